@@ -1,0 +1,30 @@
+"""What a stack of effects changes in the models: here nothing, on the reduced circuit.
+
+Each function is a *place* where an effect can act (see `ema_model.stacks.PLACES`).  `p` holds the rows of
+parameters, `i` the lane; effects read their own parameters from the rows behind the base model's.
+"""
+
+from __future__ import annotations
+
+from ema_model.numba_options import scalar
+from ema_model.physics.circuit import reduced_circuit as advance_current
+
+__all__ = ["advance_current", "moving_friction", "shaft_torque", "torque_factor"]
+
+
+@scalar
+def moving_friction(level, static, omega, motor_torque, load, p, i):
+    """Friction in motion, N·m, from its Coulomb level."""
+    return level
+
+
+@scalar
+def shaft_torque(theta, omega, current, user, p, i):
+    """Torque added at the motor's shaft, N·m."""
+    return 0.0
+
+
+@scalar
+def torque_factor(theta, omega, current, p, i):
+    """Factor of the motor's torque."""
+    return 1.0

@@ -1,0 +1,99 @@
+"""The Monitor Model's outer kernels: a whole population over several runs, or one run with its signals.
+
+All of them call the same `advance`, so a lane is bit-identical to the single run.
+"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from ema_model.numba_options import kernel, parallel_kernel
+from ema_model.physics.rows import CURRENT, LANES, OMEGA, PLAY, THETA
+
+from .monitor_step import advance
+
+
+@parallel_kernel
+def squared_errors(states, parameters, command, load, first_step, target, weight, first_sample, period, dt, result):
+    """Sum of weighted squared errors of the equivalent current against the targets, A².
+
+    states: (runs, blocks, STATE_ROWS·LANES) initial states; parameters: (blocks, rows·LANES);
+    command, load: the runs one after another, a value per step, run r from first_step[r];
+    target, weight: likewise a value per sample of `period` steps, run r from first_sample[r] to
+    first_sample[r + 1]; result: (runs, blocks, LANES), written here.
+    A sample is the mean of the current over its period.
+    """
+    runs, blocks = states.shape[0], states.shape[1]
+    for job in numba.prange(runs * blocks):
+        run = job // blocks
+        block = job % blocks
+        s = states[run, block].copy()
+        p = parameters[block]
+        total = np.zeros(LANES)
+        mean = np.empty(LANES)
+        scale = 1.0 / period
+        step = first_step[run]
+        for sample in range(first_sample[run], first_sample[run + 1]):
+            mean[:] = 0.0
+            for _ in range(period):
+                c = command[step]
+                t = load[step]
+                for i in range(LANES):
+                    advance(s, p, i, c, t, dt)
+                    mean[i] += s[CURRENT * LANES + i]
+                step += 1
+            y = target[sample]
+            w = weight[sample]
+            for i in range(LANES):
+                error = mean[i] * scale - y
+                total[i] += w * error * error
+        for i in range(LANES):
+            result[run, block, i] = total[i]
+
+
+@parallel_kernel
+def traces(states, parameters, command, load, period, dt, result):
+    """Signals of a population over one run.
+
+    result: (blocks, samples, 4, LANES), written here: current (mean over the sample's period), motor
+    speed, motor angle and output of the play (at the sample's end).
+    """
+    for block in numba.prange(states.shape[0]):
+        s = states[block].copy()
+        p = parameters[block]
+        mean = np.empty(LANES)
+        scale = 1.0 / period
+        step = 0
+        for sample in range(result.shape[1]):
+            mean[:] = 0.0
+            for _ in range(period):
+                c = command[step]
+                t = load[step]
+                for i in range(LANES):
+                    advance(s, p, i, c, t, dt)
+                    mean[i] += s[CURRENT * LANES + i]
+                step += 1
+            for i in range(LANES):
+                result[block, sample, 0, i] = mean[i] * scale
+                result[block, sample, 1, i] = s[OMEGA * LANES + i]
+                result[block, sample, 2, i] = s[THETA * LANES + i]
+                result[block, sample, 3, i] = s[PLAY * LANES + i]
+
+
+@kernel
+def single(state, parameters, command, load, period, dt, result):
+    """Signals of one run: as `traces`, with lane 0 alone; result: (samples, 4)."""
+    s = state.copy()
+    scale = 1.0 / period
+    step = 0
+    for sample in range(result.shape[0]):
+        mean = 0.0
+        for _ in range(period):
+            advance(s, parameters, 0, command[step], load[step], dt)
+            mean += s[CURRENT * LANES]
+            step += 1
+        result[sample, 0] = mean * scale
+        result[sample, 1] = s[OMEGA * LANES]
+        result[sample, 2] = s[THETA * LANES]
+        result[sample, 3] = s[PLAY * LANES]

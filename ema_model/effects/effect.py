@@ -1,0 +1,55 @@
+"""What an effect's file declares."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from ema_model.errors import InputError
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number of an effect; the unit ends its name (a ratio or an order has none)."""
+
+    name: str
+    meaning: str
+    default: float
+    low: float
+    high: float
+    integer: bool = False
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A physical effect that the base models leave out.
+
+    `places` are scalar functions named after the place where they act (`ema_model.stacks.PLACES` lists
+    the places and their arguments); each takes the effect's parameters, in order, as its last arguments.
+    """
+
+    title: str
+    equation: str
+    source: str
+    explanation: str
+    parameters: tuple[Parameter, ...]
+    severities: tuple[float, float, float]  # of the first parameter: slight, clear, strong
+    places: tuple[Callable[..., Any], ...]
+    shows: str
+    mistaken_for: str
+    name: str = ""  # of the file; the catalogue fills it in
+
+    def settings(self, given: dict[str, float]) -> dict[str, float]:
+        """All parameters, in order, those not given at their default; InputError for names and values."""
+        known = {parameter.name: parameter for parameter in self.parameters}
+        for name, value in given.items():
+            if name not in known:
+                raise InputError(f"effect {self.name} has no parameter {name!r}; it has {', '.join(known)}")
+            p = known[name]
+            if not (math.isfinite(value) and p.low <= value <= p.high):
+                raise InputError(f"effect {self.name}: {name} = {value:g} is outside {p.low:g} … {p.high:g}")
+            if p.integer and value != round(value):
+                raise InputError(f"effect {self.name}: {name} must be a whole number, not {value:g}")
+        return {name: float(given.get(name, p.default)) for name, p in known.items()}

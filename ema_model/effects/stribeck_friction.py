@@ -1,0 +1,31 @@
+"""Stribeck friction: between sticking and sliding, friction falls with speed instead of dropping at once."""
+
+from __future__ import annotations
+
+from ema_model.effects.effect import Effect, Parameter
+from ema_model.numba_options import scalar
+from ema_model.physics.elementary import decay
+
+
+@scalar
+def moving_friction(level, static, omega, motor_torque, load, speed):
+    """T_d + (T_s − T_d) e^{−(ω/ω_s)²}."""
+    ratio = omega / speed
+    return level + (static - level) * decay(ratio * ratio)
+
+
+EFFECT = Effect(
+    title="Stribeck friction",
+    equation="T_f = sgn ω [T_d + (T_s − T_d) e^{−(ω/ω_s)²}]",
+    source="Stribeck 1902; Armstrong-Hélouvry et al., Automatica 30(7), 1994",
+    explanation=(
+        "A lubricated contact at rest touches metal to metal. As it begins to slide, oil is drawn in and carries "
+        "more and more of the load, so friction falls from its static to its sliding value over a band of speeds. "
+        "The base model lets it fall at once. The difference is felt just after each reversal, while the motor is slow."
+    ),
+    parameters=(Parameter("speed_rad_s", "speed ω_s over which friction falls", 10.0, 0.1, 200.0),),
+    severities=(3.0, 10.0, 25.0),
+    places=(moving_friction,),
+    shows="in the current just after reversals and at low speed",
+    mistaken_for="backlash, dry friction",
+)

@@ -1,0 +1,122 @@
+"""The eight fault parameters k1…k8, what they mean physically, and how an answer is scored."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ema_model.actuator import Actuator
+from ema_model.errors import InputError
+
+_LEAST_TURNS = 0.02  # less, and the three-phase model diverges when two phases are shorted
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One normalised fault parameter, in [0, 1]."""
+
+    name: str
+    title: str
+    healthy: float
+
+
+FAULTS = (
+    Fault("k1", "Friction", 0.0),
+    Fault("k2", "Backlash", 0.0),
+    Fault("k3", "Short circuit A", 0.0),
+    Fault("k4", "Short circuit B", 0.0),
+    Fault("k5", "Short circuit C", 0.0),
+    Fault("k6", "Eccentricity", 0.0),
+    Fault("k7", "Eccentricity phase", 0.5),
+    Fault("k8", "Proportional gain", 0.5),
+)
+NAMES = tuple(fault.name for fault in FAULTS)
+HEALTHY: NDArray[np.float64] = np.array([fault.healthy for fault in FAULTS])
+HEALTHY.setflags(write=False)
+
+
+class PhysicalFaults(SimpleNamespace):
+    """What k means: each field has the leading shape of k."""
+
+    friction_factor: NDArray[np.float64]  # ×(1 + 2 k1)
+    backlash_factor: NDArray[np.float64]  # ×(1 + 99 k2)
+    turns: NDArray[np.float64]  # (3, …), healthy fraction of turns N_A, N_B, N_C = 1 − k
+    eccentricity: NDArray[np.float64]  # ζ = k6
+    phase_rad: NDArray[np.float64]  # φ = 2π(k7 − ½)
+    gain_factor: NDArray[np.float64]  # ×(0.5 + k8)
+
+
+def physical(k: ArrayLike) -> PhysicalFaults:
+    """The physical reading of k, (…, 8) → fields of shape (…)."""
+    k = np.asarray(k, dtype=float)
+    return PhysicalFaults(
+        friction_factor=1.0 + 2.0 * k[..., 0],
+        backlash_factor=1.0 + 99.0 * k[..., 1],
+        turns=np.maximum(1.0 - np.moveaxis(k[..., 2:5], -1, 0), _LEAST_TURNS),
+        eccentricity=k[..., 5] + 0.0,
+        phase_rad=2.0 * np.pi * (k[..., 6] - 0.5),
+        gain_factor=0.5 + k[..., 7],
+    )
+
+
+def readings(k: ArrayLike, actuator: Actuator) -> dict[str, float]:
+    """One k as the physical values that an engineer reads, units in the names."""
+    p = physical(k)
+    return {
+        "friction_factor": float(p.friction_factor),
+        "backlash_rad": float(p.backlash_factor * actuator.transmission.backlash_rad),
+        "turns_a": float(p.turns[0]),
+        "turns_b": float(p.turns[1]),
+        "turns_c": float(p.turns[2]),
+        "eccentricity": float(p.eccentricity),
+        "eccentricity_phase_rad": float(p.phase_rad),
+        "position_gain_1_s": float(p.gain_factor * actuator.controller.position_gain_1_s),
+    }
+
+
+def sentences(k: ArrayLike, actuator: Actuator) -> tuple[str, ...]:
+    """The same as eight short phrases, one for each k."""
+    r = readings(k, actuator)
+    return (
+        f"friction × {r['friction_factor']:.2f}",
+        f"backlash {r['backlash_rad'] * 1e6:.0f} µrad",
+        f"phase A: {r['turns_a']:.0%} of turns",
+        f"phase B: {r['turns_b']:.0%} of turns",
+        f"phase C: {r['turns_c']:.0%} of turns",
+        f"eccentricity ζ = {r['eccentricity']:.2f}",
+        f"thinnest gap at {np.degrees(r['eccentricity_phase_rad']):+.0f}°",
+        f"gain × {physical(k).gain_factor:.2f}",
+    )
+
+
+def vector(settings: dict[str, float]) -> NDArray[np.float64]:
+    """k from some of its components by name, the others healthy; InputError outside [0, 1] or for other names."""
+    k = HEALTHY.copy()
+    for name, value in settings.items():
+        if name not in NAMES:
+            raise InputError(f"no fault {name!r}; faults are k1 … k8")
+        if not 0.0 <= value <= 1.0:  # also NaN
+            raise InputError(f"fault {name} = {value:g} is outside 0 … 1")
+        k[NAMES.index(name)] = value
+    return k
+
+
+def error_percent(k: ArrayLike, truth: ArrayLike, *, wrap: bool = False) -> float:
+    """Err % = 100 √([Σ_{1..6} Δk² + k6,true Δk7² + Δk8²] / 6.5) (T 5.2).
+
+    With `wrap`, k7 is the angle that it is (0 and 1 are the same direction); without, as printed.
+    """
+    k, truth = np.asarray(k, dtype=float), np.asarray(truth, dtype=float)
+    d = k - truth
+    if wrap:
+        d[6] -= np.round(d[6])
+    return float(100.0 * np.sqrt((np.sum(d[:6] ** 2) + truth[5] * d[6] ** 2 + d[7] ** 2) / 6.5))
+
+
+def performance_coefficient(error_percent: ArrayLike, elapsed_s: ArrayLike) -> NDArray[np.float64]:
+    """PC % = 100 (1 − Err_i t_i / Σ_j Err_j t_j) over the algorithms compared (T 5.4); higher is better."""
+    cost = np.asarray(error_percent, dtype=float) * np.asarray(elapsed_s, dtype=float)
+    return 100.0 * (1.0 - cost / np.sum(cost))

@@ -1,0 +1,214 @@
+"""The Reference Model's kernel: three phases, one hysteresis relay per leg, floating star (T 3.2)."""
+
+from __future__ import annotations
+
+from ema_model.numba_options import kernel
+from ema_model.physics.backlash import advance_play
+from ema_model.physics.controller import advance_integral, current_reference, speed_reference
+from ema_model.physics.elementary import clamp, rotate
+from ema_model.physics.friction import advance_rotor, borello_friction
+from ema_model.physics.inverter import relay
+from ema_model.physics.phases import (
+    air_gap,
+    equivalent_current,
+    minus_120,
+    plus_120,
+    winding_coefficients,
+)
+from ema_model.physics.rows import (
+    COS_ELECTRICAL,
+    COS_ROTOR,
+    CURRENT_A,
+    CURRENT_B,
+    CURRENT_C,
+    CURRENT_LIMIT,
+    CURRENT_PER_TORQUE,
+    DERIVATIVE_GAIN,
+    DYNAMIC_FRICTION,
+    ECCENTRICITY,
+    ECCENTRICITY_COS,
+    ECCENTRICITY_SIN,
+    EMF_CONSTANT,
+    GEAR_RATIO,
+    HALF_PLAY,
+    HYSTERESIS,
+    INTEGRAL_GAIN,
+    INTEGRATOR_WINDOW,
+    INVERSE_INDUCTANCE,
+    INVERSE_INERTIA,
+    LANES,
+    OMEGA,
+    PLAY,
+    POLE_PAIRS,
+    POSITION_GAIN,
+    RESISTANCE,
+    SIN_ELECTRICAL,
+    SIN_ROTOR,
+    SPEED_GAIN,
+    SPEED_LIMIT,
+    STATIC_FRICTION,
+    STOP_HIGH,
+    STOP_LOW,
+    THETA,
+    TORQUE_CONSTANT,
+    TORQUE_LIMIT,
+    TURNS_A,
+    TURNS_B,
+    TURNS_C,
+    VISCOUS,
+    VOLTAGE,
+)
+
+from .composition import moving_friction, shaft_torque, torque_factor
+
+
+@kernel
+def run(state, p, command, load, period, substeps, dt, result):
+    """One run of the Reference Model from a state (rows of `REFERENCE_STATE_ROWS`, lane 0).
+
+    command, load: a value per `substeps` steps of dt, linear between them (one more value than there are
+    intervals); period: intervals per sample.
+    result: (samples, 11), written here: equivalent current (mean over the sample's period), motor speed,
+    motor angle, output of the play (at its end), phase currents, motor torque and leg voltages (means).
+    """
+    theta = state[THETA * LANES]
+    omega = state[OMEGA * LANES]
+    play = state[PLAY * LANES]
+    sin_r = state[SIN_ROTOR * LANES]
+    cos_r = state[COS_ROTOR * LANES]
+    sin_e = state[SIN_ELECTRICAL * LANES]
+    cos_e = state[COS_ELECTRICAL * LANES]
+    current_a = state[CURRENT_A * LANES]
+    current_b = state[CURRENT_B * LANES]
+    current_c = state[CURRENT_C * LANES]
+    leg_a, leg_b, leg_c = 1.0, 1.0, 1.0
+    integral, speed_error = 0.0, 0.0
+    first = True
+
+    tau = p[GEAR_RATIO * LANES]
+    limit = p[CURRENT_LIMIT * LANES]
+    torque_limit = p[TORQUE_LIMIT * LANES]
+    voltage = p[VOLTAGE * LANES]
+    band = p[HYSTERESIS * LANES]
+    emf = p[EMF_CONSTANT * LANES]
+    turns_a, turns_b, turns_c = p[TURNS_A * LANES], p[TURNS_B * LANES], p[TURNS_C * LANES]
+    # turns physics: R_i = N_i R, L_i = N_i² L
+    inverse_a = p[INVERSE_INDUCTANCE * LANES] / (turns_a * turns_a)
+    inverse_b = p[INVERSE_INDUCTANCE * LANES] / (turns_b * turns_b)
+    inverse_c = p[INVERSE_INDUCTANCE * LANES] / (turns_c * turns_c)
+    star = 1.0 / (inverse_a + inverse_b + inverse_c)
+    resistance_a = p[RESISTANCE * LANES] * turns_a
+    resistance_b = p[RESISTANCE * LANES] * turns_b
+    resistance_c = p[RESISTANCE * LANES] * turns_c
+    eccentricity = p[ECCENTRICITY * LANES]
+    cos_phase, sin_phase = p[ECCENTRICITY_COS * LANES], p[ECCENTRICITY_SIN * LANES]
+    static = p[STATIC_FRICTION * LANES]
+    scale = 1.0 / (period * substeps)
+    interval = 0
+
+    for sample in range(result.shape[0]):
+        mean_q, mean_a, mean_b, mean_c, mean_torque = 0.0, 0.0, 0.0, 0.0, 0.0
+        mean_va, mean_vb, mean_vc = 0.0, 0.0, 0.0
+        for _ in range(period):
+            demand = command[interval]
+            demand_step = (command[interval + 1] - demand) / substeps
+            user_load = load[interval]
+            load_step = (load[interval + 1] - user_load) / substeps
+            interval += 1
+            for _ in range(substeps):
+                user = tau * play
+                position_error = demand - user
+                omega_ref = speed_reference(demand, user, p[POSITION_GAIN * LANES], p[SPEED_LIMIT * LANES])
+                previous = speed_error
+                speed_error = omega_ref - omega
+                slope = 0.0 if first else (speed_error - previous) / dt
+                first = False
+                torque_ref = (
+                    p[SPEED_GAIN * LANES] * speed_error
+                    + p[INTEGRAL_GAIN * LANES] * integral
+                    + p[DERIVATIVE_GAIN * LANES] * slope
+                )
+                current_ref = current_reference(torque_ref, p[CURRENT_PER_TORQUE * LANES], limit)
+                integral = advance_integral(
+                    integral,
+                    speed_error,
+                    position_error,
+                    omega,
+                    abs(current_ref) >= limit,
+                    p[INTEGRATOR_WINDOW * LANES],
+                    dt,
+                )
+
+                amplitude = -(2.0 / 3.0) * current_ref
+                sin_b = minus_120(sin_e, cos_e)[0]
+                sin_c = plus_120(sin_e, cos_e)[0]
+                leg_a = relay(leg_a, amplitude * sin_e - current_a, band)
+                leg_b = relay(leg_b, amplitude * sin_b - current_b, band)
+                leg_c = relay(leg_c, amplitude * sin_c - current_c, band)
+
+                gap_a, gap_b, gap_c = air_gap(sin_r, cos_r, eccentricity, cos_phase, sin_phase)
+                k_a, k_b, k_c = winding_coefficients(
+                    sin_e, cos_e, gap_a, gap_b, gap_c, turns_a, turns_b, turns_c
+                )
+                drive_a = leg_a * voltage - resistance_a * current_a - emf * k_a * omega
+                drive_b = leg_b * voltage - resistance_b * current_b - emf * k_b * omega
+                drive_c = leg_c * voltage - resistance_c * current_c - emf * k_c * omega
+                neutral = star * (drive_a * inverse_a + drive_b * inverse_b + drive_c * inverse_c)
+                current_a += dt * inverse_a * (drive_a - neutral)
+                current_b += dt * inverse_b * (drive_b - neutral)
+                current_c += dt * inverse_c * (drive_c - neutral)
+
+                q = equivalent_current(current_a, current_b, current_c, sin_e, cos_e)
+                motor_torque = clamp(
+                    p[TORQUE_CONSTANT * LANES]
+                    * (k_a * current_a + k_b * current_b + k_c * current_c)
+                    * torque_factor(theta, omega, q, p, 0),
+                    -torque_limit,
+                    torque_limit,
+                )
+                active = (
+                    motor_torque
+                    - tau * user_load
+                    - p[VISCOUS * LANES] * omega
+                    + shaft_torque(theta, omega, q, user, p, 0)
+                )
+                dynamic = moving_friction(
+                    p[DYNAMIC_FRICTION * LANES], static, omega, motor_torque, user_load, p, 0
+                )
+                net = active - borello_friction(omega, active, static, dynamic)
+                theta1, omega = advance_rotor(
+                    theta,
+                    omega,
+                    net,
+                    p[INVERSE_INERTIA * LANES],
+                    p[STOP_LOW * LANES],
+                    p[STOP_HIGH * LANES],
+                    dt,
+                )
+                turned = theta1 - theta
+                theta = theta1
+                sin_r, cos_r = rotate(sin_r, cos_r, turned)
+                sin_e, cos_e = rotate(sin_e, cos_e, p[POLE_PAIRS * LANES] * turned)
+                play = advance_play(play, theta, p[HALF_PLAY * LANES])
+
+                mean_q += q
+                mean_a += current_a
+                mean_b += current_b
+                mean_c += current_c
+                mean_torque += motor_torque
+                mean_va += leg_a
+                mean_vb += leg_b
+                mean_vc += leg_c
+                demand += demand_step
+                user_load += load_step
+        result[sample, 0] = mean_q * scale
+        result[sample, 1] = omega
+        result[sample, 2] = theta
+        result[sample, 3] = play
+        result[sample, 4] = mean_a * scale
+        result[sample, 5] = mean_b * scale
+        result[sample, 6] = mean_c * scale
+        result[sample, 7] = mean_torque * scale
+        result[sample, 8] = mean_va * voltage * scale
+        result[sample, 9] = mean_vb * voltage * scale
+        result[sample, 10] = mean_vc * voltage * scale

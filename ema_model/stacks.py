@@ -1,0 +1,206 @@
+"""The models' kernels for a stack of effects: composed, compiled and cached.
+
+numba finds a compiled kernel again only when it stands in a file, and never notices that a function it
+inlined was edited elsewhere.  So each stack — a circuit and some effects — becomes a folder of its own:
+the files of `ema_model.kernels` copied beside a generated `composition.py` that inlines the stack.  The
+folder lies under a hash of every source file of this package and of the versions that compile it: an
+edited effect is another folder, and an old kernel is never served.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import importlib
+import importlib.metadata
+import importlib.util
+import os
+import platform
+import shutil
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from ema_model.errors import InputError
+from ema_model.physics.rows import LANES, PARAMETER_ROWS
+
+CIRCUITS = ("thesis", "reduced")
+_PACKAGE = Path(__file__).parent
+_KEPT_VERSIONS = 6  # folders of other hashes (older sources or versions) that are left in the cache
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where effects can act: its arguments, and how several effects there combine."""
+
+    arguments: tuple[str, ...]
+    start: str  # the value without effects
+    combine: str  # how an effect's value changes `value`
+
+    def source(self, name: str, calls: Sequence[str]) -> str:
+        """The place's function, inlining the calls."""
+        lines = [f"def {name}({', '.join(self.arguments)}, p, i):", f"    value = {self.start}"]
+        lines += [f"    value = {self.combine.format(call)}" for call in calls]
+        return "\n".join(["@scalar", *lines, "    return value", ""])
+
+
+PLACES = {
+    "moving_friction": Place(("level", "static", "omega", "motor_torque", "load"), "level", "{}"),
+    "shaft_torque": Place(("theta", "omega", "current", "user"), "0.0", "value + {}"),
+    "torque_factor": Place(("theta", "omega", "current"), "1.0", "value * {}"),
+}
+
+
+@dataclass(frozen=True)
+class Stack:
+    """A circuit and effects, with the kernels compiled for them (on their first call)."""
+
+    circuit: str
+    effects: tuple[str, ...]
+    parameter_rows: tuple[str, ...]  # of the base model, then "effect.parameter"
+    monitor: Any  # module: squared_errors, traces, single
+    reference: Any  # module: run
+
+
+# Two threads in numba's `workqueue` layer at once abort the process; this lock makes that impossible.
+_one_parallel_kernel = threading.Lock()
+
+
+def exclusive(kernel: Callable[..., Any], *arguments: Any) -> Any:
+    """Calls a parallel kernel, one at a time in the whole process."""
+    with _one_parallel_kernel:
+        return kernel(*arguments)
+
+
+def find_stack(circuit: str = "reduced", effects: Iterable[str] = ()) -> Stack:
+    """The stack of a circuit and of effects by name (their order and repetition do not matter)."""
+    if circuit not in CIRCUITS:
+        raise InputError(f"no circuit {circuit!r}; circuits are {', '.join(CIRCUITS)}")
+    return _stack(circuit, tuple(sorted(set(effects))))
+
+
+@lru_cache(maxsize=None)
+def _stack(circuit: str, names: tuple[str, ...]) -> Stack:
+    from ema_model.effects import find  # effects import physics, which must stand without stacks
+
+    effects = [find(name) for name in names]
+    rows = PARAMETER_ROWS + tuple(f"{effect.name}.{p.name}" for effect in effects for p in effect.parameters)
+    folder = _write(circuit, names, _composition(circuit, effects))
+    package = _import(folder)
+    return Stack(
+        circuit,
+        names,
+        rows,
+        importlib.import_module(f"{package.__name__}.monitor"),
+        importlib.import_module(f"{package.__name__}.reference"),
+    )
+
+
+def _composition(circuit: str, effects: Sequence[Any]) -> str:
+    """Source of the stack's composition.py."""
+    imports = [
+        '"""Generated: the places where this stack\'s effects act."""',
+        "from ema_model.numba_options import scalar",
+        f"from ema_model.physics.circuit import {circuit}_circuit as advance_current",
+    ]
+    calls: dict[str, list[str]] = {name: [] for name in PLACES}
+    row = len(PARAMETER_ROWS)
+    for effect in effects:
+        parameters = [f"p[{(row + j) * LANES} + i]" for j in range(len(effect.parameters))]
+        row += len(effect.parameters)
+        for function in effect.places:
+            place = function.__name__
+            alias = f"{effect.name}_{place}"
+            imports.append(f"from {function.__module__} import {place} as {alias}")
+            arguments = list(PLACES[place].arguments)
+            if place == "moving_friction":
+                arguments[0] = "value"  # the level that the effects before have made of it
+            calls[place].append(f"{alias}({', '.join(arguments + parameters)})")
+    places = [place.source(name, calls[name]) for name, place in PLACES.items()]
+    return "\n".join([*imports, "", "", *places])
+
+
+def _write(circuit: str, names: tuple[str, ...], composition: str) -> Path:
+    """The stack's folder, written whole or not at all, as several processes may want it at once."""
+    key = hashlib.sha256("+".join((circuit, *names)).encode()).hexdigest()[:16]
+    folder = cache_folder() / f"stack_{key}"
+    if not (folder / "composition.py").is_file():
+        draft = Path(tempfile.mkdtemp(prefix=".draft", dir=cache_folder()))
+        for source in (_PACKAGE / "kernels").glob("*.py"):
+            shutil.copyfile(source, draft / source.name)
+        (draft / "composition.py").write_text(composition, encoding="utf-8")
+        draft.chmod(0o700)
+        with contextlib.suppress(OSError):  # another process was first
+            draft.rename(folder)
+        shutil.rmtree(draft, ignore_errors=True)
+    return folder
+
+
+def _import(folder: Path) -> ModuleType:
+    name = f"ema_model_{folder.name}"
+    spec = importlib.util.spec_from_file_location(
+        name, folder / "__init__.py", submodule_search_locations=[str(folder)]
+    )
+    assert spec is not None and spec.loader is not None
+    package = importlib.util.module_from_spec(spec)
+    sys.modules[name] = package
+    spec.loader.exec_module(package)
+    return package
+
+
+def _hash_of_sources() -> str:
+    digest = hashlib.sha256()
+    for path in sorted(_PACKAGE.rglob("*.py")):
+        digest.update(str(path.relative_to(_PACKAGE)).encode() + b"\0" + path.read_bytes() + b"\0")
+    for distribution in ("numba", "llvmlite", "numpy"):
+        digest.update(importlib.metadata.version(distribution).encode())
+    digest.update(f"{sys.version}{platform.machine()}".encode())
+    return digest.hexdigest()[:20]
+
+
+# Taken while the package is imported: what the kernels inline is what the files held at that time.
+_SOURCES = _hash_of_sources()
+
+
+@lru_cache(maxsize=1)
+def cache_folder() -> Path:
+    """Where this version's stacks lie: under $EMAVIZ_CACHE_DIR or the user's cache, else a temporary folder."""
+    for root in _cache_roots():
+        folder = root / "kernels" / _SOURCES
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryFile(dir=folder):
+                pass
+        except OSError:
+            continue
+        os.utime(folder)
+        _prune(folder.parent)
+        return folder
+    return Path(tempfile.mkdtemp(prefix="emaviz-kernels-"))
+
+
+def _cache_roots() -> list[Path]:
+    if given := os.environ.get("EMAVIZ_CACHE_DIR"):
+        return [Path(given)]
+    if sys.platform == "win32":
+        base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
+    elif sys.platform == "darwin":
+        base = Path.home() / "Library" / "Caches"
+    else:
+        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    return [base / "emaviz"]
+
+
+def _prune(versions: Path) -> None:
+    """Drops the folders of old sources, but none that was used in the last day."""
+    others = sorted((p for p in versions.iterdir() if p.name != _SOURCES), key=lambda p: p.stat().st_mtime)
+    for old in others[: max(0, len(others) - _KEPT_VERSIONS)]:
+        if time.time() - old.stat().st_mtime > 86_400.0:
+            shutil.rmtree(old, ignore_errors=True)

@@ -3,7 +3,7 @@
 numba finds a compiled kernel again only when it stands in a file, and never notices that a function it
 inlined was edited elsewhere.  So each stack — a circuit and some effects — becomes a folder of its own:
 the files of `ema_model.kernels` copied beside a generated `composition.py` that inlines the stack.  The
-folder lies under a hash of every source file of this package and of the versions that compile it: an
+folder lies under a hash of the sources that kernels are made of and of the versions that compile them: an
 edited effect is another folder, and an old kernel is never served.
 """
 
@@ -33,6 +33,8 @@ from ema_model.physics.rows import LANES, PARAMETER_ROWS
 
 CIRCUITS = ("thesis", "reduced")
 _PACKAGE = Path(__file__).parent
+# All that a kernel may inline; `tests/model/test_stacks.py` checks that kernels import nothing else of ours.
+_COMPILED = ("numba_options.py", "stacks.py", "physics/*.py", "kernels/*.py", "effects/*.py")
 _KEPT_VERSIONS = 6  # folders of other hashes (older sources or versions) that are left in the cache
 
 
@@ -157,7 +159,7 @@ def _import(folder: Path) -> ModuleType:
 
 def _hash_of_sources() -> str:
     digest = hashlib.sha256()
-    for path in sorted(_PACKAGE.rglob("*.py")):
+    for path in sorted(path for part in _COMPILED for path in _PACKAGE.glob(part)):
         digest.update(str(path.relative_to(_PACKAGE)).encode() + b"\0" + path.read_bytes() + b"\0")
     for distribution in ("numba", "llvmlite", "numpy"):
         digest.update(importlib.metadata.version(distribution).encode())

@@ -1,0 +1,56 @@
+"""The commands: each other file of this folder is one family, found by its `name`.
+
+To add a command, add a file with a subclass of `Command`.
+"""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import Any
+
+from ema_model.commands.command import Command
+from ema_model.commands.recorded import Recorded
+from ema_model.errors import InputError
+
+__all__ = ["COMMANDS", "Command", "Recorded", "command"]
+
+for _module in pkgutil.iter_modules(__path__):
+    importlib.import_module(f"{__name__}.{_module.name}")
+
+# The thesis's four first, then the rest; a recorded command is made from a file, not from settings.
+_ORDER = ("step", "ramp", "sine", "chirp")
+COMMANDS: dict[str, type[Command]] = {
+    cls.name: cls
+    for cls in sorted(
+        Command.__subclasses__(), key=lambda cls: (_ORDER.index(cls.name) if cls.name in _ORDER else 9, cls.name)
+    )
+    if cls is not Recorded
+}
+
+
+def command(name: str, settings: Mapping[str, Any] | None = None) -> Command:
+    """The command of that name with some settings changed; text values are read as the setting's type."""
+    if name not in COMMANDS:
+        raise InputError(f"no command {name!r}; commands are {', '.join(COMMANDS)}, or a recording's file")
+    cls = COMMANDS[name]
+    known = {f.name: f.default for f in fields(cls)}
+    read: dict[str, Any] = {}
+    for setting, value in (settings or {}).items():
+        if setting not in known:
+            raise InputError(f"{name} has no setting {setting!r}; it has {', '.join(known)}")
+        read[setting] = _number(name, setting, value, known[setting])
+    return cls(**read)
+
+
+def _number(name: str, setting: str, value: Any, like: Any) -> Any:
+    try:
+        if isinstance(like, tuple):
+            parts = value.split("+") if isinstance(value, str) else value
+            return tuple(float(part) for part in parts)
+        return float(value)
+    except (TypeError, ValueError):
+        expected = "numbers joined by + (1+3+7)" if isinstance(like, tuple) else "a number"
+        raise InputError(f"{name}: {setting} must be {expected}, not {value!r}") from None

@@ -1,0 +1,1 @@
+"""Identification of the fault coefficients k1...k8 from recorded responses."""

@@ -1,0 +1,152 @@
+"""From physical parameters, faults and effects to the rows that the kernels read."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ema_model import faults
+from ema_model.actuator import Actuator
+from ema_model.physics.phases import flux_harmonics
+from ema_model.physics.rows import LANES, REFERENCE_STATE_ROWS, STATE_ROWS
+from ema_model.stacks import Stack
+
+Array = NDArray[np.float64]
+EffectSettings = Mapping[str, Mapping[str, ArrayLike]]
+
+
+def monitor_rows(actuator: Actuator, k: ArrayLike, stack: Stack, effects: EffectSettings) -> Array:
+    """Parameters of the Monitor Model for a population: k (n, 8) → (blocks, rows·LANES).
+
+    Effects' parameters are numbers or (n,) each.  Lanes beyond n repeat the last individual.
+    """
+    k = np.atleast_2d(np.asarray(k, dtype=float))
+    fault = faults.physical(k)
+    motor, inverter = actuator.motor, actuator.inverter
+    if stack.circuit == "reduced":
+        # The exact equivalent of the RM's phases: R, L × 4/(3 s), V = (2/s)(4/π)(bus/2), s the EMF's scale.
+        scale = 2.0 / (3.0 * motor.emf_scale)  # of the phase-to-phase values, twice those of a phase
+        resistance, inductance = scale * motor.resistance_Ohm, scale * motor.inductance_H
+        voltage = 4.0 / np.pi * inverter.bus_voltage_V / motor.emf_scale
+    else:
+        resistance, inductance, voltage = motor.resistance_Ohm, motor.inductance_H, inverter.bus_voltage_V
+    values = _shared_rows(actuator, fault) | {
+        "voltage": voltage,
+        "resistance": resistance,
+        "inverse_inductance": 1.0 / inductance,
+        "emf_constant": motor.torque_constant_Nm_A,
+        "viscous": motor.viscous_friction_Nms_rad,
+    }
+    harmonics = flux_harmonics(fault.turns, fault.eccentricity, fault.phase_rad)
+    values |= {f"flux_{i}": harmonics[i] for i in range(9)}
+    return _blocks(values, stack, effects, len(k))
+
+
+def reference_rows(actuator: Actuator, k: ArrayLike, stack: Stack, effects: EffectSettings) -> Array:
+    """Parameters of the Reference Model for one k (8,) → (rows·LANES,), of which lane 0 is read."""
+    fault = faults.physical(np.asarray(k, dtype=float))
+    motor, inverter = actuator.motor, actuator.inverter
+    values = _shared_rows(actuator, fault) | {
+        "voltage": 0.5 * inverter.bus_voltage_V,
+        "hysteresis": 0.5 * inverter.hysteresis_band_A,
+        "resistance": 0.5 * motor.resistance_Ohm,
+        "inverse_inductance": 2.0 / motor.inductance_H,
+        "emf_constant": motor.emf_scale * 0.5 * motor.torque_constant_Nm_A,
+        "viscous": motor.viscous_friction_Nms_rad + actuator.transmission.viscous_friction_Nms_rad,
+        "turns_a": fault.turns[0],
+        "turns_b": fault.turns[1],
+        "turns_c": fault.turns[2],
+        "eccentricity": fault.eccentricity,
+        "eccentricity_cos": np.cos(fault.phase_rad),
+        "eccentricity_sin": np.sin(fault.phase_rad),
+    }
+    return _blocks(values, stack, effects, 1)[0]
+
+
+def initial_state(
+    actuator: Actuator, blocks: int, user_rad: ArrayLike = 0.0, speed_rad_s: ArrayLike = 0.0, play: ArrayLike = 0.0
+) -> Array:
+    """State of the Monitor Model at the start, (blocks, STATE_ROWS·LANES).
+
+    user_rad: where the motor stands, as a user's angle; speed_rad_s: the motor's; play: where the user
+    stands within the backlash, rad at the motor, 0 in the middle.
+    """
+    return _state(actuator, blocks, STATE_ROWS, 2.0 * actuator.motor.pole_pairs, user_rad, speed_rad_s, play)
+
+
+def initial_reference_state(actuator: Actuator, user_rad: float = 0.0, speed_rad_s: float = 0.0, play: float = 0.0) -> Array:
+    """The same for the Reference Model, (REFERENCE_STATE_ROWS·LANES,)."""
+    return _state(actuator, 1, REFERENCE_STATE_ROWS, actuator.motor.pole_pairs, user_rad, speed_rad_s, play)[0]
+
+
+def _state(
+    actuator: Actuator,
+    blocks: int,
+    rows: tuple[str, ...],
+    electrical: float,
+    user_rad: ArrayLike,
+    speed_rad_s: ArrayLike,
+    play: ArrayLike,
+) -> Array:
+    theta = np.asarray(user_rad, dtype=float) / actuator.transmission.gear_ratio
+    rotor = theta + actuator.motor.rotor_offset_rad
+    values = {
+        "theta": theta,
+        "omega": np.asarray(speed_rad_s, dtype=float),
+        "play": theta + np.asarray(play, dtype=float),
+        "sin_rotor": np.sin(rotor),
+        "cos_rotor": np.cos(rotor),
+        "sin_electrical": np.sin(electrical * rotor),
+        "cos_electrical": np.cos(electrical * rotor),
+    }
+    state = np.zeros((blocks, len(rows), LANES))
+    for name, value in values.items():
+        state[:, rows.index(name), :] = _lanes(value, blocks)
+    return state.reshape(blocks, -1)
+
+
+def _shared_rows(actuator: Actuator, fault: faults.PhysicalFaults) -> dict[str, ArrayLike]:
+    controller, motor, transmission = actuator.controller, actuator.motor, actuator.transmission
+    tau = transmission.gear_ratio
+    return {
+        "position_gain": controller.position_gain_1_s * fault.gain_factor,
+        "speed_limit": controller.speed_limit_rad_s,
+        "speed_gain": controller.speed_gain_Nms_rad,
+        "integral_gain": controller.integral_gain_Nm_rad,
+        "derivative_gain": controller.derivative_gain_Nms2_rad,
+        "integrator_window": controller.integrator_window_rad,
+        "current_per_torque": 1.0 / controller.torque_constant_Nm_A,
+        "current_limit": controller.current_limit_A,
+        "torque_constant": motor.torque_constant_Nm_A,
+        "torque_limit": motor.torque_limit_Nm,
+        "pole_pairs": motor.pole_pairs,
+        "inverse_inertia": 1.0 / motor.inertia_kgm2,
+        "static_friction": motor.static_friction_Nm * fault.friction_factor,
+        "dynamic_friction": motor.dynamic_friction_Nm * fault.friction_factor,
+        "half_play": 0.5 * transmission.backlash_rad * fault.backlash_factor / tau,
+        "gear_ratio": tau,
+        "stop_low": transmission.stop_low_rad / tau,
+        "stop_high": transmission.stop_high_rad / tau,
+    }
+
+
+def _blocks(values: Mapping[str, ArrayLike], stack: Stack, effects: EffectSettings, individuals: int) -> Array:
+    blocks = -(-individuals // LANES)
+    rows = np.zeros((blocks, len(stack.parameter_rows), LANES))
+    given = dict(values)
+    for effect, parameters in effects.items():
+        given |= {f"{effect}.{name}": value for name, value in parameters.items()}
+    index = {name: row for row, name in enumerate(stack.parameter_rows)}
+    for name, value in given.items():
+        rows[:, index[name], :] = _lanes(value, blocks)
+    return rows.reshape(blocks, -1)
+
+
+def _lanes(value: ArrayLike, blocks: int) -> Array:
+    """One number, or one for each individual, as (blocks, LANES)."""
+    value = np.asarray(value, dtype=float)
+    if value.ndim == 0 or value.size == 1:
+        return np.broadcast_to(value.reshape(-1)[0], (blocks, LANES))
+    return np.concatenate([value, np.full(blocks * LANES - len(value), value[-1])]).reshape(blocks, LANES)

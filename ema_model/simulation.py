@@ -65,10 +65,17 @@ def steps_per_sample(period_s: float) -> int:
 
 
 def simulate_reference(
-    run: Run, actuator: Actuator, k: ArrayLike = HEALTHY, effects: Effects | None = None, *, voltages: bool = False
+    run: Run,
+    actuator: Actuator,
+    k: ArrayLike = HEALTHY,
+    effects: Effects | None = None,
+    *,
+    start_rad: float | None = None,
+    voltages: bool = False,
 ) -> Measurement:
     """The three-phase Reference Model's signals; with `voltages`, also the legs' (V, against the bus's middle).
 
+    It starts at rest at start_rad, a user's angle, or where the command starts.
     Raises InputError for settings of effects that do not exist, FloatingPointError if the model diverges.
     """
     effects = {name: find(name).settings(dict(given)) for name, given in (effects or {}).items()}
@@ -78,7 +85,7 @@ def simulate_reference(
     times = np.arange(run.samples * period + 1) * dt
     demand = run.command.at(times)
     load = np.full_like(times, run.load_torque_Nm)
-    start = float(demand[0])
+    start = float(demand[0]) if start_rad is None else start_rad
     result = np.empty((run.samples, 11))
     stack.reference.run(
         initial_reference_state(actuator, start),
@@ -90,7 +97,7 @@ def simulate_reference(
         dt / REFERENCE_SUBSTEPS,
         result,
     )
-    signals = _signals(run, actuator, result)
+    signals = _signals(run, actuator, result, start)
     for column, name in enumerate(("phase_a_current_A", "phase_b_current_A", "phase_c_current_A", "motor_torque_Nm"), 4):
         signals[name] = np.concatenate([[0.0], result[:, column]])
     if voltages:
@@ -105,6 +112,8 @@ def simulate_monitor(
     k: ArrayLike = HEALTHY,
     effects: Effects | None = None,
     circuit: str = "reduced",
+    *,
+    start_rad: float | None = None,
 ) -> Measurement:
     """The Monitor Model's signals; raises as `simulate_reference`."""
     effects = {name: find(name).settings(dict(given)) for name, given in (effects or {}).items()}
@@ -112,9 +121,10 @@ def simulate_monitor(
     period = steps_per_sample(1.0 / run.sample_rate_Hz)
     dt = 1.0 / run.sample_rate_Hz / period
     demand = run.command.at(np.arange(run.samples * period + 1) * dt)
+    start = float(demand[0]) if start_rad is None else start_rad
     result = np.empty((run.samples, 4))
     stack.monitor.single(
-        initial_state(actuator, 1, float(demand[0]))[0],
+        initial_state(actuator, 1, start)[0],
         monitor_rows(actuator, k, stack, effects)[0],
         demand,
         np.full_like(demand, run.load_torque_Nm),
@@ -122,10 +132,10 @@ def simulate_monitor(
         dt,
         result,
     )
-    return Measurement(_finite(_signals(run, actuator, result), "the monitor model"), name="monitor model")
+    return Measurement(_finite(_signals(run, actuator, result, start), "the monitor model"), name="monitor model")
 
 
-def _signals(run: Run, actuator: Actuator, result: Array) -> dict[str, Array]:
+def _signals(run: Run, actuator: Actuator, result: Array, start_rad: float) -> dict[str, Array]:
     """The kernels' columns as named signals; sample 0 is the start, at rest."""
     time = run.time_s
     demand = run.command.at(time)
@@ -134,7 +144,7 @@ def _signals(run: Run, actuator: Actuator, result: Array) -> dict[str, Array]:
     def column(index: int, start: float) -> Array:
         return np.concatenate([[start], result[:, index]])
 
-    theta = float(demand[0]) / tau
+    theta = start_rad / tau
     signals = {
         "time_s": time,
         "command_rad": demand,

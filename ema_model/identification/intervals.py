@@ -4,7 +4,8 @@ Everything is linearised at the answer.  The covariance has three parts:
 - the residual's, by the sandwich (J'J)⁻¹ J'ΩJ (J'J)⁻¹ with Ω from the residual itself, correlated over up to
   25 ms (Newey & West, Econometrica 55, 1987), since what a low-fidelity model misses is not white;
 - the tolerances of the actuator's own parameters, carried to k through their sensitivities;
-- the model's floor: how far the Monitor Model is from the Reference Model when both are healthy.
+- the model's floor: what the Monitor Model would misread a Reference Model of this very k for, run under
+  the recordings' own commands.
 """
 
 from __future__ import annotations
@@ -17,7 +18,9 @@ from scipy.stats import chi2
 
 from ema_model import faults
 from ema_model.actuator import Actuator
+from ema_model.commands import Recorded
 from ema_model.identification.objective import Objective
+from ema_model.simulation import Run, simulate_reference
 
 Array = NDArray[np.float64]
 
@@ -52,7 +55,8 @@ def uncertainty(objective: Objective, k: Array, *, parameters_known: bool = Fals
     if not parameters_known:
         shift = inverse @ jacobian.T @ _tolerance_shifts(objective, k)
         covariance += shift @ shift.T
-    covariance += 1e-12 * np.eye(8)
+    misread = inverse @ jacobian.T @ _model_floor(objective, k)
+    covariance += np.diag(misread**2) + 1e-12 * np.eye(8)
     sigma = np.sqrt(np.diag(covariance))
     interval = np.clip(np.stack([k - _Z90 * sigma, k + _Z90 * sigma], axis=1), 0.0, 1.0)
 
@@ -111,6 +115,23 @@ def _tolerance_shifts(objective: Objective, k: Array) -> Array:
         varied = replace(varied, **{section: replace(getattr(varied, section), **{name: values})})
     current = objective.currents(np.repeat(k[None, :], n, axis=0), varied)
     return (current[:-1] - current[-1]).T
+
+
+def _model_floor(objective: Objective, k: Array) -> Array:
+    """Current of the Reference Model less that of the Monitor Model, both at k, A, (blocks,)."""
+    reference = []
+    for window in objective.windows:
+        count = len(window.command)
+        times = np.arange(count) * window.step_s
+        run = Run(
+            Recorded(times, window.command),
+            duration_s=count * window.step_s,
+            sample_rate_Hz=1.0 / window.block_s,
+            load_torque_Nm=float(window.load.mean()),
+        )
+        twin = simulate_reference(run, objective.actuator, k, objective.effects, start_rad=window.user_rad)
+        reference.append(twin["current_A"][1:])
+    return np.concatenate(reference) - objective.currents(k)[0]
 
 
 def _groups(white: Array, sigma: Array, eccentric: bool) -> tuple[tuple[str, ...], ...]:

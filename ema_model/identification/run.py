@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ema_model import faults
+from ema_model.errors import InputError
 from ema_model.identification.intervals import Uncertainty, uncertainty
 from ema_model.identification.objective import Objective
 from ema_model.identification.optimisers import create
@@ -55,7 +57,7 @@ class Identification:
         return None if self.truth is None else faults.error_percent(self.k, self.truth)
 
 
-def identify(
+def steps(
     objective: Objective,
     algorithm: str = "hba",
     *,
@@ -64,45 +66,49 @@ def identify(
     seed: int = 0,
     truth: ArrayLike | None = None,
     parameters_known: bool = False,
-    on_iteration: Callable[[Progress], None] | None = None,
-    cancelled: Callable[[], bool] = lambda: False,
-) -> Identification:
-    """Fits k1…k8 to the objective's recordings.
+    **settings: float,
+) -> Generator[Progress, bool | None, Identification]:
+    """Fits k1…k8 to the objective's recordings, an iteration (about 5 ms) at a time.
 
-    on_iteration is told every iteration, on the caller's thread; cancelled is asked before each batch of
-    evaluations (about 5 ms).  parameters_known: the actuator's own parameters are exact, as in a simulation
-    of the same file, so that their tolerances do not widen the intervals.
+    Yields where it stands after each iteration; a true value sent back stops it there.  Returns the answer.
+    parameters_known: the actuator's own parameters are exact, as in a simulation of the same file, so that
+    their tolerances do not widen the intervals.  settings: the algorithm's own.
     Raises InputError for an unknown algorithm or impossible settings.
     """
-    optimiser = create(algorithm, dimension=8, population=population, iterations=iterations, seed=seed)
+    try:
+        optimiser = create(
+            algorithm, dimension=8, population=population, iterations=iterations, seed=seed, **settings
+        )
+    except (ValueError, TypeError) as error:
+        raise InputError(str(error)) from None
     compile_s = warm_up(objective)
-    started = time.perf_counter()
+    elapsed = 0.0
     rmse_history: list[float] = []
     k_history: list[Array] = []
     stopped = False
-    while not optimiser.done:
-        if cancelled() and rmse_history:
-            stopped = True
-            break
-        optimiser.tell(objective(optimiser.ask()))
-        if optimiser.iteration + 1 > len(rmse_history):
-            rmse_history.append(float(optimiser.best_f))
-            k_history.append(optimiser.best_x.copy())
-            if on_iteration is not None:
-                on_iteration(
-                    Progress(
-                        algorithm,
-                        optimiser.iteration,
-                        iterations,
-                        float(optimiser.best_f),
-                        optimiser.best_x.copy(),
-                        optimiser.population_x.copy(),
-                        optimiser.population_f.copy(),
-                        optimiser.evaluations,
-                        time.perf_counter() - started,
-                    )
+    while not (optimiser.done or stopped):
+        started = time.perf_counter()
+        iteration = optimiser.iteration if rmse_history else -1
+        while optimiser.iteration == iteration or not optimiser.evaluations:
+            optimiser.tell(objective(optimiser.ask()))
+        elapsed += time.perf_counter() - started
+        rmse_history.append(float(optimiser.best_f))
+        k_history.append(optimiser.best_x.copy())
+        stopped = bool(
+            (
+                yield Progress(
+                    algorithm,
+                    optimiser.iteration,
+                    iterations,
+                    float(optimiser.best_f),
+                    optimiser.best_x.copy(),
+                    optimiser.population_x.copy(),
+                    optimiser.population_f.copy(),
+                    optimiser.evaluations,
+                    elapsed,
                 )
-    elapsed = time.perf_counter() - started
+            )
+        )
     k = optimiser.best_x.copy()
     return Identification(
         algorithm=algorithm,
@@ -114,10 +120,30 @@ def identify(
         compile_s=compile_s,
         rmse_history=np.array(rmse_history),
         k_history=np.array(k_history),
-        stopped=stopped,
+        stopped=stopped and not optimiser.done,
         uncertainty=uncertainty(objective, k, parameters_known=parameters_known),
         truth=None if truth is None else np.asarray(truth, dtype=float),
     )
+
+
+def identify(
+    objective: Objective,
+    algorithm: str = "hba",
+    *,
+    on_iteration: Callable[[Progress], bool | None] | None = None,
+    **options: Any,
+) -> Identification:
+    """Runs `steps` to the end; on_iteration is told each iteration, and stops it by returning True."""
+    running = steps(objective, algorithm, **options)
+    answer: bool | None = None
+    try:
+        progress = next(running)
+        while True:
+            if on_iteration is not None:
+                answer = on_iteration(progress)
+            progress = running.send(answer)
+    except StopIteration as finished:
+        return finished.value
 
 
 def warm_up(objective: Objective) -> float:

@@ -42,7 +42,7 @@ class Dandelion(Optimiser):
         iterations: int = 150,
         seed: int = 0,
         *,
-        levy_scale: float = 0.01,
+        levy_scale: float = 1.0,
     ):
         super().__init__(dimension, population, iterations, seed)
         self.levy_scale = check_range("levy_scale", levy_scale, 0.0)

@@ -1,0 +1,88 @@
+"""The one compute thread.
+
+Every kernel runs here.  Callbacks of the page only post: a quick job (a slider's simulation) replaces
+one of its kind that has not begun — the latest value wins —, and goes before the next step of the long
+job (an identification), of which there is one at most and which can be stopped between two steps.
+"""
+
+from __future__ import annotations
+
+import threading
+import traceback
+from collections.abc import Callable, Iterator
+
+Job = Callable[[], None]
+
+
+class Worker:
+    """Runs quick jobs by kind, latest wins, and one long job in steps, all on one thread."""
+
+    def __init__(self, on_error: Callable[[BaseException], None]) -> None:
+        self._on_error = on_error
+        self._wake = threading.Condition()
+        self._quick: dict[str, Job] = {}
+        self._long: Iterator[None] | None = None
+        self._closing = False
+        self._thread = threading.Thread(target=self._run, name="emaviz-compute", daemon=True)
+        self._thread.start()
+
+    def post(self, kind: str, job: Job) -> None:
+        """Runs a job soon; a job of the same kind that still waits is dropped."""
+        with self._wake:
+            self._quick[kind] = job
+            self._wake.notify()
+
+    def start(self, steps: Iterator[None]) -> bool:
+        """Begins a long job, a step at a time; False, and nothing is begun, while another one runs."""
+        with self._wake:
+            if self._long is not None:
+                return False
+            self._long = steps
+            self._wake.notify()
+            return True
+
+    @property
+    def busy(self) -> bool:
+        """Whether a long job runs."""
+        return self._long is not None
+
+    def close(self) -> None:
+        """Ends the thread after its current step."""
+        with self._wake:
+            self._closing = True
+            self._wake.notify()
+        if threading.current_thread() is not self._thread:
+            self._thread.join(timeout=5.0)
+
+    def _run(self) -> None:
+        while True:
+            with self._wake:
+                self._wake.wait_for(lambda: self._closing or self._quick or self._long is not None)
+                if self._closing:
+                    break
+                job = self._quick.pop(next(iter(self._quick))) if self._quick else None
+            if job is not None:
+                self._guarded(job)
+            elif self._long is not None and not self._guarded(self._step):
+                self._long = None
+        if self._long is not None and hasattr(self._long, "close"):
+            self._guarded(self._long.close)
+
+    def _step(self) -> None:
+        assert self._long is not None
+        try:
+            next(self._long)
+        except StopIteration:
+            self._long = None
+
+    def _guarded(self, job: Job) -> bool:
+        """Whether the job ended without an error; an error is told, and the thread goes on."""
+        try:
+            job()
+        except Exception as error:
+            try:
+                self._on_error(error)
+            except Exception:
+                traceback.print_exc()
+            return False
+        return True

@@ -1,0 +1,64 @@
+"""`emaviz effects`: the library of physical effects."""
+
+from __future__ import annotations
+
+import argparse
+import textwrap
+from dataclasses import asdict
+from typing import Any
+
+from ema_model.effects import CATALOGUE, Effect, find
+from emaviz.cli.output import configuration, write_json
+
+HELP = "list the physical effects that can be added to the models, or explain one"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """NAME and --json."""
+    parser.add_argument("name", nargs="?", metavar="NAME", help="one effect; all without it")
+    parser.add_argument("--json", metavar="FILE", help="write the result there")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Prints the list or the explanation."""
+    chosen = [find(arguments.name)] if arguments.name else list(CATALOGUE.values())
+    if arguments.name:
+        print(explain(chosen[0]))
+    else:
+        width = max(len(effect.name) for effect in chosen)
+        for effect in chosen:
+            print(f"{effect.name:{width}}  {effect.equation}")
+    write_json(arguments.json, {"effects": [_facts(effect) for effect in chosen]}, 0, configuration(arguments))
+    return 0
+
+
+def explain(effect: Effect) -> str:
+    """Everything about an effect, for a terminal."""
+    lines = [effect.title, f"  {effect.equation}", "", textwrap.fill(effect.explanation, 92), "", "Parameters"]
+    width = max(len(p.name) for p in effect.parameters)
+    lines += [
+        f"  {p.name:{width}}  {p.meaning}; {p.low:g} … {p.high:g}, default {p.default:g}" for p in effect.parameters
+    ]
+    severities = ", ".join(f"{value:g}" for value in effect.severities)
+    lines += [
+        "",
+        f"Shows         {effect.shows}",
+        f"Mistaken for  {effect.mistaken_for}",
+        f"Severities    {effect.parameters[0].name} = {severities}",
+        f"Source        {effect.source}",
+    ]
+    return "\n".join(lines)
+
+
+def _facts(effect: Effect) -> dict[str, Any]:
+    return {
+        "name": effect.name,
+        "title": effect.title,
+        "equation": effect.equation,
+        "source": effect.source,
+        "explanation": effect.explanation,
+        "parameters": [asdict(p) for p in effect.parameters],
+        "severities": effect.severities,
+        "shows": effect.shows,
+        "mistaken_for": effect.mistaken_for,
+    }

@@ -1,0 +1,25 @@
+"""`emaviz`, `emaviz gui`: the app in the browser."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+HELP = "the app in the browser (also without a command)"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """FILE…, --host, --port, --open, --data-dir, --actuator."""
+    parser.add_argument("files", nargs="*", metavar="FILE", help="recordings to open")
+    parser.add_argument("--host", default="127.0.0.1", help="address to listen on; the default is this machine only")
+    parser.add_argument("--port", type=int, default=8080)
+    parser.add_argument("--open", action=argparse.BooleanOptionalAction, default=True, help="open the browser")
+    parser.add_argument("--data-dir", type=Path, default=Path("emaviz-data"), metavar="DIR", help="recordings, uploads")
+    parser.add_argument("--actuator", metavar="A.toml", help="parameters of the actuator; without it, the thesis's")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Serves the app until interrupted."""
+    from emaviz.app import serve
+
+    return serve(arguments)

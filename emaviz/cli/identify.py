@@ -1,0 +1,154 @@
+"""`emaviz identify`: k1…k8 of recordings, or of a simulated actuator with known faults."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+import numpy as np
+
+from ema_model import faults
+from ema_model.actuator import Actuator
+from ema_model.errors import InputError
+from ema_model.identification.objective import FITNESSES, Objective, simulated
+from ema_model.identification.optimisers import OPTIMISERS
+from ema_model.identification.run import Identification, Progress, identify
+from ema_model.measurement import Measurement, read_measurement
+from ema_model.sensors import Sensors
+from emaviz.cli import options, output
+
+HELP = "find the faults k1 … k8 of recordings, or of a simulated actuator"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options of INTERFACES, and those of the run that is simulated when no file is given."""
+    parser.add_argument("files", nargs="*", metavar="FILE", help="recordings of one actuator, fitted together")
+    parser.add_argument("--algorithm", choices=tuple(OPTIMISERS), default="hba")
+    parser.add_argument("--population", type=int, default=50, metavar="N")
+    parser.add_argument("--iterations", type=int, default=150, metavar="N")
+    parser.add_argument("--fitness", choices=FITNESSES, default="filtered", help="0.5 ms means, or every sample")
+    parser.add_argument("--circuit", choices=("reduced", "thesis"), default="reduced", help="of the monitor model")
+    options.add_actuator(parser)
+    options.add_faults(parser)
+    options.add_run(parser)
+    parser.add_argument("--record", metavar="FILE.rrd", help="write the identification for the Rerun viewer")
+    parser.add_argument("--json", metavar="FILE", help="write the result there")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Fits, records and prints."""
+    actuator = options.actuator_of(arguments)
+    truth = options.faults_of(arguments) if arguments.fault or not arguments.files else None
+    measurements = _recordings(arguments, actuator, truth)
+    objective = Objective(measurements, actuator, circuit=arguments.circuit, fitness=arguments.fitness)
+    recorder = _Recorder(arguments, measurements, objective, truth) if arguments.record else None
+    progress = output.Progress()
+
+    def on_iteration(at: Progress) -> None:
+        progress.show(f"{at.algorithm} {at.iteration}/{at.iterations}  rmse {at.rmse:.4f} A")
+        if recorder is not None:
+            recorder.iteration(at)
+
+    try:
+        answer = identify(
+            objective,
+            arguments.algorithm,
+            population=arguments.population,
+            iterations=arguments.iterations,
+            seed=arguments.seed,
+            truth=truth,
+            parameters_known=not arguments.files,
+            on_iteration=on_iteration,
+        )
+    except BaseException:
+        if recorder is not None:
+            recorder.close()
+        raise
+    finally:
+        progress.done()
+    if recorder is not None:
+        recorder.finish(answer)
+    output.write_json(arguments.json, result(answer, actuator), arguments.seed, output.configuration(arguments))
+    print(_table(answer, actuator))
+    if recorder is not None and recorder.failed:
+        raise InputError(recorder.failed)
+    return 0
+
+
+def result(answer: Identification, actuator: Actuator) -> dict[str, Any]:
+    """The JSON form of an answer (INTERFACES)."""
+    sure = answer.uncertainty
+    document = {
+        "k": answer.k,
+        "k_interval90": sure.interval90,
+        "healthy": bool(sure.healthy),
+        "alarms": sure.alarms,
+        "ambiguous": sure.ambiguous,
+        "physical": faults.readings(answer.k, actuator),
+        "rmse": answer.rmse,
+        "evaluations": answer.evaluations,
+        "elapsed_s": answer.elapsed_s,
+        "compile_s": answer.compile_s,
+        "algorithm": answer.algorithm,
+        "history": {"rmse": answer.rmse_history, "k": answer.k_history},
+    }
+    if answer.truth is not None:
+        document |= {"truth": answer.truth, "error_percent": answer.error_percent}
+    return document
+
+
+def _recordings(arguments: argparse.Namespace, actuator: Actuator, truth: np.ndarray | None) -> list[Measurement]:
+    if arguments.files:
+        return [read_measurement(file) for file in arguments.files]
+    assert truth is not None
+    sensors = Sensors(arguments.noise_current, arguments.encoder_bits)
+    try:
+        clean = simulated(options.run_of(arguments), actuator, truth, arguments.fitness)
+    except FloatingPointError as error:
+        raise InputError(str(error)) from None
+    return [sensors.record(clean, arguments.seed)]
+
+
+def _table(answer: Identification, actuator: Actuator) -> str:
+    sure = answer.uncertainty
+    lines = [f"{'':4}{'value':>8}  {'90 % interval':17}" + ("   truth" if answer.truth is not None else "") + "   meaning"]
+    for i, (name, phrase) in enumerate(zip(faults.NAMES, faults.sentences(answer.k, actuator))):
+        low, high = sure.interval90[i]
+        truth = "" if answer.truth is None else f"  {answer.truth[i]:6.3f}"
+        alarm = "  ← not healthy" if name in sure.alarms else ""
+        lines.append(f"{name:4}{answer.k[i]:8.4f}  {low:7.4f} … {high:.4f}  {truth}   {phrase}{alarm}")
+    lines.append("")
+    lines.append("healthy" if sure.healthy else f"not healthy: {', '.join(sure.alarms) or 'no single k stands out'}")
+    if sure.ambiguous:
+        lines.append("cannot be told apart here: " + "; ".join(" / ".join(group) for group in sure.ambiguous))
+    error = "" if answer.truth is None else f", Err {answer.error_percent:.2f} %"
+    lines.append(
+        f"rmse {answer.rmse:.4f} A{error}; {answer.evaluations} simulations in {answer.elapsed_s:.2f} s "
+        f"({answer.algorithm}), compiled in {answer.compile_s:.1f} s"
+    )
+    return "\n".join(lines)
+
+
+class _Recorder:
+    """Writes the identification as it goes; rerun, which takes a second to import, only when asked for."""
+
+    def __init__(
+        self,
+        arguments: argparse.Namespace,
+        measurements: list[Measurement],
+        objective: Objective,
+        truth: np.ndarray | None,
+    ) -> None:
+        from emaviz.recording.story import IdentificationStory
+
+        source = "measurement" if arguments.files else "reference"
+        self._story = IdentificationStory(
+            arguments.record, objective, measurements[0], source, truth, output.configuration(arguments)
+        )
+        self.iteration = self._story.iteration
+        self.finish = self._story.finish
+        self.close = self._story.close
+
+    @property
+    def failed(self) -> str | None:
+        return self._story.failed

@@ -1,0 +1,103 @@
+"""Options that several commands share, and how their text is read."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from ema_model import faults
+from ema_model.actuator import Actuator, load_actuator
+from ema_model.commands import COMMANDS, Command, Recorded, command
+from ema_model.effects import find
+from ema_model.errors import InputError
+from ema_model.measurement import read_measurement
+from ema_model.simulation import Run
+
+
+def add_actuator(parser: argparse.ArgumentParser) -> None:
+    """--actuator"""
+    parser.add_argument("--actuator", metavar="A.toml", help="parameters of the actuator; without it, the thesis's")
+
+
+def add_faults(parser: argparse.ArgumentParser) -> None:
+    """--fault, repeated"""
+    parser.add_argument(
+        "--fault", action="append", default=[], metavar="k1=0.25", help="a fault k1 … k8 in 0 … 1; repeat for more"
+    )
+
+
+def add_run(parser: argparse.ArgumentParser) -> None:
+    """What is asked of the actuator: --command, --set, --duration, --load-torque, sensors' accuracy"""
+    parser.add_argument(
+        "--command", default="chirp", metavar="NAME|FILE", help=f"{', '.join(COMMANDS)}, or a recording's command"
+    )
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="NAME=value",
+        dest="settings",
+        help="a setting of the command, e.g. amplitude_rad=0.01; repeat for more",
+    )
+    parser.add_argument("--duration", type=float, metavar="s", help="0.5 s, or the whole of a recorded command")
+    parser.add_argument(
+        "--load-torque", type=float, default=0.0, metavar="N_m", help="on the user shaft, against positive motion"
+    )
+    parser.add_argument("--noise-current", type=float, default=0.0, metavar="A", help="rms noise of the current sensors")
+    parser.add_argument("--encoder-bits", type=int, default=0, metavar="N", help="per motor turn; 0 is a perfect one")
+    parser.add_argument("--seed", type=int, default=0, help="of all random numbers")
+
+
+def actuator_of(arguments: argparse.Namespace) -> Actuator:
+    """The actuator that --actuator names."""
+    return load_actuator(arguments.actuator)
+
+
+def faults_of(arguments: argparse.Namespace) -> Any:
+    """k (8,) from --fault."""
+    return faults.vector(dict(_pair(text, "--fault") for text in arguments.fault))
+
+
+def effects_of(arguments: argparse.Namespace) -> dict[str, dict[str, float]]:
+    """Effects from --effect NAME:param=value,…"""
+    effects: dict[str, dict[str, float]] = {}
+    for text in arguments.effect:
+        name, _, rest = text.partition(":")
+        given = dict(_pair(part, f"--effect {name}") for part in rest.split(",") if part)
+        effects[name] = find(name).settings(given)
+    return effects
+
+
+def run_of(arguments: argparse.Namespace, sample_rate_Hz: float = 10_000.0) -> Run:
+    """The run that the options ask for."""
+    demand, length = _command(arguments)
+    duration = arguments.duration if arguments.duration is not None else length
+    return Run(demand, duration, sample_rate_Hz, arguments.load_torque)
+
+
+def _command(arguments: argparse.Namespace) -> tuple[Command, float]:
+    name = arguments.command
+    if name in COMMANDS or not Path(name).suffix:
+        settings = {}
+        for text in arguments.settings:
+            key, separator, value = text.partition("=")
+            if not separator:
+                raise InputError(f"--set {text}: write it as NAME=value")
+            settings[key] = value
+        return command(name, settings), 0.5
+    if arguments.settings:
+        raise InputError("--set changes a built-in command, not a recorded one")
+    recording = read_measurement(name)
+    recording.require("command_rad")
+    return Recorded(recording.time_s, recording["command_rad"], str(name)), recording.duration_s
+
+
+def _pair(text: str, option: str) -> tuple[str, float]:
+    name, separator, value = text.partition("=")
+    try:
+        if not separator:
+            raise ValueError
+        return name.strip(), float(value)
+    except ValueError:
+        raise InputError(f"{option} {text}: write it as name=number") from None

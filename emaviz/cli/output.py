@@ -1,0 +1,82 @@
+"""What every command says: JSON with its provenance, and progress on a terminal."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import numba
+import numpy as np
+
+from ema_model.errors import InputError
+from emaviz import __version__
+
+
+def write_json(path: str | None, result: dict[str, Any], seed: int, configuration: dict[str, Any]) -> None:
+    """Writes a result with its schema, versions, seed and configuration, whole or not at all."""
+    if path is None:
+        return
+    document = {
+        "schema": 1,
+        "versions": {"emaviz": __version__, "numpy": np.__version__, "numba": numba.__version__},
+        "seed": seed,
+        "configuration": configuration,
+        **result,
+    }
+    target = Path(path)
+    check_target(target, "--json")
+    handle, draft = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}-")
+    with os.fdopen(handle, "w", encoding="utf-8") as file:
+        json.dump(document, file, indent=1, default=_plain, ensure_ascii=False, allow_nan=False)
+        file.write("\n")
+    os.chmod(draft, 0o644)
+    os.replace(draft, target)
+
+
+def check_target(path: Path, option: str) -> None:
+    """InputError unless a file can be written there."""
+    if path.is_dir():
+        raise InputError(f"{option} {path}: is a folder; name a file in it")
+    if not path.parent.is_dir():
+        raise InputError(f"{option} {path}: the folder {path.parent} does not exist; make it first")
+    if not os.access(path.parent, os.W_OK):
+        raise InputError(f"{option} {path}: no permission to write in {path.parent}")
+
+
+def configuration(arguments: Any) -> dict[str, Any]:
+    """The options as they were given or defaulted."""
+    return {name: value for name, value in vars(arguments).items() if name != "run"}
+
+
+class Progress:
+    """A line on stderr that says how far a long command is; silent off a terminal and in the first second."""
+
+    def __init__(self) -> None:
+        self._started = self._shown = time.monotonic()
+        self._drawn = False
+
+    def show(self, text: str) -> None:
+        """Replaces the line, ten times a second at most."""
+        now = time.monotonic()
+        if not sys.stderr.isatty() or now - self._started < 1.0 or now - self._shown < 0.1:
+            return
+        self._shown, self._drawn = now, True
+        print(f"\r\x1b[K{text}", end="", file=sys.stderr, flush=True)
+
+    def done(self) -> None:
+        """Takes the line away."""
+        if self._drawn:
+            print("\r\x1b[K", end="", file=sys.stderr, flush=True)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, np.generic):
+        return value.item()
+    return str(value)

@@ -1,0 +1,75 @@
+"""`emaviz simulate`: one run of a model, written as a recording."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from ema_model.faults import readings
+from ema_model.measurement import Measurement, write_measurement
+from ema_model.measurement.write import check_target
+from ema_model.sensors import Sensors
+from ema_model.simulation import simulate_monitor, simulate_reference
+from emaviz.cli import options, output
+
+HELP = "simulate one run of the reference or the monitor model and write it as a recording"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options of INTERFACES: model, actuator, command, faults, effects, sensors, files."""
+    parser.add_argument("--model", choices=("rm", "mm"), default="rm", help="reference or monitor model")
+    parser.add_argument("--circuit", choices=("reduced", "thesis"), default="reduced", help="of the monitor model")
+    options.add_actuator(parser)
+    options.add_run(parser)
+    options.add_faults(parser)
+    parser.add_argument(
+        "--effect", action="append", default=[], metavar="NAME:param=value,…", help="a physical effect; repeat for more"
+    )
+    parser.add_argument("--sample-rate", type=float, default=10_000.0, metavar="Hz")
+    parser.add_argument("--out", required=True, metavar="FILE.csv|.parquet", help="the recording to write")
+    parser.add_argument("--record", metavar="FILE.rrd", help="also write it for the Rerun viewer")
+    parser.add_argument("--json", metavar="FILE", help="write a summary there")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Simulates, records with the sensors' accuracy, writes."""
+    check_target(Path(arguments.out))
+    actuator = options.actuator_of(arguments)
+    k, effects = options.faults_of(arguments), options.effects_of(arguments)
+    asked = options.run_of(arguments, arguments.sample_rate)
+    sensors = Sensors(arguments.noise_current, arguments.encoder_bits)
+    try:
+        if arguments.model == "rm":
+            signals = simulate_reference(asked, actuator, k, effects)
+        else:
+            signals = simulate_monitor(asked, actuator, k, effects, arguments.circuit)
+    except FloatingPointError as error:
+        raise options.InputError(str(error)) from None
+    signals = sensors.record(signals, arguments.seed)
+    write_measurement(signals, arguments.out)
+    if arguments.record:
+        _record(arguments, signals, k)
+    summary = {
+        "file": str(arguments.out),
+        "samples": signals.samples,
+        "k": k,
+        "physical": readings(k, actuator),
+        "effects": effects,
+        "rms": {name: float(np.sqrt(np.mean(signals[name] ** 2))) for name in signals.signals if name != "time_s"},
+    }
+    output.write_json(arguments.json, summary, arguments.seed, output.configuration(arguments))
+    print(f"{arguments.out}: {signals.samples} samples, {signals.duration_s:g} s at {arguments.sample_rate:g} Hz")
+    return 0
+
+
+def _record(arguments: argparse.Namespace, signals: Measurement, k: np.ndarray) -> None:
+    from emaviz.recording import RecordingWriter  # rerun takes a second to import
+
+    group = "reference" if arguments.model == "rm" else "monitor"
+    with RecordingWriter(arguments.record) as writer:
+        writer.signals(group, signals.time_s, {n: v for n, v in signals.signals.items() if n != "time_s"})
+        writer.truth(k)
+    if writer.failed:
+        raise options.InputError(writer.failed)

@@ -1,0 +1,22 @@
+"""`emaviz view`: a recording in the Rerun viewer, in the browser, without a network."""
+
+from __future__ import annotations
+
+import argparse
+
+HELP = "open a .rrd recording in the Rerun viewer (in the browser, no network needed)"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """FILE.rrd, --port, --open."""
+    parser.add_argument("file", metavar="FILE.rrd")
+    parser.add_argument("--port", type=int, default=0, help="0 takes a free one")
+    parser.add_argument("--open", action=argparse.BooleanOptionalAction, default=True, help="open the browser")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Serves the viewer until interrupted."""
+    from emaviz.recording.viewer import view
+
+    view(arguments.file, open_browser=arguments.open, port=arguments.port)
+    return 0

@@ -7,7 +7,9 @@ job (an identification), of which there is one at most and which can be stopped 
 
 from __future__ import annotations
 
+import math
 import threading
+import time
 import traceback
 from collections.abc import Callable, Iterator
 
@@ -15,21 +17,27 @@ Job = Callable[[], None]
 
 
 class Worker:
-    """Runs quick jobs by kind, latest wins, and one long job in steps, all on one thread."""
+    """Runs quick jobs by kind, latest wins, and one long job in steps, all on one thread.
 
-    def __init__(self, on_error: Callable[[BaseException], None]) -> None:
+    rest_s: the least time between two quick jobs of one kind; the screen's thread takes it so that the
+    browser, which has no back-pressure, is not sent more than it can draw.
+    """
+
+    def __init__(self, name: str, on_error: Callable[[BaseException], None], rest_s: float = 0.0) -> None:
         self._on_error = on_error
+        self._rest_s = rest_s
+        self._last: dict[str, float] = {}
         self._wake = threading.Condition()
         self._quick: dict[str, Job] = {}
         self._long: Iterator[None] | None = None
         self._closing = False
-        self._thread = threading.Thread(target=self._run, name="emaviz-compute", daemon=True)
+        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
         self._thread.start()
 
     def post(self, kind: str, job: Job) -> None:
         """Runs a job soon; a job of the same kind that still waits is dropped."""
         with self._wake:
-            self._quick[kind] = job
+            self._quick[kind] = job  # keeps its place in the line
             self._wake.notify()
 
     def start(self, steps: Iterator[None]) -> bool:
@@ -57,16 +65,27 @@ class Worker:
     def _run(self) -> None:
         while True:
             with self._wake:
-                self._wake.wait_for(lambda: self._closing or self._quick or self._long is not None)
+                job = self._next_job()
+                while not (self._closing or job or self._long is not None):
+                    self._wake.wait(self._rest_s if self._quick else None)
+                    job = self._next_job()
                 if self._closing:
                     break
-                job = self._quick.pop(next(iter(self._quick))) if self._quick else None
             if job is not None:
                 self._guarded(job)
             elif self._long is not None and not self._guarded(self._step):
                 self._long = None
         if self._long is not None and hasattr(self._long, "close"):
             self._guarded(self._long.close)
+
+    def _next_job(self) -> Job | None:
+        """The oldest quick job whose kind has rested, taken off the list."""
+        now = time.monotonic()
+        for kind in self._quick:
+            if now - self._last.get(kind, -math.inf) >= self._rest_s:
+                self._last[kind] = now
+                return self._quick.pop(kind)
+        return None
 
     def _step(self) -> None:
         assert self._long is not None

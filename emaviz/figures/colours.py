@@ -1,0 +1,8 @@
+"""One colour for each thing, in the charts, the bars and the recordings; legible on light and dark."""
+
+REFERENCE = "#2f6fde"
+MONITOR = "#f08c00"
+DIFFERENCE = "#e03131"
+COMMAND = "#868e96"
+TRUTH = "#2b8a3e"
+ALGORITHMS = {"ssa": "#9c36b5", "hba": "#f08c00", "do": "#1098ad"}

@@ -1,0 +1,136 @@
+"""The layout stored in a recording, so that it opens arranged: only views of what the file holds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import rerun.blueprint as rrb
+
+from emaviz.recording.style import GROUPS, ITERATION, K_NAMES, K_TITLES, SIM_TIME, algorithm_path, signal_title
+
+# What the Signals tab shows, above the rest; a view each, with every group that has the signal.
+_MAIN = ("current_A", "user_position_rad", "motor_position_rad", "motor_speed_rad_s")
+_PHASES = ("phase_a_current_A", "phase_b_current_A", "phase_c_current_A")
+
+
+@dataclass
+class Algorithm:
+    """What a recording holds of one identification."""
+
+    population: bool = False
+    monitor: bool = False
+    result: bool = False
+    iterations: bool = False
+
+
+@dataclass
+class Contents:
+    """What a recording holds: signal names per group, identifications, configuration."""
+
+    signals: dict[str, list[str]] = field(default_factory=dict)
+    algorithms: dict[str, Algorithm] = field(default_factory=dict)
+    config: bool = False
+
+    def groups_with(self, name: str) -> list[str]:
+        """The groups that have this signal, the residual (a plot of its own) apart."""
+        return [group for group in GROUPS if group != "residual" and name in self.signals.get(group, ())]
+
+    def names(self) -> list[str]:
+        """Every signal's name once, in the order in which they came."""
+        return list(dict.fromkeys(name for names in self.signals.values() for name in names))
+
+
+def build(contents: Contents) -> rrb.Blueprint:
+    """The layout: tabs Signals, More signals, Identification, Configuration, as far as there is something in them."""
+    tabs: list[rrb.Container | rrb.View] = []
+    signals = _signals_tab(contents)
+    if signals is not None:
+        tabs.append(signals)
+    more = _more_tab(contents)
+    if more is not None:
+        tabs.append(more)
+    for name, algorithm in contents.algorithms.items():
+        tabs.append(_identification_tab(name, algorithm, contents))
+    if contents.config:
+        tabs.append(rrb.TextDocumentView(origin="/config", name="Configuration"))
+    return rrb.Blueprint(
+        rrb.Tabs(*tabs, active_tab=0),
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+        rrb.TimePanel(
+            state="collapsed",
+            timeline=SIM_TIME if contents.signals else ITERATION,
+            # A sequence timeline would start to play on its own.
+            play_state="Paused",
+        ),
+        auto_views=False,
+        auto_layout=False,
+    )
+
+
+def _signals_tab(contents: Contents) -> rrb.Container | None:
+    views = [_signal_view(contents, name) for name in _MAIN if contents.groups_with(name)]
+    residual = contents.signals.get("residual", [])
+    if residual:
+        names = {signal_title(name) for name in residual}
+        title = f"Residual {names.pop().lower()}" if len(names) == 1 else "Residuals"
+        views.append(_plot(title.replace("[a]", "[A]"), ["/residual/**"]))
+    if not views:
+        return None
+    top, rest = views[0], views[1:]
+    rows = [rrb.Horizontal(*rest[i : i + 2]) for i in range(0, len(rest), 2)]
+    return rrb.Vertical(top, *rows, row_shares=[1.4] + [1.0] * len(rows), name="Signals")
+
+
+def _more_tab(contents: Contents) -> rrb.Container | None:
+    views = []
+    phases = [f"/{g}/{name}" for name in _PHASES for g in contents.groups_with(name)]
+    if phases:
+        views.append(_plot("Phase currents [A]", phases))
+    others = [name for name in contents.names() if name not in _MAIN + _PHASES and contents.groups_with(name)]
+    views += [_signal_view(contents, name) for name in others]
+    return rrb.Grid(*views, name="More signals") if views else None
+
+
+def _identification_tab(name: str, algorithm: Algorithm, contents: Contents) -> rrb.Container:
+    root = algorithm_path(name)
+    left: list[rrb.Container | rrb.View] = []
+    if algorithm.iterations:
+        left.append(_plot("Convergence: log10 of best RMSE [A]", [f"{root}/log10_rmse"], legend=False, linked=False))
+    if algorithm.monitor:
+        targets = [f"/{g}/current_A" for g in contents.groups_with("current_A") if g != "monitor"]
+        left.append(_plot("MM current through the iterations [A]", [*targets, f"{root}/monitor/**"]))
+    if algorithm.result:
+        left.append(rrb.TextDocumentView(origin=f"{root}/result", name="Result"))
+    columns: list[rrb.Container | rrb.View] = [rrb.Vertical(*left)] if left else []
+    if algorithm.iterations:
+        columns.append(rrb.Grid(*(_k_view(root, k) for k in K_NAMES), grid_columns=2))
+    shares = [2, 3] if len(columns) == 2 else None
+    return rrb.Horizontal(*columns, column_shares=shares, name=f"Identification {name}")
+
+
+def _k_view(root: str, k: str) -> rrb.TimeSeriesView:
+    contents = [f"{root}/population/{k}", f"{root}/truth/{k}", f"{root}/best/{k}"]
+    return _plot(K_TITLES[k], contents, legend=False, linked=False, range_=(-0.05, 1.05))
+
+
+def _signal_view(contents: Contents, name: str) -> rrb.TimeSeriesView:
+    return _plot(signal_title(name), [f"/{group}/{name}" for group in contents.groups_with(name)])
+
+
+def _plot(
+    title: str,
+    paths: list[str],
+    *,
+    legend: bool = True,
+    linked: bool = True,
+    range_: tuple[float, float] | None = None,
+) -> rrb.TimeSeriesView:
+    return rrb.TimeSeriesView(
+        origin="/",
+        contents=paths,
+        name=title,
+        axis_x=rrb.TimeAxis(link="LinkToGlobal" if linked else "Independent"),
+        axis_y=None if range_ is None else rrb.ScalarAxis(range=range_),
+        plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop, visible=legend),
+    )

@@ -1,0 +1,124 @@
+"""An identification told as a recording: what was measured, how the search went, what it found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ema_model import faults
+from ema_model.commands import Recorded
+from ema_model.identification.objective import Objective
+from ema_model.identification.run import Identification, Progress
+from ema_model.measurement import Measurement
+from ema_model.simulation import Run, simulate_monitor
+from emaviz.recording.writer import RecordingWriter
+
+_KEPT_MONITORS = 6  # of the search's best monitor currents, spread over the iterations
+
+
+class IdentificationStory:
+    """Writes one identification while it runs; a failure to write never reaches the search."""
+
+    def __init__(
+        self,
+        path: str | Path,
+        objective: Objective,
+        measurement: Measurement,
+        source: str,
+        truth: NDArray[np.float64] | None,
+        configuration: Mapping[str, Any],
+    ) -> None:
+        """source: "reference" for a simulated actuator, "measurement" for a recording."""
+        self.path = Path(path)
+        self._writer = RecordingWriter(path)
+        self._objective = objective
+        self._measurement = measurement
+        self._source = source
+        self._writer.config(_configuration(configuration))
+        self._writer.signals(source, measurement.time_s, _signals(measurement))
+        if truth is not None:
+            self._writer.truth(truth)
+
+    @property
+    def failed(self) -> str | None:
+        """Why nothing more is written, if so."""
+        return self._writer.failed
+
+    def iteration(self, at: Progress) -> None:
+        """One iteration: convergence, best k, population, and now and then the best monitor's current."""
+        self._writer.iteration(at.algorithm, at.iteration, at.rmse, at.k, at.population, at.population_rmse)
+        every = max(1, at.iterations // _KEPT_MONITORS)
+        if at.iteration % every == 0 or at.iteration == at.iterations:
+            window = self._objective.windows[0]
+            current = self._objective.currents(at.k)[0, : len(window.target)]
+            time = self._measurement.time_s[0] + window.block_s * (1.0 + np.arange(len(current)))
+            self._writer.monitor_iteration(at.algorithm, at.iteration, time, current)
+
+    def finish(self, answer: Identification) -> None:
+        """The fitted monitor, the residual, the result; closes the file."""
+        monitor = self._fitted(answer)
+        time = self._measurement.time_s
+        self._writer.signals("monitor", time[: monitor.samples], _signals(monitor))
+        residual = {
+            name: monitor[name] - self._measurement[name][: monitor.samples]
+            for name in ("current_A", "user_position_rad", "motor_position_rad", "motor_speed_rad_s")
+            if name in self._measurement
+        }
+        self._writer.signals("residual", time[: monitor.samples], residual)
+        self._writer.result(_result(answer, self._objective))
+        self.close()
+
+    def close(self) -> None:
+        """Closes the file as it is."""
+        self._writer.close()
+
+    def _fitted(self, answer: Identification) -> Measurement:
+        """The monitor's signals at the answer, on the recording's own time base."""
+        m = self._measurement
+        load = m.get("load_torque_Nm")
+        run = Run(
+            Recorded(m.time_s, m["command_rad"]),
+            duration_s=m.duration_s,
+            sample_rate_Hz=1.0 / m.sample_period_s,
+            load_torque_Nm=0.0 if load is None else float(load.mean()),
+        )
+        objective = self._objective
+        return simulate_monitor(
+            run,
+            objective.actuator,
+            answer.k,
+            objective.effects,
+            objective.stack.circuit,
+            start_rad=objective.windows[0].user_rad,
+        )
+
+
+def _signals(measurement: Measurement) -> dict[str, NDArray[np.float64]]:
+    return {name: values for name, values in measurement.signals.items() if name != "time_s"}
+
+
+def _configuration(configuration: Mapping[str, Any]) -> str:
+    rows = "\n".join(f"| {name} | `{value}` |" for name, value in configuration.items() if value not in (None, [], ""))
+    return f"# Identification\n\n| setting | value |\n|---|---|\n{rows}\n"
+
+
+def _result(answer: Identification, objective: Objective) -> dict[str, Any]:
+    sure = answer.uncertainty
+    result: dict[str, Any] = {
+        name: f"{answer.k[i]:.4f}  ({sure.interval90[i, 0]:.4f} … {sure.interval90[i, 1]:.4f})  — {phrase}"
+        for i, (name, phrase) in enumerate(zip(faults.NAMES, faults.sentences(answer.k, objective.actuator)))
+    }
+    result |= {
+        "verdict": "healthy" if sure.healthy else "not healthy: " + ", ".join(sure.alarms),
+        "rmse": f"{answer.rmse:.4f} A",
+        "evaluations": answer.evaluations,
+        "time": f"{answer.elapsed_s:.2f} s" + (" (stopped)" if answer.stopped else ""),
+        "seed": answer.seed,
+    }
+    if answer.error_percent is not None:
+        result["Err (T 5.2)"] = f"{answer.error_percent:.2f} %"
+    return result

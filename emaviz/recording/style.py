@@ -1,0 +1,79 @@
+"""Where things lie in a recording and how they look: entity paths, series names with units, colours."""
+
+from __future__ import annotations
+
+import re
+
+from ema_model.faults import FAULTS
+from ema_model.measurement.signals import SIGNALS
+
+Colour = tuple[int, int, int, int]
+
+APPLICATION = "emaviz"
+SIM_TIME = "sim_time"
+ITERATION = "iteration"
+K_NAMES = tuple(fault.name for fault in FAULTS)
+K_TITLES = {fault.name: f"{fault.name} {fault.title.lower()} [-]" for fault in FAULTS}
+
+GROUPS = ("reference", "monitor", "measurement", "residual")
+GROUP_TITLES = {"reference": "RM", "monitor": "MM", "measurement": "Measured", "residual": "Residual"}
+# Mid tones, which stand out on white as on black.
+GROUP_COLOURS: dict[str, Colour] = {
+    "reference": (46, 134, 222, 255),
+    "monitor": (242, 142, 43, 255),
+    "measurement": (134, 142, 150, 255),
+    "residual": (226, 72, 66, 255),
+}
+# The line that is drawn later lies on top, so the one below must be wider to be seen beside it.
+GROUP_WIDTHS = {"reference": 1.5, "monitor": 1.5, "measurement": 2.5, "residual": 1.5}
+TRUTH_COLOUR: Colour = (67, 170, 109, 255)
+POPULATION_COLOUR: Colour = (134, 142, 150, 110)
+ALGORITHM_COLOURS: tuple[Colour, ...] = (
+    (242, 142, 43, 255),
+    (156, 106, 222, 255),
+    (32, 170, 180, 255),
+    (226, 96, 152, 255),
+)
+
+_PLAIN = re.compile(r"[A-Za-z0-9_]+")
+
+
+def plain(name: str) -> str:
+    """The name itself, if it can be one part of an entity path without escapes; ValueError otherwise."""
+    if not _PLAIN.fullmatch(name):
+        raise ValueError(f"{name!r} cannot name a part of a recording: letters, digits and _ only")
+    return name
+
+
+def signal_title(name: str) -> str:
+    """'Equivalent current [A]' of 'current_A'; the name itself when it is not a canonical one."""
+    signal = SIGNALS.get(name)
+    if signal is None:
+        return name
+    return f"{signal.title} [{signal.unit or '-'}]"
+
+
+def series_title(group: str, name: str) -> str:
+    """'RM equivalent current [A]': what the legend says."""
+    title = signal_title(name)
+    return f"{GROUP_TITLES[group]} {title[0].lower()}{title[1:]}"
+
+
+def signal_colour(group: str, name: str) -> Colour:
+    """The group's colour; phases B and C are lighter and darker, as the three share a plot."""
+    red, green, blue, alpha = GROUP_COLOURS[group]
+    if name.startswith("phase_b"):
+        return (red + 255) // 2, (green + 255) // 2, (blue + 255) // 2, alpha
+    if name.startswith("phase_c"):
+        return red * 5 // 9, green * 5 // 9, blue * 5 // 9, alpha
+    return red, green, blue, alpha
+
+
+def algorithm_path(algorithm: str) -> str:
+    """'/identification/hba'."""
+    return f"/identification/{plain(algorithm)}"
+
+
+def monitor_iteration_path(algorithm: str, index: int) -> str:
+    """'/identification/hba/monitor/iteration_0040/current_A'."""
+    return f"{algorithm_path(algorithm)}/monitor/iteration_{index:04d}/current_A"

@@ -1,0 +1,1 @@
+"""The actuator in 3D."""

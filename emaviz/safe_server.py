@@ -7,6 +7,7 @@ when one is taken; and lets a client open a public tunnel.  Here all three are r
 from __future__ import annotations
 
 import http
+import inspect
 import socket
 import threading
 from collections.abc import Awaitable, Callable
@@ -76,7 +77,7 @@ def _allowed_names(host: str) -> frozenset[str] | None:
 
 
 def _guard(
-    inner: Callable[..., Awaitable[Response | None]] | None, allowed: frozenset[str] | None
+    inner: Callable[..., Any] | None, allowed: frozenset[str] | None
 ) -> Callable[..., Awaitable[Response | None]]:
     async def process_request(connection: Any, request: Request) -> Response | None:
         host = request.headers.get("Host", "")
@@ -85,7 +86,9 @@ def _guard(
             return _refusal("this server answers to its own address only")
         if origin is not None and urlsplit(origin).netloc != host:
             return _refusal("requests from other pages are refused")
-        response = None if inner is None else await inner(connection, request)
+        response = None if inner is None else inner(connection, request)
+        if inspect.isawaitable(response):
+            response = await response
         if response is not None:
             response.headers["Content-Security-Policy"] = _POLICY
             response.headers["X-Content-Type-Options"] = "nosniff"

@@ -20,19 +20,22 @@ class LiveConvergence:
             data=(np.array([0.0, 1.0]), np.array([1.0, 1.0])),
             series=({"label": "iteration"}, {"label": "best rmse [A]", "stroke": ALGORITHMS["hba"], "width": 2}),
             title="Convergence",
-            scales={"x": {"time": False}, "y": {"distr": 3}},
+            scales={"x": {"time": False, "range": (0.0, 150.0)}, "y": {"distr": 3}},
             axes=({**grey, "label": "iteration", "size": 26}, {**grey, "label": "rmse [A]", "size": 52}),
+            legend={"show": False},
             height=height,
         )
 
-    def show(self, algorithm: str, rmse: Sequence[float]) -> None:
+    def begin(self, algorithm: str, iterations: int) -> None:
+        """A new run: its colour and the length of its axis (which builds the chart anew)."""
+        line = {"label": "best rmse [A]", "stroke": ALGORITHMS.get(algorithm, "#868e96"), "width": 2}
+        self._handle.series = ({"label": "iteration"}, line)
+        self._handle.scales = {"x": {"time": False, "range": (0.0, float(iterations))}, "y": {"distr": 3}}
+
+    def show(self, rmse: Sequence[float]) -> None:
         """Draws the errors so far, A."""
         y = np.maximum(np.asarray(rmse, dtype=float), 1e-9)
         x = np.arange(len(y), dtype=float)
         if len(y) == 1:
-            x, y = np.array([0.0, 1.0]), np.repeat(y, 2)
-        self._handle.series = (
-            {"label": "iteration"},
-            {"label": f"{algorithm.upper()} best rmse [A]", "stroke": ALGORITHMS.get(algorithm, "#868e96"), "width": 2},
-        )
+            x, y = np.array([0.0, 0.1]), np.repeat(y, 2)
         self._handle.data = (x, y)

@@ -15,6 +15,15 @@ from emaviz.figures.decimate import envelope
 
 Array = NDArray[np.float64]
 _GREY = "#868e96"
+_LEGEND = '<div style="font-size:12px;padding:0 10px">' + " &nbsp; ".join(
+    f'<span style="color:{colour}">━</span> {name}'
+    for name, colour in (
+        ("reference model", REFERENCE),
+        ("monitor model", MONITOR),
+        ("monitor − reference (right axis)", DIFFERENCE),
+        ("command", COMMAND),
+    )
+) + "</div>"
 
 
 @dataclass(frozen=True)
@@ -41,11 +50,12 @@ CHARTS = (
 class LiveSignals:
     """The charts in a panel of the page."""
 
-    def __init__(self, gui: viser.GuiApi, height: int = 190) -> None:
+    def __init__(self, gui: viser.GuiApi, height: int = 154) -> None:
         empty = np.array([0.0, 1.0])
+        gui.add_html(_LEGEND)
         self._charts: list[tuple[SignalChart, Any]] = []
         for chart in CHARTS:
-            count = 4 + chart.with_command
+            count = 5 + chart.with_command
             handle = gui.add_uplot(
                 data=tuple(empty for _ in range(count)),
                 series=_series(chart),
@@ -53,8 +63,8 @@ class LiveSignals:
                 scales={"x": {"time": False}, "y": {"auto": True}, "difference": {"auto": True}},
                 axes=_axes(chart, last=chart is CHARTS[-1]),
                 cursor={"sync": {"key": "time"}},
-                legend={"show": chart is CHARTS[0]},
-                height=height + (26 if chart is CHARTS[0] else 0),
+                legend={"show": False},
+                height=height + (16 if chart is CHARTS[-1] else 0),
             )
             self._charts.append((chart, handle))
 
@@ -63,28 +73,36 @@ class LiveSignals:
         time = reference.time_s
         for chart, handle in self._charts:
             rm, mm = reference[chart.signal], monitor[chart.signal]
-            lines = [chart.scale * rm, chart.scale * mm, chart.difference_scale * (mm - rm)]
+            difference = chart.difference_scale * (mm - rm)
+            lines = [difference, chart.scale * rm, chart.scale * mm]
             if chart.with_command:
                 lines.append(chart.scale * reference["command_rad"])
-            handle.data = envelope(time, lines)
+            # in the middle third of the chart, so that it does not cover the signals
+            drawn = envelope(time, lines)
+            most = 3.0 * max(float(np.max(np.abs(difference))), 1e-6)
+            frame = np.full(len(drawn[0]), most)
+            frame[0] = -most
+            handle.data = (*drawn, frame)
 
 
 def _series(chart: SignalChart) -> tuple[dict[str, Any], ...]:
     series: list[dict[str, Any]] = [
         {"label": "t [s]"},
+        {"label": "difference", "stroke": DIFFERENCE + "b0", "width": 1, "scale": "difference"},
         {"label": "reference", "stroke": REFERENCE, "width": 1.5},
         {"label": "monitor", "stroke": MONITOR, "width": 1.5},
-        {"label": "difference", "stroke": DIFFERENCE, "width": 1, "scale": "difference"},
     ]
     if chart.with_command:
         series.append({"label": "command", "stroke": COMMAND, "width": 1, "dash": [4, 4]})
+    # unseen; it sets the range of the difference's axis, which viser cannot change without a new chart
+    series.append({"label": "range", "stroke": "#00000000", "width": 0, "scale": "difference", "points": {"show": False}})
     return tuple(series)
 
 
 def _axes(chart: SignalChart, last: bool) -> tuple[dict[str, Any], ...]:
     common = {"stroke": _GREY, "labelSize": 16, "labelGap": 0, "grid": {"stroke": "#86868625", "width": 1}}
     return (
-        {**common, "label": "time [s]" if last else "", "size": 26 if last else 22, "labelSize": 16 if last else 0},
+        {**common, "label": "time [s]" if last else "", "size": 30, "labelSize": 16 if last else 0},
         {**common, "scale": "y", "label": f"[{chart.unit}]", "size": 48},
         {
             **common,

@@ -56,6 +56,7 @@ class IdentifyPanel:
         if not self._page.session.ready.is_set():
             self._page.notify("One moment", "The models are still being compiled.", "yellow")
             return
+        settings = self._page.session.settings
         if not self._page.session.identify():
             self._page.notify("One at a time", "An identification is running; stop it first.", "yellow")
             return
@@ -63,6 +64,7 @@ class IdentifyPanel:
         self._start.disabled = True
         self._link.content = ""
         self._text.content = "Starting…"
+        self._convergence.begin(settings.algorithm, settings.iterations)
 
     def failed(self) -> None:
         """Gives the button back when no identification runs any more."""
@@ -82,7 +84,7 @@ class IdentifyPanel:
             f"**{OPTIMISERS[at.algorithm].title}** · iteration {at.iteration} of {at.iterations} · "
             f"rmse {at.rmse:.4f} A · {at.elapsed_s:.1f} s"
         )
-        self._convergence.show(at.algorithm, rmse)
+        self._convergence.show(rmse)
         self._bars.content = fault_bars(at.k, self._page.session.actuator, truth)
 
     def _identified(self, answer: Identification, path: Path | None) -> None:
@@ -98,7 +100,7 @@ class IdentifyPanel:
             f"**{OPTIMISERS[answer.algorithm].title}** · {stopped}Err {answer.error_percent:.2f} % · "
             f"rmse {answer.rmse:.4f} A · {answer.evaluations} simulations in {answer.elapsed_s:.2f} s · **{verdict}**"
         )
-        self._convergence.show(answer.algorithm, answer.rmse_history.tolist())
+        self._convergence.show(answer.rmse_history.tolist())
         self._bars.content = fault_bars(
             answer.k, self._page.session.actuator, answer.truth, sure.interval90, sure.alarms
         )

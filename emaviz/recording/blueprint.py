@@ -17,10 +17,9 @@ _PHASES = ("phase_a_current_A", "phase_b_current_A", "phase_c_current_A")
 class Algorithm:
     """What a recording holds of one identification."""
 
-    population: bool = False
+    iterations: bool = False
     monitor: bool = False
     result: bool = False
-    iterations: bool = False
 
 
 @dataclass

@@ -4,10 +4,19 @@ from __future__ import annotations
 
 import re
 
+import numpy as np
+
 from ema_model.faults import FAULTS
 from ema_model.measurement.signals import SIGNALS
+from emaviz.figures import colours
 
 Colour = tuple[int, int, int, int]
+
+
+def _rgba(hexadecimal: str, alpha: int = 255) -> Colour:
+    red, green, blue = bytes.fromhex(hexadecimal.removeprefix("#"))
+    return red, green, blue, alpha
+
 
 APPLICATION = "emaviz"
 SIM_TIME = "sim_time"
@@ -17,24 +26,16 @@ K_TITLES = {fault.name: f"{fault.name} {fault.title.lower()} [-]" for fault in F
 
 GROUPS = ("reference", "monitor", "measurement", "residual")
 GROUP_TITLES = {"reference": "RM", "monitor": "MM", "measurement": "Measured", "residual": "Residual"}
-# Mid tones, which stand out on white as on black.
 GROUP_COLOURS: dict[str, Colour] = {
-    "reference": (46, 134, 222, 255),
-    "monitor": (242, 142, 43, 255),
-    "measurement": (134, 142, 150, 255),
-    "residual": (226, 72, 66, 255),
+    "reference": _rgba(colours.REFERENCE),
+    "monitor": _rgba(colours.MONITOR),
+    "measurement": _rgba(colours.COMMAND),
+    "residual": _rgba(colours.DIFFERENCE),
 }
 # The line that is drawn later lies on top, so the one below must be wider to be seen beside it.
 GROUP_WIDTHS = {"reference": 1.5, "monitor": 1.5, "measurement": 2.5, "residual": 1.5}
-TRUTH_COLOUR: Colour = (67, 170, 109, 255)
-POPULATION_COLOUR: Colour = (134, 142, 150, 110)
-ALGORITHM_COLOURS: tuple[Colour, ...] = (
-    (242, 142, 43, 255),
-    (156, 106, 222, 255),
-    (32, 170, 180, 255),
-    (226, 96, 152, 255),
-)
-
+TRUTH_COLOUR = _rgba(colours.TRUTH)
+POPULATION_COLOUR = _rgba(colours.COMMAND, 110)
 _PLAIN = re.compile(r"[A-Za-z0-9_]+")
 
 
@@ -67,6 +68,19 @@ def signal_colour(group: str, name: str) -> Colour:
     if name.startswith("phase_c"):
         return red * 5 // 9, green * 5 // 9, blue * 5 // 9, alpha
     return red, green, blue, alpha
+
+
+def iteration_colour(index: int) -> Colour:
+    """From grey to the monitor's colour as the iterations go by (150 is usual)."""
+    share = min(index / 150.0, 1.0) ** 0.5
+    start, end = np.array(POPULATION_COLOUR), np.array(GROUP_COLOURS["monitor"])
+    red, green, blue, alpha = (start + share * (end - start)).astype(int).tolist()
+    return red, green, blue, alpha
+
+
+def algorithm_colour(algorithm: str) -> Colour:
+    """The algorithm's own colour; the monitor's for one without."""
+    return _rgba(colours.ALGORITHMS.get(algorithm, colours.MONITOR))
 
 
 def algorithm_path(algorithm: str) -> str:

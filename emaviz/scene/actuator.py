@@ -21,8 +21,8 @@ class ActuatorScene:
         scene.configure_environment_map(None)
         scene.add_light_ambient("/light/ambient", intensity=1.4)
         scene.add_light_hemisphere("/light/sky", intensity=1.2)
-        server.initial_camera.position = (0.55, -2.1, 1.05)
-        server.initial_camera.look_at = (0.42, 0.0, 0.0)
+        server.initial_camera.position = (0.75, -3.1, 1.5)
+        server.initial_camera.look_at = (0.5, 0.0, -0.05)
         along_x = (np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0)
         scene.add_grid("/ground", width=4.0, height=4.0, position=(0.4, 0.0, -0.36), cell_size=0.2)
 

@@ -1,0 +1,92 @@
+"""Iterations of an identification, gathered so that they are sent a column at a time and not a row."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import rerun as rr
+from numpy.typing import ArrayLike, NDArray
+
+from emaviz.recording.style import ITERATION, K_NAMES, algorithm_path
+
+Array = NDArray[np.float64]
+Column = tuple[str, list[rr.TimeColumn], Any]
+
+
+class IterationBuffer:
+    """Rows of one algorithm that are not yet sent.  Not thread safe: the writer holds its lock around it."""
+
+    def __init__(self, algorithm: str) -> None:
+        self._path = algorithm_path(algorithm)
+        self._clear()
+
+    def __len__(self) -> int:
+        return len(self._index)
+
+    def _clear(self) -> None:
+        self._index: list[int] = []
+        self._rmse: list[float] = []
+        self._best: list[Array] = []
+        self._population: list[tuple[int, Array]] = []
+        self._population_rmse: list[tuple[int, Array]] = []
+
+    def add(
+        self,
+        index: int,
+        rmse: float,
+        best: ArrayLike,
+        population: ArrayLike | None,
+        population_rmse: ArrayLike | None,
+    ) -> None:
+        """Keeps copies: best (8,), population (N, 8), population_rmse (N,).  ValueError on another shape."""
+        best = np.array(best, dtype=float)
+        if best.shape != (8,):
+            raise ValueError(f"best k must have the shape (8,), not {best.shape}")
+        if population is not None:
+            rows = np.array(population, dtype=float)
+            if rows.ndim != 2 or rows.shape[1] != 8:
+                raise ValueError(f"the population must have the shape (N, 8), not {rows.shape}")
+            self._population.append((int(index), rows))
+        if population_rmse is not None:
+            self._population_rmse.append((int(index), np.array(population_rmse, dtype=float).reshape(-1)))
+        self._index.append(int(index))
+        self._rmse.append(float(rmse))
+        self._best.append(best)
+
+    def drain(self, truth: Array | None) -> Iterator[Column]:
+        """Columns for `send_columns`, all rows at once; leaves the buffer empty.
+
+        truth (8,) is repeated along the iterations, since a plot cannot draw what has no time.
+        """
+        index, rmse, best = self._index, np.array(self._rmse), np.array(self._best)
+        population, population_rmse = self._population, self._population_rmse
+        self._clear()
+        if not index:
+            return
+        time = _time(index)
+        yield f"{self._path}/rmse", time, rr.Scalars.columns(scalars=rmse)
+        # The plots have no logarithmic axis.
+        positive = np.where(np.isfinite(rmse) & (rmse > 0.0), rmse, np.nan)
+        yield f"{self._path}/log10_rmse", time, rr.Scalars.columns(scalars=np.log10(positive))
+        for j, k in enumerate(K_NAMES):
+            yield f"{self._path}/best/{k}", time, rr.Scalars.columns(scalars=best[:, j])
+            if truth is not None:
+                yield f"{self._path}/truth/{k}", time, rr.Scalars.columns(scalars=np.full(len(index), truth[j]))
+        if population:
+            for j, k in enumerate(K_NAMES):
+                yield f"{self._path}/population/{k}", *_ragged([(i, rows[:, j]) for i, rows in population])
+        if population_rmse:
+            yield f"{self._path}/population/rmse", *_ragged(population_rmse)
+
+
+def _time(index: list[int]) -> list[rr.TimeColumn]:
+    return [rr.TimeColumn(ITERATION, sequence=np.array(index, dtype=np.int64))]
+
+
+def _ragged(rows: list[tuple[int, Array]]) -> tuple[list[rr.TimeColumn], Any]:
+    """One row per iteration, of as many values as the population then had."""
+    values = np.concatenate([values for _, values in rows])
+    lengths = [len(values) for _, values in rows]
+    return _time([i for i, _ in rows]), rr.Scalars.columns(scalars=values).partition(lengths)

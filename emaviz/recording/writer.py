@@ -1,0 +1,208 @@
+"""Writes one recording: signals, identifications, configuration, and the layout in which it opens."""
+
+from __future__ import annotations
+
+import json
+import threading
+from collections.abc import Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+import rerun as rr
+from numpy.typing import ArrayLike, NDArray
+
+from emaviz.recording import series, style
+from emaviz.recording.blueprint import Algorithm, Contents, build
+from emaviz.recording.file import RrdFile
+from emaviz.recording.iterations import IterationBuffer
+from emaviz.recording.markdown import table
+from emaviz.recording.paths import MIN_FREE_BYTES
+
+PROPERTIES = "emaviz"
+_ROWS_PER_CHUNK = 25
+_FLUSH_EVERY_S = 0.25
+
+
+class RecordingWriter:
+    """One .rrd file.  Grows as NAME.rrd.part and becomes NAME.rrd when closed; an older NAME.rrd stays until then.
+
+    Methods may be called from any thread.  A failure to write turns the writer off: `failed` then says why in one
+    line, later calls do nothing, and nothing is raised into the work being recorded; what was written stays in the
+    part, for `recover`.  A wrong shape or name is the caller's mistake and raises ValueError.
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        *,
+        name: str | None = None,
+        min_free_bytes: int = MIN_FREE_BYTES,
+        close_timeout_s: float = 10.0,
+    ) -> None:
+        """name: what the viewer calls the recording, else the file's name.
+
+        Raises RecordingError if it cannot start: no such folder, disk full, being recorded already.
+        """
+        self.path = Path(path)
+        self._file = RrdFile(self.path, name or self.path.stem, min_free_bytes)
+        self._close_timeout_s = close_timeout_s
+        self._contents = Contents()
+        self._arranged = repr(self._contents)
+        self._styled: set[str] = set()
+        self._truth: NDArray[np.float64] | None = None
+        self._buffers: dict[str, IterationBuffer] = {}
+        self._ending = threading.Event()
+        self._flusher: threading.Thread | None = None
+
+    @property
+    def failed(self) -> str | None:
+        """None, or one line that says why nothing more is written."""
+        return self._file.failed
+
+    def __enter__(self) -> RecordingWriter:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def config(self, text_markdown: str) -> None:
+        """The configuration, shown as text."""
+        with self._file.lock:
+            self._contents.config = True
+            self._text("/config", text_markdown)
+
+    def properties(self, values: Mapping[str, Any]) -> None:
+        """Facts about the recording by name: whatever JSON can hold, and arrays."""
+        # As text, because rerun holds a name to the type that it had first in this process.
+        encoded = {str(name): json.dumps(value, default=_for_json) for name, value in values.items()}
+        self._file.do(lambda stream: stream.send_property(PROPERTIES, rr.AnyValues(**encoded)))
+
+    def signals(self, group: str, time_s: ArrayLike, signals: Mapping[str, ArrayLike]) -> None:
+        """Signals (n,) by canonical name at time_s (n,), of reference, monitor, measurement or residual."""
+        if group not in style.GROUPS:
+            raise ValueError(f"no group {group!r}; groups are {', '.join(style.GROUPS)}")
+        time, count = _durations(time_s)
+        arrays = {style.plain(name): _column(name, values, count) for name, values in signals.items()}
+        with self._file.lock:
+            names = self._contents.signals.setdefault(group, [])
+            for name, values in arrays.items():
+                if name not in names:
+                    names.append(name)
+                self._send(f"/{group}/{name}", series.signal_style(group, name), time, values)
+            self.flush()
+
+    def truth(self, k: ArrayLike) -> None:
+        """The true k (8,), if known: static values, and a line beside every identified k from now on."""
+        truth = _column("k", k, len(style.K_NAMES))
+        with self._file.lock:
+            self._truth = truth
+            for name, value in zip(style.K_NAMES, truth, strict=True):
+                scalar = rr.Scalars(value)
+                self._file.do(lambda stream, n=name, s=scalar: stream.log(f"/truth/{n}", s, static=True))
+
+    def iteration(
+        self,
+        algorithm: str,
+        index: int,
+        rmse: float,
+        best_k: ArrayLike,
+        population_k: ArrayLike | None = None,
+        population_rmse: ArrayLike | None = None,
+    ) -> None:
+        """One iteration: the best rmse (A) and k (8,) so far, the population's k (N, 8) and rmse (N,).
+
+        Gathered, and written in chunks within about a quarter of a second.
+        """
+        with self._file.lock:
+            if not self._file.writing:
+                return
+            if algorithm not in self._buffers:
+                self._algorithm(algorithm).iterations = True
+                self._buffers[algorithm] = IterationBuffer(algorithm)
+            buffer = self._buffers[algorithm]
+            buffer.add(index, rmse, best_k, population_k, population_rmse)
+            if len(buffer) >= _ROWS_PER_CHUNK:
+                self.flush()
+            elif self._flusher is None:
+                self._flusher = threading.Thread(target=self._flush_regularly, name="recording-flush", daemon=True)
+                self._flusher.start()
+
+    def monitor_iteration(self, algorithm: str, index: int, time_s: ArrayLike, current_A: ArrayLike) -> None:
+        """The best individual's current (n,) at time_s (n,) on this iteration."""
+        time, count = _durations(time_s)
+        current = _column("current_A", current_A, count)
+        with self._file.lock:
+            self._algorithm(algorithm).monitor = True
+            self._send(style.monitor_iteration_path(algorithm, index), series.monitor_style(index), time, current)
+
+    def result(self, values: Mapping[str, Any], algorithm: str | None = None) -> None:
+        """The answer, as a table; `algorithm` can be left out if its iterations came before."""
+        with self._file.lock:
+            algorithm = algorithm or next(reversed(self._contents.algorithms), None)
+            if algorithm is None:
+                raise ValueError("a result needs its algorithm's name when no iteration came before it")
+            self._algorithm(algorithm).result = True
+            self._text(f"{style.algorithm_path(algorithm)}/result", table(f"Result of {algorithm}", values))
+
+    def flush(self) -> None:
+        """Brings everything so far to the file, with the layout for it."""
+        with self._file.lock:
+            for buffer in self._buffers.values():
+                for path, time, columns in buffer.drain(self._truth):
+                    self._send_columns(path, series.iteration_style(path), time, columns)
+            if self._arranged != repr(self._contents):
+                self._arranged = repr(self._contents)
+                self._file.do(lambda stream: stream.send_blueprint(build(self._contents)))
+            self._file.flush()
+
+    def close(self) -> None:
+        """Finishes the file under its own name; never hangs, never raises, and a second call does nothing."""
+        self._ending.set()
+        self._file.close(self.flush, self._close_timeout_s)
+
+    def _flush_regularly(self) -> None:
+        while not self._ending.wait(_FLUSH_EVERY_S):
+            if any(len(buffer) for buffer in list(self._buffers.values())):
+                self.flush()
+
+    def _algorithm(self, name: str) -> Algorithm:
+        return self._contents.algorithms.setdefault(style.plain(name), Algorithm())
+
+    def _text(self, path: str, markdown: str) -> None:
+        document = rr.TextDocument(markdown, media_type=rr.MediaType.MARKDOWN)
+        self._file.do(lambda stream: stream.log(path, document, static=True))
+        self.flush()
+
+    def _send(self, path: str, drawn: series.Style, time: list[rr.TimeColumn], values: NDArray[np.float64]) -> None:
+        self._send_columns(path, drawn, time, rr.Scalars.columns(scalars=values))
+
+    def _send_columns(self, path: str, drawn: series.Style, time: list[rr.TimeColumn], columns: Any) -> None:
+        """Values, and the first time how to draw them."""
+        if path not in self._styled:
+            self._styled.add(path)
+            self._file.do(lambda stream: stream.log(path, drawn, static=True))
+        self._file.do(lambda stream: stream.send_columns(path, time, columns))
+
+
+def _durations(time_s: ArrayLike) -> tuple[list[rr.TimeColumn], int]:
+    """The column of sim_time and its length; rounded to ns, as rerun itself would cut off."""
+    seconds = np.asarray(time_s, dtype=float)
+    if seconds.ndim != 1 or not np.isfinite(seconds).all():
+        raise ValueError(f"times must be finite and of the shape (n,), not {seconds.shape}")
+    nanoseconds = np.rint(seconds * 1e9).astype("timedelta64[ns]")
+    return [rr.TimeColumn(style.SIM_TIME, duration=nanoseconds)], len(seconds)
+
+
+def _column(name: str, values: ArrayLike, count: int) -> NDArray[np.float64]:
+    array = np.array(values, dtype=float)
+    if array.shape != (count,):
+        raise ValueError(f"{name} must have the shape ({count},), not {array.shape}")
+    return array
+
+
+def _for_json(value: Any) -> Any:
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else str(value)

@@ -1,0 +1,142 @@
+"""The compute thread: one thread, latest wins, one long job, errors told and survived."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import pytest
+
+from emaviz.worker import Worker
+
+
+@pytest.fixture
+def errors():
+    return []
+
+
+@pytest.fixture
+def worker(errors):
+    worker = Worker("test-compute", errors.append)
+    yield worker
+    worker.close()
+
+
+def wait_until(condition, seconds=5.0):
+    end = time.monotonic() + seconds
+    while not condition() and time.monotonic() < end:
+        time.sleep(0.002)
+    assert condition()
+
+
+def test_every_job_runs_on_the_one_thread(worker):
+    names = set()
+    done = threading.Semaphore(0)
+    threads = [
+        threading.Thread(
+            target=lambda i=i: worker.post(f"kind {i}", lambda: (names.add(threading.get_ident()), done.release()))
+        )
+        for i in range(20)
+    ]
+    for thread in threads:
+        thread.start()
+    for _ in threads:
+        assert done.acquire(timeout=5.0)
+    assert len(names) == 1
+    assert names != {threading.get_ident()}
+
+
+def test_the_latest_value_wins(worker):
+    gate, seen = threading.Event(), []
+    worker.post("gate", lambda: gate.wait(5.0))
+    time.sleep(0.02)
+    for value in range(100):
+        worker.post("slider", lambda value=value: seen.append(value))
+    gate.set()
+    wait_until(lambda: seen)
+    time.sleep(0.02)
+    assert seen == [99]
+
+
+def test_a_second_long_job_is_refused_until_the_first_ends(worker):
+    release = threading.Event()
+
+    def long():
+        while not release.is_set():
+            time.sleep(0.001)
+            yield
+
+    assert worker.start(long())
+    assert not worker.start(long())
+    assert worker.busy
+    release.set()
+    wait_until(lambda: not worker.busy)
+    assert worker.start(long())
+
+
+def test_double_click_from_many_threads_starts_one(worker):
+    started = []
+    gate = threading.Barrier(16)
+
+    def long():
+        for _ in range(50):
+            time.sleep(0.001)
+            yield
+
+    def click():
+        gate.wait()
+        started.append(worker.start(long()))
+
+    threads = [threading.Thread(target=click) for _ in range(16)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert sum(started) == 1
+
+
+def test_quick_jobs_run_between_the_steps_of_a_long_one(worker):
+    order = []
+
+    def long():
+        for i in range(5):
+            order.append(f"step {i}")
+            if i == 1:
+                worker.post("quick", lambda: order.append("quick"))
+            yield
+
+    worker.start(long())
+    wait_until(lambda: not worker.busy)
+    assert order == ["step 0", "step 1", "quick", "step 2", "step 3", "step 4"]
+
+
+def test_errors_are_told_and_the_thread_goes_on(worker, errors):
+    worker.post("bad", lambda: 1 / 0)
+
+    def long():
+        yield
+        raise ValueError("in a step")
+
+    wait_until(lambda: len(errors) == 1)
+    worker.start(long())
+    wait_until(lambda: len(errors) == 2 and not worker.busy)
+    done = threading.Event()
+    worker.post("good", done.set)
+    assert done.wait(5.0)
+    assert [type(error) for error in errors] == [ZeroDivisionError, ValueError]
+
+
+def test_a_pace_is_kept_and_the_last_value_still_comes(errors):
+    worker = Worker("test-screen", errors.append, rest_s=0.05)
+    times, values = [], []
+    try:
+        end = time.monotonic() + 0.5
+        last = 0
+        while time.monotonic() < end:
+            last += 1
+            worker.post("draw", lambda value=last: (times.append(time.monotonic()), values.append(value)))
+            time.sleep(0.001)
+        wait_until(lambda: values and values[-1] == last)
+    finally:
+        worker.close()
+    assert min(b - a for a, b in zip(times, times[1:])) > 0.045

@@ -1,0 +1,33 @@
+"""What all tests share: the browser."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+_SOFTWARE_GL = (
+    "--no-sandbox --disable-quic --no-first-run --disable-background-networking --disable-component-update "
+    "--disable-sync --use-gl=angle --use-angle=gl-egl --ignore-gpu-blocklist --disable-accelerated-2d-canvas "
+    "--disable-gpu-rasterization"
+).split()
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Any]:
+    """Headless Chromium with software GL; without one the test is skipped, in CI it fails."""
+    path = os.environ.get("EMAVIZ_CHROMIUM") or shutil.which("chromium") or shutil.which("chromium-browser")
+    if path is None:
+        message = "no Chromium found: install Debian's chromium, or name one in EMAVIZ_CHROMIUM"
+        if os.environ.get("CI"):
+            pytest.fail(message)
+        pytest.skip(message)
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=path, args=_SOFTWARE_GL, headless=True)
+        yield chromium
+        chromium.close()

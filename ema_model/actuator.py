@@ -141,7 +141,8 @@ def load_actuator(path: str | Path | None = None) -> Actuator:
     except IsADirectoryError:
         raise InputError(f"{path}: is a folder; an actuator file (.toml) is expected") from None
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read as text ({getattr(error, 'strerror', None) or 'not UTF-8'})") from None
+        why = getattr(error, "strerror", None) or "not UTF-8"
+        raise InputError(f"{path}: cannot be read as text ({why})") from None
     return _parse(text, str(path))
 
 
@@ -202,7 +203,7 @@ def _entry(section: str, name: str, entry: Any, where: str) -> tuple[float, Tole
     if isinstance(entry, dict) and ("tolerance" in entry or "sigma" in entry):
         sigma = entry["sigma"] if "sigma" in entry else abs(value) * entry["tolerance"]
         if isinstance(sigma, bool) or not isinstance(sigma, int | float) or not 0.0 < sigma < math.inf:
-            raise InputError(f"{where}: [{section}] {name}: the tolerance must be a number above 0 (sigma where value = 0)")
+            raise InputError(f"{where}: [{section}] {name}: the tolerance must be above 0 (sigma where value is 0)")
         tolerance = Tolerance(float(sigma), bool(entry.get("free", True)))
     return float(value), tolerance
 

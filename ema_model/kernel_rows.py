@@ -76,7 +76,9 @@ def initial_state(
     return _state(actuator, blocks, STATE_ROWS, 2.0 * actuator.motor.pole_pairs, user_rad, speed_rad_s, play)
 
 
-def initial_reference_state(actuator: Actuator, user_rad: float = 0.0, speed_rad_s: float = 0.0, play: float = 0.0) -> Array:
+def initial_reference_state(
+    actuator: Actuator, user_rad: float = 0.0, speed_rad_s: float = 0.0, play: float = 0.0
+) -> Array:
     """The same for the Reference Model, (REFERENCE_STATE_ROWS·LANES,)."""
     return _state(actuator, 1, REFERENCE_STATE_ROWS, actuator.motor.pole_pairs, user_rad, speed_rad_s, play)[0]
 

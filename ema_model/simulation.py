@@ -98,7 +98,9 @@ def simulate_reference(
         result,
     )
     signals = _signals(run, actuator, result, start)
-    for column, name in enumerate(("phase_a_current_A", "phase_b_current_A", "phase_c_current_A", "motor_torque_Nm"), 4):
+    for column, name in enumerate(
+        ("phase_a_current_A", "phase_b_current_A", "phase_c_current_A", "motor_torque_Nm"), 4
+    ):
         signals[name] = np.concatenate([[0.0], result[:, column]])
     if voltages:
         for column, name in enumerate(("leg_a_voltage_V", "leg_b_voltage_V", "leg_c_voltage_V"), 8):

@@ -23,7 +23,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -88,7 +88,7 @@ def find_stack(circuit: str = "reduced", effects: Iterable[str] = ()) -> Stack:
     return _stack(circuit, tuple(sorted(set(effects))))
 
 
-@lru_cache(maxsize=None)
+@cache
 def _stack(circuit: str, names: tuple[str, ...]) -> Stack:
     from ema_model.effects import find  # effects import physics, which must stand without stacks
 

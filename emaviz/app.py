@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import threading
 import time
+import traceback
 import webbrowser
 from pathlib import Path
 
@@ -94,7 +95,7 @@ class App:
             self.signals.show(simulation.reference, simulation.monitor)
         self.playback.show(simulation)
         if self.explore.monitor.value != self.session.settings.monitor:
-            self.explore.monitor.value = self.session.settings.monitor
+            self.explore.show_monitor(self.session.settings.monitor)
         if not self._first.is_set():
             self.first_picture_s = time.perf_counter() - started
             self._first.set()
@@ -107,8 +108,6 @@ class App:
         self.screen.post("told", self.identify.failed)
 
     def _on_screen_error(self, error: BaseException) -> None:
-        import traceback
-
         traceback.print_exception(error)
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import copy
 import threading
 import time
-from collections.abc import Callable, Iterator
+import traceback
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
@@ -23,7 +24,7 @@ from ema_model.measurement import Measurement
 from ema_model.simulation import simulate_monitor, simulate_reference
 from emaviz.recording.story import IdentificationStory
 from emaviz.state import Settings
-from emaviz.worker import Worker
+from emaviz.worker import Steps, Worker
 
 
 @dataclass(frozen=True)
@@ -116,7 +117,7 @@ class Session:
         """Ends the identification after its current iteration, keeping what it has."""
         self._stop.set()
 
-    def _identification(self, settings: Settings) -> Iterator[None]:
+    def _identification(self, settings: Settings) -> Steps:
         measurement = simulated(settings.run(), self.actuator, settings.k, settings.fitness)
         yield
         objective = Objective([measurement], self.actuator, fitness=settings.fitness)
@@ -172,8 +173,6 @@ class Session:
         if isinstance(error, InputError):
             _tell(self.events.told, "That does not work", str(error))
             return
-        import traceback
-
         traceback.print_exception(error)
         _tell(self.events.told, "Something failed; the app goes on", f"{type(error).__name__}: {error}")
 

@@ -11,9 +11,10 @@ import math
 import threading
 import time
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 
 Job = Callable[[], None]
+Steps = Generator[None, None, None]
 
 
 class Worker:
@@ -29,7 +30,7 @@ class Worker:
         self._last: dict[str, float] = {}
         self._wake = threading.Condition()
         self._quick: dict[str, Job] = {}
-        self._long: Iterator[None] | None = None
+        self._long: Steps | None = None
         self._closing = False
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
         self._thread.start()
@@ -40,7 +41,7 @@ class Worker:
             self._quick[kind] = job  # keeps its place in the line
             self._wake.notify()
 
-    def start(self, steps: Iterator[None]) -> bool:
+    def start(self, steps: Steps) -> bool:
         """Begins a long job, a step at a time; False, and nothing is begun, while another one runs."""
         with self._wake:
             if self._long is not None:
@@ -75,7 +76,7 @@ class Worker:
                 self._guarded(job)
             elif self._long is not None and not self._guarded(self._step):
                 self._long = None
-        if self._long is not None and hasattr(self._long, "close"):
+        if self._long is not None:
             self._guarded(self._long.close)
 
     def _next_job(self) -> Job | None:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ema_model.errors import InputError
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating]
 
 
 @dataclass(frozen=True)

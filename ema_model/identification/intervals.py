@@ -22,7 +22,7 @@ from ema_model.commands import Recorded
 from ema_model.identification.objective import Objective
 from ema_model.simulation import Run, simulate_reference
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating]
 
 _STEP = 0.01
 _CORRELATED_S = 0.025
@@ -69,7 +69,7 @@ def uncertainty(objective: Objective, k: Array, *, parameters_known: bool = Fals
     joint = float(deviation @ np.linalg.solve(covariance[np.ix_(tested, tested)], deviation))
     return Uncertainty(
         interval90=interval,
-        healthy=joint < chi2.ppf(0.99, len(tested)),
+        healthy=joint < float(chi2.ppf(0.99, len(tested))),
         alarms=tuple(faults.NAMES[i] for i in outside),
         ambiguous=_groups(white, sigma, eccentric),
     )

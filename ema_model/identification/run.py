@@ -76,9 +76,7 @@ def steps(
     Raises InputError for an unknown algorithm or impossible settings.
     """
     try:
-        optimiser = create(
-            algorithm, dimension=8, population=population, iterations=iterations, seed=seed, **settings
-        )
+        optimiser = create(algorithm, dimension=8, population=population, iterations=iterations, seed=seed, **settings)
     except (ValueError, TypeError) as error:
         raise InputError(str(error)) from None
     compile_s = warm_up(objective)

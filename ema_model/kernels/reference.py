@@ -147,9 +147,7 @@ def run(state, p, command, load, period, substeps, dt, result):
                 leg_c = relay(leg_c, amplitude * sin_c - current_c, band)
 
                 gap_a, gap_b, gap_c = air_gap(sin_r, cos_r, eccentricity, cos_phase, sin_phase)
-                k_a, k_b, k_c = winding_coefficients(
-                    sin_e, cos_e, gap_a, gap_b, gap_c, turns_a, turns_b, turns_c
-                )
+                k_a, k_b, k_c = winding_coefficients(sin_e, cos_e, gap_a, gap_b, gap_c, turns_a, turns_b, turns_c)
                 drive_a = leg_a * voltage - resistance_a * current_a - emf * k_a * omega
                 drive_b = leg_b * voltage - resistance_b * current_b - emf * k_b * omega
                 drive_c = leg_c * voltage - resistance_c * current_c - emf * k_c * omega
@@ -172,9 +170,7 @@ def run(state, p, command, load, period, substeps, dt, result):
                     - p[VISCOUS * LANES] * omega
                     + shaft_torque(theta, omega, q, user, p, 0)
                 )
-                dynamic = moving_friction(
-                    p[DYNAMIC_FRICTION * LANES], static, omega, motor_torque, user_load, p, 0
-                )
+                dynamic = moving_friction(p[DYNAMIC_FRICTION * LANES], static, omega, motor_torque, user_load, p, 0)
                 net = active - borello_friction(omega, active, static, dynamic)
                 theta1, omega = advance_rotor(
                     theta,

@@ -111,7 +111,8 @@ def _recordings(arguments: argparse.Namespace, actuator: Actuator, truth: np.nda
 
 def _table(answer: Identification, actuator: Actuator) -> str:
     sure = answer.uncertainty
-    lines = [f"{'':4}{'value':>8}  {'90 % interval':17}" + ("   truth" if answer.truth is not None else "") + "   meaning"]
+    known = "   truth" if answer.truth is not None else ""
+    lines = [f"{'':4}{'value':>8}  {'90 % interval':17}{known}   meaning"]
     for i, (name, phrase) in enumerate(zip(faults.NAMES, faults.sentences(answer.k, actuator))):
         low, high = sure.interval90[i]
         truth = "" if answer.truth is None else f"  {answer.truth[i]:6.3f}"

@@ -44,7 +44,7 @@ def add_run(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--load-torque", type=float, default=0.0, metavar="N_m", help="on the user shaft, against positive motion"
     )
-    parser.add_argument("--noise-current", type=float, default=0.0, metavar="A", help="rms noise of the current sensors")
+    parser.add_argument("--noise-current", type=float, default=0.0, metavar="A", help="rms noise of the sensors")
     parser.add_argument("--encoder-bits", type=int, default=0, metavar="N", help="per motor turn; 0 is a perfect one")
     parser.add_argument("--seed", type=int, default=0, help="of all random numbers")
 

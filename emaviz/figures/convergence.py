@@ -15,7 +15,7 @@ class LiveConvergence:
     """RMSE against iteration, logarithmic."""
 
     def __init__(self, gui: viser.GuiApi, height: int = 190) -> None:
-        grey = {"stroke": "#868e96", "labelSize": 16, "labelGap": 0, "grid": {"stroke": "#86868625", "width": 1}}
+        grey: Any = {"stroke": "#868e96", "labelSize": 16, "labelGap": 0, "grid": {"stroke": "#86868625", "width": 1}}
         self._handle: Any = gui.add_uplot(
             data=(np.array([0.0, 1.0]), np.array([1.0, 1.0])),
             series=({"label": "iteration"}, {"label": "best rmse [A]", "stroke": ALGORITHMS["hba"], "width": 2}),

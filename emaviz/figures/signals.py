@@ -15,15 +15,19 @@ from emaviz.figures.decimate import envelope
 
 Array = NDArray[np.float64]
 _GREY = "#868e96"
-_LEGEND = '<div style="font-size:12px;padding:0 10px">' + " &nbsp; ".join(
-    f'<span style="color:{colour}">━</span> {name}'
-    for name, colour in (
-        ("reference model", REFERENCE),
-        ("monitor model", MONITOR),
-        ("monitor − reference (right axis)", DIFFERENCE),
-        ("command", COMMAND),
+_LEGEND = (
+    '<div style="font-size:12px;padding:0 10px">'
+    + " &nbsp; ".join(
+        f'<span style="color:{colour}">━</span> {name}'
+        for name, colour in (
+            ("reference model", REFERENCE),
+            ("monitor model", MONITOR),
+            ("monitor − reference (right axis)", DIFFERENCE),
+            ("command", COMMAND),
+        )
     )
-) + "</div>"
+    + "</div>"
+)
 
 
 @dataclass(frozen=True)
@@ -85,7 +89,7 @@ class LiveSignals:
             handle.data = (*drawn, frame)
 
 
-def _series(chart: SignalChart) -> tuple[dict[str, Any], ...]:
+def _series(chart: SignalChart) -> Any:
     series: list[dict[str, Any]] = [
         {"label": "t [s]"},
         {"label": "difference", "stroke": DIFFERENCE + "b0", "width": 1, "scale": "difference"},
@@ -95,11 +99,12 @@ def _series(chart: SignalChart) -> tuple[dict[str, Any], ...]:
     if chart.with_command:
         series.append({"label": "command", "stroke": COMMAND, "width": 1, "dash": [4, 4]})
     # unseen; it sets the range of the difference's axis, which viser cannot change without a new chart
-    series.append({"label": "range", "stroke": "#00000000", "width": 0, "scale": "difference", "points": {"show": False}})
+    unseen = {"stroke": "#00000000", "width": 0, "points": {"show": False}}
+    series.append({"label": "range", "scale": "difference", **unseen})
     return tuple(series)
 
 
-def _axes(chart: SignalChart, last: bool) -> tuple[dict[str, Any], ...]:
+def _axes(chart: SignalChart, last: bool) -> Any:
     common = {"stroke": _GREY, "labelSize": 16, "labelGap": 0, "grid": {"stroke": "#86868625", "width": 1}}
     return (
         {**common, "label": "time [s]" if last else "", "size": 30, "labelSize": 16 if last else 0},

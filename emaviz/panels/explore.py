@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import fields
+from functools import partial
 from typing import Any
 
 import viser
@@ -36,15 +38,22 @@ class ExplorePanel:
             self.monitor = gui.add_dropdown("Faults of the monitor", MONITORS, initial_value="healthy")
         settings = page.session.settings
         self._command.on_update(lambda _: self._choose_command())
-        duration.on_update(lambda _: self._change(lambda: settings.set_duration(duration.value)))
-        load.on_update(lambda _: self._change(lambda: settings.set_load(load.value)))
-        self.monitor.on_update(lambda _: self._change(lambda: settings.set_monitor(self.monitor.value)))
+        for entry, setter in (
+            (duration, settings.set_duration),
+            (load, settings.set_load),
+            (self.monitor, settings.set_monitor),
+        ):
+            self._listen(entry, setter)
 
     def set_faults(self, k: Any) -> None:
         """Moves every slider, and simulates once."""
         for i, slider in enumerate(self._sliders):
             slider.value = float(k[i])
         self._page.session.refresh()
+
+    def show_monitor(self, monitor: str) -> None:
+        """Sets the dropdown to what the session has chosen."""
+        self.monitor.value = next(name for name in MONITORS if name == monitor)
 
     def _fault(self, index: int) -> Any:
         fault = FAULTS[index]
@@ -75,12 +84,17 @@ class ExplorePanel:
                 entry = self._page.server.gui.add_text(label, "+".join(f"{value:g}" for value in default))
             else:
                 entry = self._page.server.gui.add_number(label, float(default), step=_step(float(default)))
-            entry.on_update(lambda _, entry=entry, setting=f.name: self._set(name, setting, entry))
+            self._listen(entry, partial(self._page.session.settings.set_command_setting, name, f.name))
             inputs.append(entry)
         return inputs
 
-    def _set(self, name: str, setting: str, entry: Any) -> None:
-        self._change(lambda: self._page.session.settings.set_command_setting(name, setting, entry.value))
+    def _listen(self, entry: Any, setter: Callable[[Any], None]) -> None:
+        """A control's new value goes through its setter, then both models run."""
+
+        def changed(_: Any) -> None:
+            self._change(lambda: setter(entry.value))
+
+        entry.on_update(changed)
 
     def _choose_command(self) -> None:
         name = next((n for n, cls in COMMANDS.items() if cls.title == self._command.value), None)
@@ -93,7 +107,7 @@ class ExplorePanel:
             for entry in inputs:
                 entry.visible = name == chosen
 
-    def _change(self, change: Any) -> bool:
+    def _change(self, change: Callable[[], Any]) -> bool:
         good = self._page.checked(change)
         if good:
             self._page.session.refresh()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -39,7 +40,7 @@ class IdentifyPanel:
             (fitness, settings.set_fitness),
             (seed, settings.set_seed),
         ):
-            entry.on_update(lambda _, entry=entry, change=change: page.checked(lambda: change(entry.value)))
+            self._listen(entry, change)
         self._start = gui.add_button("Identify", icon=viser.Icon.SEARCH)
         self._stop = gui.add_button("Stop", icon=viser.Icon.PLAYER_STOP, color="red", disabled=True)
         self._progress = gui.add_progress_bar(0.0)
@@ -51,6 +52,12 @@ class IdentifyPanel:
         self._stop.on_click(lambda _: page.session.stop())
         page.session.events.progressed.append(self._progressed)
         page.session.events.identified.append(self._identified)
+
+    def _listen(self, entry: Any, setter: Callable[[Any], None]) -> None:
+        def changed(_: Any) -> None:
+            self._page.checked(lambda: setter(entry.value))
+
+        entry.on_update(changed)
 
     def _begin(self) -> None:
         if not self._page.session.ready.is_set():

@@ -26,7 +26,7 @@ class Page:
         for client in self.server.get_clients().values():
             client.add_notification(title, text, auto_close_seconds=8.0, color=colour)
 
-    def checked(self, change: Callable[[], None]) -> bool:
+    def checked(self, change: Callable[[], Any]) -> bool:
         """Applies a change of settings; a bad value becomes a message and leaves the old one."""
         try:
             change()

@@ -16,21 +16,18 @@ Column = tuple[str, list[rr.TimeColumn], Any]
 
 
 class IterationBuffer:
-    """Rows of one algorithm that are not yet sent.  Not thread safe: the writer holds its lock around it."""
+    """Rows of one algorithm that are not yet sent.  Not thread safe."""
 
     def __init__(self, algorithm: str) -> None:
         self._path = algorithm_path(algorithm)
-        self._clear()
-
-    def __len__(self) -> int:
-        return len(self._index)
-
-    def _clear(self) -> None:
         self._index: list[int] = []
         self._rmse: list[float] = []
         self._best: list[Array] = []
         self._population: list[tuple[int, Array]] = []
         self._population_rmse: list[tuple[int, Array]] = []
+
+    def __len__(self) -> int:
+        return len(self._index)
 
     def add(
         self,
@@ -55,16 +52,12 @@ class IterationBuffer:
         self._rmse.append(float(rmse))
         self._best.append(best)
 
-    def drain(self, truth: Array | None) -> Iterator[Column]:
-        """Columns for `send_columns`, all rows at once; leaves the buffer empty.
+    def columns(self, truth: Array | None) -> Iterator[Column]:
+        """Path, times and columns for `send_columns`: all rows of an entity at once.
 
         truth (8,) is repeated along the iterations, since a plot cannot draw what has no time.
         """
         index, rmse, best = self._index, np.array(self._rmse), np.array(self._best)
-        population, population_rmse = self._population, self._population_rmse
-        self._clear()
-        if not index:
-            return
         time = _time(index)
         yield f"{self._path}/rmse", time, rr.Scalars.columns(scalars=rmse)
         # The plots have no logarithmic axis.
@@ -74,11 +67,11 @@ class IterationBuffer:
             yield f"{self._path}/best/{k}", time, rr.Scalars.columns(scalars=best[:, j])
             if truth is not None:
                 yield f"{self._path}/truth/{k}", time, rr.Scalars.columns(scalars=np.full(len(index), truth[j]))
-        if population:
+        if self._population:
             for j, k in enumerate(K_NAMES):
-                yield f"{self._path}/population/{k}", *_ragged([(i, rows[:, j]) for i, rows in population])
-        if population_rmse:
-            yield f"{self._path}/population/rmse", *_ragged(population_rmse)
+                yield f"{self._path}/population/{k}", *_ragged([(i, rows[:, j]) for i, rows in self._population])
+        if self._population_rmse:
+            yield f"{self._path}/population/rmse", *_ragged(self._population_rmse)
 
 
 def _time(index: list[int]) -> list[rr.TimeColumn]:

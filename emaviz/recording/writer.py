@@ -52,8 +52,12 @@ class RecordingWriter:
         self._arranged = repr(self._contents)
         self._styled: set[str] = set()
         self._truth: NDArray[np.float64] | None = None
+        # Iterations come fast: they only go through this gate, and a thread of their own sends them.
+        self._gate = threading.Lock()
         self._buffers: dict[str, IterationBuffer] = {}
-        self._ending = threading.Event()
+        self._last_algorithm: str | None = None
+        self._wake = threading.Event()
+        self._ending = False
         self._flusher: threading.Thread | None = None
 
     @property
@@ -117,17 +121,17 @@ class RecordingWriter:
 
         Gathered, and written in chunks within about a quarter of a second.
         """
-        with self._file.lock:
-            if not self._file.writing:
-                return
+        if not self._file.writing:
+            return
+        with self._gate:
             if algorithm not in self._buffers:
-                self._algorithm(algorithm).iterations = True
                 self._buffers[algorithm] = IterationBuffer(algorithm)
             buffer = self._buffers[algorithm]
             buffer.add(index, rmse, best_k, population_k, population_rmse)
+            self._last_algorithm = algorithm
             if len(buffer) >= _ROWS_PER_CHUNK:
-                self.flush()
-            elif self._flusher is None:
+                self._wake.set()
+            if self._flusher is None:
                 self._flusher = threading.Thread(target=self._flush_regularly, name="recording-flush", daemon=True)
                 self._flusher.start()
 
@@ -142,7 +146,7 @@ class RecordingWriter:
     def result(self, values: Mapping[str, Any], algorithm: str | None = None) -> None:
         """The answer, as a table; `algorithm` can be left out if its iterations came before."""
         with self._file.lock:
-            algorithm = algorithm or next(reversed(self._contents.algorithms), None)
+            algorithm = algorithm or self._last_algorithm
             if algorithm is None:
                 raise ValueError("a result needs its algorithm's name when no iteration came before it")
             self._algorithm(algorithm).result = True
@@ -151,8 +155,11 @@ class RecordingWriter:
     def flush(self) -> None:
         """Brings everything so far to the file, with the layout for it."""
         with self._file.lock:
-            for buffer in self._buffers.values():
-                for path, time, columns in buffer.drain(self._truth):
+            with self._gate:
+                taken, self._buffers = self._buffers, {}
+            for algorithm, buffer in taken.items():
+                self._algorithm(algorithm).iterations = True
+                for path, time, columns in buffer.columns(self._truth):
                     self._send_columns(path, series.iteration_style(path), time, columns)
             if self._arranged != repr(self._contents):
                 self._arranged = repr(self._contents)
@@ -161,12 +168,15 @@ class RecordingWriter:
 
     def close(self) -> None:
         """Finishes the file under its own name; never hangs, never raises, and a second call does nothing."""
-        self._ending.set()
+        self._ending = True
+        self._wake.set()
         self._file.close(self.flush, self._close_timeout_s)
 
     def _flush_regularly(self) -> None:
-        while not self._ending.wait(_FLUSH_EVERY_S):
-            if any(len(buffer) for buffer in list(self._buffers.values())):
+        while not self._ending:
+            self._wake.wait(_FLUSH_EVERY_S)
+            self._wake.clear()
+            if self._buffers:
                 self.flush()
 
     def _algorithm(self, name: str) -> Algorithm:

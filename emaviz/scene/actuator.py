@@ -26,7 +26,9 @@ class ActuatorScene:
         along_x = (np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0)
         scene.add_grid("/ground", width=4.0, height=4.0, position=(0.4, 0.0, -0.36), cell_size=0.2)
 
-        scene.add_cylinder(f"{_ROOT}/housing", radius=0.26, height=0.62, color=(90, 120, 160), opacity=0.22, wxyz=along_x)
+        scene.add_cylinder(
+            f"{_ROOT}/housing", radius=0.26, height=0.62, color=(90, 120, 160), opacity=0.22, wxyz=along_x
+        )
         for i, colour in enumerate(((214, 69, 65), (72, 160, 90), (60, 110, 200))):  # phases A, B, C
             for side in (0.0, np.pi):
                 angle = 2.0 * np.pi * i / 3.0 + side

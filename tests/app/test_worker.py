@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import threading
 import time
 
@@ -139,4 +140,4 @@ def test_a_pace_is_kept_and_the_last_value_still_comes(errors):
         wait_until(lambda: values and values[-1] == last)
     finally:
         worker.close()
-    assert min(b - a for a, b in zip(times, times[1:])) > 0.045
+    assert min(b - a for a, b in itertools.pairwise(times)) > 0.045

@@ -51,7 +51,7 @@ def test_families_are_found_and_created_by_name():
     for name, family in OPTIMISERS.items():
         assert isinstance(create(name, dimension=2), family)
         assert family.title and "doi:10." in family.source
-    with pytest.raises(ValueError, match="unknown optimiser 'pso'; known: .*hba"):
+    with pytest.raises(ValueError, match=r"unknown optimiser 'pso'; known: .*hba"):
         create("pso", dimension=2)
 
 

@@ -1,0 +1,209 @@
+"""Reads a recording back into arrays."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from collections import defaultdict
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+from rerun.chunk import RrdReader
+
+from emaviz.recording import binary
+from emaviz.recording.errors import RecordingError
+from emaviz.recording.style import GROUPS, ITERATION, K_NAMES, SIM_TIME
+from emaviz.recording.writer import PROPERTIES
+
+Array = NDArray[np.float64]
+_MAGIC = (b"RRF", b"RRI")
+_REPAIR_TIMEOUT_S = 120.0
+
+
+class Series(NamedTuple):
+    """A signal: values (n,) at time_s (n,)."""
+
+    time_s: Array
+    values: Array
+
+
+@dataclass
+class IdentificationTrace:
+    """The iterations of one algorithm, in order."""
+
+    iteration: NDArray[np.int64]  # (n,)
+    rmse: Array  # (n,), A
+    best: Array  # (n, 8)
+    population: Array | None  # (m, N, 8) on the m iterations that have one; NaN where it was smaller than N
+    population_rmse: Array | None  # (m, N), A
+    monitor: dict[int, Series]  # current, A, of the best individual by iteration
+    result: str | None  # Markdown
+
+
+@dataclass
+class Recording:
+    """What a recording holds."""
+
+    path: Path
+    signals: dict[str, dict[str, Series]] = field(default_factory=dict)
+    identification: dict[str, IdentificationTrace] = field(default_factory=dict)
+    truth: Array | None = None  # (8,)
+    config: str | None = None  # Markdown
+    properties: dict[str, Any] = field(default_factory=dict)
+    name: str | None = None
+    complete: bool = True  # False: damaged, and read up to the damage
+
+    @property
+    def groups(self) -> list[str]:
+        """The groups of signals that are in the file."""
+        return list(self.signals)
+
+
+def check(path: str | Path) -> Path:
+    """The path, if there is a file that starts like a recording; RecordingError with one line otherwise."""
+    path = Path(path)
+    if path.is_dir():
+        raise RecordingError(f"{path}: is a folder; the name of a .rrd file is needed")
+    try:
+        with path.open("rb") as file:
+            start = file.read(4)
+    except FileNotFoundError:
+        raise RecordingError(f"{path}: no such file") from None
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot be read: {error.strerror}") from error
+    if not start.startswith(_MAGIC):
+        raise RecordingError(f"{path}: is {'empty' if not start else 'no Rerun recording'}; a .rrd file is needed")
+    return path
+
+
+def read(path: str | Path) -> Recording:
+    """Everything in the file.
+
+    A file without its end (its writer was killed) is read as far as it goes; one that is damaged is first repaired
+    in a copy, the file itself is left alone.  RecordingError: missing, no recording, or past repair.
+    """
+    path = check(path)
+    try:
+        return _Chunks(path).recording(path)
+    except Exception as error:  # the reader raises whatever its native part makes of the damage
+        first = error
+    with tempfile.TemporaryDirectory(prefix="emaviz-") as folder:
+        copy = Path(folder, "repaired.rrd")
+        try:
+            repair(path, copy)
+            recording = _Chunks(copy).recording(path)
+        except Exception:
+            raise RecordingError(f"{path}: is damaged and cannot be repaired: {' '.join(str(first).split())}") from first
+    recording.complete = False
+    return recording
+
+
+def repair(source: Path, target: Path) -> None:
+    """Writes what can be read of `source` to `target` as a whole file.  RecordingError if that is nothing."""
+    binary.run("rrd", "optimize", str(source), "-o", str(target), timeout_s=_REPAIR_TIMEOUT_S)
+    if not target.is_file() or not RrdReader(target).recordings():
+        raise RecordingError(f"{source}: nothing in it can be read")
+
+
+class _Chunks:
+    """All columns of a file by entity path, put together from its chunks."""
+
+    def __init__(self, path: Path) -> None:
+        self.static: dict[str, dict[str, list]] = defaultdict(dict)
+        self._rows: dict[str, list[tuple[NDArray, NDArray[np.int64], Array]]] = defaultdict(list)
+        newest: dict[tuple[str, str], bytes] = {}
+        for chunk in RrdReader(path).stream():
+            batch = chunk.to_record_batch()
+            if not chunk.is_static:
+                self._add(str(chunk.entity_path), batch)
+                continue
+            for name in batch.schema.names[1:]:
+                for row, value in zip(batch.column(0).to_pylist(), batch.column(name).to_pylist(), strict=True):
+                    key = str(chunk.entity_path), name
+                    if value is not None and row >= newest.get(key, b""):  # row ids grow with time
+                        newest[key] = row
+                        self.static[key[0]][name] = value
+
+    def _add(self, path: str, batch: pa.RecordBatch) -> None:
+        timeline = next((t for t in (SIM_TIME, ITERATION) if t in batch.schema.names), None)
+        if timeline is None or "Scalars:scalars" not in batch.schema.names:
+            return
+        lists = batch.column("Scalars:scalars")
+        times = np.asarray(batch.column(timeline).cast(pa.int64()))
+        lengths = np.asarray(lists.value_lengths().fill_null(0), dtype=np.int64)
+        self._rows[path].append((times, lengths, np.asarray(lists.flatten(), dtype=float)))
+
+    @property
+    def paths(self) -> list[str]:
+        """Entities with values over time."""
+        return list(self._rows)
+
+    def rows(self, path: str) -> tuple[NDArray[np.int64], Array]:
+        """Times (n,) in order, and values (n, widest row), NaN where a row is shorter."""
+        parts = self._rows.get(path, [])
+        if not parts:
+            return np.empty(0, np.int64), np.empty((0, 0))
+        times = np.concatenate([part[0] for part in parts])
+        lengths = np.concatenate([part[1] for part in parts])
+        flat = np.concatenate([part[2] for part in parts])
+        values = np.full((len(times), int(lengths.max(initial=0))), np.nan)
+        values[np.arange(values.shape[1]) < lengths[:, None]] = flat
+        order = np.argsort(times, kind="stable")
+        return times[order], values[order]
+
+    def series(self, path: str) -> Series:
+        """One value a row, at seconds."""
+        times, values = self.rows(path)
+        return Series(times / 1e9, values[:, 0])
+
+    def text(self, path: str) -> str | None:
+        """A text document."""
+        value = self.static.get(path, {}).get("TextDocument:text")
+        return value[0] if value else None
+
+    def recording(self, path: Path) -> Recording:
+        """All of it, by what it means."""
+        found = Recording(path, config=self.text("/config"))
+        for group in GROUPS:
+            prefix = f"/{group}/"
+            signals = {p.removeprefix(prefix): self.series(p) for p in self.paths if p.startswith(prefix)}
+            if signals:
+                found.signals[group] = signals
+        algorithms = dict.fromkeys(p.split("/")[2] for p in self.paths if p.startswith("/identification/"))
+        found.identification = {name: self._trace(f"/identification/{name}") for name in algorithms}
+        truth = [self.static.get(f"/truth/{k}", {}).get("Scalars:scalars") for k in K_NAMES]
+        if all(truth):
+            found.truth = np.array([value[0] for value in truth if value], dtype=float)
+        properties = self.static.get(f"/__properties/{PROPERTIES}", {})
+        found.properties = {name: json.loads(value[0]) for name, value in properties.items()}
+        name = self.static.get("/__properties", {}).get("RecordingInfo:name")
+        found.name = name[0] if name else None
+        return found
+
+    def _trace(self, root: str) -> IdentificationTrace:
+        iteration, rmse = self.rows(f"{root}/rmse")
+        best = [self.rows(f"{root}/best/{k}")[1] for k in K_NAMES]
+        population = [self.rows(f"{root}/population/{k}")[1] for k in K_NAMES]
+        population_rmse = self.rows(f"{root}/population/rmse")[1]
+        prefix = f"{root}/monitor/iteration_"
+        monitor = {int(p.removeprefix(prefix).split("/")[0]): p for p in self.paths if p.startswith(prefix)}
+        # A file cut short can end between the entities of one chunk: keep what all of them have.
+        count = min([len(iteration), *map(len, best)])
+        return IdentificationTrace(
+            iteration=iteration[:count],
+            rmse=rmse[:count].reshape(-1),
+            best=np.hstack([values[:count] for values in best]) if count else np.empty((0, 8)),
+            population=_stacked(population),
+            population_rmse=population_rmse if len(population_rmse) else None,
+            monitor={index: self.series(p) for index, p in sorted(monitor.items())},
+            result=self.text(f"{root}/result"),
+        )
+
+
+def _stacked(columns: list[Array]) -> Array | None:
+    count = min(map(len, columns))
+    return np.stack([values[:count] for values in columns], axis=-1) if count else None

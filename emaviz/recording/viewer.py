@@ -1,0 +1,188 @@
+"""Hosts the Rerun web viewer and recordings on the loopback interface, without any other network."""
+
+from __future__ import annotations
+
+import shutil
+import socketserver
+import threading
+import webbrowser
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote, unquote, urlsplit
+
+from emaviz.recording.assets import viewer_assets
+from emaviz.recording.errors import RecordingError
+from emaviz.recording.read import check
+
+_FOLDER = "/recordings/"
+_CSP = "; ".join(
+    (
+        "default-src 'self'",
+        # The viewer would otherwise call its makers' servers for telemetry and news.
+        "connect-src 'self' blob: data: http://127.0.0.1:*",
+        "script-src 'self' 'unsafe-inline' 'wasm-unsafe-eval'",
+        "style-src 'self' 'unsafe-inline'",
+        "img-src 'self' blob: data:",
+        "worker-src 'self' blob:",
+        "frame-ancestors 'self' http://127.0.0.1:* http://localhost:*",
+        "object-src 'none'; base-uri 'none'; form-action 'none'",
+    )
+)
+
+
+class ViewerHost:
+    """Serves the viewer and the .rrd files of one folder to browsers on this machine, until `close`.
+
+    The viewer's files are fetched from the installed rerun-sdk on the first request.
+    """
+
+    def __init__(self, folder: str | Path, *, port: int = 0, only: str | None = None) -> None:
+        """port 0 takes a free one; only: the single file to serve.  RecordingError: no folder, port taken."""
+        self.folder = Path(folder).resolve()
+        self.only = only
+        if not self.folder.is_dir():
+            raise RecordingError(f"{folder}: no such folder")
+        try:
+            self._server = _Server(("127.0.0.1", port), _Handler)
+        except (OSError, OverflowError) as error:
+            why = error.strerror.lower() if isinstance(error, OSError) and error.strerror else str(error)
+            raise RecordingError(f"port {port} cannot be used: {why}; choose another, or 0 for a free one") from error
+        self._server.host = self
+        self.port: int = self._server.server_address[1]
+        self.address = f"http://127.0.0.1:{self.port}"
+        self._thread = threading.Thread(target=self._server.serve_forever, name="rerun-viewer", daemon=True)
+        self._thread.start()
+
+    def __enter__(self) -> ViewerHost:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def url_of(self, name: str) -> str:
+        """The address at which a browser shows this recording of the folder."""
+        file = quote(f"{self.address}{_FOLDER}{quote(name, safe='')}", safe="")
+        return f"{self.address}/?url={file}&hide_welcome_screen=1&persist=0&notebook=0"
+
+    def find(self, name: str) -> Path | None:
+        """The recording of that name, if it lies in the folder itself and may be served."""
+        if Path(name).name != name or not name.endswith(".rrd") or "\0" in name or self.only not in (None, name):
+            return None
+        path = (self.folder / name).resolve()  # a link could lead outside
+        return path if path.parent == self.folder and path.is_file() else None
+
+    def close(self) -> None:
+        """Stops serving and frees the port."""
+        self._server.shutdown()
+        self._server.server_close()
+        self._thread.join(5.0)
+
+    def wait(self) -> None:
+        """Returns when the server has stopped."""
+        self._thread.join()
+
+
+def view(path: str | Path, open_browser: bool = True, port: int = 0) -> None:
+    """Shows one recording in the browser until Ctrl-C; prints the address.  RecordingError if it cannot."""
+    path = check(path)
+    with ViewerHost(path.parent, port=port, only=path.name) as host:
+        address = host.url_of(path.name)
+        print(f"{path.name}: {address}\nCtrl-C ends it.", flush=True)
+        if open_browser:
+            webbrowser.open(address)
+        try:
+            host.wait()
+        except KeyboardInterrupt:
+            return
+
+
+class _Server(socketserver.ThreadingMixIn, socketserver.TCPServer):
+    """A thread a request; none outlives the process."""
+
+    daemon_threads = True
+    allow_reuse_address = True
+    block_on_close = False
+    host: ViewerHost
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """A browser that goes away in the middle is no error worth a traceback."""
+
+
+class _Handler(BaseHTTPRequestHandler):
+    """Answers GET and HEAD; everything else is refused by the base class."""
+
+    server: _Server
+    protocol_version = "HTTP/1.1"
+    timeout = 30
+    server_version = "emaviz"
+    sys_version = ""
+
+    def do_GET(self) -> None:
+        """The viewer's files and the recordings."""
+        # A page elsewhere could otherwise reach us under a name of its own that resolves to this machine.
+        if self.headers.get("Host") not in (f"127.0.0.1:{self.server.host.port}", f"localhost:{self.server.host.port}"):
+            self._refuse(HTTPStatus.FORBIDDEN, "wrong host")
+            return
+        path = urlsplit(self.path).path
+        if path.startswith(_FOLDER):
+            self._recording(unquote(path.removeprefix(_FOLDER)))
+        else:
+            self._asset(path.removeprefix("/") or "index.html")
+
+    do_HEAD = do_GET
+
+    def _asset(self, name: str) -> None:
+        try:
+            asset = viewer_assets().get(name)
+        except RecordingError as error:
+            self._refuse(HTTPStatus.SERVICE_UNAVAILABLE, str(error))
+            return
+        if asset is None:
+            self._refuse(HTTPStatus.NOT_FOUND, "no such page")
+            return
+        common = {"ETag": asset.tag, "Cache-Control": "no-cache", "Vary": "Accept-Encoding"}
+        if self.headers.get("If-None-Match") == asset.tag:
+            self._head(HTTPStatus.NOT_MODIFIED, common)
+            return
+        body = asset.body
+        if "gzip" in self.headers.get("Accept-Encoding", ""):
+            body = asset.compressed
+            common["Content-Encoding"] = "gzip"
+        # By the last header the viewer's page knows how much is still to come.
+        length = {"Content-Length": str(len(body)), "rerun-final-length": str(len(asset.body))}
+        self._head(HTTPStatus.OK, {"Content-Type": asset.content_type, **length, **common})
+        if self.command == "GET":
+            self.wfile.write(body)
+
+    def _recording(self, name: str) -> None:
+        path = self.server.host.find(name)
+        if path is None:
+            self._refuse(HTTPStatus.NOT_FOUND, "no such recording")
+            return
+        with path.open("rb") as file:
+            size = path.stat().st_size
+            headers = {"Content-Type": "application/octet-stream", "Content-Length": str(size)}
+            self._head(HTTPStatus.OK, {**headers, "Cache-Control": "no-store"})
+            if self.command == "GET":
+                shutil.copyfileobj(file, self.wfile, 1 << 20)
+
+    def _refuse(self, status: HTTPStatus, message: str) -> None:
+        body = f"{status.value}: {message}\n".encode()
+        self._head(status, {"Content-Type": "text/plain; charset=utf-8", "Content-Length": str(len(body))})
+        if self.command == "GET":
+            self.wfile.write(body)
+
+    def _head(self, status: HTTPStatus, headers: dict[str, str]) -> None:
+        self.send_response(status)
+        for name, value in headers.items():
+            self.send_header(name, value)
+        self.send_header("Content-Security-Policy", _CSP)
+        self.send_header("X-Content-Type-Options", "nosniff")
+        self.send_header("Referrer-Policy", "no-referrer")
+        self.send_header("Cross-Origin-Resource-Policy", "same-origin")
+        self.end_headers()
+
+    def log_message(self, format: str, *args: Any) -> None:
+        """Silent."""

@@ -1,0 +1,147 @@
+"""The page in a real browser: break the actuator, watch, identify, find it in the recording."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+
+from emaviz.recording import read
+
+pytestmark = pytest.mark.browser
+
+CHART = """(title) => {
+  const charts = Object.values(window.__viserTestpoints.uplots).map(u => u.chart);
+  const chart = charts.find(c => c.root.querySelector('.u-title')?.textContent === title);
+  return chart ? Array.from(chart.data, a => Array.from(a)) : null;
+}"""
+
+
+def row(page, label):
+    """The row of a control, by how its label begins."""
+    found = page.locator("label", has_text=label).first
+    return found.locator("xpath=ancestor::div[contains(@class,'mantine-Flex-root')][1]")
+
+
+def set_slider(page, label, value):
+    box = row(page, label).locator("input:not([type=hidden])").first
+    box.fill(str(value))
+    box.press("Enter")
+
+
+def wait_until(condition, seconds=20.0):
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+def chart(page, title):
+    return np.array(page.evaluate(CHART, title))
+
+
+def test_charts_show_both_models_with_units(page):
+    for title, unit in (("Equivalent current", "A"), ("User position", "mrad"), ("Motor speed", "rad/s")):
+        data = chart(page, title)
+        assert data.shape[1] > 300 and np.all(np.isfinite(data))
+        assert data[0, 0] == 0.0 and data[0, -1] == pytest.approx(0.5, abs=0.01)
+        reference, monitor = data[2], data[3]
+        assert np.std(reference) > 0 and np.corrcoef(reference, monitor)[0, 1] > 0.99, unit
+
+
+def test_a_slider_breaks_the_actuator_and_reset_heals_it(page, app):
+    before = chart(page, "Equivalent current")
+    set_slider(page, "k1", 0.8)
+    wait_until(lambda: app.session.settings.k[0] == 0.8)
+    wait_until(lambda: not np.array_equal(chart(page, "Equivalent current"), before))
+    row(page, "k1 friction × 2.60").wait_for()
+    page.wait_for_timeout(300)
+    broken = chart(page, "Equivalent current")
+    assert np.abs(broken[2]).mean() > 1.2 * np.abs(before[2]).mean()
+    assert np.abs(broken[1]).max() > 3.0 * np.abs(before[1]).max()  # the healthy monitor does not follow
+    page.get_by_role("button", name="Reset to healthy").click()
+    wait_until(lambda: app.session.settings.k[0] == 0.0)
+    wait_until(lambda: np.allclose(chart(page, "Equivalent current")[2], before[2]))
+
+
+def test_the_command_and_its_settings_reach_the_plant(page, app):
+    page.get_by_label("Command", exact=True).click()
+    page.get_by_role("option", name="Sine", exact=True).click()
+    wait_until(lambda: app.session.settings.command == "sine")
+    page.get_by_label("Frequency [Hz]", exact=True).fill("4")
+    page.get_by_label("Frequency [Hz]", exact=True).press("Enter")
+    wait_until(lambda: app.session.settings.run().command.settings()["frequency_Hz"] == 4.0)
+    wait_until(lambda: abs(np.abs(chart(page, "Motor speed")[2]).max() - 0.005 * 500 * 2 * np.pi * 4) < 15.0)
+    page.get_by_label("Command", exact=True).click()
+    page.get_by_role("option", name="Chirp", exact=True).click()
+    wait_until(lambda: app.session.settings.command == "chirp")
+
+
+def test_a_bad_value_is_told_and_the_page_goes_on(page, app):
+    page.get_by_label("End time [s]", exact=True).fill("0")
+    page.get_by_label("End time [s]", exact=True).press("Enter")
+    page.get_by_text("end_time_s must be above 0").wait_for(timeout=10_000)
+    assert app.session.settings.run().command.settings()["end_time_s"] == 0.5
+    set_slider(page, "k2", 0.5)
+    wait_until(lambda: app.session.settings.k[1] == 0.5)
+    page.get_by_role("button", name="Reset to healthy").click()
+    wait_until(lambda: app.session.settings.k[1] == 0.0)
+
+
+def test_identify_runs_ends_and_is_recorded(page, app):
+    set_slider(page, "k1", 0.25)
+    wait_until(lambda: app.session.settings.k[0] == 0.25)
+    page.get_by_role("tab", name="Identify").click()
+    page.get_by_label("Algorithm", exact=True).click()
+    page.get_by_role("option", name="do", exact=True).click()
+    wait_until(lambda: app.session.settings.algorithm == "do")
+    page.get_by_role("button", name="Identify").dblclick()  # one run, not two
+    page.get_by_role("link", name="in Rerun").wait_for(timeout=120_000)
+    page.get_by_text("Err").wait_for()
+    curve = chart(page, "Convergence")
+    assert curve.shape[1] == 151 and np.all(np.diff(curve[1]) <= 0.0)
+
+    recordings = list(app.session.folder.glob("*.rrd"))
+    assert len(recordings) == 1
+    recording = read(recordings[0])
+    found = recording.identification["do"]
+    assert np.allclose(found.best[-1], app.session.identified.k)
+    assert abs(found.best[-1][0] - 0.25) < 0.02
+    assert recording.truth[0] == pytest.approx(0.25)
+
+    page.get_by_role("tab", name="Recordings").click()
+    page.get_by_role("link", name=recordings[0].name).wait_for()
+
+
+def test_stop_is_quick_and_keeps_the_result(page, app):
+    page.get_by_role("tab", name="Identify").click()
+    page.get_by_label("Iterations", exact=True).fill("5000")
+    page.get_by_label("Iterations", exact=True).press("Enter")
+    wait_until(lambda: app.session.settings.iterations == 5000)
+    page.get_by_role("button", name="Identify").click()
+    wait_until(lambda: app.session.worker.busy)
+    page.get_by_text("of 5000").wait_for(timeout=30_000)
+    page.get_by_role("button", name="Stop").click()
+    page.get_by_text("stopped").wait_for(timeout=30_000)
+    assert not app.session.worker.busy
+    assert app.session.identified.stopped
+    page.get_by_label("Iterations", exact=True).fill("150")
+    page.get_by_label("Iterations", exact=True).press("Enter")
+    wait_until(lambda: app.session.settings.iterations == 150)
+
+
+def test_sliders_answer_while_an_identification_runs(page, app):
+    page.get_by_role("tab", name="Identify").click()
+    page.get_by_label("Iterations", exact=True).fill("2000")
+    page.get_by_label("Iterations", exact=True).press("Enter")
+    wait_until(lambda: app.session.settings.iterations == 2000)
+    page.get_by_role("button", name="Identify").click()
+    wait_until(lambda: app.session.worker.busy)
+    page.get_by_role("tab", name="Explore").click()
+    before = chart(page, "Equivalent current")
+    set_slider(page, "k3", 0.6)
+    wait_until(lambda: not np.array_equal(chart(page, "Equivalent current"), before))
+    assert app.session.worker.busy
+    app.session.stop()
+    wait_until(lambda: not app.session.worker.busy)

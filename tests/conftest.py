@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-_SOFTWARE_GL = (
+SOFTWARE_GL = (
     "--no-sandbox --disable-quic --no-first-run --disable-background-networking --disable-component-update "
     "--disable-sync --use-gl=angle --use-angle=gl-egl --ignore-gpu-blocklist --disable-accelerated-2d-canvas "
     "--disable-gpu-rasterization"
@@ -28,6 +28,6 @@ def browser() -> Iterator[Any]:
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=path, args=_SOFTWARE_GL, headless=True)
+        chromium = playwright.chromium.launch(executable_path=path, args=SOFTWARE_GL, headless=True)
         yield chromium
         chromium.close()

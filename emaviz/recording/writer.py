@@ -49,7 +49,6 @@ class RecordingWriter:
         self._file = RrdFile(self.path, name or self.path.stem, min_free_bytes)
         self._close_timeout_s = close_timeout_s
         self._contents = Contents()
-        self._arranged = repr(self._contents)
         self._styled: set[str] = set()
         self._truth: NDArray[np.float64] | None = None
         # Iterations come fast: they only go through this gate, and a thread of their own sends them.
@@ -153,7 +152,7 @@ class RecordingWriter:
             self._text(f"{style.algorithm_path(algorithm)}/result", table(f"Result of {algorithm}", values))
 
     def flush(self) -> None:
-        """Brings everything so far to the file, with the layout for it."""
+        """Brings everything so far to the file."""
         with self._file.lock:
             with self._gate:
                 taken, self._buffers = self._buffers, {}
@@ -161,16 +160,18 @@ class RecordingWriter:
                 self._algorithm(algorithm).iterations = True
                 for path, time, columns in buffer.columns(self._truth):
                     self._send_columns(path, series.iteration_style(path), time, columns)
-            if self._arranged != repr(self._contents):
-                self._arranged = repr(self._contents)
-                self._file.do(lambda stream: stream.send_blueprint(build(self._contents)))
             self._file.flush()
 
     def close(self) -> None:
         """Finishes the file under its own name; never hangs, never raises, and a second call does nothing."""
         self._ending = True
         self._wake.set()
-        self._file.close(self.flush, self._close_timeout_s)
+        self._file.close(self._last, self._close_timeout_s)
+
+    def _last(self) -> None:
+        self.flush()
+        # Only now is it known what to arrange; the viewer would stumble through several layouts in one file.
+        self._file.do(lambda stream: stream.send_blueprint(build(self._contents)))
 
     def _flush_regularly(self) -> None:
         while not self._ending:

@@ -19,10 +19,11 @@ class ActuatorScene:
         scene = server.scene
         scene.set_up_direction("+z")
         scene.configure_environment_map(None)
+        scene.configure_default_lights(cast_shadow=False)  # shadows halve the frame rate without a GPU
         scene.add_light_ambient("/light/ambient", intensity=1.4)
         scene.add_light_hemisphere("/light/sky", intensity=1.2)
-        server.initial_camera.position = (0.75, -3.1, 1.5)
-        server.initial_camera.look_at = (0.5, 0.0, -0.05)
+        server.initial_camera.position = (0.75, -2.9, 1.3)
+        server.initial_camera.look_at = (0.5, 0.0, 0.0)
         along_x = (np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0)
         scene.add_grid("/ground", width=4.0, height=4.0, position=(0.4, 0.0, -0.36), cell_size=0.2)
 

@@ -43,6 +43,7 @@ class App:
         self.page = Page(self.server, self.session, self.screen)
         self._build(recordings)
         self.playback = Playback(ActuatorScene(self.server))
+        self._play.on_update(lambda _: self.playback.play(bool(self._play.value)))
         self._first = threading.Event()
         self.first_picture_s = 0.0
         events = self.session.events
@@ -62,6 +63,9 @@ class App:
         tabs = gui.add_tab_group()
         with tabs.add_tab("Explore", viser.Icon.ADJUSTMENTS):
             self.explore = ExplorePanel(self.page)
+            with gui.add_folder("Picture"):
+                self._caption = gui.add_markdown("")
+                self._play = gui.add_checkbox("Play", True)
         with tabs.add_tab("Identify", viser.Icon.SEARCH):
             self.identify = IdentifyPanel(self.page, self.viewer)
         with tabs.add_tab("Recordings", viser.Icon.LIST):
@@ -94,6 +98,9 @@ class App:
         with self.server.atomic():
             self.signals.show(simulation.reference, simulation.monitor)
         self.playback.show(simulation)
+        caption = self.playback.caption(simulation)
+        if self._caption.content != caption:
+            self._caption.content = caption
         if self.explore.monitor.value != self.session.settings.monitor:
             self.explore.show_monitor(self.session.settings.monitor)
         if not self._first.is_set():

@@ -49,7 +49,10 @@ def build(contents: Contents) -> rrb.Blueprint:
     if more is not None:
         tabs.append(more)
     for name, algorithm in contents.algorithms.items():
-        tabs.append(_identification_tab(name, algorithm, contents))
+        if algorithm.monitor:
+            tabs.append(_fit_tab(name, contents))
+        if algorithm.iterations or algorithm.result:
+            tabs.append(_identification_tab(name, algorithm))
     if contents.config:
         tabs.append(rrb.TextDocumentView(origin="/config", name="Configuration"))
     return rrb.Blueprint(
@@ -91,21 +94,24 @@ def _more_tab(contents: Contents) -> rrb.Container | None:
     return rrb.Grid(*views, name="More signals") if views else None
 
 
-def _identification_tab(name: str, algorithm: Algorithm, contents: Contents) -> rrb.Container:
+def _fit_tab(name: str, contents: Contents) -> rrb.View:
+    targets = [f"/{group}/current_A" for group in contents.groups_with("current_A") if group != "monitor"]
+    return _plot(f"Fit {name}: MM current through the iterations [A]", [*targets, f"{algorithm_path(name)}/monitor/**"])
+
+
+def _identification_tab(name: str, algorithm: Algorithm) -> rrb.Container:
     root = algorithm_path(name)
     left: list[rrb.Container | rrb.View] = []
+    right: list[rrb.Container | rrb.View] = []
     if algorithm.iterations:
         left.append(_plot("Convergence: log10 of best RMSE [A]", [f"{root}/log10_rmse"], legend=False, linked=False))
-    if algorithm.monitor:
-        targets = [f"/{g}/current_A" for g in contents.groups_with("current_A") if g != "monitor"]
-        left.append(_plot("MM current through the iterations [A]", [*targets, f"{root}/monitor/**"]))
+        right.append(rrb.Grid(*(_k_view(root, k) for k in K_NAMES), grid_columns=2))
     if algorithm.result:
         left.append(rrb.TextDocumentView(origin=f"{root}/result", name="Result"))
-    columns: list[rrb.Container | rrb.View] = [rrb.Vertical(*left)] if left else []
-    if algorithm.iterations:
-        columns.append(rrb.Grid(*(_k_view(root, k) for k in K_NAMES), grid_columns=2))
-    shares = [2, 3] if len(columns) == 2 else None
-    return rrb.Horizontal(*columns, column_shares=shares, name=f"Identification {name}")
+    # Every plot follows the one timeline chosen below, and a file has no means to change it with the tab.
+    title = f"Identification {name} (below, choose the timeline: iteration)"
+    shares = [2, 3] if right else None
+    return rrb.Horizontal(rrb.Vertical(*left), *right, column_shares=shares, name=title)
 
 
 def _k_view(root: str, k: str) -> rrb.TimeSeriesView:

@@ -22,7 +22,7 @@ APPLICATION = "emaviz"
 SIM_TIME = "sim_time"
 ITERATION = "iteration"
 K_NAMES = tuple(fault.name for fault in FAULTS)
-K_TITLES = {fault.name: f"{fault.name} {fault.title.lower()} [-]" for fault in FAULTS}
+K_TITLES = {fault.name: f"{fault.name} {fault.title[0].lower()}{fault.title[1:]} [-]" for fault in FAULTS}
 
 GROUPS = ("reference", "monitor", "measurement", "residual")
 GROUP_TITLES = {"reference": "RM", "monitor": "MM", "measurement": "Measured", "residual": "Residual"}

@@ -22,13 +22,22 @@ class Playback:
         self._speed = speed
         self._simulation: Simulation | None = None
         self._closing = threading.Event()
-        self.playing = True
+        self._playing = True
         self._thread = threading.Thread(target=self._run, name="emaviz-playback", daemon=True)
         self._thread.start()
 
     def show(self, simulation: Simulation) -> None:
         """Plays this run from now on, from the same moment."""
         self._simulation = simulation
+
+    def play(self, playing: bool) -> None:
+        """Lets the picture move or rest."""
+        self._playing = playing
+
+    def caption(self, simulation: Simulation) -> str:
+        """What of the picture is not to scale."""
+        enlarged = self.exaggeration(simulation)
+        return f"Played {1.0 / self._speed:g} × slower; the surface's motion is enlarged {enlarged:g} ×."
 
     def exaggeration(self, simulation: Simulation) -> float:
         """By how much the surface's motion is enlarged: a round number."""
@@ -50,7 +59,7 @@ class Playback:
             now = time.monotonic()
             clock, last = clock + (now - last) * self._speed, now
             simulation = self._simulation
-            if simulation is None or not self.playing:
+            if simulation is None or not self._playing:
                 continue
             reference = simulation.reference
             clock %= reference.duration_s

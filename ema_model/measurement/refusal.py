@@ -26,3 +26,8 @@ def listed(names: Iterable[str]) -> str:
 def refusal(path: str | os.PathLike[str], problem: str) -> InputError:
     """The error to raise: the file's name as given, then what is wrong, where, and what to do."""
     return InputError(f"{shown(os.fspath(path), 300)}: {problem}")
+
+
+def reason(error: Exception) -> str:
+    """What the system says about an error, on one line."""
+    return shown(getattr(error, "strerror", None) or error, 80)

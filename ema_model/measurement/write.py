@@ -1,49 +1,49 @@
-"""Writing recordings: CSV and Parquet, whole or not at all."""
+"""Writes a measurement to a file of any format."""
 
 from __future__ import annotations
 
-import contextlib
 import os
-import tempfile
-from pathlib import Path
+import secrets
+from contextlib import suppress
 
-import pyarrow as pa
-import pyarrow.csv
-import pyarrow.parquet
-
-from ema_model.errors import InputError
+from ema_model.measurement.checks import check_finite
+from ema_model.measurement.formats import format_of
 from ema_model.measurement.measurement import Measurement
+from ema_model.measurement.refusal import reason, refusal, shown
 
 
-def write_measurement(measurement: Measurement, path: str | Path) -> None:
-    """Writes a .csv or .parquet file, replacing one that is there only when all is written."""
-    path = Path(path)
+def write_measurement(measurement: Measurement, path: str | os.PathLike[str]) -> None:
+    """Writes all signals in the format that the suffix names; the file appears whole or not at all.
+
+    An older file of that name is replaced; folders are not made.  Raises InputError for a place that cannot
+    be written and for values that are not finite, which no reader would take back.
+    """
+    path = os.fspath(path)
     check_target(path)
-    table = pa.table({name: pa.array(values) for name, values in measurement.signals.items()})
-    handle, draft = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}-")
-    os.close(handle)
+    check_finite(path, measurement.signals, lambda row: f"sample {row + 1}")
+    target = os.path.realpath(path)
+    part = os.path.join(os.path.dirname(target), f".{secrets.token_hex(8)}.part")
     try:
-        if path.suffix.lower() == ".csv":
-            pa.csv.write_csv(table, draft, pa.csv.WriteOptions(quoting_style="none"))
-        else:
-            pa.parquet.write_table(table.replace_schema_metadata({"emaviz_schema": "1"}), draft)
-        os.chmod(draft, 0o644)
-        os.replace(draft, path)
-    except BaseException as error:
-        with contextlib.suppress(OSError):
-            os.unlink(draft)
-        if isinstance(error, OSError):
-            raise InputError(f"{path}: cannot be written ({error.strerror or error})") from None
-        raise
+        format_of(path).write(measurement.signals, part)
+        os.replace(part, target)
+    except OSError as error:
+        raise refusal(path, f"cannot be written ({reason(error)}); check the disk and the permissions") from None
+    finally:
+        with suppress(OSError):
+            os.remove(part)  # left over by a failure only
 
 
-def check_target(path: Path) -> None:
-    """InputError unless a recording can be written there."""
-    if path.suffix.lower() not in (".csv", ".parquet"):
-        raise InputError(f"{path}: write to a .csv or .parquet file")
-    if path.is_dir():
-        raise InputError(f"{path}: is a folder; name a file in it")
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: the folder {path.parent} does not exist; make it first")
-    if not os.access(path.parent, os.W_OK):
-        raise InputError(f"{path}: no permission to write in {path.parent}")
+def check_target(path: str | os.PathLike[str]) -> None:
+    """Raises InputError unless a measurement can be written there; to be asked before a long run."""
+    path = os.fspath(path)
+    if os.path.isdir(path):
+        raise refusal(path, "is a folder; the name of a file is expected")
+    format_of(path)
+    target = os.path.realpath(path)
+    folder = os.path.dirname(target)
+    if not os.path.isdir(folder):
+        raise refusal(path, f"there is no folder {shown(os.path.dirname(path) or folder, 200)!r}; make it first")
+    if os.path.exists(target) and not os.path.isfile(target):
+        raise refusal(path, "is not a regular file; take another name")
+    if not os.access(folder, os.W_OK):
+        raise refusal(path, "no permission to write into its folder; take another folder")

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 
+from ema_model.errors import InputError
+
 HELP = "open a .rrd recording in the Rerun viewer (in the browser, no network needed)"
 
 
@@ -16,7 +18,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Serves the viewer until interrupted."""
+    from emaviz.recording import RecordingError
     from emaviz.recording.viewer import view
 
-    view(arguments.file, open_browser=arguments.open, port=arguments.port)
+    try:
+        view(arguments.file, open_browser=arguments.open, port=arguments.port)
+    except RecordingError as error:
+        raise InputError(str(error)) from None
     return 0

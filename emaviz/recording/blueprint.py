@@ -56,7 +56,7 @@ def build(contents: Contents) -> rrb.Blueprint:
     if contents.config:
         tabs.append(rrb.TextDocumentView(origin="/config", name="Configuration"))
     return rrb.Blueprint(
-        rrb.Tabs(*tabs, active_tab=0),
+        rrb.Tabs(*tabs, active_tab=0 if tabs else None),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
         rrb.TimePanel(

@@ -68,7 +68,7 @@ class RrdFile:
                     action(self._stream)
             except Exception as error:
                 self._sound = False
-                self.failed = f"{self.path}: recording stopped: {_one_line(error)}; what there is: {self.part.name}"
+                self._fail(f"recording stopped: {_one_line(error)}")
 
     def flush(self) -> None:
         """To the disk, with all that was sent; stops in time, still whole, when the disk runs full."""
@@ -77,6 +77,10 @@ class RrdFile:
         if self.writing and free < self._min_free_bytes // 10:
             self.failed = f"{self.path}: recording stopped: only {free / 1e6:.0f} MB free; free some space"
 
+    def _fail(self, why: str) -> None:
+        """The first failure is the one to tell."""
+        self.failed = self.failed or f"{self.path}: {why}; what there is: {self.part.name}"
+
     def close(self, last: Callable[[], None], timeout_s: float) -> None:
         """Does `last`, then finishes the file.  Never raises, and returns within `timeout_s`, about.
 
@@ -84,23 +88,23 @@ class RrdFile:
         """
         finisher = threading.Thread(target=self._finish, args=(last,), name="recording-close", daemon=True)
         finisher.start()
-        finisher.join(timeout_s)
+        finisher.join(timeout_s if self._sound else min(timeout_s, 2.0))
         if finisher.is_alive():
-            self.failed = f"{self.path}: not finished within {timeout_s:g} s; what there is: {self.part.name}"
+            self._fail(f"not finished within {timeout_s:g} s")
             rr.unregister_shutdown()  # it would wait as well, and the interpreter could not end
 
     def _finish(self, last: Callable[[], None]) -> None:
         with self.lock:
             if self._closed:
                 return
-            last()
+            self.do(lambda _: last())
             self._closed = True
             try:
                 self._stream.disconnect()
                 if self._sound:
                     os.replace(self.part, self.path)
             except Exception as error:
-                self.failed = f"{self.path}: not finished: {_one_line(error)}; what there is: {self.part.name}"
+                self._fail(f"not finished: {_one_line(error)}")
             del self._stream
             self._owner.release()
         # Each stream leaves two threads behind until this is called.

@@ -41,15 +41,16 @@ class IterationBuffer:
         best = np.array(best, dtype=float)
         if best.shape != (8,):
             raise ValueError(f"best k must have the shape (8,), not {best.shape}")
+        row, error = int(index), float(rmse)
         if population is not None:
-            rows = np.array(population, dtype=float)
-            if rows.ndim != 2 or rows.shape[1] != 8:
-                raise ValueError(f"the population must have the shape (N, 8), not {rows.shape}")
-            self._population.append((int(index), rows))
+            individuals = np.array(population, dtype=float)
+            if individuals.ndim != 2 or individuals.shape[1] != 8:
+                raise ValueError(f"the population must have the shape (N, 8), not {individuals.shape}")
+            self._population.append((row, individuals))
         if population_rmse is not None:
-            self._population_rmse.append((int(index), np.array(population_rmse, dtype=float).reshape(-1)))
-        self._index.append(int(index))
-        self._rmse.append(float(rmse))
+            self._population_rmse.append((row, np.array(population_rmse, dtype=float).reshape(-1)))
+        self._index.append(row)
+        self._rmse.append(error)
         self._best.append(best)
 
     def columns(self, truth: Array | None) -> Iterator[Column]:

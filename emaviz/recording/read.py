@@ -20,7 +20,7 @@ from emaviz.recording.style import GROUPS, ITERATION, K_NAMES, SIM_TIME
 from emaviz.recording.writer import PROPERTIES
 
 Array = NDArray[np.float64]
-_MAGIC = (b"RRF", b"RRI")
+_MAGIC = b"RRF"
 _REPAIR_TIMEOUT_S = 120.0
 
 
@@ -97,14 +97,19 @@ def read(path: str | Path) -> Recording:
             repair(path, copy)
             recording = _Chunks(copy).recording(path)
         except Exception:
-            raise RecordingError(f"{path}: is damaged and cannot be repaired: {' '.join(str(first).split())}") from first
+            why = " ".join(str(first).split())
+            raise RecordingError(f"{path}: is damaged and cannot be repaired: {why}") from first
     recording.complete = False
     return recording
 
 
-def repair(source: Path, target: Path) -> None:
-    """Writes what can be read of `source` to `target` as a whole file.  RecordingError if that is nothing."""
-    binary.run("rrd", "optimize", str(source), "-o", str(target), timeout_s=_REPAIR_TIMEOUT_S)
+def repair(source: Path, target: Path, layout: Path | None = None) -> None:
+    """Writes what can be read of `source` to `target` as a whole file.  RecordingError if that is nothing.
+
+    layout: a file of a blueprint (.rbl) to go with it.
+    """
+    sources = [str(path) for path in (source, layout) if path is not None]
+    binary.run("rrd", "optimize", *sources, "-o", str(target), timeout_s=_REPAIR_TIMEOUT_S)
     if not target.is_file() or not RrdReader(target).recordings():
         raise RecordingError(f"{source}: nothing in it can be read")
 

@@ -6,10 +6,12 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
+from emaviz.recording.blueprint import Algorithm, Contents, build
 from emaviz.recording.errors import RecordingError
 from emaviz.recording.lock import FileLock
 from emaviz.recording.paths import free_name, lock_of
-from emaviz.recording.read import read, repair
+from emaviz.recording.read import Recording, read, repair
+from emaviz.recording.style import APPLICATION
 
 _ENDING = ".rrd.part"
 
@@ -64,18 +66,34 @@ def _recover(part: Path) -> Recovered:
     if part.stat().st_size == 0:
         part.unlink()
         return Recovered(part, None, f"{part.name}: was empty and is removed")
-    copy = part.with_name(f"{part.name}.repaired")
+    copy, layout = part.with_name(f"{part.name}.repaired"), part.with_name(f"{part.name}.rbl")
     try:
         repair(part, copy)
+        # The layout comes last in a file, so a run that was killed has none.
+        build(_contents(read(copy))).save(APPLICATION, layout)
+        repair(part, copy, layout)
         read(copy)
     except RecordingError as error:
         copy.unlink(missing_ok=True)
         damaged = free_name(part.parent, stem, ".rrd.damaged")
         part.rename(damaged)
         return Recovered(part, damaged, f"{part.name}: cannot be repaired, kept as {damaged.name}: {error}")
+    finally:
+        layout.unlink(missing_ok=True)
     path = _publish(copy, part.with_name(f"{stem}.rrd"))
     part.unlink()
     return Recovered(part, path, f"{path.name}: recovered from a run that was interrupted")
+
+
+def _contents(recording: Recording) -> Contents:
+    return Contents(
+        signals={group: list(signals) for group, signals in recording.signals.items()},
+        algorithms={
+            name: Algorithm(bool(len(trace.iteration)), bool(trace.monitor), trace.result is not None)
+            for name, trace in recording.identification.items()
+        },
+        config=recording.config is not None,
+    )
 
 
 def _publish(copy: Path, target: Path) -> Path:

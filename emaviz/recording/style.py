@@ -27,15 +27,15 @@ K_TITLES = {fault.name: f"{fault.name} {fault.title[0].lower()}{fault.title[1:]}
 GROUPS = ("reference", "monitor", "measurement", "residual")
 GROUP_TITLES = {"reference": "RM", "monitor": "MM", "measurement": "Measured", "residual": "Residual"}
 GROUP_COLOURS: dict[str, Colour] = {
-    "reference": _rgba(colours.REFERENCE),
+    "reference": _rgba(colours.REFERENCE, 170),
     "monitor": _rgba(colours.MONITOR),
     "measurement": _rgba(colours.COMMAND),
     "residual": _rgba(colours.DIFFERENCE),
 }
-# The line that is drawn later lies on top, so the one below must be wider to be seen beside it.
+# Lines are drawn in the order of their paths: the reference lies on top of the monitor, which shines through.
 GROUP_WIDTHS = {"reference": 1.5, "monitor": 1.5, "measurement": 2.5, "residual": 1.5}
 TRUTH_COLOUR = _rgba(colours.TRUTH)
-POPULATION_COLOUR = _rgba(colours.COMMAND, 110)
+POPULATION_COLOUR = _rgba(colours.COMMAND, 80)
 _PLAIN = re.compile(r"[A-Za-z0-9_]+")
 
 
@@ -73,7 +73,7 @@ def signal_colour(group: str, name: str) -> Colour:
 def iteration_colour(index: int) -> Colour:
     """From grey to the monitor's colour as the iterations go by (150 is usual)."""
     share = min(index / 150.0, 1.0) ** 0.5
-    start, end = np.array(POPULATION_COLOUR), np.array(GROUP_COLOURS["monitor"])
+    start, end = np.array(GROUP_COLOURS["measurement"]), np.array(GROUP_COLOURS["monitor"])
     red, green, blue, alpha = (start + share * (end - start)).astype(int).tolist()
     return red, green, blue, alpha
 

@@ -123,10 +123,9 @@ class RecordingWriter:
         if not self._file.writing:
             return
         with self._gate:
-            if algorithm not in self._buffers:
-                self._buffers[algorithm] = IterationBuffer(algorithm)
-            buffer = self._buffers[algorithm]
+            buffer = self._buffers.get(algorithm) or IterationBuffer(algorithm)
             buffer.add(index, rmse, best_k, population_k, population_rmse)
+            self._buffers[algorithm] = buffer
             self._last_algorithm = algorithm
             if len(buffer) >= _ROWS_PER_CHUNK:
                 self._wake.set()
@@ -153,14 +152,8 @@ class RecordingWriter:
 
     def flush(self) -> None:
         """Brings everything so far to the file."""
-        with self._file.lock:
-            with self._gate:
-                taken, self._buffers = self._buffers, {}
-            for algorithm, buffer in taken.items():
-                self._algorithm(algorithm).iterations = True
-                for path, time, columns in buffer.columns(self._truth):
-                    self._send_columns(path, series.iteration_style(path), time, columns)
-            self._file.flush()
+        self._file.do(lambda _: self._send_iterations())
+        self._file.flush()
 
     def close(self) -> None:
         """Finishes the file under its own name; never hangs, never raises, and a second call does nothing."""
@@ -179,6 +172,14 @@ class RecordingWriter:
             self._wake.clear()
             if self._buffers:
                 self.flush()
+
+    def _send_iterations(self) -> None:
+        with self._gate:
+            taken, self._buffers = self._buffers, {}
+        for algorithm, buffer in taken.items():
+            self._algorithm(algorithm).iterations = True
+            for path, time, columns in buffer.columns(self._truth):
+                self._send_columns(path, series.iteration_style(path), time, columns)
 
     def _algorithm(self, name: str) -> Algorithm:
         return self._contents.algorithms.setdefault(style.plain(name), Algorithm())

@@ -22,7 +22,7 @@ def test_time_base():
     assert measurement.samples == 4
     assert measurement.duration_s == pytest.approx(0.31)
     assert measurement.sample_period_s == pytest.approx(0.1)
-    assert measurement.jitter == pytest.approx(0.1)
+    assert measurement.jitter == pytest.approx(0.2 / 3)
     assert not measurement.is_uniform
     assert line(np.arange(500_000) * 1e-4).is_uniform
     assert line([0.0, 1.0, 2.0005]).is_uniform and not line([0.0, 1.0, 2.0015, 3.0]).is_uniform

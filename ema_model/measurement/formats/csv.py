@@ -139,6 +139,8 @@ def _explain(path: str, dialect: _Dialect, names: Sequence[str], error: object) 
             if not _is_number(cell, dialect.decimal):
                 problem = f"a number is expected, found {shown(cell)!r}; correct it or remove the line"
                 raise refusal(path, f"line {number}, column {name!r}: {problem}")
+    if next(_rows(path, dialect), None) is None:
+        raise refusal(path, "has 0 samples under its header; 100 or more are expected")
     raise refusal(path, f"cannot be read as CSV ({shown(error, 80)}); export it again")
 
 

@@ -62,7 +62,7 @@ def _opened(path: str) -> Iterator[pq.ParquetFile]:
         try:
             with pq.ParquetFile(file) as parquet:
                 yield parquet
-        except (pa.ArrowException, OSError) as error:
+        except (pa.ArrowException, OSError, UnicodeError) as error:
             problem = f"is not a whole Parquet file ({shown(error, 80)}); export it again"
             raise refusal(path, problem) from None
 

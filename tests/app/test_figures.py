@@ -1,0 +1,31 @@
+"""Figures: the envelope keeps every peak; the bars escape what they show."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ema_model.actuator import load_actuator
+from emaviz.figures.decimate import envelope
+from emaviz.figures.fault_bars import fault_bars
+
+
+@pytest.mark.parametrize("n", [10, 999, 1000, 1001, 5001, 123_457])
+def test_the_envelope_keeps_minimum_and_maximum(n):
+    random = np.random.default_rng(n)
+    x = np.arange(n) * 1e-4
+    spikes = random.standard_normal(n)
+    spikes[random.integers(n)] = 50.0
+    spikes[random.integers(n)] = -60.0
+    drawn_x, drawn, other = envelope(x, [spikes, x], points=1000)
+    assert len(drawn_x) == len(drawn) == len(other) <= 1000 if n > 1000 else n
+    assert drawn.max() == spikes.max() and drawn.min() == spikes.min()
+    assert np.all(np.diff(drawn_x) > 0.0)
+    assert np.all(np.diff(other) >= 0.0)  # a rising line stays one
+
+
+def test_bars_hold_all_faults_and_stay_inside():
+    page = fault_bars(np.full(8, 2.0), load_actuator(), np.zeros(8), np.tile([-1.0, 3.0], (8, 1)), ("k1",))
+    for i in range(1, 9):
+        assert f"<b>k{i}</b>" in page
+    assert "script" not in page and "-100" not in page and "200.00%" not in page

@@ -140,12 +140,16 @@ class _Recorder:
         objective: Objective,
         truth: np.ndarray | None,
     ) -> None:
+        from emaviz.recording import RecordingError
         from emaviz.recording.story import IdentificationStory
 
         source = "measurement" if arguments.files else "reference"
-        self._story = IdentificationStory(
-            arguments.record, objective, measurements[0], source, truth, output.configuration(arguments)
-        )
+        try:
+            self._story = IdentificationStory(
+                arguments.record, objective, measurements[0], source, truth, output.configuration(arguments)
+            )
+        except RecordingError as error:
+            raise InputError(str(error)) from None
         self.iteration = self._story.iteration
         self.finish = self._story.finish
         self.close = self._story.close

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ema_model.errors import InputError
 from ema_model.faults import readings
 from ema_model.measurement import Measurement, write_measurement
 from ema_model.measurement.write import check_target
@@ -46,7 +47,7 @@ def run(arguments: argparse.Namespace) -> int:
         else:
             signals = simulate_monitor(asked, actuator, k, effects, arguments.circuit)
     except FloatingPointError as error:
-        raise options.InputError(str(error)) from None
+        raise InputError(str(error)) from None
     signals = sensors.record(signals, arguments.seed)
     write_measurement(signals, arguments.out)
     if arguments.record:
@@ -65,11 +66,14 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _record(arguments: argparse.Namespace, signals: Measurement, k: np.ndarray) -> None:
-    from emaviz.recording import RecordingWriter  # rerun takes a second to import
+    from emaviz.recording import RecordingError, RecordingWriter  # rerun takes a second to import
 
     group = "reference" if arguments.model == "rm" else "monitor"
-    with RecordingWriter(arguments.record) as writer:
-        writer.signals(group, signals.time_s, {n: v for n, v in signals.signals.items() if n != "time_s"})
-        writer.truth(k)
+    try:
+        with RecordingWriter(arguments.record) as writer:
+            writer.signals(group, signals.time_s, {n: v for n, v in signals.signals.items() if n != "time_s"})
+            writer.truth(k)
+    except RecordingError as error:
+        raise InputError(str(error)) from None
     if writer.failed:
-        raise options.InputError(writer.failed)
+        raise InputError(writer.failed)

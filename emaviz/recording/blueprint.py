@@ -4,9 +4,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+import rerun as rr
 import rerun.blueprint as rrb
+import rerun_bindings
 
-from emaviz.recording.style import GROUPS, ITERATION, K_NAMES, K_TITLES, SIM_TIME, algorithm_path, signal_title
+from emaviz.recording.style import (
+    APPLICATION,
+    GROUPS,
+    ITERATION,
+    K_NAMES,
+    K_TITLES,
+    SIM_TIME,
+    algorithm_path,
+    signal_title,
+)
 
 # What the Signals tab shows, above the rest; a view each, with every group that has the signal.
 _MAIN = ("current_A", "user_position_rad", "motor_position_rad", "motor_speed_rad_s")
@@ -68,6 +79,24 @@ def build(contents: Contents) -> rrb.Blueprint:
         auto_views=False,
         auto_layout=False,
     )
+
+
+def send(stream: rr.RecordingStream, layout: rrb.Blueprint) -> None:
+    """Stores the layout in a recording.
+
+    As `stream.send_blueprint`, but that leaves two threads behind for each layout: the stream that it makes for it is
+    never disconnected.
+    """
+    made = rr.RecordingStream._from_native(
+        rerun_bindings.new_blueprint(
+            application_id=APPLICATION, make_default=False, make_thread_default=False, default_enabled=True
+        )
+    )
+    made.set_time("blueprint", sequence=0)
+    layout._log_to_stream(made)
+    memory = made.memory_recording()
+    rerun_bindings.send_blueprint(memory.storage, True, True, recording=stream.to_native())
+    made.disconnect()
 
 
 def _signals_tab(contents: Contents) -> rrb.Container | None:

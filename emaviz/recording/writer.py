@@ -14,7 +14,7 @@ import rerun as rr
 from numpy.typing import ArrayLike, NDArray
 
 from emaviz.recording import series, style
-from emaviz.recording.blueprint import Algorithm, Contents, build
+from emaviz.recording.blueprint import Algorithm, Contents, build, send
 from emaviz.recording.file import RrdFile
 from emaviz.recording.iterations import IterationBuffer
 from emaviz.recording.markdown import table
@@ -164,7 +164,7 @@ class RecordingWriter:
     def _last(self) -> None:
         self.flush()
         # Only now is it known what to arrange; the viewer would stumble through several layouts in one file.
-        self._file.do(lambda stream: stream.send_blueprint(build(self._contents)))
+        self._file.do(lambda stream: send(stream, build(self._contents)))
 
     def _flush_regularly(self) -> None:
         while not self._ending:

@@ -14,10 +14,6 @@ FLAGS = (
 ).split()
 
 
-def pytest_configure(config):
-    config.addinivalue_line("markers", "browser: needs Chromium")
-
-
 @pytest.fixture(scope="session")
 def signals():
     """Times (500,), s, on whole microseconds, and two signals."""

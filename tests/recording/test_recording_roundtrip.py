@@ -110,7 +110,12 @@ def test_mistakes_of_the_caller_are_raised(tmp_path):
 
 @pytest.mark.parametrize(
     ("content", "message"),
-    [(None, "no such file"), (b"", "empty"), (b"time_s,current_A\n", "no Rerun recording"), (b"RRF2" + b"x" * 99, "damag")],
+    [
+        (None, "no such file"),
+        (b"", "empty"),
+        (b"time_s,current_A\n", "no Rerun recording"),
+        (b"RRF2" + b"x" * 99, "damag"),
+    ],
 )
 def test_a_bad_file_is_refused_in_one_line(tmp_path, content, message):
     path = tmp_path / "bad.rrd"

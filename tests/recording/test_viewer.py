@@ -65,7 +65,9 @@ def test_recordings_of_the_folder_are_served(host):
     head, nothing = get(host, "/recordings/a%20b.rrd", method="HEAD")
     assert head.headers["Content-Length"] == "12" and nothing == b""
     url = host.url_of("a b.rrd")
-    assert url.startswith(f"http://127.0.0.1:{host.port}/?url=http%3A%2F%2F127.0.0.1%3A{host.port}%2Frecordings%2Fa%2520b.rrd&")
+    assert url.startswith(
+        f"http://127.0.0.1:{host.port}/?url=http%3A%2F%2F127.0.0.1%3A{host.port}%2Frecordings%2Fa%2520b.rrd&"
+    )
     assert "hide_welcome_screen=1" in url and "persist=0" in url
 
 
@@ -92,7 +94,9 @@ def test_nothing_else_is_served(host, path):
     assert get(host, path)[0].status == 404
 
 
-@pytest.mark.parametrize("name", ["evil.example", "evil.example:80", "127.0.0.1", "127.0.0.1:1", "localhost.evil:80", ""])
+@pytest.mark.parametrize(
+    "name", ["evil.example", "evil.example:80", "127.0.0.1", "127.0.0.1:1", "localhost.evil:80", ""]
+)
 def test_other_host_names_are_refused(host, name):
     for path in ("/", "/recordings/a%20b.rrd"):
         answer, body = get(host, path, Host=name)

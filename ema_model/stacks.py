@@ -38,25 +38,12 @@ _COMPILED = ("numba_options.py", "stacks.py", "physics/*.py", "kernels/*.py", "e
 _KEPT_VERSIONS = 6  # folders of other hashes (older sources or versions) that are left in the cache
 
 
-@dataclass(frozen=True)
-class Place:
-    """Where effects can act: its arguments, and how several effects there combine."""
-
-    arguments: tuple[str, ...]
-    start: str  # the value without effects
-    combine: str  # how an effect's value changes `value`
-
-    def source(self, name: str, calls: Sequence[str]) -> str:
-        """The place's function, inlining the calls."""
-        lines = [f"def {name}({', '.join(self.arguments)}, p, i):", f"    value = {self.start}"]
-        lines += [f"    value = {self.combine.format(call)}" for call in calls]
-        return "\n".join(["@scalar", *lines, "    return value", ""])
-
-
+# Where effects can act: the arguments of each place.  The first is the value that the base model, or the
+# effect before, has found there; an effect's function returns it changed.
 PLACES = {
-    "moving_friction": Place(("level", "static", "omega", "motor_torque", "load"), "level", "{}"),
-    "shaft_torque": Place(("theta", "omega", "current", "user"), "0.0", "value + {}"),
-    "torque_factor": Place(("theta", "omega", "current"), "1.0", "value * {}"),
+    "moving_friction": ("level", "static", "omega", "motor_torque", "load"),
+    "electric_torque": ("torque", "theta", "omega", "current"),
+    "shaft_torque": ("torque", "theta", "omega", "current", "user"),
 }
 
 
@@ -67,7 +54,7 @@ class Stack:
     circuit: str
     effects: tuple[str, ...]
     parameter_rows: tuple[str, ...]  # of the base model, then "effect.parameter"
-    monitor: Any  # module: squared_errors, traces, single
+    monitor: Any  # module: squared_errors, traces
     reference: Any  # module: run
 
 
@@ -112,21 +99,22 @@ def _composition(circuit: str, effects: Sequence[Any]) -> str:
         "from ema_model.numba_options import scalar",
         f"from ema_model.physics.circuit import {circuit}_circuit as advance_current",
     ]
-    calls: dict[str, list[str]] = {name: [] for name in PLACES}
+    bodies: dict[str, list[str]] = {place: [] for place in PLACES}
     row = len(PARAMETER_ROWS)
     for effect in effects:
         parameters = [f"p[{(row + j) * LANES} + i]" for j in range(len(effect.parameters))]
         row += len(effect.parameters)
         for function in effect.places:
             place = function.__name__
+            value, *rest = PLACES[place]
             alias = f"{effect.name}_{place}"
             imports.append(f"from {function.__module__} import {place} as {alias}")
-            arguments = list(PLACES[place].arguments)
-            if place == "moving_friction":
-                arguments[0] = "value"  # the level that the effects before have made of it
-            calls[place].append(f"{alias}({', '.join(arguments + parameters)})")
-    places = [place.source(name, calls[name]) for name, place in PLACES.items()]
-    return "\n".join([*imports, "", "", *places])
+            bodies[place].append(f"    {value} = {alias}({', '.join([value, *rest, *parameters])})")
+    functions = []
+    for place, arguments in PLACES.items():
+        head = f"def {place}({', '.join(arguments)}, p, i):"
+        functions += ["", "", "@scalar", head, *bodies[place], f"    return {arguments[0]}"]
+    return "\n".join([*imports, *functions, ""])
 
 
 def _write(circuit: str, names: tuple[str, ...], composition: str) -> Path:

@@ -10,9 +10,9 @@ from ema_model.physics.elementary import sine
 
 
 @scalar
-def shaft_torque(theta, omega, current, user, amplitude, order, phase):
-    """A sin(hθ + φ)."""
-    return amplitude * sine(order * theta + phase)
+def shaft_torque(torque, theta, omega, current, user, amplitude, order, phase):
+    """A sin(hθ + φ), added."""
+    return torque + amplitude * sine(order * theta + phase)
 
 
 EFFECT = Effect(

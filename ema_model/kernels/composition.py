@@ -9,7 +9,7 @@ from __future__ import annotations
 from ema_model.numba_options import scalar
 from ema_model.physics.circuit import reduced_circuit as advance_current
 
-__all__ = ["advance_current", "moving_friction", "shaft_torque", "torque_factor"]
+__all__ = ["advance_current", "electric_torque", "moving_friction", "shaft_torque"]
 
 
 @scalar
@@ -19,12 +19,12 @@ def moving_friction(level, static, omega, motor_torque, load, p, i):
 
 
 @scalar
-def shaft_torque(theta, omega, current, user, p, i):
-    """Torque added at the motor's shaft, N·m."""
-    return 0.0
+def electric_torque(torque, theta, omega, current, p, i):
+    """The motor's torque, N·m, from what its windings develop."""
+    return torque
 
 
 @scalar
-def torque_factor(theta, omega, current, p, i):
-    """Factor of the motor's torque."""
-    return 1.0
+def shaft_torque(torque, theta, omega, current, user, p, i):
+    """Torque at the motor's shaft, friction apart, N·m, from that of motor, load and viscous drag."""
+    return torque

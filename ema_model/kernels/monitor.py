@@ -1,6 +1,7 @@
-"""The Monitor Model's outer kernels: a whole population over several runs, or one run with its signals.
+"""The Monitor Model's outer kernels: the errors, or the signals, of a whole population in lanes.
 
-All of them call the same `advance`, so a lane is bit-identical to the single run.
+A single run is a population of one in the same kernel (a block of 32 lanes takes no longer than a plain
+loop over one), so that it is bit-identical to any lane.
 """
 
 from __future__ import annotations
@@ -8,7 +9,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from ema_model.numba_options import kernel, parallel_kernel
+from ema_model.numba_options import parallel_kernel
 from ema_model.physics.rows import CURRENT, LANES, OMEGA, PLAY, THETA
 
 from .monitor_step import advance
@@ -79,21 +80,3 @@ def traces(states, parameters, command, load, period, dt, result):
                 result[block, sample, 1, i] = s[OMEGA * LANES + i]
                 result[block, sample, 2, i] = s[THETA * LANES + i]
                 result[block, sample, 3, i] = s[PLAY * LANES + i]
-
-
-@kernel
-def single(state, parameters, command, load, period, dt, result):
-    """Signals of one run: as `traces`, with lane 0 alone; result: (samples, 4)."""
-    s = state.copy()
-    scale = 1.0 / period
-    step = 0
-    for sample in range(result.shape[0]):
-        mean = 0.0
-        for _ in range(period):
-            advance(s, parameters, 0, command[step], load[step], dt)
-            mean += s[CURRENT * LANES]
-            step += 1
-        result[sample, 0] = mean * scale
-        result[sample, 1] = s[OMEGA * LANES]
-        result[sample, 2] = s[THETA * LANES]
-        result[sample, 3] = s[PLAY * LANES]

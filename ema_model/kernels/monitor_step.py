@@ -49,7 +49,7 @@ from ema_model.physics.rows import (
     VOLTAGE,
 )
 
-from .composition import advance_current, moving_friction, shaft_torque, torque_factor
+from .composition import advance_current, moving_friction, shaft_torque, electric_torque
 
 
 @scalar
@@ -95,16 +95,11 @@ def advance(s, p, i, command, load, dt):
         dt,
     )
     limit = p[TORQUE_LIMIT * LANES + i]
-    motor_torque = clamp(
-        p[TORQUE_CONSTANT * LANES + i] * flux * current * torque_factor(theta, omega, current, p, i), -limit, limit
-    )
+    developed = p[TORQUE_CONSTANT * LANES + i] * flux * current
+    motor_torque = clamp(electric_torque(developed, theta, omega, current, p, i), -limit, limit)
 
-    active = (
-        motor_torque
-        - p[GEAR_RATIO * LANES + i] * load
-        - p[VISCOUS * LANES + i] * omega
-        + shaft_torque(theta, omega, current, user, p, i)
-    )
+    passive = motor_torque - p[GEAR_RATIO * LANES + i] * load - p[VISCOUS * LANES + i] * omega
+    active = shaft_torque(passive, theta, omega, current, user, p, i)
     static = p[STATIC_FRICTION * LANES + i]
     dynamic = moving_friction(p[DYNAMIC_FRICTION * LANES + i], static, omega, motor_torque, load, p, i)
     net = active - borello_friction(omega, active, static, dynamic)

@@ -59,7 +59,7 @@ from ema_model.physics.rows import (
     VOLTAGE,
 )
 
-from .composition import moving_friction, shaft_torque, torque_factor
+from .composition import moving_friction, shaft_torque, electric_torque
 
 
 @kernel
@@ -84,6 +84,7 @@ def run(state, p, command, load, period, substeps, dt, result):
     leg_a, leg_b, leg_c = 1.0, 1.0, 1.0
     integral, speed_error = 0.0, 0.0
     first = True
+    rate = 1.0 / dt
 
     tau = p[GEAR_RATIO * LANES]
     limit = p[CURRENT_LIMIT * LANES]
@@ -121,7 +122,7 @@ def run(state, p, command, load, period, substeps, dt, result):
                 omega_ref = speed_reference(demand, user, p[POSITION_GAIN * LANES], p[SPEED_LIMIT * LANES])
                 previous = speed_error
                 speed_error = omega_ref - omega
-                slope = 0.0 if first else (speed_error - previous) / dt
+                slope = 0.0 if first else (speed_error - previous) * rate
                 first = False
                 torque_ref = (
                     p[SPEED_GAIN * LANES] * speed_error
@@ -157,18 +158,10 @@ def run(state, p, command, load, period, substeps, dt, result):
                 current_c += dt * inverse_c * (drive_c - neutral)
 
                 q = equivalent_current(current_a, current_b, current_c, sin_e, cos_e)
-                motor_torque = clamp(
-                    p[TORQUE_CONSTANT * LANES]
-                    * (k_a * current_a + k_b * current_b + k_c * current_c)
-                    * torque_factor(theta, omega, q, p, 0),
-                    -torque_limit,
-                    torque_limit,
-                )
-                active = (
-                    motor_torque
-                    - tau * user_load
-                    - p[VISCOUS * LANES] * omega
-                    + shaft_torque(theta, omega, q, user, p, 0)
+                developed = p[TORQUE_CONSTANT * LANES] * (k_a * current_a + k_b * current_b + k_c * current_c)
+                motor_torque = clamp(electric_torque(developed, theta, omega, q, p, 0), -torque_limit, torque_limit)
+                active = shaft_torque(
+                    motor_torque - tau * user_load - p[VISCOUS * LANES] * omega, theta, omega, q, user, p, 0
                 )
                 dynamic = moving_friction(p[DYNAMIC_FRICTION * LANES], static, omega, motor_torque, user_load, p, 0)
                 net = active - borello_friction(omega, active, static, dynamic)

@@ -8,8 +8,13 @@ import numpy as np
 
 from ema_model.numba_options import scalar
 
-_PI = math.pi
-_INVERSE_PI = 1.0 / math.pi
+_TURNS = 0.5 / math.pi
+# sin 2πw for |w| ≤ ¼
+_SINE_1 = 6.283164044127185
+_SINE_3 = -41.33714234371979
+_SINE_5 = 81.34076785339295
+_SINE_7 = -70.99342237081245
+
 
 
 @scalar
@@ -27,42 +32,18 @@ def sign(x):
 
 @scalar
 def sine(x):
-    """sin x within 1e-9 for |x| < 1e5: reduction by multiples of π, then the series to x¹³."""
-    turns = np.floor(x * _INVERSE_PI + 0.5)
-    r = x - turns * _PI
-    q = r * r
-    series = r * (
-        1.0
-        + q
-        * (
-            -1.0 / 6.0
-            + q
-            * (
-                1.0 / 120.0
-                + q * (-1.0 / 5040.0 + q * (1.0 / 362880.0 + q * (-1.0 / 39916800.0 + q * (1.0 / 6227020800.0))))
-            )
-        )
-    )
-    odd = turns - 2.0 * np.floor(0.5 * turns)
-    return series * (1.0 - 2.0 * odd)
+    """sin x within 1e-6 for |x| < 1e5: folded into a quarter turn either way, then a minimax polynomial."""
+    turns = x * _TURNS + 0.25
+    w = 0.25 - abs(turns - np.floor(turns) - 0.5)
+    q = w * w
+    return w * (_SINE_1 + q * (_SINE_3 + q * (_SINE_5 + q * _SINE_7)))
 
 
 @scalar
 def decay(x):
-    """e^{−x} within 1e-8 (absolute) for x ≥ 0: the series at x/64, squared six times; 0 beyond x = 40."""
+    """e^{−x} within 1e-8 (absolute) for x ≥ 0: four terms of the series at x/64, squared six times."""
     r = -clamp(x, 0.0, 40.0) * (1.0 / 64.0)
-    y = 1.0 + r * (
-        1.0
-        + r
-        * (
-            0.5
-            + r
-            * (
-                1.0 / 6.0
-                + r * (1.0 / 24.0 + r * (1.0 / 120.0 + r * (1.0 / 720.0 + r * (1.0 / 5040.0 + r * (1.0 / 40320.0)))))
-            )
-        )
-    )
+    y = 1.0 + r * (1.0 + r * (0.5 + r * (1.0 / 6.0 + r * (1.0 / 24.0))))
     y = y * y
     y = y * y
     y = y * y

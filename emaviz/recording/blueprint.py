@@ -16,6 +16,7 @@ from emaviz.recording.style import (
     K_TITLES,
     SIM_TIME,
     algorithm_path,
+    series_title,
     signal_title,
 )
 
@@ -102,10 +103,8 @@ def send(stream: rr.RecordingStream, layout: rrb.Blueprint) -> None:
 def _signals_tab(contents: Contents) -> rrb.Container | None:
     views = [_signal_view(contents, name) for name in _MAIN if contents.groups_with(name)]
     residual = contents.signals.get("residual", [])
-    if residual:
-        names = {signal_title(name) for name in residual}
-        title = f"Residual {names.pop().lower()}" if len(names) == 1 else "Residuals"
-        views.append(_plot(title.replace("[a]", "[A]"), ["/residual/**"]))
+    if "current_A" in residual:
+        views.append(_residual_view("current_A"))
     if not views:
         return None
     top, rest = views[0], views[1:]
@@ -120,6 +119,7 @@ def _more_tab(contents: Contents) -> rrb.Container | None:
         views.append(_plot("Phase currents [A]", phases))
     others = [name for name in contents.names() if name not in _MAIN + _PHASES and contents.groups_with(name)]
     views += [_signal_view(contents, name) for name in others]
+    views += [_residual_view(name) for name in contents.signals.get("residual", []) if name != "current_A"]
     return rrb.Grid(*views, name="More signals") if views else None
 
 
@@ -150,6 +150,10 @@ def _k_view(root: str, k: str) -> rrb.TimeSeriesView:
 
 def _signal_view(contents: Contents, name: str) -> rrb.TimeSeriesView:
     return _plot(signal_title(name), [f"/{group}/{name}" for group in contents.groups_with(name)])
+
+
+def _residual_view(name: str) -> rrb.TimeSeriesView:
+    return _plot(series_title("residual", name), [f"/residual/{name}"])
 
 
 def _plot(

@@ -72,9 +72,12 @@ class RrdFile:
 
     def flush(self) -> None:
         """To the disk, with all that was sent; stops in time, still whole, when the disk runs full."""
-        self.do(lambda stream: stream.flush(timeout_sec=_FLUSH_TIMEOUT_S))
+        self.do(self._flush)
+
+    def _flush(self, stream: rr.RecordingStream) -> None:
+        stream.flush(timeout_sec=_FLUSH_TIMEOUT_S)
         free = free_bytes(self.path.parent)
-        if self.writing and free < self._min_free_bytes // 10:
+        if free < self._min_free_bytes // 10:
             self.failed = f"{self.path}: recording stopped: only {free / 1e6:.0f} MB free; free some space"
 
     def _fail(self, why: str) -> None:

@@ -27,13 +27,13 @@ K_TITLES = {fault.name: f"{fault.name} {fault.title[0].lower()}{fault.title[1:]}
 GROUPS = ("reference", "monitor", "measurement", "residual")
 GROUP_TITLES = {"reference": "RM", "monitor": "MM", "measurement": "Measured", "residual": "Residual"}
 GROUP_COLOURS: dict[str, Colour] = {
-    "reference": _rgba(colours.REFERENCE, 170),
+    "reference": _rgba(colours.REFERENCE, 200),
     "monitor": _rgba(colours.MONITOR),
     "measurement": _rgba(colours.COMMAND),
     "residual": _rgba(colours.DIFFERENCE),
 }
-# Lines are drawn in the order of their paths: the reference lies on top of the monitor, which shines through.
-GROUP_WIDTHS = {"reference": 1.5, "monitor": 1.5, "measurement": 2.5, "residual": 1.5}
+# Lines are drawn in the order of their paths, so what lies below is wider, and the reference lets it shine through.
+GROUP_WIDTHS = {"reference": 1.3, "monitor": 3.0, "measurement": 4.0, "residual": 1.3}
 TRUTH_COLOUR = _rgba(colours.TRUTH)
 POPULATION_COLOUR = _rgba(colours.COMMAND, 80)
 _PLAIN = re.compile(r"[A-Za-z0-9_]+")

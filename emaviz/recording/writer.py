@@ -81,8 +81,10 @@ class RecordingWriter:
     def properties(self, values: Mapping[str, Any]) -> None:
         """Facts about the recording by name: whatever JSON can hold, and arrays."""
         # As text, because rerun holds a name to the type that it had first in this process.
-        encoded = {str(name): json.dumps(value, default=_for_json) for name, value in values.items()}
-        self._file.do(lambda stream: stream.send_property(PROPERTIES, rr.AnyValues(**encoded)))
+        bundle = rr.AnyValues()
+        for name, value in values.items():
+            bundle.with_component_from_data(str(name), json.dumps(value, default=_for_json))
+        self._file.do(lambda stream: stream.send_property(PROPERTIES, bundle))
 
     def signals(self, group: str, time_s: ArrayLike, signals: Mapping[str, ArrayLike]) -> None:
         """Signals (n,) by canonical name at time_s (n,), of reference, monitor, measurement or residual."""

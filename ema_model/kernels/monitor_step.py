@@ -49,7 +49,7 @@ from ema_model.physics.rows import (
     VOLTAGE,
 )
 
-from .composition import advance_current, moving_friction, shaft_torque, electric_torque
+from .composition import advance_current, electric_torque, moving_friction, shaft_torque
 
 
 @scalar

@@ -59,7 +59,7 @@ from ema_model.physics.rows import (
     VOLTAGE,
 )
 
-from .composition import moving_friction, shaft_torque, electric_torque
+from .composition import electric_torque, moving_friction, shaft_torque
 
 
 @kernel

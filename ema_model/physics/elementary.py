@@ -16,7 +16,6 @@ _SINE_5 = 81.34076785339295
 _SINE_7 = -70.99342237081245
 
 
-
 @scalar
 def clamp(x, low, high):
     """x kept between low and high; NaN stays NaN.  (In this form each line is one machine instruction.)"""

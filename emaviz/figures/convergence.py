@@ -15,13 +15,14 @@ class LiveConvergence:
     """RMSE against iteration, logarithmic."""
 
     def __init__(self, gui: viser.GuiApi, height: int = 190) -> None:
-        grey: Any = {"stroke": "#868e96", "labelSize": 16, "labelGap": 0, "grid": {"stroke": "#86868625", "width": 1}}
+        grey = {"stroke": "#868e96", "labelSize": 16, "labelGap": 0, "grid": {"stroke": "#86868625", "width": 1}}
+        axes: Any = ({**grey, "label": "iteration", "size": 26}, {**grey, "label": "rmse [A]", "size": 52})
         self._handle: Any = gui.add_uplot(
             data=(np.array([0.0, 1.0]), np.array([1.0, 1.0])),
             series=({"label": "iteration"}, {"label": "best rmse [A]", "stroke": ALGORITHMS["hba"], "width": 2}),
             title="Convergence",
             scales={"x": {"time": False, "range": (0.0, 150.0)}, "y": {"distr": 3}},
-            axes=({**grey, "label": "iteration", "size": 26}, {**grey, "label": "rmse [A]", "size": 52}),
+            axes=axes,
             legend={"show": False},
             height=height,
         )

@@ -1,17 +1,9 @@
-"""A small recording, and a browser that can draw the viewer."""
+"""A small recording."""
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
-
-FLAGS = (
-    "--no-sandbox --disable-quic --no-first-run --disable-background-networking --disable-component-update "
-    "--disable-sync --use-gl=angle --use-angle=gl-egl --ignore-gpu-blocklist --disable-accelerated-2d-canvas "
-    "--disable-gpu-rasterization"
-).split()
 
 
 @pytest.fixture(scope="session")
@@ -46,15 +38,3 @@ def write(signals):
         )
 
     return write
-
-
-@pytest.fixture(scope="session")
-def viewer_browser():
-    """Chromium that renders in software."""
-    if not Path("/usr/bin/chromium").exists():
-        pytest.skip("no Chromium")
-    sync_api = pytest.importorskip("playwright.sync_api")
-    with sync_api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=FLAGS)
-        yield browser
-        browser.close()

@@ -141,11 +141,11 @@ def test_view_prints_the_address_and_ends_with_an_interrupt(tmp_path):
 
 
 @pytest.mark.browser
-def test_a_browser_draws_the_recording(tmp_path, write, viewer_browser):
+def test_a_browser_draws_the_recording(tmp_path, write, browser):
     with RecordingWriter(tmp_path / "a.rrd") as writer:
         write(writer)
     with ViewerHost(tmp_path) as host:
-        page = viewer_browser.new_page(viewport={"width": 1000, "height": 650}, color_scheme="dark")
+        page = browser.new_page(viewport={"width": 1000, "height": 650}, color_scheme="dark")
         abroad, fetched = [], []
         page.on("requestfinished", lambda r: (fetched if r.url.startswith(host.address) else abroad).append(r.url))
         page.goto(host.url_of("a.rrd"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 import threading
 import time
 import traceback
@@ -20,7 +21,7 @@ from emaviz.panels.page import Page
 from emaviz.panels.recordings import RecordingsPanel
 from emaviz.recording.recover import recover
 from emaviz.recording.viewer import ViewerHost
-from emaviz.safe_server import open_server
+from emaviz.safe_server import LOOPBACK, open_server
 from emaviz.scene.actuator import ActuatorScene
 from emaviz.scene.playback import Playback
 from emaviz.session import Session, Simulation
@@ -124,6 +125,8 @@ def serve(arguments: argparse.Namespace) -> int:
         raise InputError("opening recordings in the app comes with Compare; use: emaviz identify FILE")
     app = App(arguments.host, arguments.port, arguments.data_dir, arguments.actuator)
     print(f"emaviz is at {app.address}  (Ctrl-C ends it)", flush=True)
+    if arguments.host not in LOOPBACK:
+        print("It is open to the network: whoever reaches this address can use it.", file=sys.stderr)
     if arguments.open:
         webbrowser.open(app.address)
     if app.wait_for_first_picture(120.0):

@@ -21,7 +21,7 @@ from websockets.http11 import Request, Response
 
 from ema_model.errors import InputError
 
-_LOOPBACK = ("127.0.0.1", "localhost", "::1")
+LOOPBACK = ("127.0.0.1", "localhost", "::1")
 # All that the client needs is in its own page; blob: and data: are its workers, textures and saved files.
 _POLICY = (
     "default-src 'self' 'unsafe-inline' 'unsafe-eval' blob: data:; "
@@ -73,7 +73,7 @@ def _check_free(host: str, port: int) -> None:
 
 def _allowed_names(host: str) -> frozenset[str] | None:
     """Names under which a browser may ask; None (any) when the user opens the server to a network."""
-    return frozenset((*_LOOPBACK, host)) if host in _LOOPBACK else None
+    return frozenset((*LOOPBACK, host)) if host in LOOPBACK else None
 
 
 def _guard(

@@ -109,15 +109,17 @@ class Session:
 
     def identify(self) -> bool:
         """Begins an identification of the settings' faults; False while one runs."""
-        settings = copy.deepcopy(self.settings)
-        self._stop.clear()
-        return self.worker.start(self._identification(settings))
+        stop = threading.Event()
+        started = self.worker.start(self._identification(copy.deepcopy(self.settings), stop))
+        if started:
+            self._stop = stop
+        return started
 
     def stop(self) -> None:
         """Ends the identification after its current iteration, keeping what it has."""
         self._stop.set()
 
-    def _identification(self, settings: Settings) -> Steps:
+    def _identification(self, settings: Settings, stop: threading.Event) -> Steps:
         measurement = simulated(settings.run(), self.actuator, settings.k, settings.fitness)
         yield
         objective = Objective([measurement], self.actuator, fitness=settings.fitness)
@@ -138,7 +140,7 @@ class Session:
                     story.iteration(progress)
                 _tell(self.events.progressed, progress, settings.k)
                 yield
-                progress = running.send(self._stop.is_set())
+                progress = running.send(stop.is_set())
         except StopIteration as finished:
             answer: Identification = finished.value
         except BaseException:

@@ -74,8 +74,8 @@ class Worker:
                     break
             if job is not None:
                 self._guarded(job)
-            elif self._long is not None and not self._guarded(self._step):
-                self._long = None
+            elif self._long is not None:
+                self._guarded(self._step)
         if self._long is not None:
             self._guarded(self._long.close)
 
@@ -94,9 +94,12 @@ class Worker:
             next(self._long)
         except StopIteration:
             self._long = None
+        except BaseException:
+            self._long = None  # before the error is told, so that another may be started at once
+            raise
 
-    def _guarded(self, job: Job) -> bool:
-        """Whether the job ended without an error; an error is told, and the thread goes on."""
+    def _guarded(self, job: Job) -> None:
+        """Runs a job; an error is told, and the thread goes on."""
         try:
             job()
         except Exception as error:
@@ -104,5 +107,3 @@ class Worker:
                 self._on_error(error)
             except Exception:
                 traceback.print_exc()
-            return False
-        return True

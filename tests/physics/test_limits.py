@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from ema_model.actuator import load_actuator
 from ema_model.commands import Recorded, command
+from ema_model.errors import InputError
 from ema_model.faults import vector
 from ema_model.physics import elementary
 from ema_model.physics.backlash import advance_play
@@ -293,3 +294,16 @@ def test_equivalent_current_returns_the_reference(theta_e, reference):
     """Phase references −(2/3) I sin(θ_e − 2πi/3) give back I."""
     phases = [-2.0 / 3.0 * reference * math.sin(theta_e - 2.0 * math.pi * i / 3) for i in range(3)]
     assert equivalent_current(*phases, math.sin(theta_e), math.cos(theta_e)) == pytest.approx(reference, abs=1e-10)
+
+
+@each_model
+@pytest.mark.xfail(strict=True, reason="a start beyond the end stops is neither refused nor clamped; currents reach 1e27 A")
+@pytest.mark.parametrize("start", [2.0, -3.0])
+def test_start_beyond_the_end_stops_is_refused_or_held(model, start):
+    run = Run(command("step", {"initial_rad": start, "final_rad": 1.0}), 0.1)
+    try:
+        s = model(run, ACTUATOR, vector({"k3": 0.3}))
+    except InputError:
+        return
+    assert np.max(np.abs(s["user_position_rad"])) <= 1.5 * (1.0 + 1e-5)
+    assert np.max(np.abs(s["current_A"])) <= 2.0 * ACTUATOR.controller.current_limit_A

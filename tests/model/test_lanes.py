@@ -1,0 +1,177 @@
+"""A population's lanes against single runs, bit for bit, and recordings against each other."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ema_model.actuator import load_actuator
+from ema_model.commands import command
+from ema_model.effects import find
+from ema_model.faults import HEALTHY, vector
+from ema_model.identification.objective import Objective, simulated
+from ema_model.kernel_rows import initial_state, monitor_rows
+from ema_model.measurement import Measurement
+from ema_model.physics.rows import LANES
+from ema_model.simulation import Run, simulate_monitor
+from ema_model.stacks import CIRCUITS, exclusive, find_stack
+
+ACTUATOR = load_actuator()
+RUN = Run(command("chirp"), 0.1, load_torque_Nm=5.0)
+STACKS = (
+    {},
+    {"cogging_torque": {"amplitude_Nm": 0.02, "order": 7.0, "phase_rad": 0.4}},
+    {"cogging_torque": {"amplitude_Nm": 0.02}, "stribeck_friction": {"speed_rad_s": 12.0}},
+)
+each_circuit = pytest.mark.parametrize("circuit", CIRCUITS)
+each_stack = pytest.mark.parametrize("effects", STACKS, ids=["0", "1", "2"])
+
+
+def population(n: int, seed: int = 0):
+    return np.random.default_rng(seed).random((n, 8))
+
+
+@pytest.fixture(scope="module")
+def recording() -> Measurement:
+    return simulated(Run(command("chirp"), 0.1), ACTUATOR, vector({"k1": 0.3, "k3": 0.2}))
+
+
+@each_circuit
+@each_stack
+def test_traces_of_a_population_are_single_runs(circuit, effects):
+    n = LANES + 5  # a block and a part of one
+    k = population(n)
+    settings = {name: find(name).settings(dict(given)) for name, given in effects.items()}
+    stack = find_stack(circuit, settings)
+    rows = monitor_rows(ACTUATOR, k, stack, settings)
+    assert len(rows) == 2
+    period, dt = 10, 1e-5
+    demand = RUN.command.at(np.arange(RUN.samples * period + 1) * dt)
+    result = np.empty((len(rows), RUN.samples, 4, LANES))
+    exclusive(
+        stack.monitor.traces,
+        initial_state(ACTUATOR, len(rows)),
+        rows,
+        demand,
+        np.full_like(demand, RUN.load_torque_Nm),
+        period,
+        dt,
+        result,
+    )
+    columns = ("current_A", "motor_speed_rad_s", "motor_position_rad")
+    for i in (0, 1, LANES - 1, LANES, n - 1):
+        single = simulate_monitor(RUN, ACTUATOR, k[i], effects, circuit)
+        for column, name in enumerate(columns):
+            lane = result[i // LANES, :, column, i % LANES]
+            np.testing.assert_array_equal(lane, single[name][1:], err_msg=f"{name}, individual {i}")
+    ends = {result[i // LANES, -1, 2, i % LANES] for i in range(n)}
+    assert len(ends) == n, "individuals must differ"
+
+
+@each_circuit
+@each_stack
+def test_fitness_does_not_depend_on_the_neighbours(recording, circuit, effects):
+    objective = Objective([recording], ACTUATOR, effects=effects, circuit=circuit)
+    k = population(LANES + 8, seed=1)
+    together = objective(k)
+    assert np.all(np.isfinite(together)) and len(set(together)) == len(k)
+    np.testing.assert_array_equal(together, [objective(one)[0] for one in k])
+    order = np.random.default_rng(2).permutation(len(k))
+    np.testing.assert_array_equal(objective(k[order]), together[order])
+    # and it is the root mean square of what `currents` gives
+    rms = np.sqrt(np.mean((objective.currents(k) - objective.target) ** 2, axis=1))
+    np.testing.assert_allclose(together, rms, rtol=1e-9)
+
+
+def test_effects_parameters_may_differ_by_lane():
+    speeds = np.array([3.0, 10.0, 25.0])
+    stack = find_stack("reduced", ["stribeck_friction"])
+    k = np.tile(HEALTHY, (3, 1))
+    rows = monitor_rows(ACTUATOR, k, stack, {"stribeck_friction": {"speed_rad_s": speeds}})
+    row = stack.parameter_rows.index("stribeck_friction.speed_rad_s")
+    np.testing.assert_array_equal(rows[0, row * LANES : row * LANES + 3], speeds)
+    assert np.all(rows[0, row * LANES + 3 : (row + 1) * LANES] == 25.0)
+    for i, speed in enumerate(speeds):
+        alone = monitor_rows(ACTUATOR, HEALTHY, stack, {"stribeck_friction": {"speed_rad_s": speed}})
+        np.testing.assert_array_equal(rows[0].reshape(-1, LANES)[:, i], alone[0].reshape(-1, LANES)[:, 0])
+
+
+def test_recordings_add_up_as_a_quadrature():
+    truth = vector({"k1": 0.4})
+    parts = [
+        simulated(Run(command("chirp"), 0.1), ACTUATOR, truth),
+        simulated(Run(command("sine", {"frequency_Hz": 8.0}), 0.2, load_torque_Nm=8.0), ACTUATOR, truth),
+        # another sampling: its blocks cannot share a kernel call with the others'
+        simulated(Run(command("step", {"final_rad": 4e-3}), 0.15), ACTUATOR, truth).resampled(2.5e-4),
+    ]
+    objectives = [Objective([part], ACTUATOR) for part in parts]
+    assert len({o.windows[0].steps_per_block for o in objectives} | {o.blocks for o in objectives}) > 2
+    k = population(9, seed=3)
+    together = Objective(parts, ACTUATOR)
+    assert together.blocks == sum(o.blocks for o in objectives)
+    squares = sum(o.blocks * o(k) ** 2 for o in objectives)
+    np.testing.assert_allclose(together(k), np.sqrt(squares / together.blocks), rtol=1e-12)
+    np.testing.assert_array_equal(together.currents(k), np.concatenate([o.currents(k) for o in objectives], axis=1))
+    # the order of the recordings does not matter
+    np.testing.assert_allclose(Objective(parts[::-1], ACTUATOR)(k), together(k), rtol=1e-12)
+
+
+@each_circuit
+@pytest.mark.parametrize("broken", [np.nan, np.inf, -np.inf, 1e300])
+@pytest.mark.parametrize("component", [0, 2, 5, 7])
+def test_a_broken_lane_leaves_the_others_alone(recording, circuit, broken, component):
+    objective = Objective([recording], ACTUATOR, circuit=circuit)
+    k = population(20, seed=4)
+    clean = objective(k)
+    ill = k.copy()
+    ill[7, component] = broken
+    fitness = objective(ill)
+    others = np.arange(20) != 7
+    np.testing.assert_array_equal(fitness[others], clean[others])
+    assert not np.isnan(fitness).any()
+
+
+def test_divergence_stays_in_its_lane(recording):
+    """With so small an inductance the explicit step of the thesis's circuit is unstable."""
+    unstable = ACTUATOR.with_values({"motor.inductance_H": 5e-7})
+    assert np.all(Objective([recording], unstable, circuit="thesis")(population(3)) == np.inf)
+    objective = Objective([recording], ACTUATOR, circuit="thesis")
+    k = population(12, seed=5)
+    clean = objective.currents(k)
+    inductance = np.full(12, ACTUATOR.motor.inductance_H)
+    inductance[4] = 5e-7
+    one_ill = replace(ACTUATOR, motor=replace(ACTUATOR.motor, inductance_H=inductance))
+    currents = objective.currents(k, one_ill)
+    others = np.arange(12) != 4
+    np.testing.assert_array_equal(currents[others], clean[others])
+    assert not np.all(np.isfinite(currents[4]))
+
+
+def test_divergence_is_told_of_a_single_run():
+    unstable = ACTUATOR.with_values({"motor.inductance_H": 5e-7})
+    with pytest.raises(FloatingPointError, match=r"the monitor model diverged: .* is not finite from .* s on"):
+        simulate_monitor(RUN, unstable, circuit="thesis")
+
+
+_SWALLOWED = pytest.mark.xfail(strict=True, reason="comparisons with NaN bring the lane back to finite numbers")
+
+
+@pytest.mark.parametrize(
+    ("circuit", "component"),
+    [
+        ("thesis", 2),
+        ("thesis", 5),
+        ("reduced", 7),
+        pytest.param("thesis", 0, marks=_SWALLOWED),
+        pytest.param("reduced", 0, marks=_SWALLOWED),
+        pytest.param("reduced", 2, marks=_SWALLOWED),
+        pytest.param("reduced", 5, marks=_SWALLOWED),
+        pytest.param("thesis", 7, marks=_SWALLOWED),
+    ],
+)
+def test_what_is_not_a_number_is_no_answer(recording, circuit, component):
+    k = HEALTHY.copy()
+    k[component] = np.nan
+    assert Objective([recording], ACTUATOR, circuit=circuit)(k)[0] == np.inf

@@ -24,19 +24,29 @@ FILTER_S = 0.5e-3
 _DEFAULT_RATE_HZ = {"filtered": 10_000.0, "raw": 100_000.0}
 
 
+COMPARED = ("current_A", "motor_speed_rad_s", "motor_position_rad", "user_position_rad")
+
+
 @dataclass(frozen=True)
 class Window:
-    """One recording, ready for the kernels: a demand and a load per step, a target per compared block."""
+    """One recording, ready for the kernels: a demand and a load per step, targets per compared block."""
 
     name: str
     command: Array  # (steps,), rad
     load: Array  # (steps,), N·m at the user
-    target: Array  # (blocks,), A, means of the equivalent current
-    steps_per_block: int
+    target: Array  # (blocks,), A, means of the equivalent current, the sensor's gain and bias taken off
+    measured: dict[str, Array]  # (blocks,) each, means of the signals of `COMPARED` as recorded
+    samples_per_block: int
+    steps_per_sample: int
     step_s: float
     user_rad: float
     speed_rad_s: float
     play_rad: float
+
+    @property
+    def steps_per_block(self) -> int:
+        """Model steps between compared values."""
+        return self.samples_per_block * self.steps_per_sample
 
     @property
     def block_s(self) -> float:
@@ -121,6 +131,53 @@ class Objective:
             parts.append(result[:, :, 0, :].transpose(0, 2, 1).reshape(len(rows) * LANES, -1)[: len(k)])
         return np.concatenate(parts, axis=1)
 
+    def signals(
+        self,
+        window: Window,
+        k: ArrayLike,
+        actuator: Actuator | None = None,
+        turned_rad: ArrayLike = 0.0,
+        play_rad: ArrayLike = 0.0,
+    ) -> dict[str, Array]:
+        """All of `COMPARED` for one recording, as its sensors would show them: k (n, 8) → (n, blocks) each.
+
+        The parameters of `actuator`, turned_rad (the motor's angle at the start, rad, beyond the measured
+        one) and play_rad (the same for its place in the play) may be arrays (n,).
+        """
+        k = np.atleast_2d(np.asarray(k, dtype=float))
+        actuator = actuator or self.actuator
+        rows = monitor_rows(actuator, k, self.stack, self.effects)
+        tau = actuator.transmission.gear_ratio
+        samples = len(window.target) * window.samples_per_block
+        result = np.empty((len(rows), samples, 4, LANES))
+        start = initial_state(
+            actuator,
+            len(rows),
+            window.user_rad + np.asarray(turned_rad) * tau,
+            window.speed_rad_s,
+            window.play_rad + np.asarray(play_rad),
+        )
+        exclusive(
+            self.stack.monitor.traces,
+            start,
+            rows,
+            window.command,
+            window.load,
+            window.steps_per_sample,
+            window.step_s,
+            result,
+        )
+        blocks = result.reshape(len(rows), -1, window.samples_per_block, 4, LANES).mean(axis=2)
+        lanes = blocks.transpose(2, 0, 3, 1).reshape(4, len(rows) * LANES, -1)[:, : len(k)]
+        sensors = actuator.sensors
+        current = _each(sensors.current_gain) * lanes[0] + _each(sensors.current_bias_A)
+        return {
+            "current_A": current,
+            "motor_speed_rad_s": lanes[1],
+            "motor_position_rad": lanes[2],
+            "user_position_rad": _each(tau) * lanes[3],
+        }
+
     @property
     def target(self) -> Array:
         """The recordings' compared values, A, (blocks,), one recording after another."""
@@ -154,22 +211,31 @@ def _window(measurement: Measurement, actuator: Actuator, fitness: str) -> Windo
     count = blocks * samples * steps
     time = measurement.time_s - measurement.time_s[0]
     at = np.arange(count) * step_s - actuator.sensors.delay_s
-    current = (measurement["current_A"][1 : blocks * samples + 1] - actuator.sensors.current_bias_A) / (
-        actuator.sensors.current_gain
-    )
+    measured = {
+        name: measurement[name][1 : blocks * samples + 1].reshape(blocks, samples).mean(axis=1)
+        for name in COMPARED
+        if name in measurement
+    }
     load = measurement.get("load_torque_Nm")
     user, speed, play = _start(measurement, actuator)
     return Window(
         name=measurement.name,
         command=np.interp(at, time, measurement["command_rad"]),
         load=np.zeros(count) if load is None else np.interp(at, time, load),
-        target=current.reshape(blocks, samples).mean(axis=1),
-        steps_per_block=samples * steps,
+        target=(measured["current_A"] - actuator.sensors.current_bias_A) / actuator.sensors.current_gain,
+        measured=measured,
+        samples_per_block=samples,
+        steps_per_sample=steps,
         step_s=step_s,
         user_rad=user,
         speed_rad_s=speed,
         play_rad=play,
     )
+
+
+def _each(value: ArrayLike) -> Array:
+    """One number, or one for each individual, as a column."""
+    return np.atleast_1d(np.asarray(value, dtype=float))[:, None]
 
 
 def _start(measurement: Measurement, actuator: Actuator) -> tuple[float, float, float]:

@@ -121,6 +121,7 @@ class Actuator:
                 raise InputError(f"no actuator parameter {path!r}; write it as section.name, e.g. motor.inertia_kgm2")
             _check(section, name, value, "actuator")
             changed[section] = replace(changed.get(section, getattr(self, section)), **{name: float(value)})
+        _check_stops(changed.get("transmission", self.transmission), "actuator")
         return replace(self, **changed)
 
 
@@ -181,8 +182,7 @@ def _parse(text: str, where: str) -> Actuator:
             if tolerance is not None:
                 tolerances[f"{section}.{name}"] = tolerance
         sections[section] = cls(**values)
-    if not sections["transmission"].stop_low_rad < sections["transmission"].stop_high_rad:
-        raise InputError(f"{where}: [transmission] stop_low_rad must be below stop_high_rad")
+    _check_stops(sections["transmission"], where)
     return Actuator(
         name=str(document.get("name", Path(where).stem)),
         description=str(document.get("description", "")),
@@ -201,17 +201,34 @@ def _entry(section: str, name: str, entry: Any, where: str) -> tuple[float, Tole
         value = entry["value"]
     _check(section, name, value, where)
     if isinstance(entry, dict) and ("tolerance" in entry or "sigma" in entry):
-        sigma = entry["sigma"] if "sigma" in entry else abs(value) * entry["tolerance"]
-        if isinstance(sigma, bool) or not isinstance(sigma, int | float) or not 0.0 < sigma < math.inf:
+        given, scale = (entry["sigma"], 1.0) if "sigma" in entry else (entry["tolerance"], abs(value))
+        sigma = _number(given) * scale
+        if not 0.0 < sigma < math.inf:
             raise InputError(f"{where}: [{section}] {name}: the tolerance must be above 0 (sigma where value is 0)")
-        tolerance = Tolerance(float(sigma), bool(entry.get("free", True)))
+        free = entry.get("free", True)
+        if not isinstance(free, bool):
+            raise InputError(f"{where}: [{section}] {name}: free must be true or false, not {free!r}")
+        tolerance = Tolerance(sigma, free)
     return float(value), tolerance
 
 
 def _check(section: str, name: str, value: Any, where: str) -> None:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise InputError(f"{where}: [{section}] {name} must be a number, not {value!r}")
+    if not math.isfinite(_number(value)):
+        raise InputError(f"{where}: [{section}] {name} must be a number, not {str(value)[:40]!r}")
     if name in _POSITIVE and value <= 0.0:
         raise InputError(f"{where}: [{section}] {name} must be above 0, not {value!r}")
     if name not in _ANY_SIGN and value < 0.0:
         raise InputError(f"{where}: [{section}] {name} must not be negative, not {value!r}")
+
+
+def _check_stops(transmission: Transmission, where: str) -> None:
+    if not transmission.stop_low_rad < transmission.stop_high_rad:
+        raise InputError(f"{where}: [transmission] stop_low_rad must be below stop_high_rad")
+
+
+def _number(value: Any) -> float:
+    """The number, or NaN for what is none (or too large to be one)."""
+    try:
+        return math.nan if isinstance(value, bool | str) else float(value)
+    except (TypeError, ValueError, OverflowError):
+        return math.nan

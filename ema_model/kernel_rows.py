@@ -92,7 +92,9 @@ def _state(
     speed_rad_s: ArrayLike,
     play: ArrayLike,
 ) -> Array:
-    theta = np.asarray(user_rad, dtype=float) / actuator.transmission.gear_ratio
+    transmission = actuator.transmission
+    held = np.clip(np.asarray(user_rad, dtype=float), transmission.stop_low_rad, transmission.stop_high_rad)
+    theta = held / transmission.gear_ratio
     rotor = theta + actuator.motor.rotor_offset_rad
     values = {
         "theta": theta,

@@ -38,8 +38,11 @@ class Sensors:
             period = measurement.sample_period_s
             steps = {"motor_position_rad": 2.0 * np.pi / 2**self.encoder_bits, "user_position_rad": _USER_STEP_RAD}
             for name, step in steps.items():
-                changed[name] = np.round(measurement[name] / step) * step
-            # a rig's speed is the encoder's difference
-            changed["motor_speed_rad_s"] = np.diff(changed["motor_position_rad"], prepend=np.nan) / period
-            changed["motor_speed_rad_s"][0] = measurement["motor_speed_rad_s"][0]
+                if name in measurement:
+                    changed[name] = np.round(measurement[name] / step) * step
+            if {"motor_position_rad", "motor_speed_rad_s"} <= measurement.signals.keys():
+                # a rig's speed is the encoder's difference
+                difference = np.diff(changed["motor_position_rad"], prepend=0.0) / period
+                difference[0] = measurement["motor_speed_rad_s"][0]
+                changed["motor_speed_rad_s"] = difference
         return measurement.with_signals(**changed)

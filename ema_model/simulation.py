@@ -134,6 +134,7 @@ def simulate_monitor(
         demand,
         np.full_like(demand, run.load_torque_Nm),
         period,
+        1,
         dt,
         result,
     )
@@ -150,7 +151,8 @@ def _signals(run: Run, actuator: Actuator, result: Array, start_rad: float) -> d
     def column(index: int, start: float) -> Array:
         return np.concatenate([[start], result[:, index]])
 
-    theta = start_rad / tau
+    transmission = actuator.transmission
+    theta = float(np.clip(start_rad, transmission.stop_low_rad, transmission.stop_high_rad)) / tau
     signals = {
         "time_s": time,
         "command_rad": demand,

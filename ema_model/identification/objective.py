@@ -106,7 +106,9 @@ class Objective:
             )
             total += result.sum(axis=0).ravel()
         rmse = np.sqrt(total[: len(k)] / self.blocks)
-        return np.where(np.isfinite(rmse), rmse, np.inf)
+        # comparisons take a NaN for "not larger": a lane can come back to finite numbers, but is no answer
+        sound = np.isfinite(rmse) & np.isfinite(k).all(axis=1)
+        return np.where(sound, rmse, np.inf)
 
     def currents(self, k: ArrayLike, actuator: Actuator | None = None) -> Array:
         """What `__call__` compares with `target`, A: k (n, 8) → (n, blocks), the recordings one after another.
@@ -125,6 +127,7 @@ class Objective:
                 window.command,
                 window.load,
                 window.steps_per_block,
+                1,
                 window.step_s,
                 result,
             )
@@ -148,8 +151,7 @@ class Objective:
         actuator = actuator or self.actuator
         rows = monitor_rows(actuator, k, self.stack, self.effects)
         tau = actuator.transmission.gear_ratio
-        samples = len(window.target) * window.samples_per_block
-        result = np.empty((len(rows), samples, 4, LANES))
+        result = np.empty((len(rows), len(window.target), 4, LANES))
         start = initial_state(
             actuator,
             len(rows),
@@ -164,19 +166,23 @@ class Objective:
             window.command,
             window.load,
             window.steps_per_sample,
+            window.samples_per_block,
             window.step_s,
             result,
         )
-        blocks = result.reshape(len(rows), -1, window.samples_per_block, 4, LANES).mean(axis=2)
-        lanes = blocks.transpose(2, 0, 3, 1).reshape(4, len(rows) * LANES, -1)[:, : len(k)]
+        lanes = result.transpose(2, 0, 3, 1).reshape(4, len(rows) * LANES, -1)[:, : len(k)]
         sensors = actuator.sensors
         current = _each(sensors.current_gain) * lanes[0] + _each(sensors.current_bias_A)
-        return {
+        shown = {
             "current_A": current,
             "motor_speed_rad_s": lanes[1],
             "motor_position_rad": lanes[2],
             "user_position_rad": _each(tau) * lanes[3],
         }
+        late = _each(sensors.delay_s) - self.actuator.sensors.delay_s  # beyond what the window's command has
+        if not np.any(late):
+            return shown
+        return {name: y - late * np.gradient(y, window.block_s, axis=1) for name, y in shown.items()}
 
     @property
     def target(self) -> Array:

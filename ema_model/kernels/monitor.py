@@ -54,29 +54,35 @@ def squared_errors(states, parameters, command, load, first_step, target, weight
 
 
 @parallel_kernel
-def traces(states, parameters, command, load, period, dt, result):
-    """Signals of a population over one run.
+def traces(states, parameters, command, load, period, group, dt, result):
+    """Signals of a population over one run, each value the mean of `group` samples of `period` steps.
 
-    result: (blocks, samples, 4, LANES), written here: current (mean over the sample's period), motor
-    speed, motor angle and output of the play (at the sample's end).
+    result: (blocks, values, 4, LANES), written here.  A sample of the current is its mean over the period,
+    one of motor speed, motor angle and output of the play is taken at the period's end.
     """
     for block in numba.prange(states.shape[0]):
         s = states[block].copy()
         p = parameters[block]
-        mean = np.empty(LANES)
-        scale = 1.0 / period
+        total = np.empty(4 * LANES)
+        of_group = 1.0 / group
+        of_steps = of_group / period
         step = 0
-        for sample in range(result.shape[1]):
-            mean[:] = 0.0
-            for _ in range(period):
-                c = command[step]
-                t = load[step]
+        for value in range(result.shape[1]):
+            total[:] = 0.0
+            for _ in range(group):
+                for _ in range(period):
+                    c = command[step]
+                    t = load[step]
+                    for i in range(LANES):
+                        advance(s, p, i, c, t, dt)
+                        total[i] += s[CURRENT * LANES + i]
+                    step += 1
                 for i in range(LANES):
-                    advance(s, p, i, c, t, dt)
-                    mean[i] += s[CURRENT * LANES + i]
-                step += 1
+                    total[LANES + i] += s[OMEGA * LANES + i]
+                    total[2 * LANES + i] += s[THETA * LANES + i]
+                    total[3 * LANES + i] += s[PLAY * LANES + i]
             for i in range(LANES):
-                result[block, sample, 0, i] = mean[i] * scale
-                result[block, sample, 1, i] = s[OMEGA * LANES + i]
-                result[block, sample, 2, i] = s[THETA * LANES + i]
-                result[block, sample, 3, i] = s[PLAY * LANES + i]
+                result[block, value, 0, i] = total[i] * of_steps
+                result[block, value, 1, i] = total[LANES + i] * of_group
+                result[block, value, 2, i] = total[2 * LANES + i] * of_group
+                result[block, value, 3, i] = total[3 * LANES + i] * of_group

@@ -89,18 +89,21 @@ def test_emf_scale_sets_the_reduced_circuit_only():
 
 @pytest.mark.parametrize("path", [p for p in paths() if p.startswith("sensors.")])
 def test_sensor_parameter_reaches_the_objective(path):
-    recording = simulated(CHIRP, ACTUATOR, FAULTY)
-    value = {"sensors.current_gain": 1.05, "sensors.current_bias_A": 0.1, "sensors.delay_s": 2e-4}[path]
-    before = Objective([recording], ACTUATOR)
-    after = Objective([recording], ACTUATOR.with_values({path: value}))
-    if path == "sensors.current_gain":
-        np.testing.assert_allclose(after.target, before.target / 1.05)
-    elif path == "sensors.current_bias_A":
-        np.testing.assert_allclose(after.target, before.target - 0.1)
-    else:  # the recorded signals lag: the models answer an earlier command
-        np.testing.assert_array_equal(after.target, before.target)
-        assert np.max(np.abs(after.windows[0].command - before.windows[0].command)) > 1e-6
-    assert abs(after(FAULTY)[0] - before(FAULTY)[0]) > 1e-4
+    """A recording that a sensor distorted fits best with that sensor's parameter, about as well as the true one."""
+    value = {"sensors.current_gain": 1.1, "sensors.current_bias_A": 0.3, "sensors.delay_s": 1e-3}[path]
+    true = simulated(CHIRP, ACTUATOR, FAULTY)
+    current, time = true["current_A"], true.time_s
+    if path == "sensors.delay_s":  # the command of earlier times moves the actuator
+        seen = true.with_signals(current_A=np.interp(time - value, time, current))
+    elif path == "sensors.current_gain":
+        seen = true.with_signals(current_A=value * current)
+    else:
+        seen = true.with_signals(current_A=current + value)
+    clean = Objective([true], ACTUATOR)(FAULTY)[0]
+    ignored = Objective([seen], ACTUATOR)(FAULTY)[0]
+    told = Objective([seen], ACTUATOR.with_values({path: value}))(FAULTY)[0]
+    assert told == pytest.approx(clean, rel=0.15)
+    assert ignored > 1.5 * told, f"{path} reaches nothing in the objective"
 
 
 @pytest.mark.parametrize("model", MODELS)

@@ -79,3 +79,9 @@ def test_impossible_sensors_are_refused(settings):
     with pytest.raises(InputError, match="must") as error:
         Sensors(**settings)
     assert "\n" not in str(error.value)
+
+
+def test_encoder_of_a_recording_without_a_motor_angle(true):
+    partial = Measurement({name: true[name] for name in ("time_s", "command_rad", "current_A", "user_position_rad")})
+    seen = Sensors(encoder_bits=12).record(partial, 0)
+    np.testing.assert_allclose(seen["user_position_rad"] / 1e-6, np.round(seen["user_position_rad"] / 1e-6), atol=1e-6)

@@ -115,8 +115,10 @@ def test_command_negated_negates_the_signals(model, name):
 
     def simulated(sign):
         run = Run(command(name, {size[0]: sign * size[1]}), duration_s=0.2)
-        return simulate_reference(run, ACTUATOR) if model == "reference" else simulate_monitor(
-            run, ACTUATOR, circuit=model
+        return (
+            simulate_reference(run, ACTUATOR)
+            if model == "reference"
+            else simulate_monitor(run, ACTUATOR, circuit=model)
         )
 
     up, down = simulated(1.0), simulated(-1.0)

@@ -1,0 +1,1 @@
+"""Calibration: the actuator's own parameters, fitted to recordings within their tolerances."""

@@ -1,0 +1,289 @@
+"""Stacks of effects: composed right, compiled once, never stale, and safe from threads and processes."""
+
+from __future__ import annotations
+
+import ast
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import ema_model
+from ema_model import stacks
+from ema_model.actuator import load_actuator
+from ema_model.commands import command
+from ema_model.effects import CATALOGUE
+from ema_model.errors import InputError
+from ema_model.physics.rows import PARAMETER_ROWS
+from ema_model.simulation import Run, simulate_monitor, simulate_reference
+from ema_model.stacks import CIRCUITS, PLACES, find_stack
+
+PACKAGE = Path(ema_model.__file__ or "").parent if ema_model.__file__ else Path(stacks.__file__).parent
+ACTUATOR = load_actuator()
+RUN = Run(command("chirp"), 0.15, load_torque_Nm=5.0)
+MODELS = {"reference": simulate_reference, "monitor": simulate_monitor}
+SIGNALS = ("current_A", "motor_position_rad", "motor_speed_rad_s", "user_position_rad")
+
+# Effects whose first parameter, an amplitude, can be nought; the rest has no "off" but its absence.
+SWITCHABLE = [e.name for e in CATALOGUE.values() if e.parameters[0].low == 0.0]
+
+
+def assert_same(a, b, tolerance):
+    for name in SIGNALS:
+        scale = np.max(np.abs(b[name]))
+        assert np.max(np.abs(a[name] - b[name])) <= tolerance * scale, name
+
+
+# --- composition ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("effect", SWITCHABLE)
+def test_effect_of_no_amplitude_is_no_effect(effect, model):
+    first = CATALOGUE[effect].parameters[0].name
+    plain = MODELS[model](RUN, ACTUATOR)
+    off = MODELS[model](RUN, ACTUATOR, effects={effect: {first: 0.0}})
+    assert_same(off, plain, 1e-6)
+    on = MODELS[model](RUN, ACTUATOR, effects={effect: {first: CATALOGUE[effect].severities[2]}})
+    with pytest.raises(AssertionError):
+        assert_same(on, plain, 1e-6)
+
+
+def test_stribeck_friction_of_a_vanishing_speed_is_nearly_no_effect():
+    plain = simulate_monitor(RUN, ACTUATOR)
+    moved = []
+    for speed in (0.1, 1.0, 10.0):
+        s = simulate_monitor(RUN, ACTUATOR, effects={"stribeck_friction": {"speed_rad_s": speed}})
+        moved.append(np.sqrt(np.mean((s["current_A"] - plain["current_A"]) ** 2)))
+    assert 0.0 < moved[0] < moved[1] < moved[2] and moved[0] < 0.1 * moved[2]
+
+
+@pytest.mark.parametrize("circuit", CIRCUITS)
+def test_order_and_repetition_of_effects_do_not_matter(circuit):
+    a, b = "cogging_torque", "stribeck_friction"
+    assert find_stack(circuit, [a, b]) is find_stack(circuit, [b, a]) is find_stack(circuit, [b, a, b])
+    one = {a: {"amplitude_Nm": 0.02}, b: {"speed_rad_s": 12.0}}
+    other = {b: {"speed_rad_s": 12.0}, a: {"amplitude_Nm": 0.02}}
+    runs = [simulate_monitor(RUN, ACTUATOR, effects=e, circuit=circuit) for e in (one, other)]
+    runs += [simulate_reference(RUN, ACTUATOR, effects=e) for e in (one, other)]
+    for x, y in (runs[:2], runs[2:]):
+        for name in SIGNALS:
+            np.testing.assert_array_equal(x[name], y[name])
+
+
+def test_two_effects_act_both():
+    settings = {"cogging_torque": {"amplitude_Nm": 0.03}, "stribeck_friction": {"speed_rad_s": 20.0}}
+    both = simulate_monitor(RUN, ACTUATOR, effects=settings)
+    for name in settings:
+        one = simulate_monitor(RUN, ACTUATOR, effects={name: settings[name]})
+        with pytest.raises(AssertionError):
+            assert_same(one, both, 1e-3)
+
+
+def test_parameter_rows_follow_the_base_rows():
+    stack = find_stack("thesis", CATALOGUE)
+    assert stack.effects == tuple(sorted(CATALOGUE))
+    assert stack.parameter_rows[: len(PARAMETER_ROWS)] == PARAMETER_ROWS
+    rest = stack.parameter_rows[len(PARAMETER_ROWS) :]
+    assert rest == tuple(f"{e}.{p.name}" for e in stack.effects for p in CATALOGUE[e].parameters)
+    assert len(set(stack.parameter_rows)) == len(stack.parameter_rows)
+
+
+def test_unknown_circuit_and_effect_are_refused():
+    with pytest.raises(InputError, match="circuits are thesis, reduced"):
+        find_stack("three-phase")
+    with pytest.raises(InputError, match="no effect 'rust'; effects are"):
+        find_stack("reduced", ["rust"])
+
+
+@pytest.mark.parametrize("effect", CATALOGUE)
+def test_effects_act_at_known_places_with_the_right_arguments(effect):
+    declared = CATALOGUE[effect]
+    assert declared.places
+    for function in declared.places:
+        arguments = function.py_func.__code__.co_varnames[: function.py_func.__code__.co_argcount]
+        expected = len(PLACES[function.__name__]) + len(declared.parameters)
+        assert len(arguments) == expected, f"{effect}.{function.__name__} takes {arguments}"
+
+
+# --- what is hashed -------------------------------------------------------------------------------------------------
+
+
+def ours(path: Path) -> set[str]:
+    """Modules of ours that a file imports anywhere, relative imports resolved against ema_model."""
+    found = set()
+    package = ["ema_model", *path.relative_to(PACKAGE).parts[:-1]]
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            base = package[: len(package) - node.level + 1] if node.level else []
+            found.add(".".join([*base, *(node.module or "").split(".")]).strip("."))
+    return {name for name in found if name.split(".")[0] in ("ema_model", "emaviz")}
+
+
+def file_of(module: str) -> Path:
+    inside = PACKAGE.joinpath(*module.split(".")[1:])
+    return inside / "__init__.py" if inside.is_dir() else inside.with_suffix(".py")
+
+
+def test_kernels_import_nothing_of_ours_that_is_not_hashed():
+    hashed = {path for part in stacks._COMPILED for path in PACKAGE.glob(part)}
+    # These declare and find effects and stacks; no kernel inlines anything of them.
+    bookkeeping = {PACKAGE / "stacks.py", PACKAGE / "effects/__init__.py", PACKAGE / "effects/effect.py"}
+    kernels = hashed - bookkeeping
+    assert len(kernels) > 12
+    for path in kernels:
+        outside = {m for m in ours(path) if file_of(m) not in hashed}
+        assert not outside, f"{path.name} imports {outside}, whose edits the cache would not notice"
+    for place in ("physics", "kernels", "effects"):
+        assert not [p for p in (PACKAGE / place).iterdir() if p.is_dir() and p.name != "__pycache__"], (
+            "a subfolder is not hashed"
+        )
+
+
+# --- caches, processes, threads -------------------------------------------------------------------------------------
+
+PROGRAM = """
+from ema_model.actuator import load_actuator
+from ema_model.commands import command
+from ema_model.simulation import Run, simulate_monitor
+effects = {{"cogging_torque": {{"amplitude_Nm": 0.02}}}} if {effect} else {{}}
+s = simulate_monitor(Run(command("chirp"), 0.05), load_actuator(), effects=effects)
+print("RESULT", repr(float((s["current_A"] ** 2).mean())))
+"""
+
+
+def environment(package_parent: Path, cache: Path, **more: str) -> dict[str, str]:
+    return {**os.environ, "PYTHONPATH": str(package_parent), "EMAVIZ_CACHE_DIR": str(cache), **more}
+
+
+def start(program: str, cwd: Path, env: dict[str, str]) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-c", program], cwd=cwd, env=env, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+
+
+def result(process: subprocess.Popen[str]) -> float:
+    out, err = process.communicate(timeout=180)
+    assert process.returncode == 0, err[-2000:]
+    found = re.search(r"^RESULT (\S+)$", out, re.MULTILINE)
+    assert found, out
+    return float(found.group(1))
+
+
+def kernels_in(cache: Path) -> dict[str, tuple[int, int]]:
+    """numba's cache files with size and time of change."""
+    files = [p for p in cache.rglob("*") if p.suffix in (".nbi", ".nbc")]
+    return {str(p): (p.stat().st_size, p.stat().st_mtime_ns) for p in files}
+
+
+@pytest.fixture
+def copy(tmp_path) -> Path:
+    """A copy of the package that a test may edit; the folder that holds it."""
+    shutil.copytree(PACKAGE, tmp_path / "ema_model", ignore=shutil.ignore_patterns("__pycache__"))
+    if (PACKAGE.parent / "assets" / "actuators").is_dir():
+        shutil.copytree(PACKAGE.parent / "assets" / "actuators", tmp_path / "assets" / "actuators")
+    return tmp_path
+
+
+def test_edited_effect_is_never_served_from_the_cache(copy):
+    cache = copy / "cache"
+    program, env = PROGRAM.format(effect=True), environment(copy, cache)
+    first = result(start(program, copy, env))
+    compiled = kernels_in(cache)
+    assert compiled, "nothing was cached"
+
+    assert result(start(program, copy, env)) == first
+    assert kernels_in(cache) == compiled, "the second run compiled again"
+
+    file = copy / "ema_model" / "effects" / "cogging_torque.py"
+    source = file.read_text(encoding="utf-8")
+    edited = source.replace("return torque + amplitude * sine(", "return torque + 2.0 * amplitude * sine(")
+    assert edited != source
+    stat = file.stat()
+    file.write_text(edited, encoding="utf-8")
+    os.utime(file, ns=(stat.st_atime_ns, stat.st_mtime_ns))  # not even the time of change tells
+    shutil.rmtree(file.parent / "__pycache__", ignore_errors=True)
+    second = result(start(program, copy, env))
+    assert abs(second - first) > 1e-6 * first, "the old kernel was served"
+    after = kernels_in(cache)
+    assert set(compiled) < set(after)
+    assert {p: after[p] for p in compiled} == compiled, "the old version's kernels must stay for its processes"
+
+    assert result(start(program, copy, env)) == second
+    assert kernels_in(cache) == after, "an unchanged run compiled again"
+
+
+def test_edited_physics_is_never_served_from_the_cache(copy):
+    """The circuit is inlined from another file than the kernel's: numba alone would not notice."""
+    cache = copy / "cache"
+    program, env = PROGRAM.format(effect=False), environment(copy, cache)
+    first = result(start(program, copy, env))
+    file = copy / "ema_model" / "physics" / "controller.py"
+    source = file.read_text(encoding="utf-8")
+    edited = source.replace("clamp(position_gain * (", "clamp(0.8 * position_gain * (")
+    assert edited != source
+    file.write_text(edited, encoding="utf-8")
+    assert abs(result(start(program, copy, env)) - first) > 1e-6 * first
+
+
+def test_two_processes_may_build_the_same_stack_at_once(tmp_path):
+    env = environment(PACKAGE.parent, tmp_path / "cache")
+    both = [start(PROGRAM.format(effect=True), tmp_path, env) for _ in range(2)]
+    values = [result(process) for process in both]
+    assert values[0] == values[1] > 0.0
+    folders = list((tmp_path / "cache" / "kernels").glob("*/*"))
+    assert len([f for f in folders if f.name.startswith("stack_")]) == 1
+    assert not [f for f in folders if f.name.startswith(".draft")], "a draft was left behind"
+
+
+def test_unusable_cache_folder_falls_back(tmp_path):
+    blocked = tmp_path / "file"
+    blocked.write_text("not a folder")
+    env = environment(PACKAGE.parent, blocked, TMPDIR=str(tmp_path))
+    assert result(start(PROGRAM.format(effect=False), tmp_path, env)) > 0.0
+    assert list(tmp_path.glob("emaviz-kernels-*")), "a temporary folder takes its place"
+
+
+THREADS = """
+import threading
+import numpy as np
+from ema_model.actuator import load_actuator
+from ema_model.faults import HEALTHY
+from ema_model.identification.objective import Objective, simulated
+from ema_model.simulation import Run, simulate_monitor
+import numba
+actuator = load_actuator()
+recording = simulated(Run(duration_s=0.05), actuator, HEALTHY)
+objective = Objective([recording], actuator)
+k = np.random.default_rng(0).random((70, 8))
+expected = objective(k)
+assert numba.threading_layer() == "workqueue", numba.threading_layer()
+wrong = []
+def work():
+    try:
+        for _ in range(15):
+            if not np.array_equal(objective(k), expected):
+                wrong.append("values")
+            simulate_monitor(Run(duration_s=0.02), actuator)
+    except BaseException as error:
+        wrong.append(repr(error))
+threads = [threading.Thread(target=work) for _ in range(8)]
+[t.start() for t in threads]
+[t.join() for t in threads]
+assert not wrong, wrong
+print("RESULT 1.0")
+"""
+
+
+def test_parallel_kernels_from_eight_threads_do_not_abort(tmp_path):
+    """numba's workqueue layer aborts the process when two threads run a parallel kernel at once."""
+    cache = stacks.cache_folder().parents[1]
+    env = environment(PACKAGE.parent, cache, NUMBA_THREADING_LAYER="workqueue", NUMBA_NUM_THREADS="2")
+    assert result(start(THREADS, tmp_path, env)) == 1.0

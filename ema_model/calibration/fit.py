@@ -21,7 +21,7 @@ from ema_model.errors import InputError
 from ema_model.faults import HEALTHY, NAMES
 from ema_model.identification.objective import Objective
 
-Array = NDArray[np.floating]
+Array = NDArray[np.float64]
 
 BOUND = 3.0  # σ
 _STEP = 0.02  # σ, of the differences

@@ -19,7 +19,7 @@ from ema_model.identification.objective import COMPARED, Objective, Window
 from ema_model.measurement import Measurement
 from ema_model.simulation import Run, simulate_reference
 
-Array = NDArray[np.floating]
+Array = NDArray[np.float64]
 
 _AROUND_S = 0.0125
 

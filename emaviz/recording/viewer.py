@@ -89,10 +89,10 @@ def view(path: str | Path, open_browser: bool = True, port: int = 0) -> None:
     path = check(path)
     with ViewerHost(path.parent, port=port, only=path.name) as host:
         address = host.url_of(path.name)
-        print(f"{path.name}: {address}\nCtrl-C ends it.", flush=True)
-        if open_browser:
-            webbrowser.open(address)
         try:
+            print(f"{path.name}: {address}\nCtrl-C ends it.", flush=True)
+            if open_browser:
+                webbrowser.open(address)
             host.wait()
         except KeyboardInterrupt:
             return

@@ -22,7 +22,7 @@ def read_measurement(path: str | os.PathLike[str], *, max_bytes: int = 2_000_000
     _check_file(path, max_bytes)
     file_format = format_of(path)
     try:
-        known, foreign = choose_columns(path, file_format.header(path, max_bytes))
+        known, foreign = choose_columns(path, file_format.header(path))
         columns = file_format.read(path, known, max_bytes)
     except OSError as error:
         raise refusal(path, f"cannot be read ({reason(error)}); check the disk and the permissions") from None

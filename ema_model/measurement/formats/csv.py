@@ -34,8 +34,7 @@ class _Dialect:
     decimal: str
 
 
-def _header(path: str, max_bytes: int) -> list[str]:
-    del max_bytes  # only the header is read
+def _header(path: str) -> list[str]:
     return _dialect(path).names
 
 

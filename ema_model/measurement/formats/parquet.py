@@ -15,8 +15,7 @@ from ema_model.measurement.refusal import refusal, shown
 _KEY, _VERSION = b"emaviz_schema", b"1"
 
 
-def _header(path: str, max_bytes: int) -> list[str]:
-    del max_bytes  # only the header is read
+def _header(path: str) -> list[str]:
     with _opened(path) as file:
         version = (file.schema_arrow.metadata or {}).get(_KEY, _VERSION)
         if version != _VERSION:

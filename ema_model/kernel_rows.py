@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,26 +12,48 @@ from ema_model import faults
 from ema_model.actuator import Actuator
 from ema_model.physics.phases import flux_harmonics
 from ema_model.physics.rows import LANES, REFERENCE_STATE_ROWS, STATE_ROWS
-from ema_model.stacks import Stack
+from ema_model.stacks import Stack, find_stack
 
 Array = NDArray[np.float64]
 EffectSettings = Mapping[str, Mapping[str, ArrayLike]]
 
 
+@dataclass(frozen=True)
+class Circuit:
+    """One equivalent winding and the most voltage on it."""
+
+    resistance_Ohm: float
+    inductance_H: float
+    voltage_V: float
+
+
+def reduced_circuit(actuator: Actuator) -> Circuit:
+    """The exact equivalent of the RM's phases: R, L × 4/(3 s), V = (2/s)(4/π)(bus/2), s the EMF's scale."""
+    motor = actuator.motor
+    scale = 2.0 / (3.0 * motor.emf_scale)  # of the phase-to-phase values, twice those of a phase
+    voltage = 4.0 / np.pi * actuator.inverter.bus_voltage_V / motor.emf_scale
+    return Circuit(scale * motor.resistance_Ohm, scale * motor.inductance_H, voltage)
+
+
+def stack_for(actuator: Actuator, effects: Iterable[str] = (), circuit: str = "reduced") -> Stack:
+    """The kernels of an actuator with effects besides its own; circuit: for the hysteresis current loop."""
+    controller = "cascade" if actuator.controller.kind == "unknown" else actuator.controller.kind
+    return find_stack(actuator.circuit(circuit), {*actuator.effects, *effects}, controller)
+
+
 def monitor_rows(actuator: Actuator, k: ArrayLike, stack: Stack, effects: EffectSettings) -> Array:
     """Parameters of the Monitor Model for a population: k (n, 8) → (blocks, rows·LANES).
 
-    Effects' parameters are numbers or (n,) each.  Lanes beyond n repeat the last individual.
+    effects: besides those that belong to the actuator.  Parameters are numbers or (n,) each.  Lanes beyond n
+    repeat the last individual.
     """
     k = np.atleast_2d(np.asarray(k, dtype=float))
     fault = faults.physical(k)
     motor, inverter = actuator.motor, actuator.inverter
     if stack.circuit == "reduced":
-        # The exact equivalent of the RM's phases: R, L × 4/(3 s), V = (2/s)(4/π)(bus/2), s the EMF's scale.
-        scale = 2.0 / (3.0 * motor.emf_scale)  # of the phase-to-phase values, twice those of a phase
-        resistance, inductance = scale * motor.resistance_Ohm, scale * motor.inductance_H
-        voltage = 4.0 / np.pi * inverter.bus_voltage_V / motor.emf_scale
-    else:
+        circuit = reduced_circuit(actuator)
+        resistance, inductance, voltage = circuit.resistance_Ohm, circuit.inductance_H, circuit.voltage_V
+    else:  # without a voltage limit, or with the bus as it is
         resistance, inductance, voltage = motor.resistance_Ohm, motor.inductance_H, inverter.bus_voltage_V
     values = _shared_rows(actuator, fault) | {
         "voltage": voltage,
@@ -41,7 +64,7 @@ def monitor_rows(actuator: Actuator, k: ArrayLike, stack: Stack, effects: Effect
     }
     harmonics = flux_harmonics(fault.turns, fault.eccentricity, fault.phase_rad)
     values |= {f"flux_{i}": harmonics[i] for i in range(9)}
-    return _blocks(values, stack, effects, len(k))
+    return _blocks(values, stack, {**actuator.effects, **effects}, len(k))
 
 
 def reference_rows(actuator: Actuator, k: ArrayLike, stack: Stack, effects: EffectSettings) -> Array:
@@ -62,7 +85,7 @@ def reference_rows(actuator: Actuator, k: ArrayLike, stack: Stack, effects: Effe
         "eccentricity_cos": np.cos(fault.phase_rad),
         "eccentricity_sin": np.sin(fault.phase_rad),
     }
-    return _blocks(values, stack, effects, 1)[0]
+    return _blocks(values, stack, {**actuator.effects, **effects}, 1)[0]
 
 
 def initial_state(
@@ -114,20 +137,26 @@ def _state(
 def _shared_rows(actuator: Actuator, fault: faults.PhysicalFaults) -> dict[str, ArrayLike]:
     controller, motor, transmission = actuator.controller, actuator.motor, actuator.transmission
     tau = transmission.gear_ratio
+    if controller.kind == "position":
+        full = actuator.inverter.current_limit_A if actuator.inverter.kind == "current" else 1.0
+        gain, limit = controller.gain_1_rad, controller.output_limit * full
+    else:
+        gain, limit = controller.position_gain_1_s, controller.current_limit_A
     return {
-        "position_gain": controller.position_gain_1_s * fault.gain_factor,
+        "position_gain": gain * fault.gain_factor,
         "speed_limit": controller.speed_limit_rad_s,
         "speed_gain": controller.speed_gain_Nms_rad,
         "integral_gain": controller.integral_gain_Nm_rad,
         "derivative_gain": controller.derivative_gain_Nms2_rad,
         "integrator_window": controller.integrator_window_rad,
         "current_per_torque": 1.0 / controller.torque_constant_Nm_A,
-        "current_limit": controller.current_limit_A,
+        "output_limit": limit,
         "torque_constant": motor.torque_constant_Nm_A,
         "torque_limit": motor.torque_limit_Nm,
         "pole_pairs": motor.pole_pairs,
         "inverse_inertia": 1.0 / motor.inertia_kgm2,
-        "static_friction": motor.static_friction_Nm * fault.friction_factor,
+        # Less than in motion would let a rotor at rest start and stop without end.
+        "static_friction": np.maximum(motor.static_friction_Nm, motor.dynamic_friction_Nm) * fault.friction_factor,
         "dynamic_friction": motor.dynamic_friction_Nm * fault.friction_factor,
         "half_play": 0.5 * transmission.backlash_rad * fault.backlash_factor / tau,
         "gear_ratio": tau,

@@ -13,10 +13,10 @@ from ema_model.commands import Command, command
 from ema_model.effects import find
 from ema_model.errors import InputError
 from ema_model.faults import HEALTHY
-from ema_model.kernel_rows import initial_reference_state, initial_state, monitor_rows, reference_rows
+from ema_model.kernel_rows import initial_reference_state, initial_state, monitor_rows, reference_rows, stack_for
 from ema_model.measurement import Measurement
 from ema_model.physics.rows import LANES
-from ema_model.stacks import exclusive, find_stack
+from ema_model.stacks import exclusive
 
 Array = NDArray[np.float64]
 Effects = Mapping[str, Mapping[str, float]]
@@ -60,9 +60,9 @@ class Run:
         return np.arange(self.samples + 1) / self.sample_rate_Hz
 
 
-def steps_per_sample(period_s: float) -> int:
-    """Monitor steps in a sampling period: as many as keep them at 1e-5 s or just below."""
-    return max(1, int(np.ceil(period_s / MONITOR_STEP_S - 1e-6)))
+def steps_per_sample(period_s: float, step_s: float = MONITOR_STEP_S) -> int:
+    """Monitor steps in a sampling period: as many as keep them at `step_s` or just below."""
+    return max(1, int(np.ceil(period_s / step_s - 1e-6)))
 
 
 def simulate_reference(
@@ -72,15 +72,22 @@ def simulate_reference(
     effects: Effects | None = None,
     *,
     start_rad: float | None = None,
+    start_speed_rad_s: float = 0.0,
+    start_play_rad: float = 0.0,
     voltages: bool = False,
 ) -> Measurement:
     """The three-phase Reference Model's signals; with `voltages`, also the legs' (V, against the bus's middle).
 
-    It starts at rest at start_rad, a user's angle, or where the command starts.
+    It starts at start_rad, a user's angle, or where the command starts; with a motor speed, and at a place in
+    the play (rad at the motor), both 0 unless given.
     Raises InputError for settings of effects that do not exist, FloatingPointError if the model diverges.
     """
     effects = {name: find(name).settings(dict(given)) for name, given in (effects or {}).items()}
-    stack = find_stack(effects=effects)
+    if not actuator.has_reference_model:
+        raise InputError(
+            f"{actuator.name}: the reference model is of a cascade with a hysteresis inverter; use the monitor model"
+        )
+    stack = stack_for(actuator, effects)
     period = steps_per_sample(1.0 / run.sample_rate_Hz)
     dt = 1.0 / run.sample_rate_Hz / period
     times = np.arange(run.samples * period + 1) * dt
@@ -89,7 +96,7 @@ def simulate_reference(
     start = float(demand[0]) if start_rad is None else start_rad
     result = np.empty((run.samples, 11))
     stack.reference.run(
-        initial_reference_state(actuator, start),
+        initial_reference_state(actuator, start, start_speed_rad_s, start_play_rad),
         reference_rows(actuator, k, stack, effects),
         demand,
         load,
@@ -120,11 +127,12 @@ def simulate_monitor(
 ) -> Measurement:
     """The Monitor Model's signals; raises as `simulate_reference`."""
     effects = {name: find(name).settings(dict(given)) for name, given in (effects or {}).items()}
-    stack = find_stack(circuit, effects)
-    period = steps_per_sample(1.0 / run.sample_rate_Hz)
+    if actuator.controller.kind == "unknown":
+        raise InputError(f"{actuator.name}: its controller is not known, so that no command can be simulated")
+    stack = stack_for(actuator, effects, circuit)
+    period = steps_per_sample(1.0 / run.sample_rate_Hz, actuator.step_s)
     dt = 1.0 / run.sample_rate_Hz / period
     demand = run.command.at(np.arange(run.samples * period + 1) * dt)
-    start = float(demand[0]) if start_rad is None else start_rad
     start = float(demand[0]) if start_rad is None else start_rad
     result = np.empty((1, run.samples, 4, LANES))
     exclusive(
@@ -133,6 +141,7 @@ def simulate_monitor(
         monitor_rows(actuator, k, stack, effects),
         demand,
         np.full_like(demand, run.load_torque_Nm),
+        np.ones_like(demand),
         period,
         1,
         dt,

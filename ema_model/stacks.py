@@ -1,7 +1,7 @@
 """The models' kernels for a stack of effects: composed, compiled and cached.
 
 numba finds a compiled kernel again only when it stands in a file, and never notices that a function it
-inlined was edited elsewhere.  So each stack — a circuit and some effects — becomes a folder of its own:
+inlined was edited elsewhere.  So each stack — a controller, a drive and some effects — becomes a folder of its own:
 the files of `ema_model.kernels` copied beside a generated `composition.py` that inlines the stack.  The
 folder lies under a hash of the sources that kernels are made of and of the versions that compile them: an
 edited effect is another folder, and an old kernel is never served.
@@ -31,7 +31,9 @@ from typing import Any
 from ema_model.errors import InputError
 from ema_model.physics.rows import LANES, PARAMETER_ROWS
 
-CIRCUITS = ("thesis", "reduced")
+CIRCUITS = ("thesis", "reduced")  # the drives that stand for the hysteresis current loop
+DRIVES = (*CIRCUITS, "current", "voltage")
+CONTROLLERS = ("cascade", "position")
 _PACKAGE = Path(__file__).parent
 # All that a kernel may inline; `tests/model/test_stacks.py` checks that kernels import nothing else of ours.
 _COMPILED = ("numba_options.py", "stacks.py", "physics/*.py", "kernels/*.py", "effects/*.py")
@@ -43,19 +45,21 @@ _KEPT_VERSIONS = 6  # folders of other hashes (older sources or versions) that a
 PLACES = {
     "moving_friction": ("level", "static", "omega", "motor_torque", "load"),
     "electric_torque": ("torque", "theta", "omega", "current"),
-    "shaft_torque": ("torque", "theta", "omega", "current", "user"),
+    "shaft_torque": ("torque", "theta", "omega", "current", "user", "gear"),
 }
 
 
 @dataclass(frozen=True)
 class Stack:
-    """A circuit and effects, with the kernels compiled for them (on their first call)."""
+    """A controller, a drive and effects, with the kernels compiled for them (on their first call)."""
 
-    circuit: str
+    circuit: str  # the drive
+    controller: str
     effects: tuple[str, ...]
     parameter_rows: tuple[str, ...]  # of the base model, then "effect.parameter"
     monitor: Any  # module: squared_errors, traces
     reference: Any  # module: run
+    inverse: Any  # module: currents
 
 
 # Two threads in numba's `workqueue` layer at once abort the process; this lock makes that impossible.
@@ -68,36 +72,39 @@ def exclusive(kernel: Callable[..., Any], *arguments: Any) -> Any:
         return kernel(*arguments)
 
 
-def find_stack(circuit: str = "reduced", effects: Iterable[str] = ()) -> Stack:
-    """The stack of a circuit and of effects by name (their order and repetition do not matter)."""
-    if circuit not in CIRCUITS:
-        raise InputError(f"no circuit {circuit!r}; circuits are {', '.join(CIRCUITS)}")
-    return _stack(circuit, tuple(sorted(set(effects))))
+def find_stack(circuit: str = "reduced", effects: Iterable[str] = (), controller: str = "cascade") -> Stack:
+    """The stack of a drive, a controller, and effects by name (whose order and repetition do not matter)."""
+    if circuit not in DRIVES:
+        raise InputError(f"no circuit {circuit!r}; circuits are {', '.join(DRIVES)}")
+    if controller not in CONTROLLERS:
+        raise InputError(f"no controller {controller!r}; controllers are {', '.join(CONTROLLERS)}")
+    return _stack(circuit, controller, tuple(sorted(set(effects))))
 
 
 @cache
-def _stack(circuit: str, names: tuple[str, ...]) -> Stack:
+def _stack(circuit: str, controller: str, names: tuple[str, ...]) -> Stack:
     from ema_model.effects import find  # effects import physics, which must stand without stacks
 
     effects = [find(name) for name in names]
     rows = PARAMETER_ROWS + tuple(f"{effect.name}.{p.name}" for effect in effects for p in effect.parameters)
-    folder = _write(circuit, names, _composition(circuit, effects))
+    folder = _write((circuit, controller, *names), _composition(circuit, controller, effects))
     package = _import(folder)
     return Stack(
         circuit,
+        controller,
         names,
         rows,
-        importlib.import_module(f"{package.__name__}.monitor"),
-        importlib.import_module(f"{package.__name__}.reference"),
+        *(importlib.import_module(f"{package.__name__}.{module}") for module in ("monitor", "reference", "inverse")),
     )
 
 
-def _composition(circuit: str, effects: Sequence[Any]) -> str:
+def _composition(circuit: str, controller: str, effects: Sequence[Any]) -> str:
     """Source of the stack's composition.py."""
     imports = [
         '"""Generated: the places where this stack\'s effects act."""',
         "from ema_model.numba_options import scalar",
-        f"from ema_model.physics.circuit import {circuit}_circuit as advance_current",
+        f"from ema_model.physics.controller import {controller}_controller as control",
+        f"from ema_model.physics.drive import {circuit}_drive as advance_current",
     ]
     bodies: dict[str, list[str]] = {place: [] for place in PLACES}
     row = len(PARAMETER_ROWS)
@@ -117,9 +124,9 @@ def _composition(circuit: str, effects: Sequence[Any]) -> str:
     return "\n".join([*imports, *functions, ""])
 
 
-def _write(circuit: str, names: tuple[str, ...], composition: str) -> Path:
+def _write(parts: tuple[str, ...], composition: str) -> Path:
     """The stack's folder, written whole or not at all, as several processes may want it at once."""
-    key = hashlib.sha256("+".join((circuit, *names)).encode()).hexdigest()[:16]
+    key = hashlib.sha256("+".join(parts).encode()).hexdigest()[:16]
     folder = cache_folder() / f"stack_{key}"
     if not (folder / "composition.py").is_file():
         draft = Path(tempfile.mkdtemp(prefix=".draft", dir=cache_folder()))

@@ -8,13 +8,20 @@ import threading
 import time
 import traceback
 import webbrowser
+from collections.abc import Sequence
 from pathlib import Path
 
 import viser
 
 from ema_model.actuator import load_actuator
-from ema_model.errors import InputError
+from ema_model.comparison.result import Comparison
+from emaviz.comparing import Comparing
+from emaviz.data_folder import DataFolder
 from emaviz.figures.signals import LiveSignals
+from emaviz.panels.compare import ComparePanel
+from emaviz.panels.compare_keep import KeepControls
+from emaviz.panels.compare_moment import hold
+from emaviz.panels.compare_result import ResultPanel
 from emaviz.panels.explore import ExplorePanel
 from emaviz.panels.identify import IdentifyPanel
 from emaviz.panels.page import Page
@@ -33,17 +40,24 @@ _FASTEST_REDRAW_S = 0.05
 class App:
     """One page on one address; `close` ends its threads and servers."""
 
-    def __init__(self, host: str, port: int, folder: Path, actuator_file: str | None = None) -> None:
+    def __init__(
+        self, host: str, port: int, folder: Path, actuator_file: str | None = None, files: Sequence[Path] = ()
+    ) -> None:
+        """files: recordings to open on Compare, which is then the first tab.  InputError: one of them is none."""
         started = time.perf_counter()
         actuator = load_actuator(actuator_file)
-        recordings = _folder(folder)
+        data = DataFolder(folder)
+        given = [data.take_in(file) for file in files]
+        recordings = data.recordings
         self.server = open_server(host, port)
         self.viewer = _viewer(recordings)
         self.session = Session(actuator, recordings)
         self.screen = Worker("emaviz-screen", self._on_screen_error, rest_s=_FASTEST_REDRAW_S)
         self.page = Page(self.server, self.session, self.screen)
-        self._build(recordings)
-        self.playback = Playback(ActuatorScene(self.server))
+        self.comparing = Comparing(self.session, data)
+        self.scene = ActuatorScene(self.server)
+        self.playback = Playback(self.scene)
+        self._build(recordings, compare_first=bool(given))
         self._play.on_update(lambda _: self.playback.play(bool(self._play.value)))
         self._first = threading.Event()
         self.first_picture_s = 0.0
@@ -52,30 +66,67 @@ class App:
         events.status.append(lambda text: self.screen.post("status", lambda: self._status(text)))
         events.told.append(self._told)
         self.session.start()
+        for path in given:
+            self.comparing.add(data.name_of(path))
         for found in recover(recordings):
             self.explore.status.content = f"Recovered a recording of an interrupted run: {found}"
 
-    def _build(self, recordings: Path) -> None:
+    def _build(self, recordings: Path, compare_first: bool) -> None:
         gui = self.server.gui
         gui.configure_theme(show_logo=False, show_share_button=False, brand_color=(47, 111, 222))
         gui.set_panel_label("emaviz")
         gui.main_panel.dock_left()
         gui.main_panel.set_width(370)
+        # Of the two panels on the right one is seen: the one that belongs to what was done last.
+        self._signals_panel, self._result_panel = gui.add_panel(), gui.add_panel(visible=False)
+        with self._signals_panel.add_tab("Signals", viser.Icon.CHART_LINE):
+            self.signals = LiveSignals(gui)
+        with self._result_panel.add_tab("Comparison", viser.Icon.ARROWS_DIFF):
+            result = ResultPanel(
+                self.page,
+                lambda: self._bring(self._result_panel),
+                self._hold,
+                lambda: KeepControls(self.page, self.comparing, self.viewer),
+            )
+        for panel in (self._signals_panel, self._result_panel):
+            panel.dock_right()
+            panel.set_width(540)
+        builders = [
+            lambda tabs: self._build_explore(tabs),
+            lambda tabs: self._build_identify(tabs),
+            lambda tabs: self._build_compare(tabs, result),
+        ]
         tabs = gui.add_tab_group()
+        for build in (builders[-1:] + builders[:-1]) if compare_first else builders:
+            build(tabs)
+        with tabs.add_tab("Recordings", viser.Icon.LIST):
+            RecordingsPanel(self.page, self.viewer, recordings)
+
+    def _build_explore(self, tabs: viser.GuiTabGroupHandle) -> None:
+        gui = self.server.gui
         with tabs.add_tab("Explore", viser.Icon.ADJUSTMENTS):
             self.explore = ExplorePanel(self.page)
             with gui.add_folder("Picture"):
                 self._caption = gui.add_markdown("")
                 self._play = gui.add_checkbox("Play", True)
+
+    def _build_identify(self, tabs: viser.GuiTabGroupHandle) -> None:
         with tabs.add_tab("Identify", viser.Icon.SEARCH):
             self.identify = IdentifyPanel(self.page, self.viewer)
-        with tabs.add_tab("Recordings", viser.Icon.LIST):
-            RecordingsPanel(self.page, self.viewer, recordings)
-        panel = gui.add_panel()
-        with panel.add_tab("Signals", viser.Icon.CHART_LINE):
-            self.signals = LiveSignals(gui)
-        panel.dock_right()
-        panel.set_width(540)
+
+    def _build_compare(self, tabs: viser.GuiTabGroupHandle, result: ResultPanel) -> None:
+        with tabs.add_tab("Compare", viser.Icon.ARROWS_DIFF):
+            self.compare = ComparePanel(self.page, self.comparing, result)
+
+    def _bring(self, panel: viser.PanelHandle) -> None:
+        """To the front, on the right; the other one gives way."""
+        for one in (self._signals_panel, self._result_panel):
+            if one.visible != (one is panel):
+                one.visible = one is panel
+
+    def _hold(self, comparison: Comparison, recording: int, time_s: float) -> None:
+        self._play.value = False
+        hold(self.playback, self.scene, comparison, recording, time_s)
 
     @property
     def address(self) -> str:
@@ -89,6 +140,7 @@ class App:
     def close(self) -> None:
         """Ends everything that was started."""
         self.playback.close()
+        self.comparing.close()
         self.session.close()
         self.screen.close()
         if self.viewer is not None:
@@ -107,6 +159,8 @@ class App:
         if not self._first.is_set():
             self.first_picture_s = time.perf_counter() - started
             self._first.set()
+        else:
+            self._bring(self._signals_panel)
 
     def _status(self, text: str) -> None:
         self.explore.status.content = text
@@ -121,9 +175,8 @@ class App:
 
 def serve(arguments: argparse.Namespace) -> int:
     """Runs the app until interrupted (the command line's `gui`)."""
-    if arguments.files:
-        raise InputError("opening recordings in the app comes with Compare; use: emaviz identify FILE")
-    app = App(arguments.host, arguments.port, arguments.data_dir, arguments.actuator)
+    files = [Path(file) for file in arguments.files]
+    app = App(arguments.host, arguments.port, arguments.data_dir, arguments.actuator, files)
     print(f"emaviz is at {app.address}  (Ctrl-C ends it)", flush=True)
     if arguments.host not in LOOPBACK:
         print("It is open to the network: whoever reaches this address can use it.", file=sys.stderr)
@@ -136,15 +189,6 @@ def serve(arguments: argparse.Namespace) -> int:
     finally:
         app.close()
     return 0
-
-
-def _folder(folder: Path) -> Path:
-    recordings = folder / "recordings"
-    try:
-        recordings.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"--data-dir {folder}: cannot be made ({error.strerror})") from None
-    return recordings
 
 
 def _viewer(recordings: Path) -> ViewerHost | None:

@@ -7,41 +7,78 @@ differs most in transients, so its floor is local: the rms within 12.5 ms on eit
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import uniform_filter1d
 
+from ema_model.actuator import Actuator
 from ema_model.commands import Recorded
 from ema_model.faults import HEALTHY
-from ema_model.identification.objective import COMPARED, Objective, Window
 from ema_model.measurement import Measurement
+from ema_model.plants import ClosedLoop, Plant, Stretch, Window
 from ema_model.simulation import Run, simulate_reference
 
 Array = NDArray[np.float64]
 
-_AROUND_S = 0.0125
+CORRELATED_S = 0.025  # how long the model's error, and a sensor's inaccuracy, stay alike
+_SIGNALS = ("current_A", "motor_speed_rad_s", "motor_position_rad", "user_position_rad", "motor_torque_Nm")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Floor:
-    """Standard deviations per block of one recording, by signal, in the signals' units."""
+    """Standard deviations per block of one window, by signal, in the signals' units."""
 
-    noise: dict[str, float]
-    model: dict[str, Array]  # (blocks,)
+    noise: dict[str, float]  # white
+    model: dict[str, Array]  # (blocks,), alike over `CORRELATED_S`
+    block_s: float
 
     def sigma(self, signal: str) -> Array:
         """Both together, (blocks,)."""
         return np.hypot(self.noise[signal], self.model[signal])
 
+    def fit_sigma(self, signal: str) -> Array:
+        """What to weight a fit by: the correlated part counts as often as it repeats, (blocks,)."""
+        repeats = max(1.0, CORRELATED_S / self.block_s)
+        return np.hypot(self.noise[signal], np.sqrt(repeats) * self.model[signal])
+
     def rms(self, signal: str) -> float:
-        """Both together over the whole recording."""
+        """Both together over the whole window."""
         return float(np.sqrt(np.mean(self.sigma(signal) ** 2)))
 
 
-def floor(objective: Objective, window: Window, measurement: Measurement, k: ArrayLike = HEALTHY) -> Floor:
-    """The floor of one recording of the objective; k: where the twins are run (normally healthy)."""
+def floor(
+    plant: Plant,
+    window: Window | Stretch,
+    k: ArrayLike = HEALTHY,
+    stated: Mapping[str, Mapping[str, float]] | None = None,
+) -> Floor:
+    """The floor of one window of a plant.
+
+    k: where the twins are run (normally healthy); stated: what is known of the sensors, by signal: "noise" (white,
+    rms per sample) in place of the estimate, "accuracy" (slow, rms) besides it.
+    """
+    names = [name for name in _SIGNALS if name in window.measured]
+    known = {name: (stated or {}).get(name, {}) for name in names}
+    if isinstance(window, Stretch):
+        noise = dict(window.noise)
+        model = {name: np.zeros(window.blocks) for name in names}
+    else:
+        samples = plant.recorded[window.recording]
+        noise = {
+            name: known[name].get("noise", _of_runs(samples, name)) / np.sqrt(window.samples_per_block)
+            for name in names
+        }
+        assert isinstance(plant, ClosedLoop)
+        model = _twins(plant, window, k, names)
+    slow = {name: np.hypot(model[name], known[name].get("accuracy", 0.0)) for name in names}
+    return Floor(noise, slow, window.block_s)
+
+
+def twin_error(plant: ClosedLoop, window: Window, actuator: Actuator, k: ArrayLike = HEALTHY) -> dict[str, Array]:
+    """Reference Model less Monitor Model under the window's command, by signal, (blocks,) each."""
     count = len(window.command)
     times = np.arange(count) * window.step_s
     run = Run(
@@ -50,18 +87,34 @@ def floor(objective: Objective, window: Window, measurement: Measurement, k: Arr
         sample_rate_Hz=1.0 / (window.steps_per_sample * window.step_s),
         load_torque_Nm=float(window.load.mean()),
     )
-    twin = simulate_reference(run, objective.actuator, k, objective.effects, start_rad=window.user_rad)
-    monitor = objective.signals(window, k)
-    model, noise = {}, {}
-    width = max(3, 2 * round(_AROUND_S / window.block_s) + 1)
-    for name in COMPARED:
-        if name not in window.measured:
-            continue
-        means = twin[name][1:].reshape(-1, window.samples_per_block).mean(axis=1)
-        difference = means - monitor[name][0]
-        model[name] = np.sqrt(uniform_filter1d(difference**2, width, mode="nearest"))
-        noise[name] = sample_noise(measurement[name]) / np.sqrt(window.samples_per_block)
-    return Floor(noise, model)
+    twin = simulate_reference(
+        run,
+        actuator,
+        k,
+        plant.effects,
+        start_rad=window.user_rad,
+        start_speed_rad_s=window.speed_rad_s,
+        start_play_rad=window.play_rad,
+    )
+    monitor = plant.signals(window, actuator, k)
+    return {
+        name: twin[name][1:].reshape(-1, window.samples_per_block).mean(axis=1) - monitor[name][0]
+        for name in window.measured
+    }
+
+
+def _twins(plant: ClosedLoop, window: Window, k: ArrayLike, names: list[str]) -> dict[str, Array]:
+    if not plant.actuator.has_reference_model:
+        return {name: np.zeros(window.blocks) for name in names}
+    width = max(3, round(CORRELATED_S / window.block_s) | 1)
+    error = twin_error(plant, window, plant.actuator, k)
+    return {name: np.sqrt(uniform_filter1d(error[name] ** 2, width, mode="nearest")) for name in names}
+
+
+def _of_runs(measurement: Measurement, name: str) -> float:
+    """The noise of a signal over all its runs, of which the longest counts."""
+    longest = max(measurement.runs, key=lambda run: run.stop - run.start)
+    return sample_noise(measurement[name][longest])
 
 
 def sample_noise(values: Array) -> float:

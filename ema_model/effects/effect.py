@@ -39,6 +39,7 @@ class Effect:
     places: tuple[Callable[..., Any], ...]
     shows: str
     mistaken_for: str
+    is_load: bool = False  # pulls at the user from outside, so that its torque counts as the load
     name: str = ""  # of the file; the catalogue fills it in
 
     def settings(self, given: dict[str, float]) -> dict[str, float]:

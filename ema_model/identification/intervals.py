@@ -10,14 +10,13 @@ Everything is linearised at the answer.  The covariance has three parts:
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from ema_model import faults
-from ema_model.actuator import Actuator
 from ema_model.commands import Recorded
 from ema_model.identification.objective import Objective
 from ema_model.simulation import Run, simulate_reference
@@ -107,12 +106,10 @@ def _tolerance_shifts(objective: Objective, k: Array) -> Array:
     if not paths:
         return np.zeros((objective.blocks, 0))
     n = len(paths) + 1
-    varied: Actuator = actuator
+    values = {path: np.full(n, actuator.value(path)) for path in paths}
     for i, path in enumerate(paths):
-        values = np.full(n, actuator.value(path))
-        values[i] += actuator.tolerances[path].sigma
-        section, name = path.split(".")
-        varied = replace(varied, **{section: replace(getattr(varied, section), **{name: values})})
+        values[path][i] += actuator.tolerances[path].sigma
+    varied = actuator.varied(values)
     current = objective.currents(np.repeat(k[None, :], n, axis=0), varied)
     return (current[:-1] - current[-1]).T
 

@@ -1,4 +1,4 @@
-"""What a stack of effects changes in the models: here nothing, on the reduced circuit.
+"""What a stack is made of: here a cascade, the reduced circuit and no effect.
 
 Each function is a *place* where an effect can act (see `ema_model.stacks.PLACES`).  `p` holds the rows of
 parameters, `i` the lane; effects read their own parameters from the rows behind the base model's.
@@ -7,9 +7,10 @@ parameters, `i` the lane; effects read their own parameters from the rows behind
 from __future__ import annotations
 
 from ema_model.numba_options import scalar
-from ema_model.physics.circuit import reduced_circuit as advance_current
+from ema_model.physics.controller import cascade_controller as control
+from ema_model.physics.drive import reduced_drive as advance_current
 
-__all__ = ["advance_current", "electric_torque", "moving_friction", "shaft_torque"]
+__all__ = ["advance_current", "control", "electric_torque", "moving_friction", "shaft_torque"]
 
 
 @scalar
@@ -25,6 +26,6 @@ def electric_torque(torque, theta, omega, current, p, i):
 
 
 @scalar
-def shaft_torque(torque, theta, omega, current, user, p, i):
+def shaft_torque(torque, theta, omega, current, user, gear, p, i):
     """Torque at the motor's shaft, friction apart, N·m, from that of motor, load and viscous drag."""
     return torque

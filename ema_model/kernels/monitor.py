@@ -16,11 +16,13 @@ from .monitor_step import advance
 
 
 @parallel_kernel
-def squared_errors(states, parameters, command, load, first_step, target, weight, first_sample, period, dt, result):
+def squared_errors(
+    states, parameters, command, load, supply, first_step, target, weight, first_sample, period, dt, result
+):
     """Sum of weighted squared errors of the equivalent current against the targets, A².
 
     states: (runs, blocks, STATE_ROWS·LANES) initial states; parameters: (blocks, rows·LANES);
-    command, load: the runs one after another, a value per step, run r from first_step[r];
+    command, load, supply: the runs one after another, a value per step, run r from first_step[r];
     target, weight: likewise a value per sample of `period` steps, run r from first_sample[r] to
     first_sample[r + 1]; result: (runs, blocks, LANES), written here.
     A sample is the mean of the current over its period.
@@ -40,8 +42,9 @@ def squared_errors(states, parameters, command, load, first_step, target, weight
             for _ in range(period):
                 c = command[step]
                 t = load[step]
+                u = supply[step]
                 for i in range(LANES):
-                    advance(s, p, i, c, t, dt)
+                    advance(s, p, i, c, t, u, dt)
                     mean[i] += s[CURRENT * LANES + i]
                 step += 1
             y = target[sample]
@@ -54,14 +57,15 @@ def squared_errors(states, parameters, command, load, first_step, target, weight
 
 
 @parallel_kernel
-def traces(states, parameters, command, load, period, group, dt, result):
+def traces(states, parameters, command, load, supply, period, group, dt, result):
     """Signals of a population over one run, each value the mean of `group` samples of `period` steps.
 
-    result: (blocks, values, 4, LANES), written here.  A sample of the current is its mean over the period,
-    one of motor speed, motor angle and output of the play is taken at the period's end.
+    result: (blocks, values, 4, LANES), written here; states: left as they are at the end.
+    A sample of the current is its mean over the period; one of motor speed, motor angle and output of the play
+    is taken at the period's end.
     """
     for block in numba.prange(states.shape[0]):
-        s = states[block].copy()
+        s = states[block].copy()  # of its own, which proves to the compiler that nothing overlaps
         p = parameters[block]
         total = np.empty(4 * LANES)
         of_group = 1.0 / group
@@ -73,8 +77,9 @@ def traces(states, parameters, command, load, period, group, dt, result):
                 for _ in range(period):
                     c = command[step]
                     t = load[step]
+                    u = supply[step]
                     for i in range(LANES):
-                        advance(s, p, i, c, t, dt)
+                        advance(s, p, i, c, t, u, dt)
                         total[i] += s[CURRENT * LANES + i]
                     step += 1
                 for i in range(LANES):
@@ -86,3 +91,4 @@ def traces(states, parameters, command, load, period, group, dt, result):
                 result[block, value, 1, i] = total[LANES + i] * of_group
                 result[block, value, 2, i] = total[2 * LANES + i] * of_group
                 result[block, value, 3, i] = total[3 * LANES + i] * of_group
+        states[block, :] = s

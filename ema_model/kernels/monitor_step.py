@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from ema_model.numba_options import scalar
 from ema_model.physics.backlash import advance_play
-from ema_model.physics.controller import current_reference, speed_reference
 from ema_model.physics.elementary import clamp, rotate
 from ema_model.physics.friction import advance_rotor, borello_friction
 from ema_model.physics.phases import flux_factor
@@ -12,7 +11,6 @@ from ema_model.physics.rows import (
     COS_ELECTRICAL,
     COS_ROTOR,
     CURRENT,
-    CURRENT_LIMIT,
     CURRENT_PER_TORQUE,
     DYNAMIC_FRICTION,
     EMF_CONSTANT,
@@ -31,6 +29,7 @@ from ema_model.physics.rows import (
     INVERSE_INERTIA,
     LANES,
     OMEGA,
+    OUTPUT_LIMIT,
     PLAY,
     POLE_PAIRS,
     POSITION_GAIN,
@@ -49,12 +48,15 @@ from ema_model.physics.rows import (
     VOLTAGE,
 )
 
-from .composition import advance_current, electric_torque, moving_friction, shaft_torque
+from .composition import advance_current, control, electric_torque, moving_friction, shaft_torque
 
 
 @scalar
-def advance(s, p, i, command, load, dt):
-    """Advances lane i of the state s (rows of `STATE_ROWS`) by dt, s, under a command, rad, and a load, N·m."""
+def advance(s, p, i, command, load, supply, dt):
+    """Advances lane i of the state s (rows of `STATE_ROWS`) by dt, s, under a command, rad, and a load, N·m.
+
+    supply: the bus voltage over its nominal value; 0 is a drive switched off, which carries no current.
+    """
     theta = s[THETA * LANES + i]
     omega = s[OMEGA * LANES + i]
     play = s[PLAY * LANES + i]
@@ -64,9 +66,16 @@ def advance(s, p, i, command, load, dt):
     cos_2e = s[COS_ELECTRICAL * LANES + i]
     user = p[GEAR_RATIO * LANES + i] * play
 
-    omega_ref = speed_reference(command, user, p[POSITION_GAIN * LANES + i], p[SPEED_LIMIT * LANES + i])
-    torque_ref = p[SPEED_GAIN * LANES + i] * (omega_ref - omega)
-    current_ref = current_reference(torque_ref, p[CURRENT_PER_TORQUE * LANES + i], p[CURRENT_LIMIT * LANES + i])
+    demand = control(
+        command,
+        user,
+        omega,
+        p[POSITION_GAIN * LANES + i],
+        p[SPEED_LIMIT * LANES + i],
+        p[SPEED_GAIN * LANES + i],
+        p[CURRENT_PER_TORQUE * LANES + i],
+        p[OUTPUT_LIMIT * LANES + i],
+    )
 
     flux = flux_factor(
         sin_r,
@@ -85,21 +94,23 @@ def advance(s, p, i, command, load, dt):
             p[FLUX_8 * LANES + i],
         ),
     )
-    current = advance_current(
+    driven = advance_current(
         s[CURRENT * LANES + i],
-        current_ref,
+        demand,
         p[EMF_CONSTANT * LANES + i] * flux * omega,
-        p[VOLTAGE * LANES + i],
+        p[VOLTAGE * LANES + i] * supply,
         p[RESISTANCE * LANES + i],
         p[INVERSE_INDUCTANCE * LANES + i],
         dt,
     )
+    current = driven if supply > 0.0 else 0.0
     limit = p[TORQUE_LIMIT * LANES + i]
     developed = p[TORQUE_CONSTANT * LANES + i] * flux * current
     motor_torque = clamp(electric_torque(developed, theta, omega, current, p, i), -limit, limit)
 
-    passive = motor_torque - p[GEAR_RATIO * LANES + i] * load - p[VISCOUS * LANES + i] * omega
-    active = shaft_torque(passive, theta, omega, current, user, p, i)
+    gear = p[GEAR_RATIO * LANES + i]
+    passive = motor_torque - gear * load - p[VISCOUS * LANES + i] * omega
+    active = shaft_torque(passive, theta, omega, current, user, gear, p, i)
     static = p[STATIC_FRICTION * LANES + i]
     dynamic = moving_friction(p[DYNAMIC_FRICTION * LANES + i], static, omega, motor_torque, load, p, i)
     net = active - borello_friction(omega, active, static, dynamic)

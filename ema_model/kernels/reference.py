@@ -21,7 +21,6 @@ from ema_model.physics.rows import (
     CURRENT_A,
     CURRENT_B,
     CURRENT_C,
-    CURRENT_LIMIT,
     CURRENT_PER_TORQUE,
     DERIVATIVE_GAIN,
     DYNAMIC_FRICTION,
@@ -38,6 +37,7 @@ from ema_model.physics.rows import (
     INVERSE_INERTIA,
     LANES,
     OMEGA,
+    OUTPUT_LIMIT,
     PLAY,
     POLE_PAIRS,
     POSITION_GAIN,
@@ -87,7 +87,7 @@ def run(state, p, command, load, period, substeps, dt, result):
     rate = 1.0 / dt
 
     tau = p[GEAR_RATIO * LANES]
-    limit = p[CURRENT_LIMIT * LANES]
+    limit = p[OUTPUT_LIMIT * LANES]
     torque_limit = p[TORQUE_LIMIT * LANES]
     voltage = p[VOLTAGE * LANES]
     band = p[HYSTERESIS * LANES]
@@ -161,7 +161,7 @@ def run(state, p, command, load, period, substeps, dt, result):
                 developed = p[TORQUE_CONSTANT * LANES] * (k_a * current_a + k_b * current_b + k_c * current_c)
                 motor_torque = clamp(electric_torque(developed, theta, omega, q, p, 0), -torque_limit, torque_limit)
                 active = shaft_torque(
-                    motor_torque - tau * user_load - p[VISCOUS * LANES] * omega, theta, omega, q, user, p, 0
+                    motor_torque - tau * user_load - p[VISCOUS * LANES] * omega, theta, omega, q, user, tau, p, 0
                 )
                 dynamic = moving_friction(p[DYNAMIC_FRICTION * LANES], static, omega, motor_torque, user_load, p, 0)
                 net = active - borello_friction(omega, active, static, dynamic)

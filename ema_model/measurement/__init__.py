@@ -3,17 +3,35 @@
 from __future__ import annotations
 
 from ema_model.measurement.checks import check_needed
+from ema_model.measurement.equivalent_current import can_have_current, with_equivalent_current
+from ema_model.measurement.guess import guess_mapping
+from ema_model.measurement.mapping import ColumnMapping, MappedColumn, apply_mapping, parse_mapping
 from ema_model.measurement.measurement import Measurement
-from ema_model.measurement.read import read_measurement
+from ema_model.measurement.read import read_columns, read_measurement
+from ema_model.measurement.side_file import SideFile, find_side_file, read_side_file, side_path
+from ema_model.measurement.side_text import write_side_file
 from ema_model.measurement.signals import SIGNALS, Signal
 from ema_model.measurement.write import check_target, write_measurement
 
 __all__ = [
     "SIGNALS",
+    "ColumnMapping",
+    "MappedColumn",
     "Measurement",
+    "SideFile",
     "Signal",
+    "apply_mapping",
+    "can_have_current",
     "check_needed",
     "check_target",
+    "find_side_file",
+    "guess_mapping",
+    "parse_mapping",
+    "read_columns",
     "read_measurement",
+    "read_side_file",
+    "side_path",
+    "with_equivalent_current",
     "write_measurement",
+    "write_side_file",
 ]

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import TypeVar, overload
 
@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ema_model.errors import InputError
 from ema_model.measurement.refusal import listed, shown
+from ema_model.measurement.side_file import SideFile
 from ema_model.measurement.signals import SIGNALS
 
 Array = NDArray[np.float64]
@@ -33,6 +34,9 @@ class Measurement:
     signals: dict[str, Array]
     name: str = ""  # file stem or title
     notes: tuple[str, ...] = ()  # what reading found and did, in plain words
+    side: SideFile = field(
+        default_factory=SideFile
+    )  # what else is known: the actuator's file, the sensors' accuracy, the kind
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "signals", {name: _frozen(values) for name, values in self.signals.items()})
@@ -108,6 +112,35 @@ class Measurement:
     def with_signals(self, **arrays: ArrayLike) -> Measurement:
         """A copy in which these signals are added or take the place of the old ones."""
         return replace(self, signals={**self.signals, **{name: _frozen(values) for name, values in arrays.items()}})
+
+    @property
+    def is_map(self) -> bool:
+        """Whether it is a static map, current or torque against angle; its time only counts the samples."""
+        return self.side.kind == "map"
+
+    def with_notes(self, *notes: str) -> Measurement:
+        """A copy with these notes added."""
+        return replace(self, notes=(*self.notes, *notes))
+
+    def selected(
+        self, window_s: tuple[float, float] | None = None, segments: Sequence[int] | None = None
+    ) -> Measurement:
+        """The samples from one time to another, both included, and of these segments; the rest is cut off.
+
+        Raises InputError if nothing is left, or there are no segments.
+        """
+        keep = np.ones(self.samples, bool)
+        if segments is not None:
+            self.require("segment")
+            keep &= np.isin(self["segment"], np.asarray(segments, float))
+        if window_s is not None:
+            keep &= (self.time_s >= window_s[0]) & (self.time_s <= window_s[1])
+        if not keep.any():
+            where = f"{shown(self.name, 100)}: " if self.name else ""
+            raise InputError(f"{where}no sample lies in the chosen window and segments; widen them")
+        cut = {name: values[keep] for name, values in self.signals.items()}
+        note = f"{keep.sum()} of {keep.size} samples are in the chosen window and segments; the others are left aside"
+        return replace(self, signals=cut, notes=self.notes if keep.all() else (*self.notes, note))
 
     def require(self, *names: str) -> None:
         """Raises InputError if any of these signals is missing; it names them and those present."""

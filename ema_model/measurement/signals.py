@@ -47,6 +47,7 @@ _ALL = (
     Signal("motor_position_m", "Motor position", "x_m", "m", "position"),
     Signal("motor_speed_m_s", "Motor speed", "v_m", "m/s", "speed"),
     Signal("motor_force_N", "Motor force", "F_m", "N", "force"),
+    Signal("load_force_N", "Load force", "F_L", "N", "force"),
 )
 SIGNALS: dict[str, Signal] = {signal.name: signal for signal in _ALL}
 

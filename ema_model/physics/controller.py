@@ -19,6 +19,23 @@ def current_reference(torque_reference, current_per_torque, current_limit):
 
 
 @scalar
+def cascade_controller(
+    command, user_position, omega, position_gain, speed_limit, speed_gain, current_per_torque, limit
+):
+    """Position and speed loop with proportional action: the reference current, A."""
+    torque = speed_gain * (speed_reference(command, user_position, position_gain, speed_limit) - omega)
+    return current_reference(torque, current_per_torque, limit)
+
+
+@scalar
+def position_controller(
+    command, user_position, omega, position_gain, speed_limit, speed_gain, current_per_torque, limit
+):
+    """A position loop alone: limit·sat(gain·e), the share of the bus voltage, or a current, A."""
+    return limit * clamp(position_gain * (command - user_position), -1.0, 1.0)
+
+
+@scalar
 def advance_integral(integral, speed_error, position_error, omega, saturated, window, dt):
     """∫(ω_ref − ω) dt of the PID's integral branch, rad.
 

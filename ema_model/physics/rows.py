@@ -17,7 +17,7 @@ PARAMETER_ROWS = (
     "derivative_gain",  # K_D, N·m·s²/rad
     "integrator_window",  # rad at the user
     "current_per_torque",  # A/(N·m)
-    "current_limit",  # A
+    "output_limit",  # of the controller: A, or for a voltage drive a share of the bus
     # inverter and motor
     "voltage",  # V: half the bus for the RM's legs, the whole limit for the MM
     "hysteresis",  # A, half the band's width
@@ -52,7 +52,7 @@ PARAMETER_ROWS = (
     DERIVATIVE_GAIN,
     INTEGRATOR_WINDOW,
     CURRENT_PER_TORQUE,
-    CURRENT_LIMIT,
+    OUTPUT_LIMIT,
     VOLTAGE,
     HYSTERESIS,
     RESISTANCE,

@@ -27,6 +27,13 @@ def add_faults(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_effects(parser: argparse.ArgumentParser) -> None:
+    """--effect, repeated"""
+    parser.add_argument(
+        "--effect", action="append", default=[], metavar="NAME:param=value,…", help="a physical effect; repeat for more"
+    )
+
+
 def add_run(parser: argparse.ArgumentParser) -> None:
     """What is asked of the actuator: --command, --set, --duration, --load-torque, sensors' accuracy"""
     parser.add_argument(

@@ -25,9 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     options.add_actuator(parser)
     options.add_run(parser)
     options.add_faults(parser)
-    parser.add_argument(
-        "--effect", action="append", default=[], metavar="NAME:param=value,…", help="a physical effect; repeat for more"
-    )
+    options.add_effects(parser)
     parser.add_argument("--sample-rate", type=float, default=10_000.0, metavar="Hz")
     parser.add_argument("--out", required=True, metavar="FILE.csv|.parquet", help="the recording to write")
     parser.add_argument("--record", metavar="FILE.rrd", help="also write it for the Rerun viewer")

@@ -10,6 +10,7 @@ import rerun_bindings
 
 from emaviz.recording.style import (
     APPLICATION,
+    COMPARISON,
     GROUPS,
     ITERATION,
     K_NAMES,
@@ -22,6 +23,7 @@ from emaviz.recording.style import (
 
 # What the Signals tab shows, above the rest; a view each, with every group that has the signal.
 _MAIN = ("current_A", "user_position_rad", "motor_position_rad", "motor_speed_rad_s")
+_BESIDE = ("residual", "floor_high", "floor_low")  # in plots of their own, not in the signal's
 _PHASES = ("phase_a_current_A", "phase_b_current_A", "phase_c_current_A")
 
 
@@ -41,10 +43,11 @@ class Contents:
     signals: dict[str, list[str]] = field(default_factory=dict)
     algorithms: dict[str, Algorithm] = field(default_factory=dict)
     config: bool = False
+    findings: list[str] = field(default_factory=list)  # of a comparison: names of documents below /comparison
 
     def groups_with(self, name: str) -> list[str]:
-        """The groups that have this signal, the residual (a plot of its own) apart."""
-        return [group for group in GROUPS if group != "residual" and name in self.signals.get(group, ())]
+        """The groups that have this signal, the residual and its floor (plots of their own) apart."""
+        return [group for group in GROUPS if group not in _BESIDE and name in self.signals.get(group, ())]
 
     def names(self) -> list[str]:
         """Every signal's name once, in the order in which they came."""
@@ -52,11 +55,17 @@ class Contents:
 
 
 def build(contents: Contents) -> rrb.Blueprint:
-    """The layout: tabs Signals, More signals, Identification, Configuration, as far as there is something in them."""
+    """The layout: tabs Signals, More signals, Identification, Configuration, as far as there is something in them.
+
+    A comparison has Overlay, Residuals and Where it fails in the place of Signals.
+    """
     tabs: list[rrb.Container | rrb.View] = []
-    signals = _signals_tab(contents)
-    if signals is not None:
-        tabs.append(signals)
+    if contents.findings:
+        tabs += _comparison_tabs(contents)
+    else:
+        signals = _signals_tab(contents)
+        if signals is not None:
+            tabs.append(signals)
     more = _more_tab(contents)
     if more is not None:
         tabs.append(more)
@@ -104,7 +113,7 @@ def _signals_tab(contents: Contents) -> rrb.Container | None:
     views = [_signal_view(contents, name) for name in _MAIN if contents.groups_with(name)]
     residual = contents.signals.get("residual", [])
     if "current_A" in residual:
-        views.append(_residual_view("current_A"))
+        views.append(_residual_view(contents, "current_A"))
     if not views:
         return None
     top, rest = views[0], views[1:]
@@ -112,14 +121,35 @@ def _signals_tab(contents: Contents) -> rrb.Container | None:
     return rrb.Vertical(top, *rows, row_shares=[1.4] + [1.0] * len(rows), name="Signals")
 
 
+def _comparison_tabs(contents: Contents) -> list[rrb.Container | rrb.View]:
+    compared = _compared(contents)
+    text = [rrb.TextDocumentView(origin=f"{COMPARISON}/{name}", name=name.capitalize()) for name in contents.findings]
+    tabs: list[rrb.Container | rrb.View] = []
+    if compared:
+        tabs.append(rrb.Vertical(*(_signal_view(contents, name) for name in compared), name="Overlay"))
+        tabs.append(rrb.Vertical(*(_residual_view(contents, name) for name in compared), name="Residuals"))
+    first = [_residual_view(contents, name) for name in compared[:1]]
+    tabs.append(rrb.Horizontal(rrb.Vertical(*text), *first, name="Where it fails"))
+    return tabs
+
+
+def _compared(contents: Contents) -> list[str]:
+    """The signals that have a residual, in their order: the one that is explained comes first."""
+    return contents.signals.get("residual", [])
+
+
 def _more_tab(contents: Contents) -> rrb.Container | None:
     views = []
     phases = [f"/{g}/{name}" for name in _PHASES for g in contents.groups_with(name)]
     if phases:
         views.append(_plot("Phase currents [A]", phases))
-    others = [name for name in contents.names() if name not in _MAIN + _PHASES and contents.groups_with(name)]
+    shown = _compared(contents) if contents.findings else list(_MAIN)
+    others = [name for name in contents.names() if name not in [*shown, *_PHASES] and contents.groups_with(name)]
     views += [_signal_view(contents, name) for name in others]
-    views += [_residual_view(name) for name in contents.signals.get("residual", []) if name != "current_A"]
+    if not contents.findings:
+        views += [
+            _residual_view(contents, name) for name in contents.signals.get("residual", []) if name != "current_A"
+        ]
     return rrb.Grid(*views, name="More signals") if views else None
 
 
@@ -152,8 +182,9 @@ def _signal_view(contents: Contents, name: str) -> rrb.TimeSeriesView:
     return _plot(signal_title(name), [f"/{group}/{name}" for group in contents.groups_with(name)])
 
 
-def _residual_view(name: str) -> rrb.TimeSeriesView:
-    return _plot(series_title("residual", name), [f"/residual/{name}"])
+def _residual_view(contents: Contents, name: str) -> rrb.TimeSeriesView:
+    paths = [f"/{group}/{name}" for group in _BESIDE if name in contents.signals.get(group, ())]
+    return _plot(series_title("residual", name), paths)
 
 
 def _plot(

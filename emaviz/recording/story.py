@@ -54,7 +54,7 @@ class IdentificationStory:
         every = max(1, at.iterations // _KEPT_MONITORS)
         if at.iteration % every == 0 or at.iteration == at.iterations:
             window = self._objective.windows[0]
-            current = self._objective.currents(at.k)[0, : len(window.target)]
+            current = self._objective.currents(at.k)[0, : window.blocks]
             time = self._measurement.time_s[0] + window.block_s * (1.0 + np.arange(len(current)))
             self._writer.monitor_iteration(at.algorithm, at.iteration, time, current)
 

@@ -24,16 +24,23 @@ ITERATION = "iteration"
 K_NAMES = tuple(fault.name for fault in FAULTS)
 K_TITLES = {fault.name: f"{fault.name} {fault.title[0].lower()}{fault.title[1:]} [-]" for fault in FAULTS}
 
-GROUPS = ("reference", "monitor", "measurement", "residual")
+COMPARISON = "/comparison"
+GROUPS = ("reference", "monitor", "measurement", "initial", "residual", "floor_high", "floor_low")
 GROUP_TITLES = {"reference": "RM", "monitor": "MM", "measurement": "Measured", "residual": "Residual"}
+# Of a comparison: the model before calibration, and the edges between which a perfect one would leave its residual.
+GROUP_TITLES |= {"initial": "MM before calibration", "floor_high": "Floor +2σ", "floor_low": "Floor −2σ"}
 GROUP_COLOURS: dict[str, Colour] = {
     "reference": _rgba(colours.REFERENCE, 200),
     "monitor": _rgba(colours.MONITOR),
     "measurement": _rgba(colours.COMMAND),
     "residual": _rgba(colours.DIFFERENCE),
+    "initial": _rgba(colours.TRUTH, 160),
+    "floor_high": _rgba(colours.COMMAND),
+    "floor_low": _rgba(colours.COMMAND),
 }
 # Lines are drawn in the order of their paths, so what lies below is wider, and the reference lets it shine through.
 GROUP_WIDTHS = {"reference": 1.3, "monitor": 3.0, "measurement": 4.0, "residual": 1.3}
+GROUP_WIDTHS |= {"initial": 1.3, "floor_high": 1.5, "floor_low": 1.5}
 TRUTH_COLOUR = _rgba(colours.TRUTH)
 POPULATION_COLOUR = _rgba(colours.COMMAND, 80)
 _PLAIN = re.compile(r"[A-Za-z0-9_]+")

@@ -13,11 +13,12 @@ from hypothesis import strategies as st
 
 from ema_model.errors import InputError
 from ema_model.measurement import SIGNALS, Measurement, read_measurement, write_measurement
+from ema_model.measurement.checks import LARGEST
 from ema_model.measurement.formats import FORMATS
 
 N = 120
 each_format = pytest.mark.parametrize("suffix", sorted(FORMATS))
-finite = st.floats(allow_nan=False, allow_infinity=False)
+finite = st.floats(-LARGEST, LARGEST)
 
 
 def measured(**signals):

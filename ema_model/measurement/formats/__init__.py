@@ -14,7 +14,10 @@ from ema_model.measurement.refusal import refusal, shown
 __all__ = ["FORMATS", "Columns", "Format", "format_of"]
 
 _modules = [importlib.import_module(f"{__name__}.{module.name}") for module in pkgutil.iter_modules(__path__)]
-FORMATS: dict[str, Format] = {module.FORMAT.suffix: module.FORMAT for module in _modules if hasattr(module, "FORMAT")}
+_found = [module.FORMAT for module in _modules if hasattr(module, "FORMAT")]
+# Those that any program reads stand first in messages and menus.
+_found.sort(key=lambda file_format: file_format.suffix not in (".csv", ".parquet"))
+FORMATS: dict[str, Format] = {file_format.suffix: file_format for file_format in _found}
 
 
 def format_of(path: str) -> Format:

@@ -34,12 +34,13 @@ class _Dialect:
     decimal: str
 
 
-def _header(path: str) -> list[str]:
+def _header(path: str, max_bytes: int) -> list[str]:
+    del max_bytes  # only the header is read
     return _dialect(path).names
 
 
 def _read(path: str, names: Sequence[str], max_bytes: int) -> Columns:
-    del max_bytes  # numbers take less room in memory than as text, or little more
+    del max_bytes  # the file's size bounds it: a number takes 8 bytes in memory and as text 2 or more
     dialect = _dialect(path)
     try:
         with open(path, "rb") as file:
@@ -88,6 +89,8 @@ def _dialect(path: str) -> _Dialect:
     first = next((i for i, line in enumerate(lines) if line.strip()), None)
     if first is None:
         raise refusal(path, "is empty; a header line and 100 samples or more are expected")
+    if first == len(lines) - 1 and len(head) == _HEAD_BYTES:
+        raise refusal(path, f"line {first + 1} is over 64 kB long; a header line with the columns' names is expected")
     separator = max(_SEPARATORS, key=lines[first].count)
     names = [name.strip() for name in _cells(lines[first], separator)]
     if any(_NUMBER.fullmatch(name) for name in names):

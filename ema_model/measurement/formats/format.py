@@ -31,6 +31,6 @@ class Format:
 
     suffix: str
     title: str
-    header: Callable[[str], list[str]]
+    header: Callable[[str, int], list[str]]  # path, max_bytes in memory
     read: Callable[[str, Sequence[str], int], Columns]  # path, names, max_bytes in memory
     write: Callable[[Mapping[str, Array], str], None]

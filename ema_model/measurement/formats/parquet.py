@@ -9,13 +9,15 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from ema_model.measurement.formats.arrays import unpacks_to
 from ema_model.measurement.formats.format import Array, Columns, Format
 from ema_model.measurement.refusal import refusal, shown
 
 _KEY, _VERSION = b"emaviz_schema", b"1"
 
 
-def _header(path: str) -> list[str]:
+def _header(path: str, max_bytes: int) -> list[str]:
+    del max_bytes  # only the header is read
     with _opened(path) as file:
         version = (file.schema_arrow.metadata or {}).get(_KEY, _VERSION)
         if version != _VERSION:
@@ -28,7 +30,7 @@ def _read(path: str, names: Sequence[str], max_bytes: int) -> Columns:
         # Runs of equal values pack so well that a small file can fill the memory.
         size = file.metadata.num_rows * len(names) * 8
         if size > max_bytes:
-            raise refusal(path, f"unpacks to {size / 1e6:.0f} MB, over the limit of {max_bytes / 1e6:g} MB; split it")
+            raise unpacks_to(path, size, max_bytes)
         for name in names:
             kind = file.schema_arrow.field(name).type
             if not (pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_boolean(kind)):

@@ -1,0 +1,9 @@
+"""Actuators: their parameters with tolerances, and the TOML files that hold them."""
+
+from __future__ import annotations
+
+from ema_model.actuator.file import load_actuator, shipped
+from ema_model.actuator.layout import paths
+from ema_model.actuator.parameters import Actuator, Rule, Tolerance
+
+__all__ = ["Actuator", "Rule", "Tolerance", "load_actuator", "paths", "shipped"]

@@ -1,0 +1,232 @@
+"""Reads an actuator from its TOML file; every mistake in it gives one line that says where."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from ema_model.actuator.layout import KINDS, USUAL, layout
+from ema_model.actuator.parameters import (
+    SECTIONS,
+    Actuator,
+    Rule,
+    Tolerance,
+    check_stops,
+    check_value,
+    number,
+)
+from ema_model.axes import KINDS as AXIS_KINDS
+from ema_model.axes import Axes
+from ema_model.errors import InputError
+
+_OTHERS = ("schema", "name", "description", "axes", "model", "effects", "recordings")
+_RECORDING_KINDS = ("run", "map")
+
+
+def load_actuator(path: str | Path | None = None) -> Actuator:
+    """The actuator of a TOML file, or the thesis's own without one; InputError tells what is wrong in it."""
+    if path is None:
+        return _parse(shipped("thesis.toml"), "thesis.toml")
+    path = Path(path)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such actuator file") from None
+    except IsADirectoryError:
+        raise InputError(f"{path}: is a folder; an actuator file (.toml) is expected") from None
+    except (OSError, UnicodeDecodeError, ValueError) as error:
+        why = getattr(error, "strerror", None) or "not UTF-8"
+        raise InputError(f"{path}: cannot be read as text ({why})") from None
+    return _parse(text, str(path))
+
+
+def shipped(name: str) -> str:
+    """Text of an actuator file that comes with the package (assets/actuators)."""
+    inside = resources.files("ema_model") / "assets" / "actuators" / name
+    if inside.is_file():
+        return inside.read_text(encoding="utf-8")
+    return (Path(__file__).parents[2] / "assets" / "actuators" / name).read_text(encoding="utf-8")
+
+
+def _parse(text: str, where: str) -> Actuator:
+    try:
+        document = tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise InputError(f"{where}: not valid TOML: {error}") from None
+    if document.get("schema", 1) != 1:
+        raise InputError(f"{where}: schema {document['schema']!r} is not known; this version reads schema 1")
+    unknown = set(document) - set(SECTIONS) - set(_OTHERS)
+    if unknown:
+        sections = ", ".join((*SECTIONS, *_OTHERS[3:]))
+        raise InputError(f"{where}: unknown entry {sorted(unknown)[0]!r}; sections are {sections}")
+    tables = {name: _table(document, name, where) for name in (*SECTIONS, *_OTHERS[3:])}
+    axes = _axes(tables["axes"], where)
+    kinds = {
+        section: _choice(tables[section], "kind", USUAL[section], KINDS[section], section, where) for section in KINDS
+    }
+    if kinds["controller"] == "unknown":
+        kinds["inverter"] = "current"
+    if kinds["controller"] == "position" and kinds["inverter"] == "hysteresis":
+        raise InputError(f'{where}: [inverter] a position controller needs kind = "voltage" or "current"')
+    if kinds["controller"] == "cascade" and kinds["inverter"] == "voltage":
+        raise InputError(f'{where}: [inverter] a cascade needs kind = "hysteresis" or "current"')
+    tolerances: dict[str, Tolerance] = {}
+    sections = {section: _section(section, tables[section], kinds, axes, tolerances, where) for section in SECTIONS}
+    check_stops(sections["transmission"], where)
+    return Actuator(
+        name=str(document.get("name", Path(where).stem)),
+        description=str(document.get("description", "")),
+        tolerances=tolerances,
+        effects=_effects(tables["effects"], axes, tolerances, where),
+        axes=axes,
+        step_s=_seconds(tables["model"], "step_s", 1e-5, where),
+        filter_s=_seconds(tables["model"], "filter_s", 12e-3, where),
+        mapping=_mapping(tables["recordings"], where),
+        rules=_rules(tables["recordings"], axes, where),
+        **sections,
+    )
+
+
+def _section(
+    section: str, given: dict[str, Any], kinds: dict[str, str], axes: Axes, tolerances: dict[str, Tolerance], where: str
+) -> Any:
+    needed, optional = layout(section, kinds)
+    inside = {axes.parameter(name): name for name in (*needed, *optional)}
+    for extra in set(given) - set(inside) - ({"kind"} if section in KINDS else set()):
+        raise InputError(f"{where}: [{section}] has no parameter {extra!r}; it has {', '.join(inside) or 'none'}")
+    values: dict[str, Any] = {"kind": kinds[section]} if section in KINDS else {}
+    for shown, name in inside.items():
+        if shown in given:
+            values[name], tolerance = _entry(section, name, given[shown], where)
+            if tolerance is not None:
+                tolerances[f"{section}.{name}"] = tolerance
+        elif name in needed:
+            raise InputError(f"{where}: [{section}] lacks {shown}")
+    return SECTIONS[section](**values)
+
+
+def _effects(
+    given: dict[str, Any], axes: Axes, tolerances: dict[str, Tolerance], where: str
+) -> dict[str, dict[str, float]]:
+    """The effects that belong to the actuator's model, checked by the catalogue."""
+    from ema_model.effects import find  # the catalogue's kernels need not be loaded for an actuator without effects
+
+    effects = {}
+    for effect_name in given:
+        table = _table(given, effect_name, f"{where}: [effects]")
+        try:
+            effect = find(effect_name)
+        except InputError as error:
+            raise InputError(f"{where}: [effects] {error}") from None
+        values = {}
+        inside = {axes.parameter(parameter.name): parameter.name for parameter in effect.parameters}
+        for shown, entry in table.items():
+            if shown not in inside:
+                raise InputError(f"{where}: [effects.{effect_name}] has no {shown!r}; it has {', '.join(inside)}")
+            value, tolerance = _number_and_tolerance(f"effects.{effect_name}", shown, entry, where)
+            values[inside[shown]] = value
+            if tolerance is not None:
+                tolerances[f"effects.{effect_name}.{inside[shown]}"] = tolerance
+        try:
+            effects[effect_name] = effect.settings(values)
+        except InputError as error:
+            raise InputError(f"{where}: [effects.{effect_name}] {error}") from None
+    return effects
+
+
+def _entry(section: str, name: str, entry: Any, where: str) -> tuple[float, Tolerance | None]:
+    value, tolerance = _number_and_tolerance(section, name, entry, where)
+    check_value(section, name, value, where)
+    return value, tolerance
+
+
+def _number_and_tolerance(section: str, name: str, entry: Any, where: str) -> tuple[float, Tolerance | None]:
+    tolerance = None
+    value = entry
+    if isinstance(entry, dict):
+        extra = set(entry) - {"value", "tolerance", "sigma", "free"}
+        if extra or "value" not in entry:
+            raise InputError(f"{where}: [{section}] {name} takes value, tolerance or sigma, free")
+        value = entry["value"]
+    if not math.isfinite(number(value)):
+        raise InputError(f"{where}: [{section}] {name} must be a number, not {str(value)[:40]!r}")
+    if isinstance(entry, dict) and ("tolerance" in entry or "sigma" in entry):
+        given, scale = (entry["sigma"], 1.0) if "sigma" in entry else (entry["tolerance"], abs(value))
+        sigma = number(given) * scale
+        if not 0.0 < sigma < math.inf:
+            raise InputError(f"{where}: [{section}] {name}: the tolerance must be above 0 (sigma where value is 0)")
+        free = entry.get("free", True)
+        if not isinstance(free, bool):
+            raise InputError(f"{where}: [{section}] {name}: free must be true or false, not {free!r}")
+        tolerance = Tolerance(sigma, free)
+    return float(value), tolerance
+
+
+def _table(document: dict[str, Any], name: str, where: str) -> dict[str, Any]:
+    table = document.get(name, {})
+    if not isinstance(table, dict):
+        raise InputError(f"{where}: [{name}] must be a table")
+    return table
+
+
+def _choice(table: dict[str, Any], key: str, usual: str, choices: tuple[str, ...], section: str, where: str) -> str:
+    chosen = table.get(key, usual)
+    if chosen not in choices:
+        raise InputError(f"{where}: [{section}] {key} must be {' or '.join(choices)}, not {str(chosen)[:40]!r}")
+    return chosen
+
+
+def _axes(table: dict[str, Any], where: str) -> Axes:
+    for extra in set(table) - {"motor", "user"}:
+        raise InputError(f"{where}: [axes] has no {extra!r}; it has motor, user")
+    return Axes(*(_choice(table, key, "rotary", AXIS_KINDS, "axes", where) for key in ("motor", "user")))
+
+
+def _seconds(table: dict[str, Any], name: str, usual: float, where: str) -> float:
+    for extra in set(table) - {"step_s", "filter_s"}:
+        raise InputError(f"{where}: [model] has no {extra!r}; it has step_s, filter_s")
+    value = number(table.get(name, usual))
+    if not 1e-7 <= value <= 1.0:
+        raise InputError(f"{where}: [model] {name} must lie between 1e-7 and 1 s, not {str(table[name])[:40]!r}")
+    return value
+
+
+def _mapping(table: dict[str, Any], where: str) -> tuple[str, ...]:
+    for extra in set(table) - {"mapping", "where"}:
+        raise InputError(f"{where}: [recordings] has no {extra!r}; it has mapping, where")
+    mapping = table.get("mapping", [])
+    if not isinstance(mapping, list) or not all(isinstance(text, str) for text in mapping):
+        raise InputError(f'{where}: [recordings] mapping must be a list of texts such as "time_s=t[ms]"')
+    return tuple(mapping)
+
+
+def _rules(table: dict[str, Any], axes: Axes, where: str) -> tuple[Rule, ...]:
+    given = table.get("where", [])
+    if not isinstance(given, list) or not all(isinstance(rule, dict) for rule in given):
+        raise InputError(f"{where}: [[recordings.where]] must be tables")
+    rules = []
+    for rule in given:
+        for extra in set(rule) - {"match", "set", "kind"}:
+            raise InputError(f"{where}: [[recordings.where]] has no {extra!r}; it has match, set, kind")
+        if not isinstance(rule.get("match"), str):
+            raise InputError(f'{where}: [[recordings.where]] needs match, a pattern of file names such as "*kp100*"')
+        kind = _choice(rule, "kind", "run", _RECORDING_KINDS, "recordings.where", where)
+        values = {}
+        for path, value in _table(rule, "set", where).items():
+            section, _, shown = path.partition(".")
+            inside = (
+                {axes.parameter(name): name for name in SECTIONS[section].__annotations__}
+                if section in SECTIONS
+                else {}
+            )
+            if shown not in inside or shown == "kind":
+                raise InputError(
+                    f'{where}: [[recordings.where]] no parameter {path[:60]!r}; write "section.name" = value'
+                )
+            check_value(section, inside[shown], value, f"{where}: recordings.where")
+            values[f"{section}.{inside[shown]}"] = float(value)
+        rules.append(Rule(rule["match"], values, kind))
+    return tuple(rules)

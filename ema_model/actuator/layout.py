@@ -1,0 +1,50 @@
+"""Which parameters an actuator file has, by the kind of its controller and drive."""
+
+from __future__ import annotations
+
+from ema_model.actuator.parameters import SECTIONS, numbers
+
+CONTROLLER_KINDS = ("cascade", "position", "unknown")
+INVERTER_KINDS = ("hysteresis", "current", "voltage")
+KINDS = {"controller": CONTROLLER_KINDS, "inverter": INVERTER_KINDS}
+USUAL = {"controller": "cascade", "inverter": "hysteresis"}
+
+_CASCADE = (
+    *("position_gain_1_s", "speed_limit_rad_s", "speed_gain_Nms_rad", "integral_gain_Nm_rad"),
+    *("derivative_gain_Nms2_rad", "integrator_window_rad", "torque_constant_Nm_A", "current_limit_A"),
+)
+_MOTION = (
+    *("torque_constant_Nm_A", "inertia_kgm2", "viscous_friction_Nms_rad", "static_friction_Nm", "dynamic_friction_Nm"),
+)
+_DRIVES = {
+    "hysteresis": ("bus_voltage_V", "hysteresis_band_A"),
+    "current": ("current_limit_A",),
+    "voltage": ("bus_voltage_V",),
+}
+
+
+def layout(section: str, kinds: dict[str, str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Names that a section must have, and those that it may have besides.
+
+    kinds: the actuator's "controller" and "inverter".  Only an actuator of the thesis's kind must say all.
+    """
+    controller, inverter = kinds["controller"], kinds["inverter"]
+    full = controller == "cascade" and inverter == "hysteresis"
+    every = numbers(section)
+    if section == "controller":
+        needed = {"cascade": _CASCADE, "position": ("gain_1_rad",), "unknown": ()}[controller]
+        return needed, ("output_limit",) if controller == "position" else ()
+    if section == "inverter":
+        needed = _DRIVES[inverter]
+        return ((), needed) if controller == "unknown" else (needed, ())
+    if full:
+        return every, ()
+    needed = _MOTION if section == "motor" else ()
+    if section == "motor" and inverter == "voltage" and controller != "unknown":
+        needed = ("resistance_Ohm", *needed)
+    return needed, tuple(name for name in every if name not in needed)
+
+
+def paths() -> tuple[str, ...]:
+    """Every "section.parameter" of an actuator with a cascade and a hysteresis current loop."""
+    return tuple(f"{section}.{name}" for section in SECTIONS for name in layout(section, USUAL)[0])

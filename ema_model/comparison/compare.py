@@ -1,0 +1,256 @@
+"""Compares recordings with the model: floors, calibration, residuals, and what they say."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ema_model.actuator import Actuator, load_actuator
+from ema_model.calibration import Calibration, Floor, floor
+from ema_model.calibration import calibrate as fit
+from ema_model.calibration.fit import SIGNALS
+from ema_model.calibration.floor import twin_error
+from ema_model.comparison.assemble import residuals_of
+from ema_model.comparison.result import Compared, Comparison, SignalError
+from ema_model.comparison.sampling import evaluation_stretches, fit_stretches
+from ema_model.comparison.verdict import judge
+from ema_model.effects import find
+from ema_model.errors import InputError
+from ema_model.faults import HEALTHY
+from ema_model.measurement import Measurement
+from ema_model.measurement.equivalent_current import with_current
+from ema_model.measurement.health import health
+from ema_model.measurement.side_file import stated
+from ema_model.plants import ClosedLoop, Plant, Stretch, Window, plant_for
+from ema_model.recordings import check_same_actuator
+
+Array = NDArray[np.float64]
+Progress = Callable[[str], None]
+
+
+def compare(
+    measurements: Sequence[Measurement],
+    actuator: Actuator | None = None,
+    *,
+    k: ArrayLike = HEALTHY,
+    effects: Mapping[str, Mapping[str, float]] | None = None,
+    calibrate: bool = True,
+    free: Sequence[str] | None = None,
+    signals: Sequence[str] | None = None,
+    on_progress: Progress | None = None,
+) -> Comparison:
+    """The recordings of one actuator beside its model.
+
+    k: the actuator's faults, where known; effects: besides the actuator's own.  free: parameters to calibrate
+    in place of those that the actuator's file leaves free; signals: to fit, in place of current and positions.
+    on_progress is told what goes on, and may raise to stop.
+    Raises InputError for recordings that cannot be compared.
+    """
+    actuator = actuator or load_actuator()
+    tell = on_progress or (lambda text: None)
+    check_same_actuator(measurements)
+    tell("checking the data")
+    prepared = [_prepared(measurement, actuator) for measurement in measurements]
+    cards = [
+        health(m, current_limit_A=_finite(actuator.controller.current_limit_A), pole_pairs=actuator.motor.pole_pairs)
+        for m in prepared
+    ]
+    actuator = replace(actuator, effects=_with_settings(actuator, effects))
+    wanted = _signals(signals, actuator)
+    tell("measuring the model's floor")
+    fitted = plant_for(prepared, actuator, stretches=fit_stretches(prepared, actuator))
+    sensors = [_stated(m, actuator) for m in measurements]
+    floors = [floor(fitted, window, k, sensors[window.recording]) for window in fitted.windows]
+    tell("calibrating" if calibrate else "simulating")
+    calibration = fit(
+        fitted,
+        floors,
+        free=free if calibrate else (),
+        k=k,
+        signals=wanted,
+        on_progress=lambda evaluations: tell(f"calibrating: {evaluations} simulations"),
+    )
+    tell("looking where it fails")
+    plant, floors, before, after = _everywhere(prepared, fitted, floors, calibration, actuator, k)
+    known = [_known_error(plant, window, calibration) if plant is fitted else {} for window in plant.windows]
+    residuals = residuals_of(
+        plant, floors, after, known, calibration.actuator, calibration if plant is fitted else None
+    )
+    compared = [
+        _compared(i, prepared[i], cards[i], plant, floors, before, after, actuator) for i in range(len(prepared))
+    ]
+    errors = _together(compared)
+    judgement = judge(residuals, errors, calibration if calibrate else None, actuator)
+    return Comparison(
+        actuator=actuator,
+        calibration=calibration if calibrate else None,
+        recordings=compared,
+        residuals=judgement.residuals,
+        signals=errors,
+        primary=judgement.primary,
+        explained_by=judgement.explained_by,
+        orders=judgement.orders,
+        worst_regions=judgement.worst_regions,
+        adequate=judgement.adequate,
+        sentences=judgement.sentences,
+        warnings=judgement.warnings,
+    )
+
+
+def _prepared(measurement: Measurement, actuator: Actuator) -> Measurement:
+    """The measurement under the names inside, with a current."""
+    inside = replace(measurement, signals=actuator.axes.inside(measurement.signals))
+    return with_current(inside, actuator.motor.pole_pairs, actuator.motor.rotor_offset_rad)
+
+
+def _finite(value: float) -> float | None:
+    return value if np.isfinite(value) else None
+
+
+def _with_settings(
+    actuator: Actuator, effects: Mapping[str, Mapping[str, float]] | None
+) -> dict[str, dict[str, float]]:
+    added = {name: find(name).settings(dict(given)) for name, given in (effects or {}).items()}
+    return {**actuator.effects, **added}
+
+
+def _signals(signals: Sequence[str] | None, actuator: Actuator) -> Sequence[str]:
+    if signals is None:
+        return SIGNALS
+    known = {actuator.axes.signal(name): name for name in (*SIGNALS, "motor_speed_rad_s")}
+    for name in signals:
+        if name not in known:
+            raise InputError(f"no signal {name!r} to compare; there are {', '.join(known)}")
+    return [known[name] for name in signals]
+
+
+def _stated(measurement: Measurement, actuator: Actuator) -> dict[str, dict[str, float]]:
+    """What the side file says of the sensors, by the signal's name inside."""
+    given = measurement.side.sensors
+    return {
+        name: {
+            what: given[key]
+            for what in ("noise", "accuracy")
+            if (key := stated(actuator.axes.signal(name), what)) in given
+        }
+        for name in (*SIGNALS, "motor_speed_rad_s")
+    }
+
+
+def _known_error(plant: Plant, window: Window | Stretch, calibration: Calibration) -> dict[str, Array]:
+    """What the model is known to be off by: its three-phase twin's difference, both as calibrated."""
+    if isinstance(window, Window) and isinstance(plant, ClosedLoop) and plant.actuator.has_reference_model:
+        return twin_error(plant, window, calibration.actuator, calibration.k)
+    return {}
+
+
+def _everywhere(
+    measurements: Sequence[Measurement],
+    fitted: Plant,
+    floors: list[Floor],
+    calibration: Calibration,
+    actuator: Actuator,
+    k: ArrayLike,
+) -> tuple[Plant, list[Floor], list[dict[str, Array]], list[dict[str, Array]]]:
+    """The whole recordings, where the fit took only parts of them."""
+    if fit_stretches(measurements, actuator) is None:
+        return fitted, floors, calibration.before, calibration.signals
+    plant = plant_for(measurements, actuator, stretches=evaluation_stretches(measurements, actuator))
+    before, after, whole = [], [], []
+    started = {window.first: i for i, window in enumerate(fitted.windows)}
+    for window in plant.windows:
+        i = started.get(window.first)
+        turned, play = (
+            calibration.starts[f"{kind} {i}"].value if i is not None and f"{kind} {i}" in calibration.starts else 0.0
+            for kind in ("turned", "play")
+        )
+        for target, model, faults, start in (
+            (before, actuator, k, (0.0, 0.0)),
+            (after, calibration.actuator, calibration.k, (turned, play)),
+        ):
+            one = plant.signals(window, model, faults, *start)  # type: ignore[arg-type]
+            target.append({name: values[0] for name, values in one.items()})
+        whole.append(
+            _typical_floor(
+                [f for w, f in zip(fitted.windows, floors) if w.recording == window.recording], window.blocks
+            )
+        )
+    return plant, whole, before, after
+
+
+def _typical_floor(floors: list[Floor], blocks: int) -> Floor:
+    """One for the whole recording, from those of its parts."""
+    names = floors[0].noise
+    return Floor(
+        noise={name: float(np.median([one.noise[name] for one in floors])) for name in names},
+        model={
+            name: np.full(blocks, np.sqrt(np.mean([np.mean(one.model[name] ** 2) for one in floors]))) for name in names
+        },
+        block_s=floors[0].block_s,
+    )
+
+
+def _compared(
+    index: int,
+    measurement: Measurement,
+    card,
+    plant: Plant,
+    floors: Sequence[Floor],
+    before: Sequence[dict[str, Array]],
+    after: Sequence[dict[str, Array]],
+    actuator: Actuator,
+) -> Compared:
+    chosen = [i for i, window in enumerate(plant.windows) if window.recording == index]
+    windows = [plant.windows[i] for i in chosen]
+    names = [name for name in windows[0].measured if name in after[chosen[0]]]
+
+    def joined(parts: Sequence[Array]) -> Array:
+        return np.concatenate(parts)
+
+    measured = {name: joined([w.measured[name] for w in windows]) for name in names}
+    initial = {name: joined([before[i][name] for i in chosen]) for name in names}
+    model = {name: joined([after[i][name] for i in chosen]) for name in names}
+    sigma = {name: joined([floors[i].sigma(name) for i in chosen]) for name in names}
+    errors = {name: signal_error(measured[name], initial[name], model[name], sigma[name]) for name in names}
+    shown = actuator.axes.outside
+    return Compared(
+        name=measurement.name,
+        measurement=measurement,
+        health=card,
+        time_s=joined([w.time_s for w in windows]),
+        measured=shown(measured),
+        initial=shown(initial),
+        model=shown(model),
+        sigma=shown(sigma),
+        errors=shown(errors),
+    )
+
+
+def signal_error(measured: Array, initial: Array, model: Array, sigma: Array) -> SignalError:
+    """How far a model is from a measured signal; all (n,)."""
+    error = measured - model
+    rmse = float(np.sqrt(np.mean(error**2)))
+    spread = float(np.ptp(measured))
+    return SignalError(
+        rmse=rmse,
+        rmse_initial=float(np.sqrt(np.mean((measured - initial) ** 2))),
+        nrmse=rmse / spread if spread > 0.0 else float("nan"),
+        noise_floor=float(np.sqrt(np.mean(sigma**2))),
+        mean_absolute=float(np.mean(np.abs(error))),
+    )
+
+
+def _together(compared: Sequence[Compared]) -> dict[str, SignalError]:
+    names = list(dict.fromkeys(name for one in compared for name in one.errors))
+    return {
+        name: signal_error(
+            *(
+                np.concatenate([getattr(one, part)[name] for one in compared if name in one.errors])
+                for part in ("measured", "initial", "model", "sigma")
+            )
+        )
+        for name in names
+    }

@@ -1,0 +1,253 @@
+"""What explains a residual: curves of each variable, times a modulator, judged on parts that were left out.
+
+The residual's share that a curve tells ahead is compared between variables.  Many go together — in a sine the
+speed follows from the position, the acceleration is the position turned over — so that of explanations that do
+equally well the simpler counts: the fewer knots, the plainer modulator, and the variable that an effect acts
+through more directly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ema_model.axes import Axes
+from ema_model.comparison.curves import families, harmonics, orders_in, quantile_knots
+from ema_model.comparison.folds import FOLDS, Folds, Given, LeftOut, nothing_given, share_out
+from ema_model.comparison.residuals import Residuals
+from ema_model.comparison.result import Explanation
+from ema_model.comparison.words import explanation_sentence
+from ema_model.measurement import SIGNALS
+
+Array = NDArray[np.float64]
+
+MODULATORS = ("1", "sign_speed", "current")
+_PAIRS = (1, 3, 6)  # orders that a curve of the angle is made of
+_LEAST_T = 4.0  # of the mean gain over its standard error, so that 1 % of all recordings raise a false alarm
+_LEAST_T_WHITE, _LEAST_WHITE = 2.0, 30.0  # or of a gain on few stretches, with its χ² against white noise
+_LEFT_OF_FLOOR = 0.3  # of the model floor's power
+_LEAST_DROP = 0.014  # of χ², below which a gain is immaterial
+_FAR_ABOVE = 3.0  # the noise, and its own median, from which on a model floor is left out
+_SPIKE = 4.0  # of a residual's usual size
+_LEAST_BLOCKS, _MOST_BLOCKS, _PIECE = 60, 40_000, 200
+# What an explanation must be better by, as a share, to go before a simpler one that does as well.
+_FINER, _MODULATED = 0.015, 0.01
+_DIRECT = {
+    "motor_angle": 0.0,
+    "motor_speed": 0.0,
+    "load": 0.0,
+    "current": 0.005,
+    "user_position": 0.01,
+    "acceleration": 0.03,
+    "temperature": 0.05,
+    "time": 0.15,
+}
+_BINS = 24
+_AT_BOUND = 0.02  # σ
+_FINALISTS = 6
+
+
+@dataclass(frozen=True, eq=False)
+class _Candidate:
+    variable: str
+    modulator: str
+    gains: Array  # of χ², by stretch
+    merit: float  # the gain, less what finer and less direct curves must be better by
+
+    @property
+    def gain(self) -> float:
+        return float(self.gains.sum())
+
+    @property
+    def t(self) -> float:
+        spread = float(np.std(self.gains, ddof=1)) * np.sqrt(len(self.gains))
+        return self.gain / spread if spread > 0.0 else 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Used:
+    """The blocks that count, and the residual there, in σ of the noise."""
+
+    chosen: NDArray[np.bool_]  # (blocks,)
+    values: Array  # the residual, less the model's known error
+    weight: Array  # 1/σ
+    folds: Folds
+    given: Given  # how the model's parameters could still move it
+
+    def without_bounded(self) -> Used:
+        """The same with parameters at their bounds held there."""
+        inside = np.minimum(-self.given.room[0], self.given.room[1]) > _AT_BOUND
+        given = self.given
+        held = Given(given.columns[:, inside], given.prior[inside], (given.room[0][inside], given.room[1][inside]))
+        return replace(self, given=held)
+
+
+def explain(residuals: Residuals, signal: str, axes: Axes) -> list[Explanation]:
+    """Every variable × modulator that is known, the best explanation first; the simplest curve that does for each."""
+    used = used_blocks(residuals, signal)
+    if used is None:
+        return []
+    y = without_spikes(used.values * used.weight)
+    inner = used.without_bounded()
+    candidates = [
+        candidate
+        for variable in residuals.variables
+        for modulator in MODULATORS
+        if (candidate := _candidate(residuals, inner, y, variable, modulator)) is not None
+    ]
+    candidates.sort(key=lambda one: -one.merit)
+    if used.given.prior.size and np.any(np.isclose(used.given.room, 0.0, atol=_AT_BOUND)):
+        # With the right curve, parameters come back from bounds that they were driven to.
+        finalists = [
+            final
+            for one in candidates[:_FINALISTS]
+            if (final := _candidate(residuals, used, y, one.variable, one.modulator, bounded=True)) is not None
+        ]
+        candidates = sorted(finalists, key=lambda one: -one.merit) + candidates[_FINALISTS:]
+    total = float(y @ y)
+    expected = float(len(y))  # of noise alone, known within √2n
+    beyond = max(total - expected, 3.0 * np.sqrt(2.0 * expected))
+    floor = _floor_power(residuals, signal, used)
+    found = []
+    for one in candidates:
+        white = one.gain / max(1.0, total / expected)  # as if what is left were noise
+        steady = one.t > _LEAST_T or (one.t > _LEAST_T_WHITE and white > _LEAST_WHITE)
+        significant = steady and one.gain > _LEAST_DROP * total and one.gain > floor
+        centres, curve, error = _binned(residuals, used, one.variable, one.modulator)
+        r2 = float(np.clip(one.gain / beyond, -1.0, 1.0))
+        found.append(
+            Explanation(
+                signal=axes.signal(signal),
+                variable=one.variable,
+                modulator=one.modulator,
+                r2=r2,
+                significant=bool(significant),
+                centres=centres,
+                curve=curve,
+                error=error,
+                sentence=explanation_sentence(axes.signal(signal), one.variable, one.modulator, r2),
+            )
+        )
+    # A curve that is not significant does not go before one that is.
+    return sorted(found, key=lambda one: not one.significant)
+
+
+def used_blocks(residuals: Residuals, signal: str) -> Used | None:
+    """Blocks that are known, not saturated and, for what drives the motor, not at rest; None where too few are.
+
+    At rest friction holds the motor under any current up to its static limit, and where it stopped decides.
+    """
+    known = residuals.known.get(signal, np.zeros(residuals.blocks))
+    values = residuals.values[signal] - known
+    chosen = np.isfinite(values) & ~residuals.saturated
+    # In transients the model's own error stands far above all else; they cannot tell.
+    model = np.sqrt(np.maximum(residuals.sigma[signal] ** 2 - residuals.noise[signal] ** 2, 0.0))
+    usual = float(np.median(model[chosen])) if chosen.any() else 0.0
+    chosen &= np.maximum(model, np.abs(known)) <= _FAR_ABOVE * np.maximum(residuals.noise[signal], usual)
+    if SIGNALS[signal].kind in ("current", "torque") and "motor_speed" in residuals.variables:
+        chosen &= residuals.direction != 0.0
+    if np.count_nonzero(chosen) < _LEAST_BLOCKS:
+        return None
+    every = -(-np.count_nonzero(chosen) // _MOST_BLOCKS)
+    chosen &= (np.arange(residuals.blocks) // _PIECE) % every == 0  # of a long recording, pieces all over it
+    weight = 1.0 / residuals.sigma[signal]
+    folds = share_out(residuals.run[chosen], independent=residuals.is_map)
+    given = nothing_given(int(chosen.sum()))
+    if signal in residuals.adjustable:
+        one = residuals.adjustable[signal]
+        given = Given(one.columns[chosen] * weight[chosen][:, None], -one.x, one.room)
+    return Used(chosen, values[chosen], weight[chosen], folds, given)
+
+
+def without_spikes(values: Array) -> Array:
+    """The values, cut off beyond a multiple of their usual size: a moment of a transient is not to outvote all else."""
+    usual = 1.4826 * float(np.median(np.abs(values - np.median(values))))
+    return np.clip(values, -_SPIKE * usual, _SPIKE * usual) if usual > 0.0 else values
+
+
+def modulator_of(residuals: Residuals, name: str) -> Array | None:
+    """The factor of each block; None where it is not known or the same everywhere."""
+    if name == "1":
+        return np.ones(residuals.blocks)
+    if name == "sign_speed":
+        direction = residuals.direction
+        return direction if np.ptp(direction) > 0.0 else None
+    current = residuals.variables.get("current")
+    return current if current is not None and np.ptp(np.nan_to_num(current)) > 0.0 else None
+
+
+def _candidate(
+    residuals: Residuals, used: Used, y: Array, variable: str, modulator: str, *, bounded: bool = False
+) -> _Candidate | None:
+    """The simplest curve of a variable × modulator that does nearly as well as the best of its families."""
+    factor = modulator_of(residuals, modulator)
+    values = residuals.variables[variable][used.chosen]
+    if factor is None or not np.all(np.isfinite(values)) or np.ptp(values) <= 1e-9 * (1.0 + np.max(np.abs(values))):
+        return None
+    if modulator == "current" and variable == "current":
+        return None  # a curve of the current alone
+    scale = factor[used.chosen] * used.weight
+    gains = list(_by_family(residuals, used, y, values, variable, scale, bounded))
+    if not gains:
+        return None
+    penalties = _FINER * np.arange(len(gains)) + (_MODULATED if modulator != "1" else 0.0) + _DIRECT[variable]
+    totals = np.array([float(one.sum()) for one in gains])
+    merits = totals - penalties * np.maximum(totals.max(), 0.0)
+    best = int(np.argmax(merits))
+    return _Candidate(variable, modulator, gains[best], float(merits[best]))
+
+
+def _by_family(
+    residuals: Residuals, used: Used, y: Array, values: Array, variable: str, scale: Array, bounded: bool
+) -> Iterator[Array]:
+    """Gains by stretch, from the simplest family to the finest."""
+    if variable != "motor_angle":
+        for columns in families(values):
+            yield LeftOut(columns * scale[:, None], y, used.folds, used.given).gains(bounded=bounded)
+        return
+    advance = advance_of(residuals, used)
+    orders = orders_in(residuals.turns, advance)
+    if len(orders):
+        columns = harmonics(values, orders, advance)
+        fit = LeftOut(columns * scale[:, None], y, used.folds, used.given)
+        picked = [fit.pursue(fold, max(_PAIRS)) for fold in range(FOLDS)]
+        for pairs in _PAIRS:
+            choices = [
+                np.array([c for pair in one[:pairs] for c in (2 * pair, 2 * pair + 1)], np.intp) for one in picked
+            ]
+            yield fit.gains(choices, bounded=bounded)
+
+
+def advance_of(residuals: Residuals, used: Used) -> Array | None:
+    """The motor's turn during a block, rad."""
+    speed = residuals.variables.get("motor_speed")
+    return None if speed is None else np.nan_to_num(speed[used.chosen]) * residuals.block_s
+
+
+def _floor_power(residuals: Residuals, signal: str, used: Used) -> float:
+    """χ² that what is left of the model floor may hold, the twins' own difference taken off."""
+    model2 = (residuals.sigma[signal] ** 2 - residuals.noise[signal] ** 2)[used.chosen]
+    return float(_LEFT_OF_FLOOR * np.sum(model2 * used.weight**2))
+
+
+def _binned(residuals: Residuals, used: Used, variable: str, modulator: str) -> tuple[Array, Array, Array]:
+    """Bin centres of the variable, mean residual over modulator there, and its standard error."""
+    values = residuals.variables[variable][used.chosen]
+    factor = modulator_of(residuals, modulator)
+    assert factor is not None
+    factor = factor[used.chosen]
+    if variable == "motor_angle":
+        edges = np.linspace(0.0, 2.0 * np.pi, 4 * _BINS + 1)
+        values = np.mod(values, 2.0 * np.pi)
+    else:
+        edges = quantile_knots(values, _BINS + 1)
+    at = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, len(edges) - 2)
+    count = len(edges) - 1
+    power = np.bincount(at, (factor * used.weight) ** 2, count)
+    moment = np.bincount(at, factor * used.values * used.weight**2, count)
+    filled = power > 0.0
+    centres = 0.5 * (edges[1:] + edges[:-1])
+    return centres[filled], moment[filled] / power[filled], 1.0 / np.sqrt(power[filled])

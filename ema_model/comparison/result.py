@@ -1,0 +1,98 @@
+"""What a comparison finds, in the words and numbers that the screen, the report and JSON show."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ema_model.comparison.residuals import Residuals
+
+if TYPE_CHECKING:
+    from ema_model.actuator import Actuator
+    from ema_model.calibration.fit import Calibration
+    from ema_model.comparison.orders import Order
+    from ema_model.measurement import Measurement
+    from ema_model.measurement.health import Health
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Explanation:
+    """How much of a signal's residual one variable, times a modulator, tells ahead on data it was not fitted to.
+
+    The residual is modulator × curve(variable); the modulator is 1, the current, or the sign of the speed.
+    """
+
+    signal: str
+    variable: str
+    modulator: str  # "1", "current", "sign_speed"
+    r2: float  # cross-validated share of the residual's power beyond noise and floor, at most 1
+    significant: bool
+    centres: Array  # (bins,) of the variable, in its unit (the angle from 0 to 2π)
+    curve: Array  # (bins,) mean residual over modulator, in the signal's unit (over A for the current)
+    error: Array  # (bins,) its standard error
+    sentence: str  # "The residual current repeats with the motor's angle."
+
+
+@dataclass(frozen=True, eq=False)
+class Region:
+    """A range of a variable in which the model fails most."""
+
+    signal: str
+    variable: str
+    low: float
+    high: float
+    rmse: float  # in the signal's unit
+    mean: float  # of the residual, likewise
+    excess: float  # rmse over the floor there
+    sentence: str  # "The motor needs 35 mN·m more at 300 rad/s than the model."
+    blocks: NDArray[np.bool_]  # (blocks,) of the joined residuals
+
+
+@dataclass(frozen=True)
+class SignalError:
+    """How far the model is from one signal over all recordings, in the signal's unit."""
+
+    rmse: float
+    rmse_initial: float  # before calibration
+    nrmse: float  # rmse over the range of the measured signal
+    noise_floor: float  # noise and model floor, rms
+    mean_absolute: float
+
+
+@dataclass(frozen=True, eq=False)
+class Compared:
+    """One recording beside the model; all arrays are (blocks,)."""
+
+    name: str
+    measurement: Measurement  # as it was compared
+    health: Health
+    time_s: Array
+    measured: dict[str, Array]
+    initial: dict[str, Array]  # the model with the file's parameters
+    model: dict[str, Array]  # the model after calibration (the same without one)
+    sigma: dict[str, Array]  # standard deviation that a perfect model would leave
+    errors: dict[str, SignalError]
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """All of it: the recordings one by one, and what they say together."""
+
+    actuator: Actuator  # as given
+    calibration: Calibration | None
+    recordings: Sequence[Compared]
+    residuals: Residuals  # joined
+    signals: dict[str, SignalError]
+    primary: str  # the signal whose residual is explained
+    explained_by: Sequence[Explanation]  # best first
+    orders: Sequence[Order]  # of the primary signal, strongest first; significant ones only
+    worst_regions: Sequence[Region]  # worst first
+    adequate: bool
+    sentences: Sequence[str]  # the answer in plain words, the first one first
+    warnings: Sequence[str] = field(default_factory=tuple)

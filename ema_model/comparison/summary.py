@@ -1,0 +1,102 @@
+"""A comparison in plain numbers, as `emaviz compare --json` writes it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ema_model.calibration import Calibrated, Calibration
+from ema_model.comparison.result import Comparison, SignalError
+
+
+def as_dict(comparison: Comparison) -> dict[str, Any]:
+    """Everything but the series, in numbers and texts that JSON can hold; unknown numbers are None."""
+    return _plain(
+        {
+            "adequate": comparison.adequate,
+            "sentences": list(comparison.sentences),
+            "warnings": list(comparison.warnings),
+            "signals": {name: _error(error) for name, error in comparison.signals.items()},
+            "primary": comparison.primary,
+            "calibration": None if comparison.calibration is None else _calibration(comparison.calibration, comparison),
+            "explained_by": [
+                {
+                    "variable": one.variable,
+                    "modulator": one.modulator,
+                    "r2": one.r2,
+                    "significant": one.significant,
+                    "signal": one.signal,
+                    "sentence": one.sentence,
+                }
+                for one in comparison.explained_by
+            ],
+            "orders": [
+                {"order": one.order, "amplitude": one.amplitude, "phase_rad": one.phase} for one in comparison.orders
+            ],
+            "worst_regions": [
+                {
+                    "signal": one.signal,
+                    "variable": one.variable,
+                    "from": one.low,
+                    "to": one.high,
+                    "rmse": one.rmse,
+                    "mean": one.mean,
+                    "sentence": one.sentence,
+                }
+                for one in comparison.worst_regions
+            ],
+            "recordings": [
+                {
+                    "name": one.name,
+                    "notes": list(one.measurement.notes),
+                    "health": one.health.as_dict(),
+                    "signals": {name: _error(error) for name, error in one.errors.items()},
+                }
+                for one in comparison.recordings
+            ],
+        }
+    )
+
+
+def _error(error: SignalError) -> dict[str, float]:
+    return {
+        "rmse": error.rmse,
+        "nrmse": error.nrmse,
+        "noise_floor": error.noise_floor,
+        "rmse_initial": error.rmse_initial,
+        "mean_absolute": error.mean_absolute,
+    }
+
+
+def _calibration(calibration: Calibration, comparison: Comparison) -> dict[str, Any]:
+    axes = comparison.actuator.axes
+    return {
+        "converged": calibration.converged,
+        "evaluations": calibration.evaluations,
+        "parameters": {axes.path(name): _parameter(one) for name, one in calibration.parameters.items()},
+        "starts": {name: _parameter(one) for name, one in calibration.starts.items()},
+        "outside_tolerance": [axes.path(name) for name in calibration.outside_tolerance],
+        "confounded": [[axes.path(a), axes.path(b)] for a, b in calibration.confounded],
+    }
+
+
+def _parameter(one: Calibrated) -> dict[str, Any]:
+    return {
+        "value": one.value,
+        "initial": one.initial,
+        "interval90": list(one.interval90),
+        "unit": one.unit,
+        "z": one.z,
+        "at_bound": one.at_bound,
+    }
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _plain(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(one) for one in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    return None if isinstance(value, float) and not np.isfinite(value) else value

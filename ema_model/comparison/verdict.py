@@ -1,0 +1,110 @@
+"""What the residuals say: which signal to explain, by what, where it is worst, and whether anything is left at all."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ema_model.actuator import Actuator
+from ema_model.calibration import Calibration
+from ema_model.calibration.floor import CORRELATED_S
+from ema_model.comparison.explain import explain
+from ema_model.comparison.orders import Order, residual_orders
+from ema_model.comparison.regions import worst_regions
+from ema_model.comparison.residuals import Residuals
+from ema_model.comparison.result import Explanation, Region, SignalError
+from ema_model.measurement import SIGNALS
+
+Array = NDArray[np.float64]
+
+_ORDER_OF_PRIMARY = ("current_A", "motor_torque_Nm", "user_position_rad", "motor_position_rad", "motor_speed_rad_s")
+_SLOW_RATIO = 2.0  # of the residual's means over 25 ms to their floor, from which on the model has failed
+
+
+@dataclass(frozen=True, eq=False)
+class Judgement:
+    """The part of a `Comparison` that interprets."""
+
+    residuals: Residuals
+    primary: str
+    explained_by: Sequence[Explanation]
+    orders: Sequence[Order]
+    worst_regions: Sequence[Region]
+    adequate: bool
+    sentences: Sequence[str]
+    warnings: Sequence[str]
+
+
+def judge(
+    residuals: Residuals, errors: Mapping[str, SignalError], calibration: Calibration | None, actuator: Actuator
+) -> Judgement:
+    """Explains the residual of the first signal of interest: the current, where it is measured."""
+    primary = next(name for name in _ORDER_OF_PRIMARY if name in residuals.values)
+    explained = explain(residuals, primary, actuator.axes)
+    orders = residual_orders(residuals, primary)
+    regions = worst_regions(residuals, primary, explained, actuator.axes)
+    failed = [
+        name for name in residuals.values if name != "motor_speed_rad_s" and slow_ratio(residuals, name) > _SLOW_RATIO
+    ]
+    significant = [one for one in explained if one.significant]
+    adequate = not significant and not failed and (calibration is None or calibration.converged)
+    shown = actuator.axes.signal(primary)
+    sentences = [] if adequate else [one.sentence for one in significant[:1]] + [one.sentence for one in regions[:3]]
+    sentences += [_summary(shown, errors[shown], adequate)]
+    return Judgement(
+        residuals=residuals,
+        primary=shown,
+        explained_by=explained,
+        orders=orders,
+        worst_regions=() if adequate else regions,
+        adequate=adequate,
+        sentences=sentences,
+        warnings=_warnings(residuals, calibration),
+    )
+
+
+def slow_ratio(residuals: Residuals, name: str) -> float:
+    """rms of the residual's means over 25 ms, over what noise and model floor give."""
+    size = max(1, round(CORRELATED_S / residuals.block_s))
+    used = np.isfinite(residuals.values[name]) & ~residuals.saturated
+    values, sigma, noise = residuals.values[name][used], residuals.sigma[name][used], residuals.noise[name][used]
+    count = values.size // size
+    if count < 4:
+        return 0.0
+
+    def means(array: Array) -> Array:
+        return array[: count * size].reshape(count, size).mean(axis=1)
+
+    floor = means(noise**2) / size + means(sigma**2 - noise**2)
+    return float(np.sqrt(np.mean(means(values) ** 2) / np.mean(floor)))
+
+
+def _summary(name: str, error: SignalError, adequate: bool) -> str:
+    signal = SIGNALS[name]
+    size = f"{error.rmse:.3g} {signal.unit} rms"
+    floor = f"{error.noise_floor:.3g} {signal.unit}"
+    if adequate:
+        left = f"what is left of the {signal.title.lower()}, {size}, is noise and the model's own floor ({floor})"
+        return f"The model explains the recordings: {left}."
+    return f"The {signal.title.lower()} is off by {size}, where noise and the model's own floor are {floor}."
+
+
+def _warnings(residuals: Residuals, calibration: Calibration | None) -> list[str]:
+    found = []
+    if calibration is not None:
+        if not calibration.converged:
+            found.append("The calibration has not converged: what looks like missing physics may be an unfinished fit.")
+        for name in calibration.outside_tolerance:
+            one = calibration.parameters[name]
+            partners = {a if b == name else b for a, b in calibration.confounded if name in (a, b)}
+            traded = f"; it trades against {', '.join(sorted(partners))}" if partners else ""
+            found.append(
+                f"{name} stands {abs(one.z):.1f} σ from the file's value, at the edge of its tolerance{traded}."
+            )
+    share = float(np.mean(residuals.saturated))
+    if share > 0.005:
+        found.append(f"The drive is at its limit for {100.0 * share:.2g} % of the time; these parts are not counted.")
+    return found

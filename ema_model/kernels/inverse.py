@@ -1,0 +1,55 @@
+"""Inverse dynamics: the current that a measured motion needs, for recordings whose controller is not known."""
+
+from __future__ import annotations
+
+import numba
+
+from ema_model.numba_options import parallel_kernel, scalar
+from ema_model.physics.elementary import clamp
+from ema_model.physics.rows import (
+    DYNAMIC_FRICTION,
+    GEAR_RATIO,
+    INVERSE_INERTIA,
+    LANES,
+    STATIC_FRICTION,
+    TORQUE_CONSTANT,
+    VISCOUS,
+)
+
+from .composition import electric_torque, moving_friction, shaft_torque
+
+_ROUNDS = 4  # effects that depend on the current itself are found by substitution
+
+
+@scalar
+def needed_current(p, i, theta, omega, acceleration, load, still):
+    """I with T(I) = J dω/dt + C ω + τ T_load + T_f sgn ω − effects on the shaft, A (T 3.13 solved for the motor).
+
+    Friction's sign goes over softly below the speed `still`, rad/s, under which the direction is not known.
+    """
+    constant = p[TORQUE_CONSTANT * LANES + i]
+    gear = p[GEAR_RATIO * LANES + i]
+    static = p[STATIC_FRICTION * LANES + i]
+    dynamic = p[DYNAMIC_FRICTION * LANES + i]
+    direction = clamp(omega / still, -1.0, 1.0)
+    base = acceleration / p[INVERSE_INERTIA * LANES + i] + p[VISCOUS * LANES + i] * omega + gear * load
+    current = base / constant
+    for _ in range(_ROUNDS):
+        torque = electric_torque(constant * current, theta, omega, current, p, i)
+        friction = direction * moving_friction(dynamic, static, omega, torque, load, p, i)
+        required = base + friction - shaft_torque(0.0, theta, omega, current, gear * theta, gear, p, i)
+        current += (required - torque) / constant
+    return current
+
+
+@parallel_kernel
+def currents(parameters, theta, omega, acceleration, load, still, result):
+    """The current of every sample for a population: parameters (blocks, rows·LANES), the motion (samples,) each.
+
+    result: (blocks, samples, LANES), A, written here.
+    """
+    for block in numba.prange(parameters.shape[0]):
+        p = parameters[block]
+        for n in range(theta.size):
+            for i in range(LANES):
+                result[block, n, i] = needed_current(p, i, theta[n], omega[n], acceleration[n], load[n], still)

@@ -1,0 +1,134 @@
+"""`emaviz compare`: recordings beside the model, and where it fails."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from ema_model.comparison import Comparison, as_dict, compare
+from ema_model.errors import InputError
+from ema_model.measurement import SIGNALS
+from ema_model.recordings import read_recording
+from emaviz.cli import options, output
+
+HELP = "show where the model fails beside recordings"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options of INTERFACES, with the signals to fit and the part to use."""
+    parser.add_argument("files", nargs="+", metavar="FILE", help="recordings of one actuator, compared together")
+    options.add_actuator(parser)
+    parser.add_argument(
+        "--map",
+        action="append",
+        default=[],
+        dest="mapping",
+        metavar="signal=column",
+        help="a column's meaning, with its unit where it is not SI: motor_speed_rad_s=speed[rpm]; repeat for more",
+    )
+    parser.add_argument(
+        "--calibrate", action=argparse.BooleanOptionalAction, default=True, help="fit the actuator within tolerances"
+    )
+    parser.add_argument(
+        "--free", action="append", metavar="NAME", help="calibrate only these: k1 … k8 or section.name; repeat for more"
+    )
+    options.add_faults(parser)
+    options.add_effects(parser)
+    parser.add_argument(
+        "--signal", action="append", dest="signals", metavar="NAME", help="fit only these signals; repeat for more"
+    )
+    parser.add_argument("--from", type=float, dest="start_s", metavar="s", help="leave out what lies before")
+    parser.add_argument("--to", type=float, dest="stop_s", metavar="s", help="leave out what lies after")
+    parser.add_argument("--seed", type=int, default=0, help="of all random numbers")
+    parser.add_argument("--record", metavar="FILE.rrd", help="write the comparison for the Rerun viewer")
+    parser.add_argument("--report", metavar="FILE.html", help="write a report that opens in any browser, offline")
+    parser.add_argument("--json", metavar="FILE", help="write the result there")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Reads, compares, writes and prints."""
+    actuator = options.actuator_of(arguments)
+    for path, option in ((arguments.report, "--report"), (arguments.json, "--json")):
+        if path is not None:
+            output.check_target(Path(path), option)
+    progress = output.Progress()
+    try:
+        measurements = []
+        for file in arguments.files:
+            progress.show(f"reading {Path(file).name}")
+            measurements.append(read_recording(file, actuator, arguments.mapping))
+        if arguments.start_s is not None or arguments.stop_s is not None:
+            window = (
+                -float("inf") if arguments.start_s is None else arguments.start_s,
+                float("inf") if arguments.stop_s is None else arguments.stop_s,
+            )
+            measurements = [measurement.selected(window) for measurement in measurements]
+        result = compare(
+            measurements,
+            actuator,
+            k=options.faults_of(arguments),
+            effects=options.effects_of(arguments),
+            calibrate=arguments.calibrate,
+            free=arguments.free,
+            signals=arguments.signals,
+            on_progress=progress.show,
+        )
+        if arguments.record:
+            progress.show("recording")
+            _record(result, arguments)
+        if arguments.report:
+            progress.show("writing the report")
+            from emaviz.report import write_report  # plotly takes a second to import
+
+            write_report(result, arguments.report)
+    finally:
+        progress.done()
+    output.write_json(arguments.json, as_dict(result), arguments.seed, output.configuration(arguments))
+    print(text(result))
+    return 0
+
+
+def _record(result: Comparison, arguments: argparse.Namespace) -> None:
+    from emaviz.recording import RecordingError
+    from emaviz.recording.comparison import write_comparison
+
+    try:
+        write_comparison(result, arguments.record, output.configuration(arguments))
+    except RecordingError as error:
+        raise InputError(str(error)) from None
+
+
+def text(result: Comparison) -> str:
+    """The answer as the terminal shows it: the sentences, the errors, the explanations, the calibration."""
+    lines = [*result.sentences, *(f"! {warning}" for warning in result.warnings), ""]
+    lines.append(f"{'signal':22}{'rms error':>12}{'initially':>12}{'floor':>12}{'mean |e|':>12}")
+    for name, error in result.signals.items():
+        numbers = (error.rmse, error.rmse_initial, error.noise_floor, error.mean_absolute)
+        lines.append(f"{name:22}" + "".join(f"{number:12.4g}" for number in numbers) + f"  {SIGNALS[name].unit}")
+    if len(result.recordings) > 1:
+        lines += ["", f"{'recording':34}{'rms error':>12}{'floor':>12}{'mean |e|':>12}  of {result.primary}"]
+        for one in result.recordings:
+            if result.primary in one.errors:
+                error = one.errors[result.primary]
+                lines.append(
+                    f"{one.name[:33]:34}{error.rmse:12.4g}{error.noise_floor:12.4g}{error.mean_absolute:12.4g}"
+                )
+    if result.explained_by:
+        lines += ["", "what explains the residual (share told ahead on parts that were left out)"]
+        for one in result.explained_by[:6]:
+            modulator = "" if one.modulator == "1" else f" × {one.modulator}"
+            mark = "" if one.significant else "   within noise"
+            lines.append(f"  {one.variable + modulator:28}{100.0 * one.r2:6.1f} %{mark}")
+    if result.orders:
+        unit = SIGNALS[result.primary].unit
+        found = ", ".join(f"{one.order} ({one.amplitude:.3g} {unit})" for one in result.orders[:8])
+        lines += ["", f"orders per revolution: {found}"]
+    if result.calibration is not None and result.calibration.parameters:
+        state = "converged" if result.calibration.converged else "NOT converged"
+        lines += ["", f"calibration {state}", f"  {'':38}{'value':>12}{'± (90 %)':>12}{'z':>7}"]
+        for name, one in result.calibration.parameters.items():
+            half = 0.5 * (one.interval90[1] - one.interval90[0])
+            bound = "  at its bound" if one.at_bound else ""
+            shown = result.actuator.axes.path(name)
+            lines.append(f"  {shown:38}{one.value:12.5g}{half:12.2g}{one.z:7.2f}  {one.unit}{bound}")
+    return "\n".join(lines)

@@ -1,0 +1,202 @@
+"""A comparison told as a recording: measured, model, residual and floor, where it fails, and how it was compared."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from ema_model.comparison.result import Compared, Comparison
+from ema_model.comparison.summary import as_dict
+from ema_model.errors import InputError
+from emaviz.figures.theme import FLOOR_WIDTH
+from emaviz.recording.errors import RecordingError
+from emaviz.recording.style import COMPARISON, SIM_TIME, plain
+from emaviz.recording.writer import RecordingWriter
+
+Array = NDArray[np.float64]
+
+_PAUSE_S = 0.2  # between recordings, so that one is seen to end
+_CELLS = str.maketrans({"|": r"\|", "\n": " ", "\r": " ", "`": "'", "<": "&lt;", "[": r"\[", "*": r"\*", "_": r"\_"})
+
+
+def write_comparison(comparison: Comparison, path: str | Path, configuration: Mapping[str, Any] | None = None) -> None:
+    """Writes a whole .rrd file; InputError in one line where that cannot be done.
+
+    Several recordings stand one after another on sim_time, because then every signal has the one path that scripts
+    know, and one view shows all of it; the configuration says where each begins.  A signal that was compared is
+    there in the block means it was compared by, the others as they were recorded; of a recording whose time starts
+    anew in between only those that were compared.
+    """
+    try:
+        with ComparisonWriter(path) as writer:
+            times, shifts = _one_after_another(comparison.recordings)
+            writer.config(_configuration(comparison, times, shifts, configuration or {}))
+            writer.properties({"comparison": as_dict(comparison), "shift_s": shifts})
+            for group, signals in _groups(comparison).items():
+                for name, values in signals.items():
+                    _write(writer, group, name, times, values)
+            raw = [_sample_times(one, shift) for one, shift in zip(comparison.recordings, shifts)]
+            for name in _not_compared(comparison):
+                values = [one.measurement.get(name) for one in comparison.recordings]
+                _write(writer, "measurement", name, raw, values)
+            writer.finding("answer", _answer(comparison))
+            writer.finding("regions", _regions(comparison, times))
+    except RecordingError as error:
+        raise InputError(str(error)) from None
+    if writer.failed is not None:
+        raise InputError(writer.failed)
+
+
+class ComparisonWriter(RecordingWriter):
+    """A recording that also holds what a comparison found, in words."""
+
+    def __enter__(self) -> ComparisonWriter:
+        return self
+
+    def finding(self, name: str, text_markdown: str) -> None:
+        """A document at /comparison/NAME, shown where it fails."""
+        with self._file.lock:
+            if plain(name) not in self._contents.findings:
+                self._contents.findings.append(name)
+            self._text(f"{COMPARISON}/{name}", text_markdown)
+
+    def gap(self, group: str, name: str, time_s: float) -> None:
+        """Ends a signal's line there, so that none is drawn to the value that follows."""
+        time = [rr.TimeColumn(SIM_TIME, duration=[np.timedelta64(round(time_s * 1e9), "ns")])]
+        clear = rr.Clear.columns(is_recursive=[False])
+        self._file.do(lambda stream: stream.send_columns(f"/{group}/{plain(name)}", time, clear))
+
+
+def _one_after_another(recordings: Sequence[Compared]) -> tuple[list[Array], list[float]]:
+    """Times of each recording's blocks on sim_time, s, and what was added to them; the first keeps its own.
+
+    A run that starts anew within a recording follows the run before it.
+    """
+    times, shifts = [], []
+    end = None
+    for one in recordings:
+        time = one.time_s.copy()
+        for at in np.flatnonzero(np.diff(time) <= 0.0) + 1:
+            time[at:] += time[at - 1] + _PAUSE_S - time[at]
+        shift = 0.0 if end is None else end + _PAUSE_S - float(min(time[0], one.measurement.time_s[0]))
+        times.append(time + shift)
+        shifts.append(shift)
+        end = float(max(times[-1][-1], one.measurement.time_s[-1] + shift))
+    return times, shifts
+
+
+def _sample_times(one: Compared, shift: float) -> Array | None:
+    """Times of the samples; None where runs start anew, as which blocks they belong to is then not known."""
+    time = one.measurement.time_s
+    return time + shift if np.all(np.diff(time) > 0.0) else None
+
+
+def _groups(comparison: Comparison) -> dict[str, dict[str, list[Array | None]]]:
+    """By group and signal, the values of each recording, None where it lacks the signal; the primary signal first."""
+    names = sorted(comparison.signals, key=lambda name: name != comparison.primary)
+    calibrated = comparison.calibration is not None
+
+    def residual(one: Compared, name: str) -> Array:
+        return one.measured[name] - one.model[name]
+
+    of = {
+        "measurement": lambda one, name: one.measured[name],
+        "monitor": lambda one, name: one.model[name],
+        **({"initial": lambda one, name: one.initial[name]} if calibrated else {}),
+        "residual": residual,
+        "floor_high": lambda one, name: FLOOR_WIDTH * one.sigma[name],
+        "floor_low": lambda one, name: -FLOOR_WIDTH * one.sigma[name],
+    }
+    return {
+        group: {
+            name: [take(one, name) if name in one.measured else None for one in comparison.recordings] for name in names
+        }
+        for group, take in of.items()
+    }
+
+
+def _write(
+    writer: ComparisonWriter,
+    group: str,
+    name: str,
+    times: Sequence[Array | None],
+    values: Sequence[Array | None],
+) -> None:
+    """The recordings' values one after another, without what is no number: it would stop the plot's lines."""
+    known = [(t, v) for t, v in zip(times, values, strict=True) if t is not None and v is not None]
+    if not known:
+        return
+    time, joined = np.concatenate([t for t, _ in known]), np.concatenate([v for _, v in known])
+    finite = np.isfinite(joined)
+    writer.signals(group, time[finite], {name: joined[finite]})
+    steps = np.diff(time[finite])
+    if not len(steps):
+        return
+    for at in np.flatnonzero(steps > max(0.99 * _PAUSE_S, 5.0 * float(np.median(steps)))):
+        writer.gap(group, name, float(time[finite][at]) + 0.5 * float(steps[at]))
+
+
+def _not_compared(comparison: Comparison) -> list[str]:
+    """Recorded signals that were not compared."""
+    names = dict.fromkeys(name for one in comparison.recordings for name in one.measurement.signals)
+    return [name for name in names if name != "time_s" and name not in comparison.signals]
+
+
+def _answer(comparison: Comparison) -> str:
+    verdict = "The model is adequate." if comparison.adequate else "The model is not adequate."
+    lines = [f"# {_escaped(verdict)}", "", *(f"{_escaped(sentence)}\n" for sentence in comparison.sentences)]
+    lines += [f"- ⚠ {_escaped(warning)}" for warning in comparison.warnings]
+    lines += ["", "| signal | rmse | before calibration | floor |", "|---|---|---|---|"]
+    for name, error in comparison.signals.items():
+        lines.append(f"| {_escaped(name)} | {error.rmse:.4g} | {error.rmse_initial:.4g} | {error.noise_floor:.4g} |")
+    return "\n".join(lines)
+
+
+def _regions(comparison: Comparison, times: Sequence[Array]) -> str:
+    lines = ["# Worst regions", ""]
+    residuals, time = comparison.residuals, np.concatenate(times)
+    for i, region in enumerate(comparison.worst_regions):
+        size = np.abs(residuals.values[region.signal]) / residuals.sigma[region.signal]
+        at = int(np.argmax(np.where(region.blocks & np.isfinite(size), size, -1.0)))
+        lines.append(
+            f"{i + 1}. **{_escaped(region.sentence)}** {region.excess:.3g} times the floor; worst at {time[at]:.4g} s."
+        )
+    return "\n".join(lines if comparison.worst_regions else [*lines, "No region stands out of the floor."])
+
+
+def _configuration(
+    comparison: Comparison, times: Sequence[Array], shifts: Sequence[float], configuration: Mapping[str, Any]
+) -> str:
+    settings = {"actuator": comparison.actuator.name, **configuration}
+    lines = ["# Comparison", "", "| setting | value |", "|---|---|"]
+    lines += [f"| {_escaped(k)} | {_escaped(v)} |" for k, v in settings.items() if v not in (None, [], "")]
+    lines.append(f"| block | {1e3 * comparison.residuals.block_s:.4g} ms |")
+    for i, (one, time, shift) in enumerate(zip(comparison.recordings, times, shifts)):
+        moved = f", moved by {shift:.4g} s" if shift else ""
+        lines.append(f"| recording {i + 1} | {_escaped(one.name)}: {time[0]:.4g} … {time[-1]:.4g} s{moved} |")
+    fit = comparison.calibration
+    if fit is not None:
+        lines += [
+            "",
+            "# Calibration",
+            "",
+            "| parameter | value | 90 % interval | unit | z [σ] |",
+            "|---|---|---|---|---|",
+        ]
+        for path, found in fit.parameters.items():
+            name = comparison.actuator.axes.path(path)
+            low, high = found.interval90
+            lines.append(
+                f"| {_escaped(name)} | {found.value:.5g} | {low:.5g} … {high:.5g} | {found.unit} | {found.z:.2f} |"
+            )
+    return "\n".join(lines) + "\n"
+
+
+def _escaped(value: object) -> str:
+    """Text that Markdown shows as it is, and that cannot break a table."""
+    return str(value).translate(_CELLS)

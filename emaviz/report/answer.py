@@ -1,0 +1,25 @@
+"""The answer in plain words, first of all."""
+
+from __future__ import annotations
+
+from ema_model.comparison.result import Comparison
+from emaviz.report.markup import bullets, escape, paragraph
+from emaviz.report.section import Figures, Section
+
+
+class Answer(Section[Comparison]):
+    """The sentences, whether the model is adequate, and what to be warned of."""
+
+    title = "The answer"
+    anchor = "answer"
+
+    def body(self, subject: Comparison, figures: Figures) -> str:
+        """Always there."""
+        kind, verdict = ("good", "adequate") if subject.adequate else ("bad", "not adequate")
+        first, *others = subject.sentences or (f"The model is {verdict}.",)
+        return (
+            f'<p><span class="verdict {kind}">{escape(verdict)}</span></p>'
+            + paragraph(first, "answer")
+            + "".join(paragraph(sentence) for sentence in others)
+            + bullets(subject.warnings, "warning")
+        )

@@ -1,0 +1,231 @@
+"""Compare in a real browser: a file dropped on the page, its columns, its health, where the model fails."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+
+from ema_model.actuator import load_actuator
+from ema_model.commands import command
+from ema_model.measurement import write_measurement
+from ema_model.sensors import Sensors
+from ema_model.simulation import Run, simulate_reference
+from emaviz.app import App
+
+pytestmark = pytest.mark.browser
+
+SHAPES = """() => Array.from(document.querySelectorAll('.js-plotly-plot'), plot => ({
+  title: plot.layout?.title?.text ?? '', shapes: (plot.layout?.shapes ?? []).length,
+  traces: (plot.data ?? []).length }))"""
+DROP = """([name, text]) => {
+  const transfer = new DataTransfer();
+  transfer.items.add(new File([text], name, { type: 'text/csv' }));
+  const init = { dataTransfer: transfer, bubbles: true, cancelable: true };
+  document.querySelector('canvas').dispatchEvent(new DragEvent('drop', init));
+}"""
+
+
+@pytest.fixture(scope="module")
+def recording():
+    """The Reference Model with cogging, as a rig's sensors would show it."""
+    run = Run(command("sine", {"amplitude_rad": 0.03, "frequency_Hz": 3.0}), 1.0)
+    true = simulate_reference(run, load_actuator(), effects={"cogging_torque": {}})
+    return Sensors(current_noise_A=0.2, encoder_bits=12).record(true, seed=1)
+
+
+@pytest.fixture(scope="module")
+def rig_file(recording, tmp_path_factory):
+    """The same under names and in units of a rig."""
+    columns = {
+        "t [ms]": 1e3 * recording.time_s,
+        "pos_cmd [deg]": np.rad2deg(recording["command_rad"]),
+        "output_angle [deg]": np.rad2deg(recording["user_position_rad"]),
+        "motor_angle [deg]": np.rad2deg(recording["motor_position_rad"]),
+        "motor_speed [rpm]": recording["motor_speed_rad_s"] * 30.0 / np.pi,
+        "iq [mA]": 1e3 * recording["current_A"],
+        "channel_7": np.arange(recording.samples) % 7.0,
+    }
+    path = tmp_path_factory.mktemp("rig") / "rig <b>7.csv"
+    table = np.column_stack(list(columns.values()))
+    np.savetxt(path, table, delimiter=",", header=",".join(columns), comments="", fmt="%.10g")
+    return path
+
+
+@pytest.fixture(autouse=True)
+def signals_in_front(app):
+    """As an earlier test may have left a comparison on the right, while a new page is known by its charts."""
+    wait_until(lambda: not app.comparing.running)
+
+    def in_front():
+        app.session.refresh()
+        time.sleep(0.2)
+        return app._signals_panel.visible
+
+    wait_until(in_front)
+
+
+@pytest.fixture
+def compare(page, app):
+    """The page on its Compare tab, nothing chosen."""
+    for name in list(app.comparing.opened):
+        app.comparing.remove(name)
+    page.get_by_role("tab", name="Compare", exact=True).click()
+    page.get_by_role("button", name="Upload a recording").wait_for()
+    wait_until(lambda: not app.comparing.running)
+    page.set_default_timeout(15_000)
+    return page
+
+
+def wait_until(condition, seconds=30.0):
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+def upload(page, path):
+    page.locator("input[type=file]").first.set_input_files(str(path))
+
+
+def figures(page):
+    """(title, shapes) of every figure that is drawn."""
+    return [(one["title"], one["shapes"]) for one in page.evaluate(SHAPES) if one["traces"]]
+
+
+def number_box(page, label):
+    row = page.locator("label", has_text=label).first
+    row = row.locator("xpath=ancestor::div[contains(@class,'mantine-Flex-root')][1]")
+    return float(row.locator("input:not([type=hidden])").first.input_value())
+
+
+def test_from_a_file_to_the_region_where_the_model_fails(compare, app, rig_file):
+    page = compare
+    upload(page, rig_file)
+    page.get_by_text("← iq [mA]").wait_for()
+    page.get_by_text("channel_7:").wait_for()
+    wait_until(lambda: len(figures(page)) >= 1)  # the preview
+    name = next(iter(app.comparing.opened))
+    assert "<" not in name and app.comparing.opened[name].measurement is None
+
+    page.get_by_role("button", name="Use these columns").click()
+    page.get_by_text("Data health").wait_for()
+    page.get_by_text("rms").first.wait_for()
+    page.get_by_text("Compared in").wait_for(timeout=60_000)
+    comparison = app.comparing.comparison
+    page.get_by_text(comparison.sentences[0]).first.wait_for()
+    assert comparison.explained_by[0].variable == "motor_angle"
+
+    region = comparison.worst_regions[0]
+    button = page.get_by_role("button", name=region.sentence).first
+    button.wait_for()
+    wait_until(lambda: len(figures(page)) >= 2)
+    before = dict(figures(page))
+    button.click()
+    wait_until(lambda: all(shapes > before[title] for title, shapes in figures(page)[:2]))
+
+    moment = number_box(page, "Moment [s]")
+    one = comparison.recordings[0]
+    at = int(np.argmin(np.abs(one.time_s - moment)))
+    assert region.blocks[at], "the play-head is in the region"
+    turned = 0.5 * one.measured["motor_position_rad"][at]
+    wait_until(lambda: np.allclose(app.scene._rotor.wxyz, (np.cos(turned), np.sin(turned), 0.0, 0.0), atol=0.02))
+
+    for tab, title in (("Against", "against"), ("Turn", "orders"), ("Why", "explains"), ("Fit", "Calibrated")):
+        page.get_by_role("tab", name=tab, exact=True).click()
+        wait_until(lambda title=title: any(title in drawn for drawn, _ in figures(page)))
+
+
+def test_a_column_is_corrected_by_hand(compare, app, rig_file):
+    page = compare
+    upload(page, rig_file)
+    page.get_by_text("← iq [mA]").wait_for()
+    name = next(iter(app.comparing.opened))
+    page.get_by_label("Column", exact=True).click()
+    page.get_by_role("option", name="iq [mA]", exact=True).click()
+    page.get_by_label("Sign turned", exact=True).click()
+    page.get_by_text("← iq [mA] × −1").wait_for()
+    page.get_by_label("Column", exact=True).click()
+    page.get_by_role("option", name="channel_7", exact=True).click()
+    page.get_by_label("is", exact=True).click()
+    page.get_by_role("option", name="Temperature [°C]", exact=True).click()
+    page.get_by_text("← channel_7").wait_for()
+    page.get_by_role("button", name="Use these columns").click()
+    wait_until(lambda: app.comparing.opened[name].measurement is not None)
+    measurement = app.comparing.opened[name].measurement
+    assert measurement["temperature_C"].max() == 6.0
+    raw = app.comparing.opened[name].columns["iq [mA]"]
+    assert np.allclose(measurement["current_A"], -1e-3 * raw)
+
+
+def test_a_bad_file_is_one_line_and_the_app_goes_on(compare, app, tmp_path):
+    page = compare
+    bad = tmp_path / "bad.csv"
+    bad.write_text("time_s,current_A\n0,1\n1e-3,x\n" + "2e-3,1\n" * 200)
+    upload(page, bad)
+    line = page.get_by_text("a number is expected")
+    line.wait_for()
+    assert line.count() == 1 and "line 3" in line.inner_text()
+    assert str(app.comparing.folder.folder) not in line.inner_text()
+    assert not app.comparing.opened
+    page.get_by_role("tab", name="Explore", exact=True).click()
+    drawn = app.session.simulation
+    app.session.refresh()
+    wait_until(lambda: app.session.simulation is not drawn)
+
+
+def test_too_large_an_upload_is_refused(compare, app, tmp_path, monkeypatch):
+    page = compare
+    monkeypatch.setattr(app.compare.uploads, "most_bytes", 100_000)
+    large = tmp_path / "large.csv"
+    large.write_bytes(b"0" * 700_000)  # in two parts
+    before = set(app.comparing.folder.uploads.iterdir())
+    upload(page, large)
+    page.get_by_text("over the page's limit of 0.1 MB").wait_for()
+    page.get_by_role("button", name="Upload a recording").click(trial=True)  # enabled again
+    # viser says so itself, and would take it away after 4 s only
+    wait_until(lambda: page.get_by_text("uploaded successfully").count() == 0, seconds=2.5)
+    assert set(app.comparing.folder.uploads.iterdir()) == before
+
+
+def test_a_kind_of_file_that_is_none_of_ours_is_refused(compare, app, tmp_path):
+    strange = tmp_path / "run.exe"
+    strange.write_bytes(b"MZ" * 100)
+    upload(compare, strange)
+    compare.get_by_text("run.exe: the page takes measurements").wait_for()
+    assert not list(app.comparing.folder.uploads.glob("*.exe"))
+
+
+def test_a_file_is_dropped_on_the_scene(compare, app):
+    rows = "\n".join(f"{i * 1e-3},{np.sin(0.1 * i):.6f}" for i in range(300))
+    compare.evaluate(DROP, ["dropped.csv", f"time [s],I_motor [A]\n{rows}\n"])
+    wait_until(lambda: "uploads/dropped.csv" in app.comparing.opened)
+    compare.get_by_text("← I_motor [A]").wait_for()
+
+
+def test_the_panel_on_the_right_follows_what_is_done(compare, app, rig_file):
+    page = compare
+    upload(page, rig_file)
+    page.get_by_role("tab", name="Comparison").wait_for()
+    assert page.get_by_role("tab", name="Signals").count() == 0
+    page.get_by_role("tab", name="Explore", exact=True).click()
+    page.get_by_role("button", name="Reset to healthy").click()
+    page.get_by_role("tab", name="Signals").wait_for()
+    assert page.get_by_role("tab", name="Comparison").count() == 0
+
+
+def test_files_of_the_command_line_open_on_compare(browser, recording, tmp_path):
+    path = tmp_path / "given.csv"
+    write_measurement(recording, path)
+    app = App("127.0.0.1", 0, tmp_path / "data", files=[path])
+    try:
+        assert app.wait_for_first_picture(120.0)
+        page = browser.new_page(viewport={"width": 1400, "height": 900})
+        page.goto(app.address)
+        page.get_by_role("button", name="Upload a recording").wait_for(timeout=60_000)
+        page.get_by_text("Compared in").wait_for(timeout=60_000)
+        page.get_by_text("Where the model fails").wait_for()
+        page.close()
+    finally:
+        app.close()

@@ -1,0 +1,145 @@
+"""What NumPy and MATLAB write is read: alone, structured, in structs, packed or not; the four formats agree."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from ema_model.errors import InputError
+from ema_model.measurement import SIGNALS, Measurement, read_columns, read_measurement, write_measurement
+from ema_model.measurement.formats import FORMATS
+
+N = 150
+k = np.arange(float(N))
+COLUMNS = {"time_s": k / 1e3, "current_A": np.sin(k / 9.0), "motor_position_rad": k / 7.0}
+
+
+def assert_same(measurement, columns=COLUMNS):
+    assert sorted(measurement) == sorted(columns)
+    for name, values in columns.items():
+        np.testing.assert_array_equal(measurement[name], np.asarray(values, float).ravel())
+        assert measurement[name].dtype == np.float64 and measurement[name].dtype.isnative
+
+
+def test_the_four_formats():
+    assert list(FORMATS)[:2] == [".csv", ".parquet"] and set(FORMATS) == {".csv", ".parquet", ".npz", ".mat"}
+    assert all(file_format.suffix == suffix and file_format.title for suffix, file_format in FORMATS.items())
+
+
+@pytest.mark.parametrize("suffix", sorted(FORMATS))
+def test_round_trip(suffix, tmp_path):
+    states = {"segment": k // 50, "drive_enabled": k % 2}
+    values = {name: np.sin(k * (1.0 + i)) * 10.0 ** (i - 9) for i, name in enumerate(SIGNALS)}
+    values |= {"time_s": k / 3e3, **states}
+    write_measurement(Measurement(values), tmp_path / f"run{suffix}")
+    assert_same(read_measurement(tmp_path / f"run{suffix}"), values)
+    table = read_columns(tmp_path / f"run{suffix}")
+    assert list(table) == list(SIGNALS)
+    np.testing.assert_array_equal(table["current_A"], values["current_A"])
+
+
+@pytest.mark.parametrize("save", [np.savez, np.savez_compressed])
+def test_npz_of_vectors(save, tmp_path):
+    path = tmp_path / "a.npz"
+    save(path, time_s=COLUMNS["time_s"][None, :], current_A=COLUMNS["current_A"][:, None], gain=3.0, label="rig 1",
+         motor_position_rad=COLUMNS["motor_position_rad"], table=np.zeros((N, 2)))  # fmt: skip
+    measurement = read_measurement(path)
+    assert_same(measurement)
+    assert measurement.notes == ("left aside, as they are no columns of numbers: gain, label, table",)
+
+
+@pytest.mark.parametrize("dtype", ["f2", "f4", ">f8", "<f8", "f16", "i1", "u2", ">i4", "u8", "?"])
+def test_npz_of_other_number_types(dtype, tmp_path):
+    if np.dtype(dtype).kind == "f" and np.dtype(dtype).itemsize == 16 and np.finfo(dtype).bits < 80:
+        pytest.skip("no long double on this machine")
+    numbers = (k % 2).astype(dtype)
+    np.savez(tmp_path / "a.npz", time_s=k, duty=numbers)
+    assert_same(read_measurement(tmp_path / "a.npz"), {"time_s": k, "duty": k % 2})
+
+
+def test_npz_structured(tmp_path):
+    table = np.rec.fromarrays([*COLUMNS.values(), np.array(["x"] * N)], names=[*COLUMNS, "note"])
+    np.savez(tmp_path / "a.npz", log=np.asarray(table))
+    assert_same(read_measurement(tmp_path / "a.npz"))
+    # A name that stands twice is told apart by its array's.
+    np.savez(tmp_path / "a.npz", rig=np.asarray(table), time_s=2.0 * k, model=np.asarray(table)[["current_A"]])
+    assert set(read_columns(tmp_path / "a.npz")) == {"time_s", "rig.time_s", "current_A", "motor_position_rad",
+                                                     "model.current_A"}  # fmt: skip
+    np.testing.assert_array_equal(read_measurement(tmp_path / "a.npz").time_s, 2.0 * k)
+
+
+@pytest.mark.parametrize("packed", [False, True])
+@pytest.mark.parametrize("oned_as", ["row", "column"])
+def test_mat_of_vectors(packed, oned_as, tmp_path):
+    path = tmp_path / "a.mat"
+    more = {"gain": 3.0, "label": "rig 1", "table": np.zeros((N, 2)), "cells": np.array([1, "a"], object)}
+    savemat(path, COLUMNS | more, do_compression=packed, oned_as=oned_as)
+    measurement = read_measurement(path)
+    assert_same(measurement)
+    assert measurement.notes == ("left aside, as they are no columns of numbers: gain, label, table, cells",)
+
+
+@pytest.mark.parametrize("packed", [False, True])
+def test_mat_structs(packed, tmp_path):
+    path = tmp_path / "a.mat"
+    inner = {name: COLUMNS[name] for name in ("current_A", "motor_position_rad")}
+    savemat(path, {"rig": {"time_s": COLUMNS["time_s"], "signals": inner, "operator": "x"}}, do_compression=packed)
+    assert_same(read_measurement(path))
+    # Simulink's "structure with time", mapped
+    savemat(path, {"out": {"time": k / 1e3, "signals": {"values": k / 7.0, "label": "theta"}}}, do_compression=packed)
+    mapped = read_measurement(path, ["time_s=time[s]", "motor_position_rad=values"])
+    assert_same(mapped, {"time_s": k / 1e3, "motor_position_rad": k / 7.0})
+    savemat(path, {"x": {"time_s": k, "duty": k}, "y": {"duty": -k}}, do_compression=packed)
+    assert set(read_columns(path)) == {"time_s", "x.duty", "y.duty"}
+
+
+@pytest.mark.parametrize("dtype", ["f4", "f8", "i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8", "?"])
+def test_mat_of_other_number_types(dtype, tmp_path):
+    savemat(tmp_path / "a.mat", {"time_s": k, "duty": (k % 2).astype(dtype)})
+    assert_same(read_measurement(tmp_path / "a.mat"), {"time_s": k, "duty": k % 2})
+
+
+def test_mat_of_a_big_endian_machine(tmp_path):
+    """MATLAB on older machines; written by hand, as no library does so any more."""
+
+    def element(kind, content):
+        return kind.to_bytes(4, "big") + len(content).to_bytes(4, "big") + content + bytes(-len(content) % 8)
+
+    def array(name, values):
+        shape = np.array([values.size, 1], ">i4").tobytes()
+        parts = (
+            (6, np.array([6, 0], ">u4").tobytes()),
+            (5, shape),
+            (1, name.encode()),
+            (9, values.astype(">f8").tobytes()),
+        )
+        return element(14, b"".join(element(*part) for part in parts))
+
+    header = b"MATLAB 5.0 MAT-file".ljust(124) + b"\1\0MI"
+    (tmp_path / "a.mat").write_bytes(header + b"".join(array(name, values) for name, values in COLUMNS.items()))
+    assert_same(read_measurement(tmp_path / "a.mat"))
+
+
+def test_newer_and_older_mat_refused(tmp_path):
+    path = tmp_path / "a.mat"
+    for header in (b"MATLAB 7.3 MAT-file".ljust(124) + b"\0\2IM", b"\x89HDF\r\n\x1a\n" + bytes(500)):
+        path.write_bytes(header + bytes(1000))
+        with pytest.raises(
+            InputError, match=r"a\.mat: is a MATLAB v7\.3 \(HDF5\) file, which is not read; save .* -v7$"
+        ):
+            read_measurement(path)
+    savemat(path, COLUMNS, format="4")
+    with pytest.raises(InputError, match="not a MATLAB file of version 5 to 7; save it with -v7"):
+        read_measurement(path)
+
+
+def test_a_static_map_needs_no_time(tmp_path):
+    path = tmp_path / "map.csv"
+    path.write_text("theta_rad,iq_A\n" + "".join(f"{value},{value}\n" for value in k))
+    path.with_suffix(".toml").write_text(
+        'kind = "map"\n[mapping]\nmotor_position_rad = "theta_rad"\ncurrent_A = "iq_A"\n'
+    )
+    measurement = read_measurement(path)
+    assert measurement.is_map and measurement.samples == N
+    np.testing.assert_array_equal(measurement.time_s, k)

@@ -1,0 +1,209 @@
+"""The report of a comparison: it opens offline, draws its figures, and takes no text for more than text."""
+
+from __future__ import annotations
+
+import errno
+import os
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from ema_model.comparison.result import Comparison
+from ema_model.errors import InputError
+from ema_model.measurement.finding import Finding
+from ema_model.measurement.health import Health
+from emaviz.report import write_report
+
+HOSTILE = '</script><script>window.bad = 1</script><img src="x" onerror="window.bad = 2">&amp;'
+
+
+@pytest.fixture(scope="module")
+def report(comparison: Comparison, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("report") / "report.html"
+    write_report(comparison, path)
+    return path
+
+
+def _own_text(path: Path) -> str:
+    """The page without the library that draws."""
+    text = path.read_text(encoding="utf-8")
+    return re.sub(r"<script>/\*\*.*?</script>", "", text, flags=re.DOTALL)
+
+
+def test_it_says_what_was_found(report, comparison):
+    text = _own_text(report)
+    for sentence in comparison.sentences:
+        assert sentence.replace("'", "&#x27;") in text
+    for region in comparison.worst_regions:
+        assert region.sentence.replace("'", "&#x27;") in text
+    error = comparison.signals["current_A"]
+    assert f"{1e3 * error.rmse:.0f} mA" in text and f"{error.rmse / error.noise_floor:.2f}" in text
+    assert "not adequate" in text and "Data health" in text
+    assert "+3.00" in text and "Motor inertia stands at the bound" in text
+
+
+def test_every_link_leads_somewhere(report):
+    text = _own_text(report)
+    links, anchors = set(re.findall(r'href="#([^"]+)"', text)), set(re.findall(r'id="([^"]+)"', text))
+    assert {"against-motor_angle", "recording-1"} <= links <= anchors
+
+
+def test_nothing_is_calibrated_and_nothing_stands_out(comparison, tmp_path):
+    plain = replace(comparison, calibration=None, worst_regions=(), orders=(), explained_by=(), adequate=True)
+    write_report(plain, tmp_path / "r.html")
+    text = _own_text(tmp_path / "r.html")
+    assert 'id="calibration"' not in text and "No region stands out" in text and ">adequate<" in text
+
+
+def _hostile(comparison: Comparison) -> Comparison:
+    finding = Finding("noise", "warning", HOSTILE)
+    recordings = [
+        replace(
+            one,
+            name=HOSTILE,
+            health=Health(HOSTILE, (finding,)),
+            measurement=replace(one.measurement, name=HOSTILE, notes=(HOSTILE,)),
+        )
+        for one in comparison.recordings
+    ]
+    return replace(
+        comparison,
+        actuator=replace(comparison.actuator, name=HOSTILE),
+        recordings=recordings,
+        sentences=(HOSTILE,),
+        warnings=(HOSTILE,),
+        worst_regions=[replace(region, sentence=HOSTILE) for region in comparison.worst_regions],
+        explained_by=[replace(one, sentence=HOSTILE) for one in comparison.explained_by],
+    )
+
+
+def test_hostile_names_stay_text(comparison, tmp_path):
+    write_report(_hostile(comparison), tmp_path / "r.html")
+    text = _own_text(tmp_path / "r.html")
+    assert "window.bad" in text  # it is shown
+    assert "<script>window" not in text and "<img" not in text and 'onerror="' not in text
+
+
+@pytest.mark.parametrize(
+    ("place", "why"), [(".", "is a folder"), ("none/r.html", "does not exist"), ("file/r.html", "does not exist")]
+)
+def test_a_place_that_cannot_be_written_is_told_in_one_line(comparison, tmp_path, place, why):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match=why) as error:
+        write_report(comparison, tmp_path / place)
+    assert "\n" not in str(error.value) and str(tmp_path) in str(error.value)
+
+
+def test_a_full_disk_leaves_the_old_report_and_no_draft(comparison, tmp_path, monkeypatch):
+    (tmp_path / "r.html").write_text("old")
+
+    def full(*_: Any) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "replace", full)
+    with pytest.raises(InputError, match="No space left"):
+        write_report(comparison, tmp_path / "r.html")
+    assert [path.name for path in tmp_path.iterdir()] == ["r.html"]
+    assert (tmp_path / "r.html").read_text() == "old"
+
+
+@pytest.fixture
+def tab(browser: Any) -> Iterator[Any]:
+    """A page in a browser whose network is blocked; what it asked for and complained of is kept."""
+    context = browser.new_context(offline=True, viewport={"width": 1000, "height": 800}, color_scheme="light")
+    tab = context.new_page()
+    tab.asked, tab.complaints = [], []
+    tab.on("request", lambda request: tab.asked.append(request.url))
+    tab.on("console", lambda message: tab.complaints.append(message.text))
+    tab.on("pageerror", lambda error: tab.complaints.append(str(error)))
+    yield tab
+    context.close()
+
+
+def _draw_all(tab: Any) -> None:
+    """Opens what is folded and scrolls through, as a reader would."""
+    tab.evaluate("document.querySelectorAll('details').forEach((part) => { part.open = true; })")
+    for place in tab.locator("[data-figure]").all():
+        place.scroll_into_view_if_needed()
+        place.locator("svg.main-svg").first.wait_for(timeout=20_000)
+
+
+@pytest.mark.browser
+def test_all_figures_are_drawn_without_network(report, tab):
+    tab.goto(report.as_uri())
+    _draw_all(tab)
+    assert tab.complaints == []
+    assert [url for url in tab.asked if not url.startswith(("file:", "data:", "blob:"))] == []
+    figures = tab.locator("[data-figure]").count()
+    assert figures >= 20
+    inked = tab.evaluate(
+        "[...document.querySelectorAll('[data-figure]')].filter((f) =>"
+        " f.querySelector('.scatterlayer path, .barlayer path, .polarlayer path')).length"
+    )
+    assert inked == figures
+    titles = set(tab.locator("[data-figure] .ytitle, [data-figure] .xtitle").all_text_contents())
+    assert {"Residual torque [mN·m]", "I_eq [A]", "Time [s]", "Motor angle [°]"} <= titles
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("width", [420, 1000])
+def test_legends_and_titles_cover_nothing(report, tab, width):
+    tab.set_viewport_size({"width": width, "height": 900})
+    tab.goto(report.as_uri())
+    _draw_all(tab)
+    overlaps = tab.evaluate(
+        """() => {
+          const found = [];
+          for (const figure of document.querySelectorAll('[data-figure]')) {
+            const box = (query) => figure.querySelector(query)?.getBoundingClientRect();
+            const plot = box('.bglayer .bg, .plotbg, .xy .plot, .polarlayer .polar .plotbg');
+            const legend = box('.infolayer .legend'), title = box('.infolayer .g-gtitle');
+            const xtitle = box('.infolayer .xtitle');
+            const meet = (a, b) => a && b && a.width && b.width && a.left < b.right - 1 && b.left < a.right - 1
+              && a.top < b.bottom - 1 && b.top < a.bottom - 1;
+            for (const [name, a, b] of [['legend on plot', legend, plot], ['title on plot', title, plot],
+                ['legend on axis', legend, xtitle], ['legend on title', legend, title]])
+              if (meet(a, b)) found.push(name + ' in ' + figure.dataset.figure);
+            if (title && title.right > figure.getBoundingClientRect().right + 1) found.push('long title');
+          }
+          return found;
+        }"""
+    )
+    assert overlaps == []
+    assert tab.evaluate("document.documentElement.scrollWidth <= innerWidth + 1")  # nothing sticks out
+
+
+def _until(tab: Any, condition: str) -> None:
+    """Waits for it; the page's own policy forbids the browser to wait for a text to be evaluated."""
+    for _ in range(100):
+        if tab.evaluate(condition):
+            return
+        tab.wait_for_timeout(100)
+    pytest.fail(f"still not: {condition}")
+
+
+@pytest.mark.browser
+def test_it_follows_light_and_dark_and_prints_whole(report, tab):
+    ink = "getComputedStyle(document.querySelector('[data-figure] .gtitle')).fill"
+    tab.goto(report.as_uri())
+    tab.locator("svg.main-svg").first.wait_for()
+    light = tab.evaluate(ink)
+    tab.emulate_media(color_scheme="dark")
+    _until(tab, f"{ink} !== '{light}'")
+    tab.emulate_media(media="print", color_scheme="dark")
+    _until(tab, f"{ink} === '{light}'")  # paper is white
+    tab.evaluate("dispatchEvent(new Event('beforeprint'))")
+    assert tab.evaluate("document.querySelectorAll('[data-figure]:not(.js-plotly-plot)').length") == 0
+
+
+@pytest.mark.browser
+def test_hostile_names_do_nothing_in_a_browser(comparison, tab, tmp_path):
+    write_report(_hostile(comparison), tmp_path / "r.html")
+    tab.goto((tmp_path / "r.html").as_uri())
+    _draw_all(tab)
+    assert tab.evaluate("window.bad") is None and tab.complaints == []
+    assert tab.locator("h1 + .lead").inner_text().count("<script>") == 3  # actuator and two recordings

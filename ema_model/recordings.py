@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -32,10 +32,14 @@ def read_recording(
     if "map" in kinds and not side.path:
         side = replace(side, kind="map")
     if actuator.mapping and not (side.mapping and side.mapping.entries):
-        header = format_of(path).header(path, max_bytes)
-        usual = parse_mapping(actuator.mapping, header)
-        side = replace(side, mapping=ColumnMapping(tuple(e for e in usual.entries if e.column in header)))
+        side = replace(side, mapping=usual_mapping(actuator, format_of(path).header(path, max_bytes)))
     return read_measurement(path, list(mapping) or None, side=side, max_bytes=max_bytes)
+
+
+def usual_mapping(actuator: Actuator, columns: Collection[str]) -> ColumnMapping:
+    """The part of the actuator's mapping that these columns are in."""
+    usual = parse_mapping(actuator.mapping, columns)
+    return ColumnMapping(tuple(entry for entry in usual.entries if entry.column in columns))
 
 
 def check_same_actuator(measurements: Sequence[Measurement]) -> None:

@@ -32,7 +32,8 @@ from ema_model.measurement import (
 )
 from ema_model.measurement.health import Health, health
 from ema_model.measurement.refusal import shown
-from ema_model.measurement.side_file import SideFile
+from ema_model.measurement.side_file import SideFile, find_side_file
+from ema_model.recordings import read_recording, usual_mapping
 from emaviz.data_folder import DataFolder
 from emaviz.recording.comparison import write_comparison
 from emaviz.report.comparison import write_report
@@ -122,27 +123,41 @@ class Comparing:
         path = self.folder.measurement(name)
         if name not in self.opened and len(self.opened) >= MOST_RECORDINGS:
             raise InputError(f"{MOST_RECORDINGS} recordings are the most to compare at once; remove one first")
-        beside = self.folder.beside(path)
         columns = read_columns(path)
-        if beside.is_file() or set(columns) <= set(SIGNALS):
-            side = read_side_file(beside) if beside.is_file() else SideFile()
-            self._read(Opened(name, path, columns, side.mapping or guess_mapping(columns)))
-            self._take_actuator(side)
-            return
-        self._opened(Opened(name, path, columns, guess_mapping(columns)))
+        side = self._side(path)
+        refused = self._take_actuator(side) if side is not None else None
+        of_actuator = usual_mapping(self.actuator, columns)
+        if side is not None or set(columns) <= set(SIGNALS) or of_actuator.entries:
+            mapping = (side.mapping if side else None) or of_actuator
+            self._read(Opened(name, path, columns, mapping if mapping.entries else guess_mapping(columns)))
+        else:
+            self._opened(Opened(name, path, columns, guess_mapping(columns)))
+        if refused is not None:
+            raise refused  # told once the recording is there all the same
+
+    def _side(self, path: Path) -> SideFile | None:
+        """The side file of a recording, or of its folder."""
+        beside = self.folder.beside(path)
+        found = find_side_file(path)
+        if found is None:
+            return None
+        if found != beside and not self.folder.holds(found):
+            raise InputError(f"{found.name} leads out of the data folder; replace the link by the file")
+        return read_side_file(found)
 
     def _map(self, name: str, mapping: ColumnMapping) -> None:
         opened = self.opened.get(name)
         if opened is None:
             return
         beside = self.folder.beside(opened.path)
-        side = read_side_file(beside) if beside.is_file() else SideFile()
-        side = replace(side, mapping=mapping, path=str(beside))
+        side = replace(self._side(opened.path) or SideFile(), mapping=mapping, path=str(beside))
         self._read(replace(opened, mapping=mapping), side)  # first, so that nothing wrong is remembered
         write_side_file(side, beside)
 
     def _read(self, opened: Opened, side: SideFile | None = None) -> None:
-        measurement = read_measurement(opened.path, side=side)
+        measurement = (
+            read_recording(opened.path, self.actuator) if side is None else read_measurement(opened.path, side=side)
+        )
         limit: float | None = self.actuator.controller.current_limit_A
         if not np.isfinite(limit):  # a drive whose limit is not known
             limit = None
@@ -153,16 +168,18 @@ class Comparing:
         self.opened[opened.name] = opened
         _tell(self.events.opened, opened)
 
-    def _take_actuator(self, side: SideFile) -> None:
-        """The actuator that a side file names, if the data folder holds it."""
+    def _take_actuator(self, side: SideFile) -> InputError | None:
+        """Takes the actuator that a side file names, if the data folder holds it; else why not."""
         if side.actuator_path is None:
-            return
-        if not self.folder.holds(Path(side.actuator_path)):
-            raise InputError(
-                f"{shown(side.actuator, 100)}: the side file names an actuator outside the data folder; upload it"
-            )
-        name = self.folder.name_of(Path(side.actuator_path))
-        self.choose_actuator(f"{UPLOADED}{name}")
+            return None
+        try:
+            if not self.folder.holds(Path(side.actuator_path)):
+                named = shown(side.actuator, 100)
+                raise InputError(f"{named}: the side file names an actuator outside the data folder; upload it")
+            self.choose_actuator(f"{UPLOADED}{self.folder.name_of(Path(side.actuator_path))}")
+        except InputError as error:
+            return error
+        return None
 
     # --- what is asked ----------------------------------------------------------------------------------------------
 
@@ -181,6 +198,9 @@ class Comparing:
             chosen = load_actuator(self.folder.actuator(str(name).removeprefix(UPLOADED)))
         self._use(chosen)
         self.actuator_name = str(name)
+        for opened in list(self.opened.values()):
+            if opened.measurement is None and usual_mapping(chosen, opened.columns).entries:
+                self.add(opened.name)  # this actuator's file knows their columns
 
     def _use(self, actuator: Actuator) -> None:
         self.actuator = actuator
@@ -264,6 +284,7 @@ class Comparing:
             if stop.is_set():
                 raise Stopped
             _tell(self.events.progressed, text)
+            self.session.worker.breathe()  # the sliders of the other tabs
 
         yield
         try:

@@ -50,6 +50,16 @@ class Worker:
             self._wake.notify()
             return True
 
+    def breathe(self) -> None:
+        """Runs the quick jobs that wait, from within a step of the long job that takes longer than they should."""
+        assert threading.current_thread() is self._thread
+        while not self._closing:
+            with self._wake:
+                job = self._next_job()
+            if job is None:
+                return
+            self._guarded(job)
+
     @property
     def busy(self) -> bool:
         """Whether a long job runs."""

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import least_squares
 
 from ema_model.actuator import Actuator
+from ema_model.axes import Axes
 from ema_model.calibration.floor import CORRELATED_S, Floor
 from ema_model.calibration.problem import BOUND, Problem, Unknown
 from ema_model.faults import HEALTHY
@@ -123,7 +124,8 @@ def calibrate(
         covariance *= max(1.0, CORRELATED_S / min(one.block_s for one in floors))
     actuator, fitted_k = problem.actuator(x)
     after, before = problem.simulate(x), problem.simulate(np.zeros(len(x)))
-    found = {u.name: _calibrated(u, x[i], np.sqrt(covariance[i, i])) for i, u in enumerate(problem.unknowns)}
+    axes = plant.actuator.axes
+    found = {u.name: _calibrated(u, x[i], np.sqrt(covariance[i, i]), axes) for i, u in enumerate(problem.unknowns)}
     return Calibration(
         converged=fit.converged,
         parameters={name: one for name, one in found.items() if name in chosen},
@@ -214,11 +216,13 @@ def default_free(actuator: Actuator) -> tuple[str, ...]:
     return tuple(path for path, tolerance in actuator.tolerances.items() if tolerance.free)
 
 
-def _calibrated(unknown: Unknown, x: float, sigma: float) -> Calibrated:
+def _calibrated(unknown: Unknown, x: float, sigma: float, axes: Axes) -> Calibrated:
     value = unknown.nominal + unknown.sigma * x
     half = _Z90 * unknown.sigma * float(sigma)
     at_bound = bool(x < unknown.low + 0.01 or x > unknown.high - 0.01)
-    return Calibrated(value, unknown.nominal, (value - half, value + half), unit_of(unknown.name), float(x), at_bound)
+    return Calibrated(
+        value, unknown.nominal, (value - half, value + half), unit_of(axes.path(unknown.name)), float(x), at_bound
+    )
 
 
 def _confounded(unknowns: Sequence[Unknown], covariance: NDArray[np.floating]) -> tuple[tuple[str, str], ...]:

@@ -93,13 +93,15 @@ def _first_time(plant: Plant, window: Window | Stretch) -> float:
 def _variables(
     window: Window | Stretch, signals: dict[str, Array], actuator: Actuator, start_s: float
 ) -> dict[str, Array]:
-    """All that are known: positions as measured, the rest from the model, which has no noise."""
+    """All that were recorded, positions as measured, the rest from the model, which has no noise."""
     tau = actuator.transmission.gear_ratio
     if isinstance(window, Stretch):
         angle, speed = window.context["motor_position_rad"], window.context["motor_speed_rad_s"]
         acceleration = window.context["acceleration_rad_s2"]
         moves = bool(np.any(speed))
-        variables = {"motor_angle": angle}
+        variables = {} if actuator.axes.motor == "linear" else {"motor_angle": angle}
+        if actuator.axes.motor == "linear" or tau != 1.0:
+            variables["user_position"] = tau * angle
         if moves:
             variables |= {"motor_speed": speed, "acceleration": acceleration, "time": window.time_s - start_s}
             variables["current"] = signals["current_A"]
@@ -112,10 +114,11 @@ def _variables(
             "user_position": user,
             "motor_speed": speed,
             "acceleration": _slope(speed, half, window.block_s),
-            "current": signals["current_A"],
             "time": window.time_s - start_s,
         }
-        if "motor_position_rad" in window.measured:
+        if "current_A" in window.measured:
+            variables["current"] = signals["current_A"]
+        if "motor_position_rad" in window.measured and actuator.axes.motor == "rotary":
             variables["motor_angle"] = window.measured["motor_position_rad"]
     loads = [window.context.get("load_torque_Nm"), _modelled_load(actuator, user)]
     known = [load for load in loads if load is not None]

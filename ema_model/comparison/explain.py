@@ -46,6 +46,7 @@ _DIRECT = {
     "time": 0.15,
 }
 _BINS = 24
+_LEAST_WITHIN = 0.3  # of a variable's variance, within recordings
 _AT_BOUND = 0.02  # σ
 _FINALISTS = 6
 
@@ -187,6 +188,8 @@ def _candidate(
     values = residuals.variables[variable][used.chosen]
     if factor is None or not np.all(np.isfinite(values)) or np.ptp(values) <= 1e-9 * (1.0 + np.max(np.abs(values))):
         return None
+    if _tells_recordings_apart(values, residuals.recording[used.chosen]):
+        return None
     if modulator == "current" and variable == "current":
         return None  # a curve of the current alone
     scale = factor[used.chosen] * used.weight
@@ -198,6 +201,13 @@ def _candidate(
     merits = totals - penalties * np.maximum(totals.max(), 0.0)
     best = int(np.argmax(merits))
     return _Candidate(variable, modulator, gains[best], float(merits[best]))
+
+
+def _tells_recordings_apart(values: Array, recording: NDArray[np.intp]) -> bool:
+    """Whether a variable hardly varies within recordings: it then labels them, whatever differs between them."""
+    count = np.bincount(recording)
+    mean = np.bincount(recording, values) / np.maximum(count, 1)
+    return bool(np.var(values - mean[recording]) < _LEAST_WITHIN * np.var(values))
 
 
 def _by_family(

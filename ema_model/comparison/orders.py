@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 
 from ema_model.comparison.curves import HIGHEST_ORDER, harmonics, orders_in
 from ema_model.comparison.explain import advance_of, used_blocks
@@ -18,6 +19,8 @@ from ema_model.comparison.residuals import Residuals
 Array = NDArray[np.float64]
 
 _RIDGE = 1e-3  # of the number of samples: directions that the angles hardly cover do not blow up
+_AROUND = 25  # orders, over which noise is as strong
+_MEDIAN_CHI2 = 2.0 * np.log(2.0)  # of 2 degrees of freedom
 _LEVEL = 0.01  # of recordings in which noise would show an order
 
 
@@ -48,8 +51,7 @@ def residual_orders(residuals: Residuals, signal: str) -> list[Order]:
 def orders(angle: Array, values: Array, turns: float, advance: Array | None = None) -> list[Order]:
     """The orders that so many turns can show, strongest first.
 
-    angle, values: (samples,), rad and the signal's unit, in the order of time (their autocorrelation widens the
-    error); advance: the turn during a sample, rad.
+    angle, values: (samples,), rad and the signal's unit; advance: the turn during a sample, rad.
     """
     tried = orders_in(turns, advance)[: max(0, (len(angle) - 2) // 4)]
     if not len(tried):
@@ -61,31 +63,20 @@ def orders(angle: Array, values: Array, turns: float, advance: Array | None = No
     coefficients = inverse @ (columns.T @ values)
     left = values - columns @ coefficients
     freedom = max(1.0, len(values) - float(np.sum(inverse * gram)))
-    variance = float(left @ left) / freedom * correlation_factor(left)
-    covariance = inverse @ gram @ inverse * max(variance, 1e-300)
+    covariance = inverse @ gram @ inverse * max(float(left @ left) / freedom, 1e-300)
+    pairs = [slice(2 * j + 1, 2 * j + 3) for j in range(len(tried))]
+    white = np.array([float(coefficients[at] @ np.linalg.solve(covariance[at, at], coefficients[at])) for at in pairs])
     found = []
-    for j, h in enumerate(tried):
-        at = slice(2 * j + 1, 2 * j + 3)
+    for h, at, chi2 in zip(tried, pairs, white / _colour(white)):
         a, b = coefficients[at]
-        chi2 = float(coefficients[at] @ np.linalg.solve(covariance[at, at], coefficients[at]))
-        found.append(Order(int(h), float(np.hypot(a, b)), float(np.arctan2(b, a)), chi2))
+        found.append(Order(int(h), float(np.hypot(a, b)), float(np.arctan2(b, a)), float(chi2)))
     return sorted(found, key=lambda order: -order.amplitude)
 
 
-def correlation_factor(values: Array) -> float:
-    """How many times a correlated series' mean varies more than a white one's would: 1 + 2 Σ ρ.
+def _colour(chi2: Array) -> Array:
+    """How many times stronger than white noise the noise is around each order, at least 1.
 
-    The sum stops at the first pair of lags whose correlations add to nothing (Geyer's rule).
+    The median over neighbouring orders does not see those few that stand out.
     """
-    n = len(values)
-    centred = values - np.mean(values)
-    spectrum = np.fft.rfft(centred, 2 * n)
-    correlation = np.fft.irfft(spectrum * spectrum.conj())[: max(2, n // 4)]
-    if not correlation[0] > 0.0:
-        return 1.0
-    rho = correlation / correlation[0]
-    pairs = rho[1 : len(rho) - (len(rho) + 1) % 2].reshape(-1, 2).sum(axis=1)
-    # White noise alone has |ρ| of 1/√n: what stands out less is none.
-    small = np.flatnonzero(pairs < 2.0 * np.sqrt(2.0 / n))
-    stop = int(small[0]) if len(small) else len(pairs)
-    return float(max(1.0, 1.0 + 2.0 * np.sum(pairs[:stop])))
+    around = median_filter(chi2, size=min(_AROUND, len(chi2)), mode="nearest")
+    return np.maximum(1.0, around / _MEDIAN_CHI2)

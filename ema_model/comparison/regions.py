@@ -23,7 +23,7 @@ _SPREAD = 0.5  # of the peak's mean, down to which neighbouring bins belong to i
 _ALIKE = 0.6  # of the smaller region's blocks, from which on two regions are one
 _LEAST_Z = 4.0  # of a region's mean over its error
 _SLOW = 0.08  # of the largest speed, below which a region is that of reversals
-_ALWAYS = ("motor_speed", "user_position", "time")
+_ALWAYS = ("load", "motor_speed", "user_position", "time")
 _ONE_WAY = 0.9
 
 

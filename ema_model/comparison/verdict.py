@@ -16,6 +16,7 @@ from ema_model.comparison.orders import Order, residual_orders
 from ema_model.comparison.regions import worst_regions
 from ema_model.comparison.residuals import Residuals
 from ema_model.comparison.result import Explanation, Region, SignalError
+from ema_model.comparison.words import order_sentence
 from ema_model.measurement import SIGNALS
 
 Array = NDArray[np.float64]
@@ -52,7 +53,12 @@ def judge(
     significant = [one for one in explained if one.significant]
     adequate = not significant and not failed and (calibration is None or calibration.converged)
     shown = actuator.axes.signal(primary)
-    sentences = [] if adequate else [one.sentence for one in significant[:1]] + [one.sentence for one in regions[:3]]
+    sentences: list[str] = []
+    if not adequate:
+        sentences += [one.sentence for one in significant[:1]]
+        if orders and significant and significant[0].variable == "motor_angle":
+            sentences.append(_order(orders[0], primary, residuals, actuator))
+        sentences += [one.sentence for one in regions[:3]]
     sentences += [_summary(shown, errors[shown], adequate)]
     return Judgement(
         residuals=residuals,
@@ -62,8 +68,16 @@ def judge(
         worst_regions=() if adequate else regions,
         adequate=adequate,
         sentences=sentences,
-        warnings=_warnings(residuals, calibration),
+        warnings=_warnings(residuals, calibration, actuator),
     )
+
+
+def _order(order: Order, primary: str, residuals: Residuals, actuator: Actuator) -> str:
+    """The strongest order, as a torque where the signal is a current."""
+    if primary == "current_A" and residuals.torque_constant is not None:
+        unit = "N" if actuator.axes.motor == "linear" else "N·m"
+        return order_sentence(order.order, order.amplitude * residuals.torque_constant, unit)
+    return order_sentence(order.order, order.amplitude, SIGNALS[actuator.axes.signal(primary)].unit)
 
 
 def slow_ratio(residuals: Residuals, name: str) -> float:
@@ -92,18 +106,18 @@ def _summary(name: str, error: SignalError, adequate: bool) -> str:
     return f"The {signal.title.lower()} is off by {size}, where noise and the model's own floor are {floor}."
 
 
-def _warnings(residuals: Residuals, calibration: Calibration | None) -> list[str]:
+def _warnings(residuals: Residuals, calibration: Calibration | None, actuator: Actuator) -> list[str]:
     found = []
     if calibration is not None:
         if not calibration.converged:
             found.append("The calibration has not converged: what looks like missing physics may be an unfinished fit.")
         for name in calibration.outside_tolerance:
             one = calibration.parameters[name]
-            partners = {a if b == name else b for a, b in calibration.confounded if name in (a, b)}
+            shown = actuator.axes.path
+            partners = {shown(a if b == name else b) for a, b in calibration.confounded if name in (a, b)}
             traded = f"; it trades against {', '.join(sorted(partners))}" if partners else ""
-            found.append(
-                f"{name} stands {abs(one.z):.1f} σ from the file's value, at the edge of its tolerance{traded}."
-            )
+            off = f"{shown(name)} stands {abs(one.z):.1f} σ from the file's value"
+            found.append(f"{off}, at the edge of its tolerance{traded}.")
     share = float(np.mean(residuals.saturated))
     if share > 0.005:
         found.append(f"The drive is at its limit for {100.0 * share:.2g} % of the time; these parts are not counted.")

@@ -141,3 +141,27 @@ def test_a_pace_is_kept_and_the_last_value_still_comes(errors):
     finally:
         worker.close()
     assert min(b - a for a, b in itertools.pairwise(times)) > 0.045
+
+
+def test_quick_jobs_run_while_a_long_step_breathes():
+    worker = Worker("breathing", on_error=lambda error: None)
+    done: list[str] = []
+    inside, posted = threading.Event(), threading.Event()
+
+    def steps():
+        yield
+        inside.set()
+        assert posted.wait(5.0)
+        worker.breathe()
+        done.append("long")
+
+    assert worker.start(steps())
+    assert inside.wait(5.0)
+    worker.post("quick", lambda: done.append("quick"))
+    posted.set()
+    for _ in range(500):
+        if len(done) == 2:
+            break
+        time.sleep(0.01)
+    worker.close()
+    assert done == ["quick", "long"]

@@ -1,0 +1,184 @@
+"""A comparison from end to end, on recordings of the three-phase Reference Model."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from hidden_effects import ACTUATOR, SINE, plant, recorded
+
+from ema_model.actuator import load_actuator
+from ema_model.comparison import as_dict, compare
+from ema_model.errors import InputError
+from ema_model.measurement import SIGNALS, Measurement
+
+COGGING = {"cogging_torque": {"amplitude_Nm": 0.012}}
+
+
+@pytest.fixture(scope="module")
+def cogged():
+    return compare(recorded(1, effects=COGGING), ACTUATOR)
+
+
+@pytest.mark.parametrize(
+    "command, noise",
+    [
+        (SINE, 0.45),
+        (("chirp", {}, 0.5), 0.1),
+        (("step", {"final_rad": 0.005}, 0.5), 0.45),
+        (("staircase", {}, 1.0), 0.2),
+    ],
+)
+def test_nothing_hidden_is_adequate(command, noise):
+    found = compare(recorded(5, commands=[command], noise_A=noise), ACTUATOR)
+    assert found.adequate and not found.worst_regions
+    assert found.sentences[0].startswith("The model explains the recordings")
+
+
+@pytest.mark.parametrize(
+    "case, variable, modulators",
+    [
+        ({"extra": {"motor.viscous_friction_Nms_rad": 7e-5}}, "motor_speed", {"1", "sign_speed"}),
+        ({"effects": {"hinge_moment": {"stiffness_Nm_rad": 1000.0}}}, "user_position", {"1"}),
+        ({"effects": {"load_dependent_friction": {"ratio": 0.15}}, "load": 50.0}, "current", {"sign_speed"}),
+    ],
+)
+def test_hidden_effect_shows_against_its_variable(case, variable, modulators):
+    found = compare(recorded(3, **case), ACTUATOR)
+    first = found.explained_by[0]
+    assert not found.adequate and first.significant
+    assert first.variable == variable and first.modulator in modulators
+    assert found.worst_regions
+
+
+def test_cogging_is_named_with_its_order_and_amplitude(cogged):
+    assert cogged.explained_by[0].variable == "motor_angle" and not cogged.adequate
+    assert cogged.orders[0].order == 12
+    # 12 mN·m of torque, of which the loop lets a part through as motion, in amperes at 0.0752 N·m/A
+    assert cogged.orders[0].amplitude == pytest.approx(0.012 / 0.0752, rel=0.5)
+    assert "12 times a turn" in cogged.sentences[1] and "mN·m" in cogged.sentences[1]
+
+
+def test_error_falls_to_the_floor_once_the_effect_is_in_the_model(cogged):
+    added = compare(recorded(1, effects=COGGING), ACTUATOR, effects=COGGING)
+    assert added.adequate
+    error = added.signals["current_A"]
+    assert error.rmse < 1.03 * error.noise_floor < cogged.signals["current_A"].rmse
+
+
+def test_calibration_finds_the_plant():
+    truth = plant(11)
+    found = compare(recorded(11, commands=[("chirp", {}, 0.5), SINE]), ACTUATOR).calibration
+    assert found is not None and found.converged
+    for path in ("motor.inertia_kgm2", "motor.dynamic_friction_Nm", "transmission.backlash_rad"):
+        low, high = found.parameters[path].interval90
+        width = high - low
+        assert low - 2.0 * width < truth.value(path) < high + 2.0 * width
+        assert width < 3.3 * ACTUATOR.tolerances[path].sigma, "the data tell more than the file"
+    initial = compare(recorded(11), ACTUATOR, calibrate=False)
+    assert initial.calibration is None
+    position = initial.signals["motor_position_rad"]  # only the start is fitted then
+    assert position.rmse == pytest.approx(position.rmse_initial, rel=0.01)
+
+
+def test_free_parameters_and_faults_are_the_users_choice():
+    recordings = recorded(4, noise_A=0.1)
+    found = compare(recordings, ACTUATOR, free=["motor.inertia_kgm2", "k1"])
+    assert found.calibration is not None and set(found.calibration.parameters) == {"motor.inertia_kgm2", "k1"}
+    with pytest.raises(InputError, match=r"motor\.pole_pairs cannot be calibrated"):
+        compare(recordings, ACTUATOR, free=["motor.pole_pairs"])
+    with pytest.raises(InputError, match="no signal 'speed' to compare"):
+        compare(recordings, ACTUATOR, signals=["speed"])
+
+
+def test_regions_lie_where_their_sentences_say(cogged):
+    residuals = cogged.residuals
+    for region in cogged.worst_regions:
+        values = residuals.variables[region.variable]
+        if region.variable == "motor_angle":
+            values = np.mod(values, 2.0 * np.pi)
+        inside = values[region.blocks]
+        assert region.low - 1e-9 <= inside.min() and inside.max() <= region.high + 1e-9
+        error = residuals.values[region.signal][region.blocks]
+        assert region.rmse == pytest.approx(np.sqrt(np.mean(error**2)))
+        assert region.mean == pytest.approx(np.mean(error))
+        assert region.sentence.endswith("than the model.")
+
+
+def test_json_is_whole_and_plain(cogged):
+    document = json.loads(json.dumps(as_dict(cogged), allow_nan=False))
+    assert set(document) >= {"signals", "calibration", "explained_by", "orders", "worst_regions", "adequate"}
+    assert set(document["signals"]["current_A"]) >= {"rmse", "nrmse", "noise_floor"}
+    parameter = document["calibration"]["parameters"]["motor.inertia_kgm2"]
+    assert parameter["unit"] == "kg·m²" and len(parameter["interval90"]) == 2
+    assert {"variable", "from", "to", "rmse", "sentence"} <= set(document["worst_regions"][0])
+
+
+def test_progress_may_stop_it():
+    class Stop(Exception):
+        pass
+
+    def stop(text: str) -> None:
+        if text.startswith("calibrating"):
+            raise Stop
+
+    with pytest.raises(Stop):
+        compare(recorded(2), ACTUATOR, on_progress=stop)
+
+
+def test_phase_currents_and_a_turned_rotor_are_enough():
+    [recording] = recorded(6, noise_A=0.1)
+    bare = {name: recording[name] for name in recording if name != "current_A"}
+    bare["motor_position_rad"] = bare["motor_position_rad"] - 0.2  # the encoder's zero is not phase A's
+    bare["user_position_rad"] = bare["user_position_rad"] - 0.2 / 500.0
+    bare["command_rad"] = bare["command_rad"] - 0.2 / 500.0
+    found = compare([Measurement(bare, name="phases")], ACTUATOR.with_values({"motor.rotor_offset_rad": 0.15}))
+    [note] = [note for note in found.recordings[0].measurement.notes if "rotor's offset" in note]
+    assert float(note.split()[-2]) == pytest.approx(0.2, abs=0.01)
+    assert found.signals["current_A"].rmse < 1.2 * found.signals["current_A"].noise_floor
+
+
+LINEAR = """
+name = "linear axis"
+[axes]
+motor = "linear"
+user = "linear"
+[controller]
+kind = "unknown"
+[motor]
+force_constant_N_A = 20.0
+mass_kg = { value = 2.0, tolerance = 0.2 }
+viscous_friction_Ns_m = { value = 3.0, sigma = 2.0 }
+static_friction_N = 0.0
+dynamic_friction_N = { value = 5.0, sigma = 3.0 }
+"""
+
+
+def test_linear_axis_speaks_of_newtons_and_metres(tmp_path):
+    path = tmp_path / "linear.toml"
+    path.write_text(LINEAR, encoding="utf-8")
+    time = np.arange(0.0, 4.0, 1e-3)
+    position = 0.2 * np.sin(2.0 * np.pi * 0.5 * time) + 0.02 * np.sin(2.0 * np.pi * 3.0 * time)
+    speed = np.gradient(position, time)
+    force = 2.3 * np.gradient(speed, time) + 3.0 * speed + 5.0 * np.sign(speed) + 60.0 * position
+    random = np.random.default_rng(0)
+    recording = Measurement(
+        {
+            "time_s": time,
+            "motor_position_m": position,
+            "current_A": force / 20.0 + 0.02 * random.standard_normal(time.size),
+        },
+        name="slide",
+    )
+    found = compare([recording], load_actuator(path))
+    assert set(found.signals) == {"current_A"} and set(found.signals) <= set(SIGNALS)
+    assert not found.adequate
+    assert found.explained_by[0].variable == "user_position" and not found.orders
+    assert any(" N more force" in sentence and " mm" in sentence for sentence in found.sentences)
+    assert as_dict(found)["calibration"]["parameters"]["motor.mass_kg"]["unit"] == "kg"

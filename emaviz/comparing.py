@@ -35,8 +35,6 @@ from ema_model.measurement.refusal import shown
 from ema_model.measurement.side_file import SideFile, find_side_file
 from ema_model.recordings import read_recording, usual_mapping
 from emaviz.data_folder import DataFolder
-from emaviz.recording.comparison import write_comparison
-from emaviz.report.comparison import write_report
 from emaviz.session import Session
 from emaviz.state import number
 from emaviz.worker import Steps, Worker
@@ -322,6 +320,10 @@ class Comparing:
         stamp = datetime.now().strftime("%Y%m%d-%H%M%S")
         names = (f"{stamp}-compare{'' if again == 1 else f'-{again}'}{suffix}" for again in count(1))
         path = next(path for name in names if not (path := self.folder.recordings / name).exists())
+        # Imported when wanted: rerun and the report's figures take half a second of the app's start.
+        from emaviz.recording.comparison import write_comparison
+        from emaviz.report import write_report
+
         if suffix == ".html":
             write_report(comparison, path)
         else:

@@ -23,6 +23,7 @@ from ema_model.axes import Axes
 from ema_model.errors import InputError
 
 _OTHERS = ("schema", "name", "description", "axes", "model", "effects", "recordings")
+_MODEL = ("step_s", "filter_s", "torque_known")
 _RECORDING_KINDS = ("run", "map")
 
 
@@ -83,6 +84,7 @@ def _parse(text: str, where: str) -> Actuator:
         effects=_effects(tables["effects"], axes, tolerances, where),
         axes=axes,
         step_s=_seconds(tables["model"], "step_s", 1e-5, where),
+        torque_known=_flag(tables["model"], "torque_known", where),
         filter_s=_seconds(tables["model"], "filter_s", 12e-3, where),
         mapping=_mapping(tables["recordings"], where),
         rules=_rules(tables["recordings"], axes, where),
@@ -186,11 +188,18 @@ def _axes(table: dict[str, Any], where: str) -> Axes:
 
 
 def _seconds(table: dict[str, Any], name: str, usual: float, where: str) -> float:
-    for extra in set(table) - {"step_s", "filter_s"}:
-        raise InputError(f"{where}: [model] has no {extra!r}; it has step_s, filter_s")
+    for extra in set(table) - set(_MODEL):
+        raise InputError(f"{where}: [model] has no {extra!r}; it has {', '.join(_MODEL)}")
     value = number(table.get(name, usual))
     if not 1e-7 <= value <= 1.0:
         raise InputError(f"{where}: [model] {name} must lie between 1e-7 and 1 s, not {str(table[name])[:40]!r}")
+    return value
+
+
+def _flag(table: dict[str, Any], name: str, where: str) -> bool:
+    value = table.get(name, True)
+    if not isinstance(value, bool):
+        raise InputError(f"{where}: [model] {name} must be true or false, not {str(value)[:40]!r}")
     return value
 
 

@@ -130,6 +130,7 @@ class Actuator:
     axes: Axes = field(default_factory=Axes)
     step_s: float = 1e-5  # of the Monitor Model
     filter_s: float = 12e-3  # half width over which a measured motion is differentiated, for inverse dynamics
+    torque_known: bool = True  # whether the torque constant is known, so that currents can be told as torques
     mapping: tuple[str, ...] = ()  # of its recordings' columns, as for --map
     rules: tuple[Rule, ...] = ()
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import least_squares
 
 from ema_model.actuator import Actuator
 from ema_model.axes import Axes
@@ -174,6 +173,8 @@ class _Search:
         return found
 
     def _from(self, starts: Sequence[Array], scale: float, loss: str) -> _Found:
+        from scipy.optimize import least_squares  # takes a third of a second to import
+
         least, greatest = self.problem.bounds
         fits = []
         for start in starts:
@@ -218,7 +219,7 @@ def default_free(actuator: Actuator) -> tuple[str, ...]:
 
 def _calibrated(unknown: Unknown, x: float, sigma: float, axes: Axes) -> Calibrated:
     value = unknown.nominal + unknown.sigma * x
-    half = _Z90 * unknown.sigma * float(sigma)
+    half = _Z90 * unknown.sigma * min(1.0, float(sigma))  # never less sure than the file itself
     at_bound = bool(x < unknown.low + 0.01 or x > unknown.high - 0.01)
     return Calibrated(
         value, unknown.nominal, (value - half, value + half), unit_of(axes.path(unknown.name)), float(x), at_bound

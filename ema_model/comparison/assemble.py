@@ -51,7 +51,7 @@ def residuals_of(
                 run=np.zeros(blocks, np.intp),
                 saturated=_saturated(signals, actuator),
                 block_s=window.block_s,
-                torque_constant=actuator.motor.torque_constant_Nm_A,
+                torque_constant=actuator.motor.torque_constant_Nm_A if actuator.torque_known else None,
                 known=error,
                 is_map=plant.measurements[window.recording].is_map,
             )

@@ -33,8 +33,9 @@ _LEAST_DROP = 0.014  # of χ², below which a gain is immaterial
 _FAR_ABOVE = 3.0  # the noise, and its own median, from which on a model floor is left out
 _SPIKE = 4.0  # of a residual's usual size
 _LEAST_BLOCKS, _MOST_BLOCKS, _PIECE = 60, 40_000, 200
-# What an explanation must be better by, as a share, to go before a simpler one that does as well.
-_FINER, _MODULATED = 0.015, 0.01
+# What an explanation must be better by, as a share, to go before a simpler one that does as well; of gains
+# below _SMALL a share of that, since a few χ² more say nothing.
+_FINER, _MODULATED, _SMALL = 0.015, 0.01, 200.0
 _DIRECT = {
     "motor_angle": 0.0,
     "motor_speed": 0.0,
@@ -45,6 +46,7 @@ _DIRECT = {
     "temperature": 0.05,
     "time": 0.15,
 }
+_NOT_FRICTION = 0.05  # what turns with the direction is friction, which knows speed, load and current
 _BINS = 24
 _LEAST_WITHIN = 0.3  # of a variable's variance, within recordings
 _AT_BOUND = 0.02  # σ
@@ -196,9 +198,11 @@ def _candidate(
     gains = list(_by_family(residuals, used, y, values, variable, scale, bounded))
     if not gains:
         return None
-    penalties = _FINER * np.arange(len(gains)) + (_MODULATED if modulator != "1" else 0.0) + _DIRECT[variable]
+    penalty = _DIRECT[variable] + (_MODULATED if modulator != "1" else 0.0)
+    if modulator == "sign_speed" and variable not in ("motor_speed", "load", "current"):
+        penalty += _NOT_FRICTION
     totals = np.array([float(one.sum()) for one in gains])
-    merits = totals - penalties * np.maximum(totals.max(), 0.0)
+    merits = totals - (penalty + _FINER * np.arange(len(gains))) * max(float(totals.max()), _SMALL)
     best = int(np.argmax(merits))
     return _Candidate(variable, modulator, gains[best], float(merits[best]))
 

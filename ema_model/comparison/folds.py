@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import lsq_linear
 
 Array = NDArray[np.float64]
 
@@ -114,6 +113,8 @@ class LeftOut:
 
     def _within(self, gram: Array, moment: Array) -> Array:
         """The coefficients, those of the given columns, which come first, within their room."""
+        from scipy.optimize import lsq_linear  # takes a third of a second to import
+
         n = len(self.given.prior)
         free = np.full(len(moment) - n, np.inf)
         scale = 1.0 / np.sqrt(np.diag(gram))

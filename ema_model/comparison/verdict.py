@@ -111,13 +111,12 @@ def _warnings(residuals: Residuals, calibration: Calibration | None, actuator: A
     if calibration is not None:
         if not calibration.converged:
             found.append("The calibration has not converged: what looks like missing physics may be an unfinished fit.")
-        for name in calibration.outside_tolerance:
-            one = calibration.parameters[name]
-            shown = actuator.axes.path
-            partners = {shown(a if b == name else b) for a, b in calibration.confounded if name in (a, b)}
-            traded = f"; it trades against {', '.join(sorted(partners))}" if partners else ""
-            off = f"{shown(name)} stands {abs(one.z):.1f} σ from the file's value"
-            found.append(f"{off}, at the edge of its tolerance{traded}.")
+        outside = [actuator.axes.path(name) for name in calibration.outside_tolerance]
+        if outside:
+            found.append(
+                f"At the edge of {'its' if len(outside) == 1 else 'their'} tolerance (3 σ): {', '.join(outside)}. "
+                "Either the value is wrong, or it stands in for what is missing."
+            )
     share = float(np.mean(residuals.saturated))
     if share > 0.005:
         found.append(f"The drive is at its limit for {100.0 * share:.2g} % of the time; these parts are not counted.")

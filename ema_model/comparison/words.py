@@ -83,7 +83,7 @@ def region_sentence(
             more = "more" if mean * direction > 0.0 else "less"
             return f"The motor needs {amount(size, unit)} {more} {where}{moving} than the model."
         way = "forward" if mean > 0.0 else "backward"
-        what = "force" if unit == "N" else "torque"
+        what = {"N": "force", "A": "current"}.get(unit, "torque")
         return f"The motor needs {amount(size, unit)} more {what} {way} {where} than the model."
     title, unit = SIGNALS[signal].title.lower(), SIGNALS[signal].unit
     if SIGNALS[signal].kind == "position":

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from ema_model import faults
 from ema_model.commands import Recorded
@@ -68,7 +68,7 @@ def uncertainty(objective: Objective, k: Array, *, parameters_known: bool = Fals
     joint = float(deviation @ np.linalg.solve(covariance[np.ix_(tested, tested)], deviation))
     return Uncertainty(
         interval90=interval,
-        healthy=joint < float(chi2.ppf(0.99, len(tested))),
+        healthy=joint < float(chdtri(len(tested), 0.01)),
         alarms=tuple(faults.NAMES[i] for i in outside),
         ambiguous=_groups(white, sigma, eccentric),
     )

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import fftconvolve, savgol_coeffs
 
 Array = NDArray[np.float64]
 
@@ -32,6 +31,8 @@ class Motion:
 
 def motion_of(position: Array, period_s: float, half_s: float) -> Motion:
     """The motion of a run, sampled every period_s; half_s: half width of the parabolas, s."""
+    from scipy.signal import savgol_coeffs  # takes a third of a second to import
+
     half = max(2, round(half_s / period_s))
     half = max(1, min(half, (position.size - 1) // 2 - 1))
     size = 2 * half + 1
@@ -49,6 +50,8 @@ def motion_of(position: Array, period_s: float, half_s: float) -> Motion:
 
 def _convolved(values: Array, kernel: Array) -> Array:
     """The middle part of a convolution along the last axis; beyond the ends the line goes straight on."""
+    from scipy.signal import fftconvolve
+
     reach = kernel.size // 2
     first, last = values[..., :1], values[..., -1:]
     before = 2.0 * first - values[..., reach:0:-1]

@@ -6,7 +6,6 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from scipy.io import savemat
 
 from ema_model.measurement.formats.arrays import Kind, as_columns, check_column, check_size, column_names, is_column
 from ema_model.measurement.formats.format import Array, Columns, Format
@@ -30,6 +29,8 @@ def _read(path: str, names: Sequence[str], max_bytes: int) -> Columns:
 
 def _write(signals: Mapping[str, Array], path: str) -> None:
     with open(path, "wb") as file:
+        from scipy.io import savemat  # reading does without it
+
         savemat(file, dict(signals), oned_as="column", long_field_names=True)
 
 

@@ -1,0 +1,46 @@
+"""XL330 servo on a pendulum: twelve logs, simulated forward from the goal, with an actuator file and no other help."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ema_model.actuator import load_actuator
+from ema_model.comparison import compare
+from ema_model.recordings import read_recording
+
+
+@pytest.fixture(scope="module")
+def compared(data_folder, actuators):
+    actuator = load_actuator(actuators / "xl330.toml")
+    files = sorted((data_folder / "xl330").glob("*.csv"))
+    return compare([read_recording(file, actuator) for file in files], actuator)
+
+
+def test_calibration_converges_on_all_twelve(compared):
+    assert len(compared.recordings) == 12
+    assert compared.calibration.converged
+    assert not compared.calibration.outside_tolerance
+
+
+def test_coulomb_viscous_error_is_what_is_known_of_it(compared):
+    errors = {one.name: one.errors["user_position_rad"].mean_absolute for one in compared.recordings}
+    print()
+    for name, error in errors.items():
+        print(f"  {name:32} {error:.4f} rad")
+    mean = float(np.mean(list(errors.values())))
+    print(f"  {'mean':32} {mean:.4f} rad")
+    # 0.058 rad by an implementation of its own on the same logs
+    assert mean == pytest.approx(0.058, abs=0.002)
+
+
+def test_the_load_is_named_first(compared):
+    assert not compared.adequate
+    assert "load" in compared.sentences[0]
+    assert compared.explained_by[0].variable in ("load", "user_position")
+
+
+def test_gain_of_each_log_is_its_own(data_folder, actuators):
+    actuator = load_actuator(actuators / "xl330.toml")
+    gains = [actuator.for_recording(f"xl330_kp{kp}_sin_sin").controller.gain_1_rad for kp in (100, 400, 800)]
+    assert gains == pytest.approx([kp * 4096 / (2 * np.pi) / (256 * 885) for kp in (100, 400, 800)], rel=1e-4)

@@ -44,7 +44,8 @@ Array = NDArray[np.float64]
 MOST_RECORDINGS = 20
 # By their names on a rotary axis.  The speed is mostly the position's difference, so it is not fitted unless asked for.
 COMPARABLE = ("current_A", "motor_position_rad", "user_position_rad", "motor_speed_rad_s")
-USUAL = frozenset(COMPARABLE[:3])
+USUAL = {name: 1.0 for name in COMPARABLE[:3]}
+_MOST_WEIGHT = 1e3
 UPLOADED = "uploaded: "  # before the names of actuator files that the data folder holds
 
 
@@ -89,7 +90,7 @@ class Comparing:
         self.actuator: Actuator = session.actuator
         self.calibrate = True
         self.free: set[str] = set()
-        self.signals: set[str] = set(USUAL)
+        self.weights: dict[str, float] = dict(USUAL)  # of the signals to fit
         self.window_s: tuple[float, float] | None = None
         self.running = False
         self._stop = threading.Event()
@@ -211,11 +212,15 @@ class Comparing:
             raise InputError(f"{path[:60]}: the actuator's file gives it no tolerance, so it cannot be calibrated")
         self.free = self.free | {path} if free else self.free - {path}
 
-    def set_signal(self, name: str, used: bool) -> None:
-        """Whether a signal is compared."""
+    def set_weight(self, name: str, weight: Any) -> None:
+        """How much a signal counts in the calibration, 1 as its floor says; 0 leaves it out."""
         if name not in COMPARABLE:
             raise InputError(f"{name[:60]} is not compared; choose of {', '.join(COMPARABLE)}")
-        self.signals = self.signals | {name} if used else self.signals - {name}
+        value = number(weight, f"the weight of the {SIGNALS[name].title.lower()}")
+        if not 0.0 <= value <= _MOST_WEIGHT:
+            raise InputError(f"the weight of a signal must lie between 0 and {_MOST_WEIGHT:g}, not {value:g}")
+        others = {other: w for other, w in self.weights.items() if other != name}
+        self.weights = others | {name: value} if value else others
 
     def set_window(self, start: Any, stop: Any) -> None:
         """The time to compare, s; InputError unless it starts before it ends."""
@@ -248,7 +253,7 @@ class Comparing:
         measurements = [o.measurement for o in self.opened.values() if o.measurement is not None]
         if not measurements:
             raise InputError("no recording is chosen; upload one, or choose one of the data folder")
-        if not self.signals:
+        if not self.weights:
             wanted = ", ".join(SIGNALS[name].title.lower() for name in COMPARABLE)
             raise InputError(f"no signal to fit is chosen; choose one or more of {wanted}")
         if self.calibrate and not self.free:
@@ -267,12 +272,12 @@ class Comparing:
 
     def _asked(self) -> dict[str, Any]:
         """What `compare` is asked beside the recordings; None stands for what the actuator's file says."""
-        chosen = [self.actuator.axes.signal(name) for name in COMPARABLE if name in self.signals]
+        chosen = {self.actuator.axes.signal(name): w for name, w in self.weights.items()}
         return {
             "actuator": self.actuator,
             "calibrate": self.calibrate,
             "free": None if self.free == _freed(self.actuator) else sorted(self.free),
-            "signals": None if self.signals == USUAL else chosen,
+            "signals": None if self.weights == USUAL else chosen,
         }
 
     def _steps(self, measurements: Sequence[Measurement], asked: dict[str, Any], stop: threading.Event) -> Steps:

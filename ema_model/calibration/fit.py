@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -94,18 +94,19 @@ def calibrate(
     *,
     free: Sequence[str] | None = None,
     k: ArrayLike = HEALTHY,
-    signals: Sequence[str] = SIGNALS,
+    signals: Mapping[str, float] | None = None,
     on_progress: Callable[[int], None] | None = None,
 ) -> Calibration:
     """Fits the free parameters ("section.name", "effects.name.parameter", or k1…k8), and each window's start.
 
+    signals: those to fit, with weights; without it, current and positions as their floors say.
     free: what may move; without it, every parameter that the actuator's file leaves free.
     Two starts or more; the best is kept, and the fit has converged when it ended before its limit and two agree.
     on_progress is told the evaluations so far, and may raise to stop.
     Raises InputError for a parameter that does not exist or has no tolerance.
     """
     chosen = default_free(plant.actuator) if free is None else tuple(free)
-    problem = Problem(plant, floors, chosen, k, signals)
+    problem = Problem(plant, floors, chosen, k, signals or dict.fromkeys(SIGNALS, 1.0))
     evaluations = 0
 
     def residual(x: Array) -> Array:

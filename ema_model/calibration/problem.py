@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -45,12 +45,14 @@ class Problem:
     """
 
     def __init__(
-        self, plant: Plant, floors: Sequence[Floor], free: Sequence[str], k: ArrayLike, signals: Sequence[str]
+        self, plant: Plant, floors: Sequence[Floor], free: Sequence[str], k: ArrayLike, signals: Mapping[str, float]
     ) -> None:
         self.plant = plant
         self.k = np.asarray(k, dtype=float)
         self.signals = [[name for name in signals if name in window.measured] for window in plant.windows]
-        self.weights = [{name: 1.0 / one.fit_sigma(name) for name in names} for one, names in zip(floors, self.signals)]
+        self.weights = [
+            {name: signals[name] / one.fit_sigma(name) for name in names} for one, names in zip(floors, self.signals)
+        ]
         self.unknowns = [*(unknown_of(plant.actuator, name) for name in free), *_starts(plant)]
         self.values = sum(window.blocks * len(names) for window, names in zip(plant.windows, self.signals))
         if not self.values:

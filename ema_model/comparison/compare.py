@@ -39,13 +39,14 @@ def compare(
     effects: Mapping[str, Mapping[str, float]] | None = None,
     calibrate: bool = True,
     free: Sequence[str] | None = None,
-    signals: Sequence[str] | None = None,
+    signals: Sequence[str] | Mapping[str, float] | None = None,
     on_progress: Progress | None = None,
 ) -> Comparison:
     """The recordings of one actuator beside its model.
 
     k: the actuator's faults, where known; effects: besides the actuator's own.  free: parameters to calibrate
-    in place of those that the actuator's file leaves free; signals: to fit, in place of current and positions.
+    in place of those that the actuator's file leaves free; signals: to fit, in place of current and positions, with
+    weights where it is a mapping (1 is what the signal's floor says).
     on_progress is told what goes on, and may raise to stop.
     Raises InputError for recordings that cannot be compared.
     """
@@ -117,14 +118,19 @@ def _with_settings(
     return {**actuator.effects, **added}
 
 
-def _signals(signals: Sequence[str] | None, actuator: Actuator) -> Sequence[str]:
+def _signals(signals: Sequence[str] | Mapping[str, float] | None, actuator: Actuator) -> dict[str, float]:
+    """Weights by the signals' names inside."""
     if signals is None:
-        return SIGNALS
+        return dict.fromkeys(SIGNALS, 1.0)
     known = {actuator.axes.signal(name): name for name in (*SIGNALS, "motor_speed_rad_s")}
     for name in signals:
         if name not in known:
             raise InputError(f"no signal {name!r} to compare; there are {', '.join(known)}")
-    return [known[name] for name in signals]
+    weights = signals if isinstance(signals, Mapping) else dict.fromkeys(signals, 1.0)
+    for name, weight in weights.items():
+        if not 0.0 < weight < np.inf:
+            raise InputError(f"the weight of {name} must be a number above 0, not {weight:g}")
+    return {known[name]: weight for name, weight in weights.items()}
 
 
 def _stated(measurement: Measurement, actuator: Actuator) -> dict[str, dict[str, float]]:

@@ -35,7 +35,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     options.add_faults(parser)
     options.add_effects(parser)
     parser.add_argument(
-        "--signal", action="append", dest="signals", metavar="NAME", help="fit only these signals; repeat for more"
+        "--signal",
+        action="append",
+        dest="signals",
+        metavar="NAME[=weight]",
+        help="fit only these signals, with a weight (1 is what the noise says); repeat for more",
     )
     parser.add_argument("--from", type=float, dest="start_s", metavar="s", help="leave out what lies before")
     parser.add_argument("--to", type=float, dest="stop_s", metavar="s", help="leave out what lies after")
@@ -70,7 +74,7 @@ def run(arguments: argparse.Namespace) -> int:
             effects=options.effects_of(arguments),
             calibrate=arguments.calibrate,
             free=arguments.free,
-            signals=arguments.signals,
+            signals=options.weights_of(arguments.signals),
             on_progress=progress.show,
         )
         if arguments.record:

@@ -76,6 +76,13 @@ def effects_of(arguments: argparse.Namespace) -> dict[str, dict[str, float]]:
     return effects
 
 
+def weights_of(texts: list[str] | None) -> dict[str, float] | None:
+    """Weights from --signal NAME or NAME=weight."""
+    if texts is None:
+        return None
+    return dict(_pair(text, "--signal") if "=" in text else (text, 1.0) for text in texts)
+
+
 def run_of(arguments: argparse.Namespace, sample_rate_Hz: float = 10_000.0) -> Run:
     """The run that the options ask for."""
     demand, length = _command(arguments)

@@ -1,4 +1,4 @@
-"""What a comparison is asked for: the actuator, what may be calibrated, the signals, the window."""
+"""What a comparison is asked for: the actuator, what may be calibrated, the signals' weights, the window."""
 
 from __future__ import annotations
 
@@ -60,10 +60,12 @@ class AskedControls:
             self.show_actuator()
 
     def _signal(self, name: str) -> Any:
-        box = self._page.server.gui.add_checkbox(SIGNALS[name].title, name in self._comparing.signals, disabled=True)
+        weight = self._comparing.weights.get(name, 0.0)
+        hint = "Weight in the calibration: 1 is what its noise says, 0 leaves it out"
+        box = self._page.server.gui.add_number(SIGNALS[name].title, weight, min=0.0, step=0.1, hint=hint, disabled=True)
 
         def changed(_: Any) -> None:
-            self._page.checked(lambda: self._comparing.set_signal(name, bool(box.value)))
+            self._page.checked(lambda: self._comparing.set_weight(name, box.value))
 
         box.on_update(changed)
         return box

@@ -210,13 +210,13 @@ def test_stop_ends_it_soon_and_keeps_the_last_result(comparing, heard, recording
 @pytest.mark.parametrize(
     ("change", "line"),
     [
-        (lambda c: c.signals.clear(), "no signal to fit is chosen"),
+        (lambda c: c.weights.clear(), "no signal to fit is chosen"),
         (lambda c: c.free.clear(), "no parameter may move"),
         (lambda c: c.set_window(8.0, 9.0), "no sample lies in the chosen window"),
         (lambda c: c.set_window(1.0, 0.5), "must start before it ends"),
         (lambda c: c.set_window("x", 0.5), "the window's start must be a number"),
         (lambda c: c.set_free("motor.magic", True), "gives it no tolerance"),
-        (lambda c: c.set_signal("time_s", True), "is not compared"),
+        (lambda c: c.set_weight("time_s", 1.0), "is not compared"),
         (lambda c: c.choose_actuator("../../etc/passwd"), "no such file in the data folder"),
         (lambda c: c.choose_actuator("uploaded: nothing.toml"), "no such file in the data folder"),
     ],

@@ -1,0 +1,105 @@
+"""`emaviz compare`: its JSON, report and recording, and one clear line for each mistake."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from ema_model.measurement import read_measurement
+from emaviz.cli import main
+from emaviz.recording import read
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory):
+    """A recording with hidden cogging under the names and in the units of a rig."""
+    folder = tmp_path_factory.mktemp("rig")
+    path = folder / "own.csv"
+    effect = ["--effect", "cogging_torque:amplitude_Nm=0.02,order=12", "--noise-current", "0.2", "--encoder-bits", "12"]
+    sine = ["--command", "sine", "--set", "amplitude_rad=0.03", "--set", "frequency_Hz=3", "--duration", "1"]
+    assert main(["simulate", *effect, *sine, "--out", str(path)]) == 0
+    own = read_measurement(path)
+    foreign = folder / "foreign.csv"
+    columns = {
+        "t[ms]": 1e3 * own.time_s,
+        "set": np.rad2deg(own["command_rad"]),
+        "motor": own["motor_position_rad"],
+        "iq": 1e3 * own["current_A"],
+    }
+    table = np.column_stack(list(columns.values()))
+    np.savetxt(foreign, table, delimiter=",", header=",".join(columns), comments="", fmt="%.10g")
+    return path, foreign
+
+
+MAPPING = ["time_s=t[ms]", "command_rad=set[deg]", "motor_position_rad=motor", "current_A=iq[mA]"]
+
+
+def test_everything_is_written(rig, tmp_path, capsys):
+    out, report, record = tmp_path / "r.json", tmp_path / "r.html", tmp_path / "r.rrd"
+    arguments = ["--json", str(out), "--report", str(report), "--record", str(record), "--seed", "7"]
+    assert main(["compare", str(rig[0]), *arguments]) == 0
+    printed = capsys.readouterr().out
+    assert printed.startswith("The equivalent current's error repeats with the motor's angle")
+    assert "12 times a turn" in printed and "calibration converged" in printed
+    result = json.loads(out.read_text())
+    assert result["schema"] == 1 and result["seed"] == 7 and result["adequate"] is False
+    assert result["explained_by"][0]["variable"] == "motor_angle" and result["orders"][0]["order"] == 12
+    assert result["calibration"]["converged"] and result["worst_regions"][0]["sentence"]
+    assert result["signals"]["current_A"]["rmse"] > result["signals"]["current_A"]["noise_floor"]
+    assert report.stat().st_size > 1e6 and "12 times a turn" in report.read_text(encoding="utf-8")
+    assert set(read(record).signals) >= {"measurement", "monitor", "residual"}
+
+
+def test_foreign_columns_are_mapped(rig, tmp_path):
+    out = tmp_path / "r.json"
+    mapping = [part for text in MAPPING for part in ("--map", text)]
+    assert main(["compare", str(rig[1]), *mapping, "--json", str(out)]) == 0
+    result = json.loads(out.read_text())
+    assert set(result["signals"]) == {"current_A", "motor_position_rad"}
+    assert result["explained_by"][0]["variable"] == "motor_angle"
+
+
+def test_options_reach_the_comparison(rig, tmp_path):
+    out = tmp_path / "r.json"
+    choice = ["--free", "motor.inertia_kgm2", "--signal", "current_A=2", "--from", "0.2", "--to", "0.7"]
+    assert main(["compare", str(rig[0]), *choice, "--json", str(out)]) == 0
+    result = json.loads(out.read_text())
+    assert set(result["calibration"]["parameters"]) == {"motor.inertia_kgm2"}
+    assert main(["compare", str(rig[0]), "--no-calibrate", "--json", str(out)]) == 0
+    assert json.loads(out.read_text())["calibration"] is None
+    added = ["--effect", "cogging_torque:amplitude_Nm=0.02,order=12"]
+    assert main(["compare", str(rig[0]), *added, "--json", str(out)]) == 0
+    assert json.loads(out.read_text())["adequate"] is True
+
+
+@pytest.mark.parametrize(
+    "arguments, says",
+    [
+        (["missing.csv"], "missing.csv: no such file"),
+        ([], "FILE"),
+        (["OWN", "--actuator", "nowhere.toml"], "nowhere.toml: no such actuator file"),
+        (["OWN", "--map", "current=iq"], "no signal 'current'"),
+        (["OWN", "--map", "current_A=iq"], "no column 'iq' for current_A"),
+        (["OWN", "--map", "nonsense"], "signal=column"),
+        (["FOREIGN"], "no column time_s"),
+        (["FOREIGN", "--map", "time_s=t[ms]"], "command_rad is needed"),
+        (["OWN", "--free", "motor.colour"], "motor.colour cannot be calibrated"),
+        (["OWN", "--fault", "k9=1"], "k9"),
+        (["OWN", "--effect", "rust"], "no effect 'rust'"),
+        (["OWN", "--signal", "speed"], "no signal 'speed'"),
+        (["OWN", "--signal", "current_A=-1"], "must be a number above 0"),
+        (["OWN", "--from", "5"], "no sample lies in the chosen window"),
+        (["OWN", "--from", "0.1", "--to", "0.101"], "too short"),
+        (["OWN", "--json", "nowhere/r.json"], "the folder nowhere does not exist"),
+        (["OWN", "--report", "nowhere/r.html"], "the folder nowhere does not exist"),
+        (["OWN", "--record", "nowhere/r.txt"], ".rrd"),
+    ],
+)
+def test_each_mistake_is_one_clear_line(rig, tmp_path, monkeypatch, capsys, arguments, says):
+    monkeypatch.chdir(tmp_path)
+    given = [{"OWN": str(rig[0]), "FOREIGN": str(rig[1])}.get(argument, argument) for argument in arguments]
+    assert main(["compare", *given]) == 2
+    said = capsys.readouterr().err
+    assert says in said and said.count("\n") == 1 and "Traceback" not in said

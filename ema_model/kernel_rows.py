@@ -52,11 +52,12 @@ def monitor_rows(actuator: Actuator, k: ArrayLike, stack: Stack, effects: Effect
     motor, inverter = actuator.motor, actuator.inverter
     if stack.circuit == "reduced":
         circuit = reduced_circuit(actuator)
-        resistance, inductance, voltage = circuit.resistance_Ohm, circuit.inductance_H, circuit.voltage_V
+        resistance, inductance = circuit.resistance_Ohm, circuit.inductance_H
+        ratio = circuit.voltage_V / inverter.bus_voltage_V
     else:  # without a voltage limit, or with the bus as it is
-        resistance, inductance, voltage = motor.resistance_Ohm, motor.inductance_H, inverter.bus_voltage_V
+        resistance, inductance, ratio = motor.resistance_Ohm, motor.inductance_H, 1.0
     values = _shared_rows(actuator, fault) | {
-        "voltage": voltage,
+        "voltage_ratio": ratio,
         "resistance": resistance,
         "inverse_inductance": 1.0 / inductance,
         "emf_constant": motor.torque_constant_Nm_A,
@@ -72,7 +73,7 @@ def reference_rows(actuator: Actuator, k: ArrayLike, stack: Stack, effects: Effe
     fault = faults.physical(np.asarray(k, dtype=float))
     motor, inverter = actuator.motor, actuator.inverter
     values = _shared_rows(actuator, fault) | {
-        "voltage": 0.5 * inverter.bus_voltage_V,
+        "voltage_ratio": 0.5,
         "hysteresis": 0.5 * inverter.hysteresis_band_A,
         "resistance": 0.5 * motor.resistance_Ohm,
         "inverse_inductance": 2.0 / motor.inductance_H,
@@ -89,21 +90,32 @@ def reference_rows(actuator: Actuator, k: ArrayLike, stack: Stack, effects: Effe
 
 
 def initial_state(
-    actuator: Actuator, blocks: int, user_rad: ArrayLike = 0.0, speed_rad_s: ArrayLike = 0.0, play: ArrayLike = 0.0
+    actuator: Actuator,
+    blocks: int,
+    user_rad: ArrayLike = 0.0,
+    speed_rad_s: ArrayLike = 0.0,
+    play: ArrayLike = 0.0,
+    stack: Stack | None = None,
 ) -> Array:
-    """State of the Monitor Model at the start, (blocks, STATE_ROWS·LANES).
+    """State of the Monitor Model at the start, (blocks, rows·LANES); the states of the stack's effects are 0.
 
     user_rad: where the motor stands, as a user's angle; speed_rad_s: the motor's; play: where the user
     stands within the backlash, rad at the motor, 0 in the middle.
     """
-    return _state(actuator, blocks, STATE_ROWS, 2.0 * actuator.motor.pole_pairs, user_rad, speed_rad_s, play)
+    rows = STATE_ROWS + (stack.states if stack else ())
+    return _state(actuator, blocks, rows, 2.0 * actuator.motor.pole_pairs, user_rad, speed_rad_s, play)
 
 
 def initial_reference_state(
-    actuator: Actuator, user_rad: float = 0.0, speed_rad_s: float = 0.0, play: float = 0.0
+    actuator: Actuator,
+    user_rad: float = 0.0,
+    speed_rad_s: float = 0.0,
+    play: float = 0.0,
+    stack: Stack | None = None,
 ) -> Array:
-    """The same for the Reference Model, (REFERENCE_STATE_ROWS·LANES,)."""
-    return _state(actuator, 1, REFERENCE_STATE_ROWS, actuator.motor.pole_pairs, user_rad, speed_rad_s, play)[0]
+    """The same for the Reference Model, (rows·LANES,)."""
+    rows = REFERENCE_STATE_ROWS + (stack.states if stack else ())
+    return _state(actuator, 1, rows, actuator.motor.pole_pairs, user_rad, speed_rad_s, play)[0]
 
 
 def _state(
@@ -149,6 +161,7 @@ def _shared_rows(actuator: Actuator, fault: faults.PhysicalFaults) -> dict[str, 
         "integral_gain": controller.integral_gain_Nm_rad,
         "derivative_gain": controller.derivative_gain_Nms2_rad,
         "integrator_window": controller.integrator_window_rad,
+        "bus_voltage": actuator.inverter.bus_voltage_V,
         "current_per_torque": 1.0 / controller.torque_constant_Nm_A,
         "output_limit": limit,
         "torque_constant": motor.torque_constant_Nm_A,

@@ -96,7 +96,7 @@ def simulate_reference(
     start = float(demand[0]) if start_rad is None else start_rad
     result = np.empty((run.samples, 11))
     stack.reference.run(
-        initial_reference_state(actuator, start, start_speed_rad_s, start_play_rad),
+        initial_reference_state(actuator, start, start_speed_rad_s, start_play_rad, stack),
         reference_rows(actuator, k, stack, effects),
         demand,
         load,
@@ -137,7 +137,7 @@ def simulate_monitor(
     result = np.empty((1, run.samples, 4, LANES))
     exclusive(
         stack.monitor.traces,
-        initial_state(actuator, 1, start),
+        initial_state(actuator, 1, start, stack=stack),
         monitor_rows(actuator, k, stack, effects),
         demand,
         np.full_like(demand, run.load_torque_Nm),
@@ -165,7 +165,7 @@ def _signals(run: Run, actuator: Actuator, result: Array, start_rad: float) -> d
     signals = {
         "time_s": time,
         "command_rad": demand,
-        "user_position_rad": tau * column(3, theta),
+        "user_position_rad": column(3, tau * theta),
         "motor_position_rad": column(2, theta),
         "motor_speed_rad_s": column(1, 0.0),
         "current_A": column(0, 0.0),

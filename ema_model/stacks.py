@@ -43,10 +43,23 @@ _KEPT_VERSIONS = 6  # folders of other hashes (older sources or versions) that a
 # Where effects can act: the arguments of each place.  The first is the value that the base model, or the
 # effect before, has found there; an effect's function returns it changed.
 PLACES = {
-    "moving_friction": ("level", "static", "omega", "motor_torque", "load"),
+    "moving_friction": ("level", "static", "omega", "motor_torque", "load", "gear"),
+    "friction": ("torque", "omega", "active", "static", "dynamic"),
     "electric_torque": ("torque", "theta", "omega", "current"),
-    "shaft_torque": ("torque", "theta", "omega", "current", "user", "gear"),
+    "shaft_torque": ("torque", "theta", "omega", "current", "user", "gear", "load"),
+    "back_emf": ("emf", "omega", "current"),
+    "winding_resistance": ("resistance",),
+    "bus_voltage": ("volts", "current"),
+    "inverse_inertia": ("inverse",),
+    "user_position": ("user", "theta", "gear"),
+    "position_reading": ("user",),
+    "current_reading": ("current",),
 }
+# The arguments of an effect's `advance_states`, which returns its new states as a tuple: the step, s; angle and
+# speed at its start; the rigid transmission's output before and after; how far the user moved; what acts.
+ADVANCE = (
+    *("dt", "theta", "omega", "rigid", "rigid_next", "user_step", "gear", "load", "active", "static", "dynamic"),
+)
 
 
 @dataclass(frozen=True)
@@ -57,6 +70,7 @@ class Stack:
     controller: str
     effects: tuple[str, ...]
     parameter_rows: tuple[str, ...]  # of the base model, then "effect.parameter"
+    states: tuple[str, ...]  # of the effects, "effect.state", behind the base model's
     monitor: Any  # module: squared_errors, traces
     reference: Any  # module: run
     inverse: Any  # module: currents
@@ -87,6 +101,7 @@ def _stack(circuit: str, controller: str, names: tuple[str, ...]) -> Stack:
 
     effects = [find(name) for name in names]
     rows = PARAMETER_ROWS + tuple(f"{effect.name}.{p.name}" for effect in effects for p in effect.parameters)
+    states = tuple(f"{effect.name}.{state}" for effect in effects for state in effect.states)
     folder = _write((circuit, controller, *names), _composition(circuit, controller, effects))
     package = _import(folder)
     return Stack(
@@ -94,6 +109,7 @@ def _stack(circuit: str, controller: str, names: tuple[str, ...]) -> Stack:
         controller,
         names,
         rows,
+        states,
         *(importlib.import_module(f"{package.__name__}.{module}") for module in ("monitor", "reference", "inverse")),
     )
 
@@ -107,20 +123,31 @@ def _composition(circuit: str, controller: str, effects: Sequence[Any]) -> str:
         f"from ema_model.physics.drive import {circuit}_drive as advance_current",
     ]
     bodies: dict[str, list[str]] = {place: [] for place in PLACES}
-    row = len(PARAMETER_ROWS)
+    advances: list[str] = []
+    row, state = len(PARAMETER_ROWS), 0
     for effect in effects:
-        parameters = [f"p[{(row + j) * LANES} + i]" for j in range(len(effect.parameters))]
+        own = [f"p[{(row + j) * LANES} + i]" for j in range(len(effect.parameters))]
+        states = [f"s[(first + {state + j}) * {LANES} + i]" for j in range(len(effect.states))]
         row += len(effect.parameters)
+        state += len(effect.states)
         for function in effect.places:
             place = function.__name__
             value, *rest = PLACES[place]
             alias = f"{effect.name}_{place}"
             imports.append(f"from {function.__module__} import {place} as {alias}")
-            bodies[place].append(f"    {value} = {alias}({', '.join([value, *rest, *parameters])})")
+            bodies[place].append(f"    {value} = {alias}({', '.join([value, *rest, *own, *states])})")
+        if effect.states:
+            alias = f"{effect.name}_advance"
+            imports.append(f"from {effect.advance_states.__module__} import advance_states as {alias}")
+            new = [f"new_{state_name}" for state_name in effect.states]
+            advances.append(f"    ({', '.join(new)},) = {alias}({', '.join([*ADVANCE, *own, *states])})")
+            advances += [f"    {place} = {value}" for place, value in zip(states, new)]
     functions = []
     for place, arguments in PLACES.items():
-        head = f"def {place}({', '.join(arguments)}, p, i):"
+        head = f"def {place}({', '.join(arguments)}, s, first, p, i):"
         functions += ["", "", "@scalar", head, *bodies[place], f"    return {arguments[0]}"]
+    head = f"def advance_states({', '.join(ADVANCE)}, s, first, p, i):"
+    functions += ["", "", "@scalar", head, *(advances or ["    pass"])]
     return "\n".join([*imports, *functions, ""])
 
 

@@ -187,6 +187,7 @@ def _calibration(before: Actuator, after: Actuator, recordings: Sequence[Compare
         signals=[one.model for one in recordings],
         before=[one.initial for one in recordings],
         sensitivities=[],
+        weighted_sensitivities=[],
         x=np.zeros(0),
         room=(np.zeros(0), np.zeros(0)),
         evaluations=12,

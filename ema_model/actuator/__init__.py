@@ -5,5 +5,6 @@ from __future__ import annotations
 from ema_model.actuator.file import load_actuator, shipped
 from ema_model.actuator.layout import paths
 from ema_model.actuator.parameters import Actuator, Rule, Tolerance
+from ema_model.actuator.write import save_actuator
 
-__all__ = ["Actuator", "Rule", "Tolerance", "load_actuator", "paths", "shipped"]
+__all__ = ["Actuator", "Rule", "Tolerance", "load_actuator", "paths", "save_actuator", "shipped"]

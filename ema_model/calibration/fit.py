@@ -76,6 +76,7 @@ class Calibration:
     signals: list[dict[str, Array]]  # the fitted model's, per window, (blocks,) each
     before: list[dict[str, Array]]  # the file's own model's
     sensitivities: list[dict[str, Array]]  # per window and fitted signal: ∂signal/∂x, (blocks, unknowns)
+    weighted_sensitivities: list[dict[str, Array]]  # the same over the floor that weights the fit
     x: Array  # (unknowns,), the fitted values, in σ from the file's
     room: tuple[Array, Array]  # (unknowns,) each, how far x may still go down and up, in σ
     evaluations: int
@@ -95,6 +96,7 @@ def calibrate(
     free: Sequence[str] | None = None,
     k: ArrayLike = HEALTHY,
     signals: Mapping[str, float] | None = None,
+    start: Mapping[str, float] | None = None,
     on_progress: Callable[[int], None] | None = None,
 ) -> Calibration:
     """Fits the free parameters ("section.name", "effects.name.parameter", or k1…k8), and each window's start.
@@ -102,6 +104,7 @@ def calibrate(
     signals: those to fit, with weights; without it, current and positions as their floors say.
     free: what may move; without it, every parameter that the actuator's file leaves free.
     Two starts or more; the best is kept, and the fit has converged when it ended before its limit and two agree.
+    start: x by name, from an earlier fit, from which alone this one begins.
     on_progress is told the evaluations so far, and may raise to stop.
     Raises InputError for a parameter that does not exist or has no tolerance.
     """
@@ -116,7 +119,7 @@ def calibrate(
             on_progress(evaluations)
         return problem.residual(x)
 
-    fit = _Search(problem, residual).solve()
+    fit = _Search(problem, residual).solve(start)
     x = fit.x
     chi2 = fit.chi2
     covariance = np.linalg.inv(fit.jacobian.T @ fit.jacobian) * max(1.0, chi2)
@@ -136,6 +139,7 @@ def calibrate(
         signals=[{name: values[0] for name, values in one.items()} for one in after],
         before=[{name: values[0] for name, values in one.items()} for one in before],
         sensitivities=problem.split(fit.jacobian),
+        weighted_sensitivities=problem.split(fit.jacobian, weighted=True),
         x=x,
         room=(problem.bounds[0] - x, problem.bounds[1] - x),
         evaluations=evaluations,
@@ -160,12 +164,15 @@ class _Search:
         self.problem = problem
         self.residual = residual
 
-    def solve(self) -> _Found:
+    def solve(self, start: Mapping[str, float] | None) -> _Found:
         """The best fit; where the model misses by far, one in which large errors count less."""
         count = len(self.problem.unknowns)
         if not count:
             fun = self.problem.residual(np.zeros(0))
             return _Found(np.zeros(0), np.zeros((0, 0)), float(fun @ fun) / self.problem.values, 0.0, True)
+        if start is not None:
+            known = np.array([start.get(u.name, 0.0) for u in self.problem.unknowns])
+            return self._from([known], 1.0, "linear")
         starts = [np.zeros(count), *_promising(self.problem)]
         found = self._from(starts, 1.0, "linear")
         if found.chi2 > _MISFIT:
@@ -198,7 +205,7 @@ class _Search:
             if len(fits) > 1 and fits[1].cost < 1.01 * fits[0].cost + 2.0:
                 break
         best = fits[0]
-        agree = len(fits) > 1 and fits[1].cost < 1.01 * best.cost + 2.0
+        agree = len(starts) == 1 or fits[1].cost < 1.01 * best.cost + 2.0
         fun, x = self.problem.residual(best.x), best.x
         chi2 = float(fun @ fun - x @ x) / self.problem.values
         jacobian = self.problem.jacobian(x)  # the fit's own is weighted by its loss

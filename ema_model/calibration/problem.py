@@ -91,13 +91,14 @@ class Problem:
         residuals = self._residuals(points)
         return ((residuals[n:] - residuals[:n]) / (high - low)[:, None]).T
 
-    def split(self, jacobian: Array) -> list[dict[str, Array]]:
-        """A Jacobian per window and signal, in the signals' own units: (blocks, unknowns) each."""
+    def split(self, jacobian: Array, *, weighted: bool = False) -> list[dict[str, Array]]:
+        """A Jacobian per window and signal, in the signals' own units unless weighted: (blocks, unknowns) each."""
         parts, row = [], 0
         for window, weights in zip(self.plant.windows, self.weights):
             part = {}
             for name, weight in weights.items():
-                part[name] = jacobian[row : row + window.blocks] / weight[:, None]
+                rows = jacobian[row : row + window.blocks]
+                part[name] = rows if weighted else rows / weight[:, None]
                 row += window.blocks
             parts.append(part)
         return parts

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -54,15 +55,15 @@ def compare(
     tell = on_progress or (lambda text: None)
     check_same_actuator(measurements)
     tell("checking the data")
-    prepared = [_prepared(measurement, actuator) for measurement in measurements]
+    recordings = [prepared(measurement, actuator) for measurement in measurements]
     cards = [
         health(m, current_limit_A=_finite(actuator.controller.current_limit_A), pole_pairs=actuator.motor.pole_pairs)
-        for m in prepared
+        for m in recordings
     ]
     actuator = replace(actuator, effects=_with_settings(actuator, effects))
-    wanted = _signals(signals, actuator)
+    wanted = weights_of(signals, actuator)
     tell("measuring the model's floor")
-    fitted = plant_for(prepared, actuator, stretches=fit_stretches(prepared, actuator))
+    fitted = plant_for(recordings, actuator, stretches=fit_stretches(recordings, actuator))
     sensors = [_stated(m, actuator) for m in measurements]
     floors = [floor(fitted, window, k, sensors[window.recording]) for window in fitted.windows]
     tell("calibrating" if calibrate else "simulating")
@@ -75,13 +76,13 @@ def compare(
         on_progress=lambda evaluations: tell(f"calibrating: {evaluations} simulations"),
     )
     tell("looking where it fails")
-    plant, floors, before, after = _everywhere(prepared, fitted, floors, calibration, actuator, k)
-    known = [_known_error(plant, window, calibration) if plant is fitted else {} for window in plant.windows]
+    plant, floors, before, after = _everywhere(recordings, fitted, floors, calibration, actuator, k)
+    known = [known_error(plant, window, calibration) if plant is fitted else {} for window in plant.windows]
     residuals = residuals_of(
         plant, floors, after, known, calibration.actuator, calibration if plant is fitted else None
     )
     compared = [
-        _compared(i, prepared[i], cards[i], plant, floors, before, after, actuator) for i in range(len(prepared))
+        _compared(i, recordings[i], cards[i], plant, floors, before, after, actuator) for i in range(len(recordings))
     ]
     errors = _together(compared)
     judgement = judge(residuals, errors, calibration if calibrate else None, actuator)
@@ -101,7 +102,7 @@ def compare(
     )
 
 
-def _prepared(measurement: Measurement, actuator: Actuator) -> Measurement:
+def prepared(measurement: Measurement, actuator: Actuator) -> Measurement:
     """The measurement under the names inside, with a current."""
     inside = replace(measurement, signals=actuator.axes.inside(measurement.signals))
     return with_current(inside, actuator.motor.pole_pairs, actuator.motor.rotor_offset_rad)
@@ -118,7 +119,7 @@ def _with_settings(
     return {**actuator.effects, **added}
 
 
-def _signals(signals: Sequence[str] | Mapping[str, float] | None, actuator: Actuator) -> dict[str, float]:
+def weights_of(signals: Sequence[str] | Mapping[str, float] | None, actuator: Actuator) -> dict[str, float]:
     """Weights by the signals' names inside."""
     if signals is None:
         return dict.fromkeys(SIGNALS, 1.0)
@@ -146,7 +147,7 @@ def _stated(measurement: Measurement, actuator: Actuator) -> dict[str, dict[str,
     }
 
 
-def _known_error(plant: Plant, window: Window | Stretch, calibration: Calibration) -> dict[str, Array]:
+def known_error(plant: Plant, window: Window | Stretch, calibration: Calibration) -> dict[str, Array]:
     """What the model is known to be off by: its three-phase twin's difference, both as calibrated."""
     if isinstance(window, Window) and isinstance(plant, ClosedLoop) and plant.actuator.has_reference_model:
         return twin_error(plant, window, calibration.actuator, calibration.k)
@@ -177,7 +178,8 @@ def _everywhere(
             (before, actuator, k, (0.0, 0.0)),
             (after, calibration.actuator, calibration.k, (turned, play)),
         ):
-            one = plant.signals(window, model, faults, *start)  # type: ignore[arg-type]
+            signals: Any = plant.signals  # each plant knows its own windows
+            one = signals(window, model, faults, *start)
             target.append({name: values[0] for name, values in one.items()})
         whole.append(
             _typical_floor(

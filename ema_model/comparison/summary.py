@@ -6,20 +6,23 @@ from typing import Any
 
 import numpy as np
 
+from ema_model.axes import Axes
 from ema_model.calibration import Calibrated, Calibration
 from ema_model.comparison.result import Comparison, SignalError
 
 
 def as_dict(comparison: Comparison) -> dict[str, Any]:
     """Everything but the series, in numbers and texts that JSON can hold; unknown numbers are None."""
-    return _plain(
+    return plain(
         {
             "adequate": comparison.adequate,
             "sentences": list(comparison.sentences),
             "warnings": list(comparison.warnings),
             "signals": {name: _error(error) for name, error in comparison.signals.items()},
             "primary": comparison.primary,
-            "calibration": None if comparison.calibration is None else _calibration(comparison.calibration, comparison),
+            "calibration": None
+            if comparison.calibration is None
+            else calibration_dict(comparison.calibration, comparison.actuator.axes),
             "explained_by": [
                 {
                     "variable": one.variable,
@@ -69,19 +72,20 @@ def _error(error: SignalError) -> dict[str, float]:
     }
 
 
-def _calibration(calibration: Calibration, comparison: Comparison) -> dict[str, Any]:
-    axes = comparison.actuator.axes
+def calibration_dict(calibration: Calibration, axes: Axes) -> dict[str, Any]:
+    """A calibration's parameters by the names in files."""
     return {
         "converged": calibration.converged,
         "evaluations": calibration.evaluations,
-        "parameters": {axes.path(name): _parameter(one) for name, one in calibration.parameters.items()},
-        "starts": {name: _parameter(one) for name, one in calibration.starts.items()},
+        "parameters": {axes.path(name): parameter_dict(one) for name, one in calibration.parameters.items()},
+        "starts": {name: parameter_dict(one) for name, one in calibration.starts.items()},
         "outside_tolerance": [axes.path(name) for name in calibration.outside_tolerance],
         "confounded": [[axes.path(a), axes.path(b)] for a, b in calibration.confounded],
     }
 
 
-def _parameter(one: Calibrated) -> dict[str, Any]:
+def parameter_dict(one: Calibrated) -> dict[str, Any]:
+    """One calibrated parameter."""
     return {
         "value": one.value,
         "initial": one.initial,
@@ -92,11 +96,12 @@ def _parameter(one: Calibrated) -> dict[str, Any]:
     }
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
+    """The value in types that JSON has; numbers that are not finite are None."""
     if isinstance(value, dict):
-        return {key: _plain(one) for key, one in value.items()}
+        return {key: plain(one) for key, one in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(one) for one in value]
+        return [plain(one) for one in value]
     if isinstance(value, np.generic):
         value = value.item()
     return None if isinstance(value, float) and not np.isfinite(value) else value

@@ -21,7 +21,7 @@ from ema_model.measurement import SIGNALS
 
 Array = NDArray[np.float64]
 
-_ORDER_OF_PRIMARY = ("current_A", "motor_torque_Nm", "user_position_rad", "motor_position_rad", "motor_speed_rad_s")
+ORDER_OF_PRIMARY = ("current_A", "motor_torque_Nm", "user_position_rad", "motor_position_rad", "motor_speed_rad_s")
 _SLOW_RATIO = 2.0  # of the residual's means over 25 ms to their floor, from which on the model has failed
 
 
@@ -43,7 +43,7 @@ def judge(
     residuals: Residuals, errors: Mapping[str, SignalError], calibration: Calibration | None, actuator: Actuator
 ) -> Judgement:
     """Explains the residual of the first signal of interest: the current, where it is measured."""
-    primary = next(name for name in _ORDER_OF_PRIMARY if name in residuals.values)
+    primary = next(name for name in ORDER_OF_PRIMARY if name in residuals.values)
     explained = explain(residuals, primary, actuator.axes)
     orders = residual_orders(residuals, primary)
     regions = worst_regions(residuals, primary, explained, actuator.axes)

@@ -10,7 +10,7 @@ from ema_model.physics.elementary import sine
 
 
 @scalar
-def shaft_torque(torque, theta, omega, current, user, gear, amplitude, order, phase):
+def shaft_torque(torque, theta, omega, current, user, gear, load, amplitude, order, phase):
     """A sin(hθ + φ), added."""
     return torque + amplitude * sine(order * theta + phase)
 

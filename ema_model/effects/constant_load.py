@@ -7,7 +7,7 @@ from ema_model.numba_options import scalar
 
 
 @scalar
-def shaft_torque(torque, theta, omega, current, user, gear, load):
+def shaft_torque(torque, theta, omega, current, user, gear, recorded, load):
     """− τ T_0, added."""
     return torque - gear * load
 

@@ -39,6 +39,8 @@ class Effect:
     places: tuple[Callable[..., Any], ...]
     shows: str
     mistaken_for: str
+    states: tuple[str, ...] = ()  # of its own, 0 at the start; `advance_states` takes their next values
+    advance_states: Callable[..., Any] | None = None  # (*ema_model.stacks.ADVANCE, parameters, states) → new states
     is_load: bool = False  # pulls at the user from outside, so that its torque counts as the load
     name: str = ""  # of the file; the catalogue fills it in
 

@@ -7,7 +7,7 @@ from ema_model.numba_options import scalar
 
 
 @scalar
-def shaft_torque(torque, theta, omega, current, user, gear, stiffness, offset):
+def shaft_torque(torque, theta, omega, current, user, gear, load, stiffness, offset):
     """− τ (H θ_user + H_0), added."""
     return torque - gear * (stiffness * user + offset)
 

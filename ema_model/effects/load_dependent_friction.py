@@ -7,7 +7,7 @@ from ema_model.numba_options import scalar
 
 
 @scalar
-def moving_friction(level, static, omega, motor_torque, load, ratio):
+def moving_friction(level, static, omega, motor_torque, load, gear, ratio):
     """+ μ |T_m|."""
     return level + ratio * abs(motor_torque)
 

@@ -10,7 +10,7 @@ from ema_model.physics.elementary import sine
 
 
 @scalar
-def shaft_torque(torque, theta, omega, current, user, gear, moment, angle):
+def shaft_torque(torque, theta, omega, current, user, gear, load, moment, angle):
     """− τ M sin(θ_user − θ_0), added."""
     return torque - gear * moment * sine(user - angle)
 

@@ -8,7 +8,7 @@ from ema_model.physics.elementary import decay
 
 
 @scalar
-def moving_friction(level, static, omega, motor_torque, load, speed):
+def moving_friction(level, static, omega, motor_torque, load, gear, speed):
     """T_d + (T_s − T_d) e^{−(ω/ω_s)²}."""
     ratio = omega / speed
     return level + (static - level) * decay(ratio * ratio)

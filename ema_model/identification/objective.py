@@ -111,7 +111,7 @@ class Objective(ClosedLoop):
         return (window.measured["current_A"] - sensors.current_bias_A) / sensors.current_gain
 
     def _state(self, window: Window, blocks: int) -> Array:
-        return initial_state(self.actuator, blocks, window.user_rad, window.speed_rad_s, window.play_rad)
+        return initial_state(self.actuator, blocks, window.user_rad, window.speed_rad_s, window.play_rad, self.stack)
 
 
 def simulated(

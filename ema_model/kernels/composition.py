@@ -1,7 +1,8 @@
 """What a stack is made of: here a cascade, the reduced circuit and no effect.
 
 Each function is a *place* where an effect can act (see `ema_model.stacks.PLACES`).  `p` holds the rows of
-parameters, `i` the lane; effects read their own parameters from the rows behind the base model's.
+parameters, `s` those of the state, `i` the lane; effects read their own parameters from the rows behind the base
+model's, and their own states from row `first` on.
 """
 
 from __future__ import annotations
@@ -10,22 +11,90 @@ from ema_model.numba_options import scalar
 from ema_model.physics.controller import cascade_controller as control
 from ema_model.physics.drive import reduced_drive as advance_current
 
-__all__ = ["advance_current", "control", "electric_torque", "moving_friction", "shaft_torque"]
+__all__ = [
+    "advance_current",
+    "advance_states",
+    "back_emf",
+    "bus_voltage",
+    "control",
+    "current_reading",
+    "electric_torque",
+    "friction",
+    "inverse_inertia",
+    "moving_friction",
+    "position_reading",
+    "shaft_torque",
+    "user_position",
+    "winding_resistance",
+]
 
 
 @scalar
-def moving_friction(level, static, omega, motor_torque, load, p, i):
+def moving_friction(level, static, omega, motor_torque, load, gear, s, first, p, i):
     """Friction in motion, N·m, from its Coulomb level."""
     return level
 
 
 @scalar
-def electric_torque(torque, theta, omega, current, p, i):
+def friction(torque, omega, active, static, dynamic, s, first, p, i):
+    """Friction's torque, N·m, from that of Borello's law."""
+    return torque
+
+
+@scalar
+def electric_torque(torque, theta, omega, current, s, first, p, i):
     """The motor's torque, N·m, from what its windings develop."""
     return torque
 
 
 @scalar
-def shaft_torque(torque, theta, omega, current, user, gear, p, i):
+def shaft_torque(torque, theta, omega, current, user, gear, load, s, first, p, i):
     """Torque at the motor's shaft, friction apart, N·m, from that of motor, load and viscous drag."""
     return torque
+
+
+@scalar
+def back_emf(emf, omega, current, s, first, p, i):
+    """The voltage against the drive, V, of the equivalent winding or of a phase."""
+    return emf
+
+
+@scalar
+def winding_resistance(resistance, s, first, p, i):
+    """Resistance, Ω, of the equivalent winding or of a phase."""
+    return resistance
+
+
+@scalar
+def bus_voltage(volts, current, s, first, p, i):
+    """Voltage of the supply, V, under an equivalent current, A."""
+    return volts
+
+
+@scalar
+def inverse_inertia(inverse, s, first, p, i):
+    """1/J, 1/(kg·m²)."""
+    return inverse
+
+
+@scalar
+def user_position(user, theta, gear, s, first, p, i):
+    """Where the user stands, rad, from the rigid transmission's output."""
+    return user
+
+
+@scalar
+def position_reading(user, s, first, p, i):
+    """What the position sensor tells the controller, rad."""
+    return user
+
+
+@scalar
+def current_reading(current, s, first, p, i):
+    """What the recorded equivalent current is, A."""
+    return current
+
+
+@scalar
+def advance_states(dt, theta, omega, rigid, rigid_next, user_step, gear, load, active, static, dynamic, s, first, p, i):
+    """Advances the effects' own states in `s`."""

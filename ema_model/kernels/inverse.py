@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numba
+import numpy as np
 
 from ema_model.numba_options import parallel_kernel, scalar
 from ema_model.physics.elementary import clamp
@@ -16,13 +17,14 @@ from ema_model.physics.rows import (
     VISCOUS,
 )
 
-from .composition import electric_torque, moving_friction, shaft_torque
+from .composition import current_reading, electric_torque, inverse_inertia, moving_friction, shaft_torque
 
+_MOST_STATES = 16
 _ROUNDS = 4  # effects that depend on the current itself are found by substitution
 
 
 @scalar
-def needed_current(p, i, theta, omega, acceleration, load, still):
+def needed_current(s, p, i, theta, omega, acceleration, load, still):
     """I with T(I) = J dω/dt + C ω + τ T_load + T_f sgn ω − effects on the shaft, A (T 3.13 solved for the motor).
 
     Friction's sign goes over softly below the speed `still`, rad/s, under which the direction is not known.
@@ -32,24 +34,29 @@ def needed_current(p, i, theta, omega, acceleration, load, still):
     static = p[STATIC_FRICTION * LANES + i]
     dynamic = p[DYNAMIC_FRICTION * LANES + i]
     direction = clamp(omega / still, -1.0, 1.0)
-    base = acceleration / p[INVERSE_INERTIA * LANES + i] + p[VISCOUS * LANES + i] * omega + gear * load
+    base = (
+        acceleration / inverse_inertia(p[INVERSE_INERTIA * LANES + i], s, 0, p, i)
+        + p[VISCOUS * LANES + i] * omega
+        + gear * load
+    )
     current = base / constant
     for _ in range(_ROUNDS):
-        torque = electric_torque(constant * current, theta, omega, current, p, i)
-        friction = direction * moving_friction(dynamic, static, omega, torque, load, p, i)
-        required = base + friction - shaft_torque(0.0, theta, omega, current, gear * theta, gear, p, i)
+        torque = electric_torque(constant * current, theta, omega, current, s, 0, p, i)
+        resisting = direction * moving_friction(dynamic, static, omega, torque, load, gear, s, 0, p, i)
+        required = base + resisting - shaft_torque(0.0, theta, omega, current, gear * theta, gear, load, s, 0, p, i)
         current += (required - torque) / constant
-    return current
+    return current_reading(current, s, 0, p, i)
 
 
 @parallel_kernel
 def currents(parameters, theta, omega, acceleration, load, still, result):
     """The current of every sample for a population: parameters (blocks, rows·LANES), the motion (samples,) each.
 
-    result: (blocks, samples, LANES), A, written here.
+    result: (blocks, samples, LANES), A, written here.  Effects' own states stay at 0.
     """
     for block in numba.prange(parameters.shape[0]):
         p = parameters[block]
+        s = np.zeros(_MOST_STATES * LANES)
         for n in range(theta.size):
             for i in range(LANES):
-                result[block, n, i] = needed_current(p, i, theta[n], omega[n], acceleration[n], load[n], still)
+                result[block, n, i] = needed_current(s, p, i, theta[n], omega[n], acceleration[n], load[n], still)

@@ -10,9 +10,9 @@ import numba
 import numpy as np
 
 from ema_model.numba_options import parallel_kernel
-from ema_model.physics.rows import CURRENT, LANES, OMEGA, PLAY, THETA
+from ema_model.physics.rows import LANES, OMEGA, THETA
 
-from .monitor_step import advance
+from .monitor_step import advance, shown_current, shown_position
 
 
 @parallel_kernel
@@ -45,7 +45,7 @@ def squared_errors(
                 u = supply[step]
                 for i in range(LANES):
                     advance(s, p, i, c, t, u, dt)
-                    mean[i] += s[CURRENT * LANES + i]
+                    mean[i] += shown_current(s, p, i)
                 step += 1
             y = target[sample]
             w = weight[sample]
@@ -61,7 +61,7 @@ def traces(states, parameters, command, load, supply, period, group, dt, result)
     """Signals of a population over one run, each value the mean of `group` samples of `period` steps.
 
     result: (blocks, values, 4, LANES), written here; states: left as they are at the end.
-    A sample of the current is its mean over the period; one of motor speed, motor angle and output of the play
+    A sample of the current is its mean over the period; one of motor speed, motor angle and user position
     is taken at the period's end.
     """
     for block in numba.prange(states.shape[0]):
@@ -80,12 +80,12 @@ def traces(states, parameters, command, load, supply, period, group, dt, result)
                     u = supply[step]
                     for i in range(LANES):
                         advance(s, p, i, c, t, u, dt)
-                        total[i] += s[CURRENT * LANES + i]
+                        total[i] += shown_current(s, p, i)
                     step += 1
                 for i in range(LANES):
                     total[LANES + i] += s[OMEGA * LANES + i]
                     total[2 * LANES + i] += s[THETA * LANES + i]
-                    total[3 * LANES + i] += s[PLAY * LANES + i]
+                    total[3 * LANES + i] += shown_position(s, p, i)
             for i in range(LANES):
                 result[block, value, 0, i] = total[i] * of_steps
                 result[block, value, 1, i] = total[LANES + i] * of_group

@@ -8,6 +8,7 @@ from ema_model.physics.elementary import clamp, rotate
 from ema_model.physics.friction import advance_rotor, borello_friction
 from ema_model.physics.phases import flux_factor
 from ema_model.physics.rows import (
+    BUS_VOLTAGE,
     COS_ELECTRICAL,
     COS_ROTOR,
     CURRENT,
@@ -38,6 +39,7 @@ from ema_model.physics.rows import (
     SIN_ROTOR,
     SPEED_GAIN,
     SPEED_LIMIT,
+    STATE_ROWS,
     STATIC_FRICTION,
     STOP_HIGH,
     STOP_LOW,
@@ -45,10 +47,27 @@ from ema_model.physics.rows import (
     TORQUE_CONSTANT,
     TORQUE_LIMIT,
     VISCOUS,
-    VOLTAGE,
+    VOLTAGE_RATIO,
 )
 
-from .composition import advance_current, control, electric_torque, moving_friction, shaft_torque
+from .composition import (
+    advance_current,
+    advance_states,
+    back_emf,
+    bus_voltage,
+    control,
+    current_reading,
+    electric_torque,
+    friction,
+    inverse_inertia,
+    moving_friction,
+    position_reading,
+    shaft_torque,
+    user_position,
+    winding_resistance,
+)
+
+FIRST = len(STATE_ROWS)  # row of the effects' own states
 
 
 @scalar
@@ -64,11 +83,14 @@ def advance(s, p, i, command, load, supply, dt):
     cos_r = s[COS_ROTOR * LANES + i]
     sin_2e = s[SIN_ELECTRICAL * LANES + i]
     cos_2e = s[COS_ELECTRICAL * LANES + i]
-    user = p[GEAR_RATIO * LANES + i] * play
+    before = s[CURRENT * LANES + i]
+    gear = p[GEAR_RATIO * LANES + i]
+    rigid = gear * play
+    user = user_position(rigid, theta, gear, s, FIRST, p, i)
 
     demand = control(
         command,
-        user,
+        position_reading(user, s, FIRST, p, i),
         omega,
         p[POSITION_GAIN * LANES + i],
         p[SPEED_LIMIT * LANES + i],
@@ -94,38 +116,78 @@ def advance(s, p, i, command, load, supply, dt):
             p[FLUX_8 * LANES + i],
         ),
     )
+    bus = p[BUS_VOLTAGE * LANES + i]
     driven = advance_current(
-        s[CURRENT * LANES + i],
+        before,
         demand,
-        p[EMF_CONSTANT * LANES + i] * flux * omega,
-        p[VOLTAGE * LANES + i] * supply,
-        p[RESISTANCE * LANES + i],
+        back_emf(p[EMF_CONSTANT * LANES + i] * flux * omega, omega, before, s, FIRST, p, i),
+        p[VOLTAGE_RATIO * LANES + i] * bus_voltage(bus * supply, before, s, FIRST, p, i),
+        winding_resistance(p[RESISTANCE * LANES + i], s, FIRST, p, i),
         p[INVERSE_INDUCTANCE * LANES + i],
         dt,
     )
     current = driven if supply > 0.0 else 0.0
     limit = p[TORQUE_LIMIT * LANES + i]
     developed = p[TORQUE_CONSTANT * LANES + i] * flux * current
-    motor_torque = clamp(electric_torque(developed, theta, omega, current, p, i), -limit, limit)
+    motor_torque = clamp(electric_torque(developed, theta, omega, current, s, FIRST, p, i), -limit, limit)
 
-    gear = p[GEAR_RATIO * LANES + i]
     passive = motor_torque - gear * load - p[VISCOUS * LANES + i] * omega
-    active = shaft_torque(passive, theta, omega, current, user, gear, p, i)
+    active = shaft_torque(passive, theta, omega, current, user, gear, load, s, FIRST, p, i)
     static = p[STATIC_FRICTION * LANES + i]
-    dynamic = moving_friction(p[DYNAMIC_FRICTION * LANES + i], static, omega, motor_torque, load, p, i)
-    net = active - borello_friction(omega, active, static, dynamic)
+    dynamic = moving_friction(p[DYNAMIC_FRICTION * LANES + i], static, omega, motor_torque, load, gear, s, FIRST, p, i)
+    resisting = friction(
+        borello_friction(omega, active, static, dynamic), omega, active, static, dynamic, s, FIRST, p, i
+    )
     theta1, omega1 = advance_rotor(
-        theta, omega, net, p[INVERSE_INERTIA * LANES + i], p[STOP_LOW * LANES + i], p[STOP_HIGH * LANES + i], dt
+        theta,
+        omega,
+        active - resisting,
+        inverse_inertia(p[INVERSE_INERTIA * LANES + i], s, FIRST, p, i),
+        p[STOP_LOW * LANES + i],
+        p[STOP_HIGH * LANES + i],
+        dt,
     )
     turned = theta1 - theta
     sin_r1, cos_r1 = rotate(sin_r, cos_r, turned)
     sin_2e1, cos_2e1 = rotate(sin_2e, cos_2e, 2.0 * p[POLE_PAIRS * LANES + i] * turned)
+    play1 = advance_play(play, theta1, p[HALF_PLAY * LANES + i])
 
     s[THETA * LANES + i] = theta1
     s[OMEGA * LANES + i] = omega1
-    s[PLAY * LANES + i] = advance_play(play, theta1, p[HALF_PLAY * LANES + i])
+    s[PLAY * LANES + i] = play1
     s[SIN_ROTOR * LANES + i] = sin_r1
     s[COS_ROTOR * LANES + i] = cos_r1
     s[SIN_ELECTRICAL * LANES + i] = sin_2e1
     s[COS_ELECTRICAL * LANES + i] = cos_2e1
     s[CURRENT * LANES + i] = current
+    advance_states(
+        dt,
+        theta,
+        omega,
+        rigid,
+        gear * play1,
+        gear * (play1 - play),
+        gear,
+        load,
+        active,
+        static,
+        dynamic,
+        s,
+        FIRST,
+        p,
+        i,
+    )
+
+
+@scalar
+def shown_current(s, p, i):
+    """The equivalent current as its sensor shows it, A."""
+    return current_reading(s[CURRENT * LANES + i], s, FIRST, p, i)
+
+
+@scalar
+def shown_position(s, p, i):
+    """The user's position as its sensor shows it, rad."""
+    gear = p[GEAR_RATIO * LANES + i]
+    user = user_position(gear * s[PLAY * LANES + i], s[THETA * LANES + i], gear, s, FIRST, p, i)
+    return position_reading(user, s, FIRST, p, i)

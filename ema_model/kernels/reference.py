@@ -16,6 +16,7 @@ from ema_model.physics.phases import (
     winding_coefficients,
 )
 from ema_model.physics.rows import (
+    BUS_VOLTAGE,
     COS_ELECTRICAL,
     COS_ROTOR,
     CURRENT_A,
@@ -41,6 +42,7 @@ from ema_model.physics.rows import (
     PLAY,
     POLE_PAIRS,
     POSITION_GAIN,
+    REFERENCE_STATE_ROWS,
     RESISTANCE,
     SIN_ELECTRICAL,
     SIN_ROTOR,
@@ -56,10 +58,25 @@ from ema_model.physics.rows import (
     TURNS_B,
     TURNS_C,
     VISCOUS,
-    VOLTAGE,
+    VOLTAGE_RATIO,
 )
 
-from .composition import electric_torque, moving_friction, shaft_torque
+from .composition import (
+    advance_states,
+    back_emf,
+    bus_voltage,
+    current_reading,
+    electric_torque,
+    friction,
+    inverse_inertia,
+    moving_friction,
+    position_reading,
+    shaft_torque,
+    user_position,
+    winding_resistance,
+)
+
+FIRST = len(REFERENCE_STATE_ROWS)  # row of the effects' own states
 
 
 @kernel
@@ -69,7 +86,7 @@ def run(state, p, command, load, period, substeps, dt, result):
     command, load: a value per `substeps` steps of dt, linear between them (one more value than there are
     intervals); period: intervals per sample.
     result: (samples, 11), written here: equivalent current (mean over the sample's period), motor speed,
-    motor angle, output of the play (at its end), phase currents, motor torque and leg voltages (means).
+    motor angle, user position (at its end), phase currents, motor torque and leg voltages (means).
     """
     theta = state[THETA * LANES]
     omega = state[OMEGA * LANES]
@@ -89,7 +106,13 @@ def run(state, p, command, load, period, substeps, dt, result):
     tau = p[GEAR_RATIO * LANES]
     limit = p[OUTPUT_LIMIT * LANES]
     torque_limit = p[TORQUE_LIMIT * LANES]
-    voltage = p[VOLTAGE * LANES]
+    s = state.copy()
+    bus = p[BUS_VOLTAGE * LANES]
+    ratio = p[VOLTAGE_RATIO * LANES]
+    voltage = ratio * bus
+    inertia = inverse_inertia(p[INVERSE_INERTIA * LANES], s, FIRST, p, 0)
+    winding = winding_resistance(p[RESISTANCE * LANES], s, FIRST, p, 0)
+    q = 0.0
     band = p[HYSTERESIS * LANES]
     emf = p[EMF_CONSTANT * LANES]
     turns_a, turns_b, turns_c = p[TURNS_A * LANES], p[TURNS_B * LANES], p[TURNS_C * LANES]
@@ -98,9 +121,9 @@ def run(state, p, command, load, period, substeps, dt, result):
     inverse_b = p[INVERSE_INDUCTANCE * LANES] / (turns_b * turns_b)
     inverse_c = p[INVERSE_INDUCTANCE * LANES] / (turns_c * turns_c)
     star = 1.0 / (inverse_a + inverse_b + inverse_c)
-    resistance_a = p[RESISTANCE * LANES] * turns_a
-    resistance_b = p[RESISTANCE * LANES] * turns_b
-    resistance_c = p[RESISTANCE * LANES] * turns_c
+    resistance_a = winding * turns_a
+    resistance_b = winding * turns_b
+    resistance_c = winding * turns_c
     eccentricity = p[ECCENTRICITY * LANES]
     cos_phase, sin_phase = p[ECCENTRICITY_COS * LANES], p[ECCENTRICITY_SIN * LANES]
     static = p[STATIC_FRICTION * LANES]
@@ -117,9 +140,11 @@ def run(state, p, command, load, period, substeps, dt, result):
             load_step = (load[interval + 1] - user_load) / substeps
             interval += 1
             for _ in range(substeps):
-                user = tau * play
-                position_error = demand - user
-                omega_ref = speed_reference(demand, user, p[POSITION_GAIN * LANES], p[SPEED_LIMIT * LANES])
+                rigid = tau * play
+                user = user_position(rigid, theta, tau, s, FIRST, p, 0)
+                told = position_reading(user, s, FIRST, p, 0)
+                position_error = demand - told
+                omega_ref = speed_reference(demand, told, p[POSITION_GAIN * LANES], p[SPEED_LIMIT * LANES])
                 previous = speed_error
                 speed_error = omega_ref - omega
                 slope = 0.0 if first else (speed_error - previous) * rate
@@ -148,10 +173,14 @@ def run(state, p, command, load, period, substeps, dt, result):
                 leg_c = relay(leg_c, amplitude * sin_c - current_c, band)
 
                 gap_a, gap_b, gap_c = air_gap(sin_r, cos_r, eccentricity, cos_phase, sin_phase)
+                volts = ratio * bus_voltage(bus, q, s, FIRST, p, 0)
                 k_a, k_b, k_c = winding_coefficients(sin_e, cos_e, gap_a, gap_b, gap_c, turns_a, turns_b, turns_c)
-                drive_a = leg_a * voltage - resistance_a * current_a - emf * k_a * omega
-                drive_b = leg_b * voltage - resistance_b * current_b - emf * k_b * omega
-                drive_c = leg_c * voltage - resistance_c * current_c - emf * k_c * omega
+                against_a = back_emf(emf * k_a * omega, omega, current_a, s, FIRST, p, 0)
+                drive_a = leg_a * volts - resistance_a * current_a - against_a
+                against_b = back_emf(emf * k_b * omega, omega, current_b, s, FIRST, p, 0)
+                drive_b = leg_b * volts - resistance_b * current_b - against_b
+                against_c = back_emf(emf * k_c * omega, omega, current_c, s, FIRST, p, 0)
+                drive_c = leg_c * volts - resistance_c * current_c - against_c
                 neutral = star * (drive_a * inverse_a + drive_b * inverse_b + drive_c * inverse_c)
                 current_a += dt * inverse_a * (drive_a - neutral)
                 current_b += dt * inverse_b * (drive_b - neutral)
@@ -159,28 +188,61 @@ def run(state, p, command, load, period, substeps, dt, result):
 
                 q = equivalent_current(current_a, current_b, current_c, sin_e, cos_e)
                 developed = p[TORQUE_CONSTANT * LANES] * (k_a * current_a + k_b * current_b + k_c * current_c)
-                motor_torque = clamp(electric_torque(developed, theta, omega, q, p, 0), -torque_limit, torque_limit)
-                active = shaft_torque(
-                    motor_torque - tau * user_load - p[VISCOUS * LANES] * omega, theta, omega, q, user, tau, p, 0
+                motor_torque = clamp(
+                    electric_torque(developed, theta, omega, q, s, FIRST, p, 0), -torque_limit, torque_limit
                 )
-                dynamic = moving_friction(p[DYNAMIC_FRICTION * LANES], static, omega, motor_torque, user_load, p, 0)
-                net = active - borello_friction(omega, active, static, dynamic)
-                theta1, omega = advance_rotor(
+                active = shaft_torque(
+                    motor_torque - tau * user_load - p[VISCOUS * LANES] * omega,
                     theta,
                     omega,
-                    net,
-                    p[INVERSE_INERTIA * LANES],
+                    q,
+                    user,
+                    tau,
+                    user_load,
+                    s,
+                    FIRST,
+                    p,
+                    0,
+                )
+                dynamic = moving_friction(
+                    p[DYNAMIC_FRICTION * LANES], static, omega, motor_torque, user_load, tau, s, FIRST, p, 0
+                )
+                resisting = friction(
+                    borello_friction(omega, active, static, dynamic), omega, active, static, dynamic, s, FIRST, p, 0
+                )
+                theta1, omega1 = advance_rotor(
+                    theta,
+                    omega,
+                    active - resisting,
+                    inertia,
                     p[STOP_LOW * LANES],
                     p[STOP_HIGH * LANES],
                     dt,
                 )
                 turned = theta1 - theta
-                theta = theta1
                 sin_r, cos_r = rotate(sin_r, cos_r, turned)
                 sin_e, cos_e = rotate(sin_e, cos_e, p[POLE_PAIRS * LANES] * turned)
-                play = advance_play(play, theta, p[HALF_PLAY * LANES])
+                play1 = advance_play(play, theta1, p[HALF_PLAY * LANES])
+                advance_states(
+                    dt,
+                    theta,
+                    omega,
+                    rigid,
+                    tau * play1,
+                    tau * (play1 - play),
+                    tau,
+                    user_load,
+                    active,
+                    static,
+                    dynamic,
+                    s,
+                    FIRST,
+                    p,
+                    0,
+                )
+                theta, omega, play = theta1, omega1, play1
 
-                mean_q += q
+                mean_q += current_reading(q, s, FIRST, p, 0)
                 mean_a += current_a
                 mean_b += current_b
                 mean_c += current_c
@@ -193,7 +255,7 @@ def run(state, p, command, load, period, substeps, dt, result):
         result[sample, 0] = mean_q * scale
         result[sample, 1] = omega
         result[sample, 2] = theta
-        result[sample, 3] = play
+        result[sample, 3] = position_reading(user_position(tau * play, theta, tau, s, FIRST, p, 0), s, FIRST, p, 0)
         result[sample, 4] = mean_a * scale
         result[sample, 5] = mean_b * scale
         result[sample, 6] = mean_c * scale

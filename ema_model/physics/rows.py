@@ -19,7 +19,8 @@ PARAMETER_ROWS = (
     "current_per_torque",  # A/(N·m)
     "output_limit",  # of the controller: A, or for a voltage drive a share of the bus
     # inverter and motor
-    "voltage",  # V: half the bus for the RM's legs, the whole limit for the MM
+    "bus_voltage",  # V
+    "voltage_ratio",  # of the bus: ½ for the RM's legs, the equivalent winding's limit for the MM
     "hysteresis",  # A, half the band's width
     "resistance",  # Ω
     "inverse_inductance",  # 1/H
@@ -53,7 +54,8 @@ PARAMETER_ROWS = (
     INTEGRATOR_WINDOW,
     CURRENT_PER_TORQUE,
     OUTPUT_LIMIT,
-    VOLTAGE,
+    BUS_VOLTAGE,
+    VOLTAGE_RATIO,
     HYSTERESIS,
     RESISTANCE,
     INVERSE_INDUCTANCE,

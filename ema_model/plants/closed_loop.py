@@ -76,6 +76,7 @@ class ClosedLoop:
             window.user_rad + np.asarray(turned_rad) * tau,
             window.speed_rad_s,
             window.play_rad + np.asarray(play_rad),
+            self.stack,
         )
         lanes = np.empty((4, len(k), window.blocks))
         steps = window.steps_per_block
@@ -101,7 +102,7 @@ class ClosedLoop:
             "current_A": _each(sensors.current_gain) * lanes[0] + _each(sensors.current_bias_A),
             "motor_speed_rad_s": lanes[1],
             "motor_position_rad": lanes[2],
-            "user_position_rad": _each(tau) * lanes[3],
+            "user_position_rad": lanes[3],
         }
         late = _each(sensors.delay_s) - self.actuator.sensors.delay_s  # beyond what the window's command has
         if not np.any(late):

@@ -15,7 +15,7 @@ from typing import NoReturn
 from ema_model.errors import InputError
 from emaviz import __version__
 
-COMMANDS = ("gui", "simulate", "identify", "compare", "effects", "view")
+COMMANDS = ("gui", "simulate", "identify", "compare", "discover", "effects", "view")
 
 
 class _Parser(argparse.ArgumentParser):

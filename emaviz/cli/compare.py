@@ -18,14 +18,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of INTERFACES, with the signals to fit and the part to use."""
     parser.add_argument("files", nargs="+", metavar="FILE", help="recordings of one actuator, compared together")
     options.add_actuator(parser)
-    parser.add_argument(
-        "--map",
-        action="append",
-        default=[],
-        dest="mapping",
-        metavar="signal=column",
-        help="a column's meaning, with its unit where it is not SI: motor_speed_rad_s=speed[rpm]; repeat for more",
-    )
+    options.add_mapping(parser)
     parser.add_argument(
         "--calibrate", action=argparse.BooleanOptionalAction, default=True, help="fit the actuator within tolerances"
     )

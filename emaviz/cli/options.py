@@ -27,6 +27,18 @@ def add_faults(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_mapping(parser: argparse.ArgumentParser) -> None:
+    """--map, repeated"""
+    parser.add_argument(
+        "--map",
+        action="append",
+        default=[],
+        dest="mapping",
+        metavar="signal=column",
+        help="a column's meaning, with its unit where it is not SI: motor_speed_rad_s=speed[rpm]; repeat for more",
+    )
+
+
 def add_effects(parser: argparse.ArgumentParser) -> None:
     """--effect, repeated"""
     parser.add_argument(

@@ -1,0 +1,133 @@
+"""A model with some effects, fitted to the recordings; the floors are measured once."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ema_model.actuator import Actuator, Tolerance
+from ema_model.calibration import Calibration, Floor, calibrate, default_free, floor
+from ema_model.calibration.problem import Problem
+from ema_model.effects import find
+from ema_model.faults import HEALTHY
+from ema_model.measurement import Measurement
+from ema_model.plants import Plant, plant_for
+
+Array = NDArray[np.float64]
+
+_SHARE = 0.5  # 1 σ of an effect's parameter, of the value that its fingerprint suggests
+_ANGLE_SIGMA = 0.7  # rad
+
+
+@dataclass(frozen=True, eq=False)
+class Data:
+    """Recordings, the floors of their windows, and the signals to fit with their weights."""
+
+    measurements: Sequence[Measurement]
+    stretches: Sequence[list[slice] | None] | None
+    floors: Sequence[Floor]
+    signals: Mapping[str, float]
+
+    def plant(self, actuator: Actuator) -> Plant:
+        """The recordings beside this actuator's model."""
+        return plant_for(self.measurements, actuator, stretches=self.stretches)
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A calibrated model."""
+
+    actuator: Actuator  # as it went in: with effects, their suggested settings and tolerances
+    plant: Plant
+    calibration: Calibration
+    residual: Array  # (values,), over the floor
+    starts: dict[str, float]  # x by name
+
+    @property
+    def chi2(self) -> float:
+        """Of the signals over their floor, and the prior."""
+        return float(self.residual @ self.residual + self.calibration.x @ self.calibration.x)
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """The effects in the model."""
+        return tuple(self.actuator.effects)
+
+    def error(self) -> float:
+        """rms of the residual in units of the floor that fits are weighted by."""
+        return float(np.sqrt(np.mean(self.residual**2)))
+
+
+def gather(
+    measurements: Sequence[Measurement],
+    actuator: Actuator,
+    signals: Mapping[str, float],
+    stretches: Sequence[list[slice] | None] | None,
+) -> Data:
+    """The data with the floors of the bare model."""
+    plant = plant_for(measurements, actuator, stretches=stretches)
+    return Data(measurements, stretches, [floor(plant, window) for window in plant.windows], signals)
+
+
+def with_effect(actuator: Actuator, name: str, settings: Mapping[str, float]) -> Actuator:
+    """The actuator with an effect, its parameters free around these settings; whole numbers stay."""
+    effect = find(name)
+    tolerances = dict(actuator.tolerances)
+    full = effect.settings(dict(settings))
+    for parameter in effect.parameters:
+        if not parameter.integer:
+            value = full[parameter.name]
+            sigma = _ANGLE_SIGMA if parameter.name == "phase_rad" else _SHARE * abs(value)
+            sigma = sigma or _SHARE * abs(parameter.default) or 0.01 * (parameter.high - parameter.low)
+            tolerances[f"effects.{name}.{parameter.name}"] = Tolerance(sigma, True)
+    return replace(actuator, effects={**actuator.effects, name: full}, tolerances=tolerances)
+
+
+def without_effect(actuator: Actuator, name: str) -> Actuator:
+    """The actuator without one of its effects."""
+    kept = {path: one for path, one in actuator.tolerances.items() if not path.startswith(f"effects.{name}.")}
+    return replace(
+        actuator, effects={other: given for other, given in actuator.effects.items() if other != name}, tolerances=kept
+    )
+
+
+def fit(
+    data: Data, actuator: Actuator, start: Mapping[str, float] | None = None, tell: Callable[[str], None] | None = None
+) -> Fit:
+    """Calibrates the base parameters and those of the actuator's effects together."""
+    plant = data.plant(actuator)
+    calibration = calibrate(
+        plant,
+        data.floors,
+        free=default_free(actuator),
+        signals=data.signals,
+        start=start,
+        on_progress=None if tell is None else lambda evaluations: tell(f"fitting: {evaluations} simulations"),
+    )
+    problem = Problem(plant, data.floors, default_free(actuator), HEALTHY, data.signals)
+    residual = problem.residual(calibration.x)[: problem.values]
+    starts = {unknown.name: float(x) for unknown, x in zip(problem.unknowns, calibration.x)}
+    return Fit(actuator, plant, calibration, residual, starts)
+
+
+def holdout_error(data: Data, found: Fit) -> float:
+    """The same as `floor_ratio` on recordings that were not fitted; only their starts are."""
+    plant = data.plant(found.calibration.actuator)
+    calibration = calibrate(plant, data.floors, free=(), signals=data.signals)
+    ratio = floor_ratio(data, plant, calibration.signals)
+    return ratio if math.isfinite(ratio) else math.inf
+
+
+def floor_ratio(data: Data, plant: Plant, shown: Sequence[Mapping[str, Array]]) -> float:
+    """rms of measurement − model in units of the floor, pooled over windows and signals: 1 is the floor."""
+    parts = [
+        (signals[name] - window.measured[name]) / one.sigma(name)
+        for window, one, signals in zip(plant.windows, data.floors, shown)
+        for name in data.signals
+        if name in window.measured
+    ]
+    return float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))

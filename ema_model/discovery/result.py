@@ -1,0 +1,61 @@
+"""What a discovery finds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from ema_model.actuator import Actuator
+from ema_model.calibration import Calibrated, Calibration
+from ema_model.comparison.result import Explanation
+
+VERDICTS = ("effects_found", "adequate", "unknown_effect", "not_converged")
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One effect that might be missing, with its best settings so far."""
+
+    name: str
+    predicted_drop: float  # of χ², before any refit
+    settings: dict[str, float]
+    untestable_reason: str = ""
+    refitted_drop: float | None = None  # of χ², where it was refitted
+
+
+@dataclass(frozen=True)
+class Rung:
+    """One step of the error ladder, in units of the floor: 1 is the floor."""
+
+    label: str
+    rmse: float
+    holdout_rmse: float | None
+    signals: dict[str, float]  # rms by signal, in its unit
+
+
+@dataclass(frozen=True)
+class Added:
+    """An effect that was added."""
+
+    name: str
+    parameters: dict[str, Calibrated]
+    rmse_before: float
+    rmse_after: float
+    holdout_before: float | None
+    holdout_after: float | None
+    same_as: tuple[str, ...]  # effects that this recording cannot tell from it
+
+
+@dataclass(frozen=True, eq=False)
+class Discovery:
+    """The verdict, and all that led to it."""
+
+    verdict: str
+    calibration: Calibration  # of the last model
+    effects: Sequence[Added]
+    ladder: Sequence[Rung]
+    candidates: Sequence[Candidate]  # of the first search, best first
+    parameters_outside_tolerance: Sequence[str]
+    actuator: Actuator  # with the effects, as calibrated
+    unknown: Explanation | None = None
+    warnings: Sequence[str] = field(default_factory=tuple)

@@ -1,0 +1,74 @@
+"""The score test: how much of the error each fingerprint would take away, before any refit.
+
+A fingerprint counts only as far as the calibrated parameters, within their prior, cannot do the same.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ema_model.discovery.fingerprints import Fingerprint
+from ema_model.discovery.fitting import Fit
+from ema_model.discovery.result import Candidate
+from ema_model.effects import CATALOGUE
+
+Array = NDArray[np.float64]
+
+_LEAST_ENERGY = 25.0  # χ² of a strong case of the effect, below which these recordings cannot show it
+_AT_BOUND = 0.02
+
+
+def scored(found: Fit, prints: Sequence[Fingerprint]) -> list[Candidate]:
+    """A candidate for each effect, at the best of its variants, the most promising first."""
+    jacobian = _movable(found)
+    gram = jacobian.T @ jacobian + np.eye(jacobian.shape[1])
+    best: dict[str, Candidate] = {}
+    for one in prints:
+        candidate = _scored(found, one, jacobian, gram)
+        other = best.get(one.name)
+        if other is None or candidate.predicted_drop > other.predicted_drop:
+            best[one.name] = candidate
+    return sorted(best.values(), key=lambda candidate: -candidate.predicted_drop)
+
+
+def _movable(found: Fit) -> Array:
+    """∂residual/∂x of the parameters that do not stand at a bound, (values, unknowns)."""
+    low, high = found.calibration.room
+    free = np.minimum(-low, high) > _AT_BOUND
+    parts = [part[name] for part in found.calibration.weighted_sensitivities for name in part]
+    return np.concatenate(parts)[:, free] if parts else np.zeros((len(found.residual), 0))
+
+
+def _scored(found: Fit, one: Fingerprint, jacobian: Array, gram: Array) -> Candidate:
+    columns = one.columns
+    shared = jacobian.T @ columns
+    own = columns - jacobian @ np.linalg.solve(gram, shared)
+    energy = columns.T @ own
+    toward = -(own.T @ found.residual)  # the residual is model − measurement
+    effect = CATALOGUE[one.name]
+    first = effect.parameters[0]
+    strong = effect.severities[2] / one.settings[first.name]
+    reason = ""
+    if np.max(np.diag(energy)) * strong**2 < _LEAST_ENERGY:
+        reason = "these recordings cannot show it: what it would change is within the noise"
+    ridge = energy + 1e-9 * (np.trace(energy) + 1e-300) * np.eye(len(energy))
+    amounts = np.linalg.solve(ridge, toward)
+    settings = dict(one.settings)
+    if len(amounts) == 1:
+        amount = float(amounts[0])
+        low, high = first.low / settings[first.name], first.high / settings[first.name]
+        amount = float(np.clip(amount, low, high))
+        drop = float(2.0 * amount * toward[0] - amount**2 * energy[0, 0])
+        if first.low <= 0.0:  # otherwise the parameter is no amplitude
+            settings[first.name] *= amount
+        elif amount < 0.0:
+            drop = 0.0
+    else:
+        drop = float(toward @ amounts)
+        settings[first.name] = float(np.clip(settings[first.name] * math.hypot(*amounts), first.low, first.high))
+        settings["phase_rad"] = math.atan2(float(amounts[1]), float(amounts[0]))
+    return Candidate(one.name, 0.0 if reason else max(0.0, drop), settings, reason)

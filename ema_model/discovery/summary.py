@@ -1,0 +1,58 @@
+"""A discovery in plain numbers, as `emaviz discover --json` writes it."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from ema_model.comparison.summary import calibration_dict, parameter_dict, plain
+from ema_model.discovery.result import Added, Discovery
+
+
+def as_dict(found: Discovery) -> dict[str, Any]:
+    """Everything but the series, in numbers and texts that JSON can hold; unknown numbers are None."""
+    axes = found.actuator.axes
+    unknown = found.unknown
+    return plain(
+        {
+            "verdict": found.verdict,
+            "calibration": calibration_dict(found.calibration, axes),
+            "effects": [_added(one) for one in found.effects],
+            "ladder": [asdict(rung) for rung in found.ladder],
+            "candidates": [
+                {
+                    "name": one.name,
+                    "predicted_drop": one.predicted_drop,
+                    "tested": one.refitted_drop is not None,
+                    "refitted_drop": one.refitted_drop,
+                    "settings": one.settings,
+                    "untestable_reason": one.untestable_reason,
+                }
+                for one in found.candidates
+            ],
+            "parameters_outside_tolerance": [axes.path(name) for name in found.parameters_outside_tolerance],
+            "unknown": None
+            if unknown is None
+            else {
+                "variable": unknown.variable,
+                "modulator": unknown.modulator,
+                "r2": unknown.r2,
+                "curve": np.column_stack([unknown.centres, unknown.curve, unknown.error]).tolist(),
+            },
+            "warnings": list(found.warnings),
+        }
+    )
+
+
+def _added(one: Added) -> dict[str, Any]:
+    return {
+        "name": one.name,
+        "parameters": {name: parameter_dict(parameter) for name, parameter in one.parameters.items()},
+        "rmse_before": one.rmse_before,
+        "rmse_after": one.rmse_after,
+        "holdout_rmse_before": one.holdout_before,
+        "holdout_rmse_after": one.holdout_after,
+        "same_as": list(one.same_as),
+    }

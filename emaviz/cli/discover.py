@@ -1,0 +1,95 @@
+"""`emaviz discover`: which physical effects are missing, added one after another; the error ladder."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from ema_model.actuator import save_actuator
+from ema_model.discovery import Discovery, as_dict, discover
+from ema_model.effects import find
+from ema_model.recordings import read_recording
+from emaviz.cli import options, output
+
+HELP = "find the physical effects that the model lacks, and add them"
+_VERDICTS = {
+    "effects_found": "effects are missing, and have been added",
+    "adequate": "nothing is missing: what is left is noise and the model's own floor",
+    "unknown_effect": "something is missing that none of the known effects explains",
+    "not_converged": "the calibration has not converged; what looks like missing physics may be an unfinished fit",
+}
+_CURRENT_ONLY = ("current_A",)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options of INTERFACES, and where the improved model goes."""
+    parser.add_argument("files", nargs="+", metavar="FILE", help="recordings of one actuator, fitted together")
+    parser.add_argument(
+        "--holdout", action="append", default=[], metavar="FILE", help="not fitted, must improve; repeat for more"
+    )
+    options.add_actuator(parser)
+    options.add_mapping(parser)
+    parser.add_argument("--signals", choices=("current", "all"), default="all", help="what is fitted")
+    parser.add_argument("--max-effects", type=int, default=3, metavar="N", help="at most so many are added")
+    parser.add_argument("--seed", type=int, default=0, help="of all random numbers")
+    parser.add_argument("--save-actuator", metavar="FILE.toml", help="write the improved model as an actuator file")
+    parser.add_argument("--json", metavar="FILE", help="write the result there")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Reads, discovers, writes and prints."""
+    actuator = options.actuator_of(arguments)
+    for path, option in ((arguments.json, "--json"), (arguments.save_actuator, "--save-actuator")):
+        if path is not None:
+            output.check_target(Path(path), option)
+    progress = output.Progress()
+    try:
+        progress.show("reading")
+        fitted, held = (
+            [read_recording(file, actuator, arguments.mapping) for file in files]
+            for files in (arguments.files, arguments.holdout)
+        )
+        found = discover(
+            fitted,
+            actuator,
+            holdout=held,
+            signals=_CURRENT_ONLY if arguments.signals == "current" else None,
+            most_effects=arguments.max_effects,
+            on_progress=progress.show,
+        )
+    finally:
+        progress.done()
+    if arguments.save_actuator:
+        save_actuator(found.actuator, arguments.save_actuator)
+    output.write_json(arguments.json, as_dict(found), arguments.seed, output.configuration(arguments))
+    print(text(found))
+    return 0
+
+
+def text(found: Discovery) -> str:
+    """The answer as the terminal shows it: the verdict, the effects, the ladder, the candidates."""
+    lines = [f"{found.verdict}: {_VERDICTS[found.verdict]}"]
+    for one in found.effects:
+        effect = find(one.name)
+        lines += ["", f"{effect.title}: {effect.equation}"]
+        for name, parameter in one.parameters.items():
+            half = 0.5 * (parameter.interval90[1] - parameter.interval90[0])
+            lines.append(f"  {name:24}{parameter.value:12.4g} ± {half:.2g} {parameter.unit}")
+        if one.same_as:
+            lines.append(f"  these recordings cannot tell it from {', '.join(one.same_as)}")
+    lines += ["", f"{'error ladder':34}{'fitted':>10}{'held out':>10}   (1 is the floor)"]
+    for rung in found.ladder:
+        held = "" if rung.holdout_rmse is None else f"{rung.holdout_rmse:10.3f}"
+        lines.append(f"  {rung.label:32}{rung.rmse:10.3f}{held}")
+    if found.candidates:
+        lines += ["", f"{'candidates':34}{'predicted':>10}{'refitted':>10}   (fall of χ²)"]
+        for candidate in found.candidates:
+            drop = "" if candidate.refitted_drop is None else f"{candidate.refitted_drop:10.0f}"
+            why = f"   {candidate.untestable_reason}" if candidate.untestable_reason else ""
+            lines.append(f"  {candidate.name:32}{candidate.predicted_drop:10.0f}{drop:>10}{why}")
+    if found.parameters_outside_tolerance:
+        outside = ", ".join(found.actuator.axes.path(name) for name in found.parameters_outside_tolerance)
+        lines += ["", f"outside their tolerance: {outside}"]
+    if found.unknown is not None:
+        lines += ["", found.unknown.sentence]
+    return "\n".join(lines)

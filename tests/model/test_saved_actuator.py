@@ -1,0 +1,84 @@
+"""An actuator written to a file is read back the same, whatever its kind."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from ema_model.actuator import load_actuator, save_actuator
+from ema_model.errors import InputError
+
+SHIPPED = sorted((Path(__file__).parents[2] / "assets" / "actuators").glob("*.toml"))
+LINEAR = """
+name = "ball screw \\"3\\""
+[axes]
+user = "linear"
+[controller]
+kind = "position"
+gain_1_m = 50.0
+[inverter]
+kind = "current"
+current_limit_A = 5.0
+[motor]
+torque_constant_Nm_A = 0.1
+inertia_kgm2 = { value = 1e-4, tolerance = 0.1 }
+viscous_friction_Nms_rad = 0.0
+static_friction_Nm = 0.0
+dynamic_friction_Nm = 0.01
+[transmission]
+gear_ratio = 8e-4
+backlash_m = { value = 1e-5, tolerance = 0.2, free = false }
+[effects.hinge_moment]
+stiffness_N_m = 1000.0
+offset_N = { value = 0.0, sigma = 5.0 }
+"""
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
+def test_shipped_files_come_back(path, tmp_path):
+    actuator = load_actuator(path)
+    save_actuator(actuator, tmp_path / "again.toml")
+    assert load_actuator(tmp_path / "again.toml") == actuator
+
+
+def test_mixed_axes_and_effects_come_back(tmp_path):
+    (tmp_path / "screw.toml").write_text(LINEAR, encoding="utf-8")
+    actuator = load_actuator(tmp_path / "screw.toml")
+    assert actuator.transmission.backlash_rad == 1e-5 and actuator.effects["hinge_moment"]["stiffness_Nm_rad"] == 1000.0
+    save_actuator(actuator, tmp_path / "again.toml")
+    text = (tmp_path / "again.toml").read_text(encoding="utf-8")
+    assert "backlash_m" in text and "gain_1_m" in text and "stiffness_N_m" in text
+    assert load_actuator(tmp_path / "again.toml") == actuator
+
+
+def test_a_place_that_cannot_be_written_is_one_line(tmp_path):
+    with pytest.raises(InputError, match=r"must end in \.toml"):
+        save_actuator(load_actuator(), tmp_path / "a.txt")
+    with pytest.raises(InputError, match="cannot be written"):
+        save_actuator(load_actuator(), tmp_path / "none" / "a.toml")
+
+
+@pytest.mark.parametrize(
+    "change, says",
+    [
+        (('user = "linear"', 'user = "round"'), "[axes] user must be rotary or linear"),
+        (('kind = "position"', 'kind = "fuzzy"'), "[controller] kind must be cascade or position or unknown"),
+        (('kind = "current"', 'kind = "hysteresis"'), "a position controller needs"),
+        (("gain_1_m", "gain_1_rad"), "[controller] has no parameter 'gain_1_rad'"),
+        (("[effects.hinge_moment]", "[effects.rust]"), "[effects] no effect 'rust'"),
+        (("stiffness_N_m", "stiffness_Nm_rad"), "has no 'stiffness_Nm_rad'"),
+        (("stiffness_N_m = 1000.0", "stiffness_N_m = 1e9"), "is outside"),
+        (("[axes]", "[recordings]\nmapping = 3\n[axes]"), "mapping must be a list of texts"),
+        (("[axes]", "[[recordings.where]]\nset = {}\n[axes]"), "needs match"),
+        (("[axes]", '[[recordings.where]]\nmatch = "*"\nset = { "motor.colour" = 1 }\n[axes]'), "no parameter"),
+        (("[axes]", "[model]\nstep_s = 5\n[axes]"), "step_s must lie between"),
+    ],
+)
+def test_mistakes_are_one_clear_line(tmp_path, change, says):
+    path = tmp_path / "screw.toml"
+    assert change[0] in LINEAR
+    path.write_text(LINEAR.replace(*change), encoding="utf-8")
+    with pytest.raises(InputError) as error:
+        load_actuator(path)
+    assert says in str(error.value) and "\n" not in str(error.value)

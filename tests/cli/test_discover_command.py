@@ -1,0 +1,56 @@
+"""`emaviz discover`: the verdict, its JSON, the improved model, and one clear line for each mistake."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from ema_model.actuator import load_actuator
+from emaviz.cli import main
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory):
+    """Two recordings with hidden cogging: a sine to fit, a chirp to hold out."""
+    folder = tmp_path_factory.mktemp("rig")
+    common = ["--effect", "cogging_torque:amplitude_Nm=0.02,order=12", "--noise-current", "0.3", "--encoder-bits", "12"]
+    sine = ["--command", "sine", "--set", "amplitude_rad=0.03", "--set", "frequency_Hz=3", "--duration", "1"]
+    assert main(["simulate", *common, *sine, "--out", str(folder / "sine.csv")]) == 0
+    assert main(["simulate", *common, "--seed", "1", "--out", str(folder / "chirp.csv")]) == 0
+    return folder
+
+
+def test_effect_is_found_and_the_model_saved(rig, tmp_path, capsys):
+    out, better = tmp_path / "d.json", tmp_path / "better.toml"
+    held = ["--holdout", str(rig / "chirp.csv")]
+    arguments = [*held, "--json", str(out), "--save-actuator", str(better), "--max-effects", "1"]
+    assert main(["discover", str(rig / "sine.csv"), *arguments]) == 0
+    printed = capsys.readouterr().out
+    assert printed.startswith("effects_found") and "error ladder" in printed and "+ cogging_torque" in printed
+    result = json.loads(out.read_text())
+    assert result["schema"] == 1 and result["verdict"] == "effects_found"
+    assert [one["name"] for one in result["effects"]] == ["cogging_torque"]
+    assert result["ladder"][-1]["holdout_rmse"] < result["ladder"][0]["holdout_rmse"]
+    assert load_actuator(better).effects["cogging_torque"]["order"] == 12.0
+    assert main(["compare", str(rig / "chirp.csv"), "--actuator", str(better), "--json", str(out)]) == 0
+    assert json.loads(out.read_text())["adequate"] is True
+
+
+@pytest.mark.parametrize(
+    "arguments, says",
+    [
+        (["missing.csv"], "missing.csv: no such file"),
+        (["SINE", "--holdout", "missing.csv"], "missing.csv: no such file"),
+        (["SINE", "--signals", "some"], "--signals"),
+        (["SINE", "--max-effects", "many"], "--max-effects"),
+        (["SINE", "--save-actuator", "nowhere/a.toml"], "the folder nowhere does not exist"),
+        (["SINE", "--map", "x=y"], "no signal 'x'"),
+    ],
+)
+def test_each_mistake_is_one_clear_line(rig, tmp_path, monkeypatch, capsys, arguments, says):
+    monkeypatch.chdir(tmp_path)
+    given = [str(rig / "sine.csv") if argument == "SINE" else argument for argument in arguments]
+    assert main(["discover", *given]) == 2
+    said = capsys.readouterr().err
+    assert says in said and said.count("\n") == 1 and "Traceback" not in said

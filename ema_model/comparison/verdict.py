@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ema_model.actuator import Actuator
 from ema_model.calibration import Calibration
 from ema_model.calibration.floor import CORRELATED_S
-from ema_model.comparison.explain import explain
+from ema_model.comparison.explain import explain, used_blocks
 from ema_model.comparison.orders import Order, residual_orders
 from ema_model.comparison.regions import worst_regions
 from ema_model.comparison.residuals import Residuals
@@ -68,7 +68,7 @@ def judge(
         worst_regions=() if adequate else regions,
         adequate=adequate,
         sentences=sentences,
-        warnings=_warnings(residuals, calibration, actuator),
+        warnings=_warnings(residuals, primary, calibration, actuator),
     )
 
 
@@ -106,8 +106,13 @@ def _summary(name: str, error: SignalError, adequate: bool) -> str:
     return f"The {signal.title.lower()} is off by {size}, where noise and the model's own floor are {floor}."
 
 
-def _warnings(residuals: Residuals, calibration: Calibration | None, actuator: Actuator) -> list[str]:
+def _warnings(
+    residuals: Residuals, primary: str, calibration: Calibration | None, actuator: Actuator
+) -> list[str]:
     found = []
+    if used_blocks(residuals, primary) is None:
+        title = SIGNALS[primary].title.lower()
+        found.append(f"Of the {title} too little can be judged: the motor stands, or the drive is at its limits.")
     if calibration is not None:
         if not calibration.converged:
             found.append("The calibration has not converged: what looks like missing physics may be an unfinished fit.")

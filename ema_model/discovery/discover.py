@@ -34,9 +34,10 @@ Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 
 _REFITTED_SHARE, _MOST_REFITTED = 0.25, 6  # of the best score; of candidates
-_LEAST_BIC, _LEAST_FALL, _LEAST_T = 10.0, 0.01, 2.4
+_LEAST_BIC, _LEAST_FALL, _LEAST_HELD_FALL, _LEAST_T = 10.0, 0.01, 0.02, 2.4
 _TIE = 10.0  # of χ², within which rivals cannot be told apart
 _CORRELATED = 50  # values of a signal that may share their error
+_NOT_LOOKED_FOR = ("pendulum_load",)  # whoever has an arm on the shaft knows of it
 _ORDERS = 4  # of the residual's strongest, tried for periodic effects
 
 
@@ -74,12 +75,11 @@ def discover(
     tell("calibrating")
     base = current = fit(data, actuator, tell=tell)
     ladder = [_rung("calibrated", current, data, held)]
-    if not base.calibration.converged:
-        return _discovery("not_converged", base, (), ladder, (), None)
     added: list[Added] = []
     first: list[Candidate] = []
     left = _left(data, current)
-    while left.significant and len(added) < most_effects:
+    # Each round looks whether or not `_left` sees anything: a fingerprint knows better what to look for.
+    while len(added) < most_effects:
         tell("scoring the candidates")
         ranked = scored(current, fingerprints(data, current, names, left.orders))
         trials = _refitted(data, current, ranked, tell)
@@ -89,7 +89,9 @@ def discover(
             break
         best = accepted[0]
         ties = tuple(t.candidate.name for t in accepted[1:] if best.drop - t.drop < _TIE)
-        rung = _rung(f"+ {best.candidate.name}", best.fit, data, held)
+        path = CATALOGUE[best.candidate.name].duplicates
+        label = f"{actuator.axes.path(path)} outside its tolerance" if path else f"+ {best.candidate.name}"
+        rung = _rung(label, best.fit, data, held)
         added.append(_added(best, ladder[-1], rung, ties))
         ladder.append(rung)
         current = best.fit
@@ -97,6 +99,8 @@ def discover(
     current, added, ladder = _without_idle(data, held, current, added, ladder)
     unknown = left.explanation if left.significant else None
     verdict = "effects_found" if added else "unknown_effect" if unknown else "adequate"
+    if not added and not base.calibration.converged:
+        verdict = "not_converged"  # an unfinished fit looks exactly like missing physics
     return _discovery(verdict, current, added, ladder, first, unknown)
 
 
@@ -111,8 +115,8 @@ def _data(
 
 
 def _belongs(name: str) -> bool:
-    """Whether an effect is looked for: not one that the calibration's own parameters stand for."""
-    return not getattr(CATALOGUE[name], "duplicates", "")
+    """Whether an effect is looked for: not the rig's own arm."""
+    return name not in _NOT_LOOKED_FOR
 
 
 @dataclass(frozen=True)
@@ -174,7 +178,7 @@ def _pays(current: Fit, trial: _Trial, data: Data, held: Data | None) -> bool:
     sums = np.array([gain.sum() for gain in gains])
     if sums.sum() < _LEAST_T * np.std(sums, ddof=1) * np.sqrt(len(sums)):
         return False
-    return held is None or holdout_error(held, trial.fit) < holdout_error(held, current)
+    return held is None or holdout_error(held, trial.fit) < (1.0 - _LEAST_HELD_FALL) * holdout_error(held, current)
 
 
 def _without_idle(
@@ -228,8 +232,13 @@ def _discovery(
     unknown: Explanation | None,
 ) -> Discovery:
     calibration = found.calibration
+    stand_ins = [CATALOGUE[one.name].duplicates for one in added]
+    effects = [one for one, path in zip(added, stand_ins) if not path]
     outside = [name for name in calibration.outside_tolerance if not name.startswith("effects.")]
-    return Discovery(verdict, calibration, added, ladder, candidates, outside, calibration.actuator, unknown)
+    outside = list(dict.fromkeys([*(path for path in stand_ins if path), *outside]))
+    if verdict == "effects_found" and not effects:
+        verdict = "adequate"  # a parameter is outside its tolerance; no physics is missing
+    return Discovery(verdict, calibration, effects, ladder, candidates, outside, calibration.actuator, unknown)
 
 
 def settings_of(found: Discovery) -> Mapping[str, Mapping[str, float]]:

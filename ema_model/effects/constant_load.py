@@ -25,5 +25,6 @@ EFFECT = Effect(
     places=(shaft_torque,),
     shows="as a constant offset of the current",
     mistaken_for="current sensor bias",
+    duplicates="sensors.current_bias_A",
     is_load=True,
 )

@@ -41,6 +41,7 @@ class Effect:
     mistaken_for: str
     states: tuple[str, ...] = ()  # of its own, 0 at the start; `advance_states` takes their next values
     advance_states: Callable[..., Any] | None = None  # (*ema_model.stacks.ADVANCE, parameters, states) → new states
+    duplicates: str = ""  # path of the base parameter that does the same, e.g. "motor.inertia_kgm2"
     is_load: bool = False  # pulls at the user from outside, so that its torque counts as the load
     name: str = ""  # of the file; the catalogue fills it in
 

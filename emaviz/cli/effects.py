@@ -44,6 +44,7 @@ def explain(effect: Effect) -> str:
         "",
         f"Shows         {effect.shows}",
         f"Mistaken for  {effect.mistaken_for}",
+        *([f"Duplicates    {effect.duplicates}, which a calibration moves"] if effect.duplicates else []),
         f"Severities    {effect.parameters[0].name} = {severities}",
         f"Source        {effect.source}",
     ]
@@ -61,4 +62,5 @@ def _facts(effect: Effect) -> dict[str, Any]:
         "severities": effect.severities,
         "shows": effect.shows,
         "mistaken_for": effect.mistaken_for,
+        "duplicates": effect.duplicates,
     }

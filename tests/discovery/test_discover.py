@@ -109,3 +109,12 @@ def test_mixed_maps_and_runs_are_refused():
     with pytest.raises(InputError, match="static maps and runs"):
         discover([run, replace(run, side=SideFile(kind="map"))], ACTUATOR)
     assert np.isfinite(run["current_A"]).all()
+
+
+def test_parameter_outside_its_tolerance_is_no_missing_physics():
+    extra = {"motor.viscous_friction_Nms_rad": 1.5e-4}
+    recordings, unseen = (recorded(31, commands=commands, extra=extra) for commands in (COMMANDS, UNSEEN))
+    found = discover(recordings, ACTUATOR, holdout=unseen, candidates=(*NAMES, "viscous_friction"))
+    assert found.verdict == "adequate" and not found.effects
+    assert "motor.viscous_friction_Nms_rad" in found.parameters_outside_tolerance
+    assert found.ladder[-1].rmse < 1.1 < found.ladder[0].rmse

@@ -32,7 +32,7 @@ UNSEEN = [("sine", {"amplitude_rad": 0.02, "frequency_Hz": 5}, 0.5)]
 SHOWABLE = 25.0
 NEEDS_LOAD = ("gear_load_friction", "load_dependent_friction")
 HIDDEN = [
-    name for name, effect in CATALOGUE.items() if not getattr(effect, "duplicates", "") and name != "pendulum_load"
+    name for name, effect in CATALOGUE.items() if not effect.duplicates and name != "pendulum_load"
 ]
 
 

@@ -26,6 +26,9 @@ from ema_model.stacks import CIRCUITS, PLACES, find_stack
 PACKAGE = Path(ema_model.__file__ or "").parent if ema_model.__file__ else Path(stacks.__file__).parent
 ACTUATOR = load_actuator()
 RUN = Run(command("chirp"), 0.15, load_torque_Nm=5.0)
+SATURATING = Run(command("step"), 0.1)
+# Effects that show only where the voltage is at its limit.
+ELECTRIC = {"bus_voltage_sag", "dead_time", "winding_resistance"}
 MODELS = {"reference": simulate_reference, "monitor": simulate_monitor}
 SIGNALS = ("current_A", "motor_position_rad", "motor_speed_rad_s", "user_position_rad")
 
@@ -46,10 +49,11 @@ def assert_same(a, b, tolerance):
 @pytest.mark.parametrize("effect", SWITCHABLE)
 def test_effect_of_no_amplitude_is_no_effect(effect, model):
     first = CATALOGUE[effect].parameters[0].name
-    plain = MODELS[model](RUN, ACTUATOR)
-    off = MODELS[model](RUN, ACTUATOR, effects={effect: {first: 0.0}})
+    run = SATURATING if effect in ELECTRIC else RUN
+    plain = MODELS[model](run, ACTUATOR)
+    off = MODELS[model](run, ACTUATOR, effects={effect: {first: 0.0}})
     assert_same(off, plain, 1e-6)
-    on = MODELS[model](RUN, ACTUATOR, effects={effect: {first: CATALOGUE[effect].severities[2]}})
+    on = MODELS[model](run, ACTUATOR, effects={effect: {first: CATALOGUE[effect].severities[2]}})
     with pytest.raises(AssertionError):
         assert_same(on, plain, 1e-6)
 
@@ -107,7 +111,7 @@ def test_effects_act_at_known_places_with_the_right_arguments(effect):
     assert declared.places
     for function in declared.places:
         arguments = function.py_func.__code__.co_varnames[: function.py_func.__code__.co_argcount]
-        expected = len(PLACES[function.__name__]) + len(declared.parameters)
+        expected = len(PLACES[function.__name__]) + len(declared.parameters) + len(declared.states)
         assert len(arguments) == expected, f"{effect}.{function.__name__} takes {arguments}"
 
 

@@ -1,0 +1,31 @@
+"""Asymmetric friction: it takes more to slide one way than the other."""
+
+from __future__ import annotations
+
+from ema_model.effects.effect import Effect, Parameter
+from ema_model.numba_options import scalar
+from ema_model.physics.elementary import sign
+
+
+@scalar
+def moving_friction(level, static, omega, motor_torque, load, gear, ratio):
+    """T_d (1 + a sgn ω)."""
+    return level * (1.0 + ratio * sign(omega))
+
+
+EFFECT = Effect(
+    title="Asymmetric friction",
+    equation="T_f = T_d (1 + a sgn ω) sgn ω",
+    source="Armstrong-Hélouvry, Control of Machines with Friction, Kluwer 1991: friction by direction",
+    explanation=(
+        "Seals lie at a slant, teeth wear on one flank, a bearing is loaded to one side: friction one way is then "
+        "not that of the other. The mean of both is the base model's friction. Half the difference acts like a "
+        "constant torque as long as the motor moves, and goes away when it stands, which tells it from an offset "
+        "of the current's sensor."
+    ),
+    parameters=(Parameter("ratio", "share a more in positive motion, and less in negative", 0.12, -0.9, 0.9),),
+    severities=(0.06, 0.12, 0.25),
+    places=(moving_friction,),
+    shows="as an offset of the current in motion, in either direction alike",
+    mistaken_for="current sensor bias",
+)

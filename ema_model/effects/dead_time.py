@@ -1,0 +1,35 @@
+"""Dead time: the pause between the two switches of an inverter's leg costs voltage, against the current."""
+
+from __future__ import annotations
+
+from ema_model.effects.effect import Effect, Parameter
+from ema_model.numba_options import scalar
+from ema_model.physics.elementary import clamp
+
+_ZERO_A = 0.2  # current below which the pause costs less: a sign that jumps would chatter about zero
+
+
+@scalar
+def back_emf(emf, omega, current, voltage):
+    """+ V_dt sgn I."""
+    return emf + voltage * clamp(current * (1.0 / _ZERO_A), -1.0, 1.0)
+
+
+EFFECT = Effect(
+    title="Dead time",
+    equation="L dI/dt = V − R I − E − V_dt sgn I",
+    source="Jeong and Park, The analysis and compensation of dead-time effects in PWM inverters, IEEE Trans. Ind. "
+    "Electron. 38(2), 1991",
+    explanation=(
+        "The two switches of a leg must never conduct at once, so the inverter waits a microsecond or two between "
+        "them. In the pause the current flows on through a diode, always against the voltage that was wanted. The "
+        "loss depends on the current's direction only, and shows when the voltage is at its limit. The voltage "
+        "is that of the winding which it acts on: in the Reference Model a phase, in the Monitor Model the "
+        "equivalent winding, where the phases' square waves of V_dt add up to √2 (4/π) V_dt = 1.8 V_dt."
+    ),
+    parameters=(Parameter("voltage_V", "voltage V_dt lost in the winding", 1.0, 0.0, 10.0),),
+    severities=(0.5, 1.0, 2.0),
+    places=(back_emf,),
+    shows="in the current and the speed in saturating steps",
+    mistaken_for="winding resistance, bus voltage sag",
+)

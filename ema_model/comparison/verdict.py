@@ -106,9 +106,7 @@ def _summary(name: str, error: SignalError, adequate: bool) -> str:
     return f"The {signal.title.lower()} is off by {size}, where noise and the model's own floor are {floor}."
 
 
-def _warnings(
-    residuals: Residuals, primary: str, calibration: Calibration | None, actuator: Actuator
-) -> list[str]:
+def _warnings(residuals: Residuals, primary: str, calibration: Calibration | None, actuator: Actuator) -> list[str]:
     found = []
     if used_blocks(residuals, primary) is None:
         title = SIGNALS[primary].title.lower()

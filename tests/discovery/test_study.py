@@ -31,9 +31,7 @@ COMMANDS = [("chirp", {}, 0.5), ("step", {"final_rad": 0.005}, 0.5), SINE]
 UNSEEN = [("sine", {"amplitude_rad": 0.02, "frequency_Hz": 5}, 0.5)]
 SHOWABLE = 25.0
 NEEDS_LOAD = ("gear_load_friction", "load_dependent_friction")
-HIDDEN = [
-    name for name, effect in CATALOGUE.items() if not effect.duplicates and name != "pendulum_load"
-]
+HIDDEN = [name for name, effect in CATALOGUE.items() if not effect.duplicates and name != "pendulum_load"]
 
 
 COLUMNS = {"first": 8, "exact": 8, "wrong": 8, "abstained": 11, "showable": 13}

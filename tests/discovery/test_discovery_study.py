@@ -1,6 +1,6 @@
 """The study of discovery: what is named, for every effect of the library, and what is not there.
 
-    pytest -m study -s tests/discovery/test_study.py
+    pytest -m study -s tests/discovery/test_discovery_study.py
 
 Resumable: each case's answer is a line of study.jsonl in EMAVIZ_STUDY (a folder; a temporary one without it), and
 is not computed again.  EMAVIZ_STUDY_SEEDS says how many seeds (5).

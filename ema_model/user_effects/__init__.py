@@ -1,9 +1,0 @@
-"""Effects that the user makes: a torque from an expression, or from a curve."""
-
-from __future__ import annotations
-
-from ema_model.user_effects.curve import torque_curve
-from ema_model.user_effects.expression import Expression, parse
-from ema_model.user_effects.torque import user_torque
-
-__all__ = ["Expression", "parse", "torque_curve", "user_torque"]

@@ -210,7 +210,7 @@ def _rung(label: str, found: Fit, data: Data, held: Data | None) -> Rung:
                 signals.setdefault(name, []).append(shown[name] - window.measured[name])
     rms = {name: float(np.sqrt(np.mean(np.concatenate(parts) ** 2))) for name, parts in signals.items()}
     ratio = floor_ratio(data, found.plant, found.calibration.signals)
-    return Rung(label, ratio, None if held is None else holdout_error(held, found), rms)
+    return Rung(label, ratio, None if held is None else holdout_error(held, found), rms, found.calibration.signals)
 
 
 def _added(trial: _Trial, before: Rung, after: Rung, ties: tuple[str, ...]) -> Added:
@@ -238,7 +238,7 @@ def _discovery(
     outside = list(dict.fromkeys([*(path for path in stand_ins if path), *outside]))
     if verdict == "effects_found" and not effects:
         verdict = "adequate"  # a parameter is outside its tolerance; no physics is missing
-    return Discovery(verdict, calibration, effects, ladder, candidates, outside, calibration.actuator, unknown)
+    return Discovery(verdict, calibration, effects, ladder, candidates, outside, calibration.actuator, found.plant, unknown)
 
 
 def settings_of(found: Discovery) -> Mapping[str, Mapping[str, float]]:

@@ -5,9 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ema_model.actuator import Actuator
 from ema_model.calibration import Calibrated, Calibration
 from ema_model.comparison.result import Explanation
+from ema_model.plants import Plant
+
+Array = NDArray[np.float64]
 
 VERDICTS = ("effects_found", "adequate", "unknown_effect", "not_converged")
 
@@ -31,6 +37,7 @@ class Rung:
     rmse: float
     holdout_rmse: float | None
     signals: dict[str, float]  # rms by signal, in its unit
+    signals_per_window: Sequence[dict[str, Array]]  # the fitted model's, (blocks,) each
 
 
 @dataclass(frozen=True)
@@ -57,5 +64,6 @@ class Discovery:
     candidates: Sequence[Candidate]  # of the first search, best first
     parameters_outside_tolerance: Sequence[str]
     actuator: Actuator  # with the effects, as calibrated
+    plant: Plant  # the recordings as they were fitted: windows with their blocks
     unknown: Explanation | None = None
     warnings: Sequence[str] = field(default_factory=tuple)

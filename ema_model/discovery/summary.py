@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from ema_model.comparison.summary import calibration_dict, parameter_dict, plain
-from ema_model.discovery.result import Added, Discovery
+from ema_model.discovery.result import Added, Discovery, Rung
 
 
 def as_dict(found: Discovery) -> dict[str, Any]:
@@ -20,7 +19,7 @@ def as_dict(found: Discovery) -> dict[str, Any]:
             "verdict": found.verdict,
             "calibration": calibration_dict(found.calibration, axes),
             "effects": [_added(one) for one in found.effects],
-            "ladder": [asdict(rung) for rung in found.ladder],
+            "ladder": [_rung(rung) for rung in found.ladder],
             "candidates": [
                 {
                     "name": one.name,
@@ -44,6 +43,10 @@ def as_dict(found: Discovery) -> dict[str, Any]:
             "warnings": list(found.warnings),
         }
     )
+
+
+def _rung(one: Rung) -> dict[str, Any]:
+    return {"label": one.label, "rmse": one.rmse, "holdout_rmse": one.holdout_rmse, "signals": one.signals}
 
 
 def _added(one: Added) -> dict[str, Any]:

@@ -110,16 +110,8 @@ def calibrate(
     """
     chosen = default_free(plant.actuator) if free is None else tuple(free)
     problem = Problem(plant, floors, chosen, k, signals or dict.fromkeys(SIGNALS, 1.0))
-    evaluations = 0
-
-    def residual(x: Array) -> Array:
-        nonlocal evaluations
-        evaluations += 1
-        if on_progress is not None:
-            on_progress(evaluations)
-        return problem.residual(x)
-
-    fit = _Search(problem, residual).solve(start)
+    search = _Search(problem, on_progress)
+    fit = search.solve(start)
     x = fit.x
     chi2 = fit.chi2
     covariance = np.linalg.inv(fit.jacobian.T @ fit.jacobian) * max(1.0, chi2)
@@ -142,7 +134,7 @@ def calibrate(
         weighted_sensitivities=problem.split(fit.jacobian, weighted=True),
         x=x,
         room=(problem.bounds[0] - x, problem.bounds[1] - x),
-        evaluations=evaluations,
+        evaluations=search.evaluations,
         confounded=_confounded(problem.unknowns, covariance),
         free=chosen,
     )
@@ -160,16 +152,31 @@ class _Found:
 class _Search:
     """Least squares from several starts, until the two best agree."""
 
-    def __init__(self, problem: Problem, residual: Callable[[Array], Array]) -> None:
+    def __init__(self, problem: Problem, on_progress: Callable[[int], None] | None) -> None:
         self.problem = problem
-        self.residual = residual
+        self.on_progress = on_progress
+        self.evaluations = 0
+        self._at, self._jacobian = np.zeros(0), np.zeros((0, 0))  # of the last evaluation
+
+    def residual(self, x: Array) -> Array:
+        """Also keeps the Jacobian there, which an accepted step asks for next."""
+        self.evaluations += 1
+        if self.on_progress is not None:
+            self.on_progress(self.evaluations)
+        residual, self._jacobian = self.problem.linearised(x)
+        self._at = x.copy()
+        return residual
+
+    def jacobian(self, x: Array) -> Array:
+        """∂residual/∂x."""
+        return self._jacobian if np.array_equal(x, self._at) else self.problem.jacobian(x)
 
     def solve(self, start: Mapping[str, float] | None) -> _Found:
         """The best fit; where the model misses by far, one in which large errors count less."""
         count = len(self.problem.unknowns)
         if not count:
             fun = self.problem.residual(np.zeros(0))
-            return _Found(np.zeros(0), np.zeros((0, 0)), float(fun @ fun) / self.problem.values, 0.0, True)
+            return _Found(np.zeros(0), np.zeros((len(fun), 0)), float(fun @ fun) / self.problem.values, 0.0, True)
         if start is not None:
             known = np.array([start.get(u.name, 0.0) for u in self.problem.unknowns])
             return self._from([known], 1.0, "linear")
@@ -190,11 +197,11 @@ class _Search:
                 least_squares(
                     self.residual,
                     np.clip(start, 0.98 * least, 0.98 * greatest),
-                    jac=self.problem.jacobian,  # pyright: ignore[reportArgumentType]
+                    jac=self.jacobian,  # pyright: ignore[reportArgumentType]
                     bounds=(least, greatest),
                     max_nfev=_LONGEST,
-                    xtol=1e-6,
-                    ftol=1e-6,
+                    xtol=1e-4,
+                    ftol=5e-5,
                     loss=loss,
                     f_scale=scale,
                     tr_solver="lsmr",  # the default's singular values of the long Jacobian cost more than all else
@@ -206,9 +213,9 @@ class _Search:
                 break
         best = fits[0]
         agree = len(starts) == 1 or fits[1].cost < 1.01 * best.cost + 2.0
-        fun, x = self.problem.residual(best.x), best.x
+        x = best.x
+        fun, jacobian = self.problem.linearised(x)  # the fit's own are weighted by its loss
         chi2 = float(fun @ fun - x @ x) / self.problem.values
-        jacobian = self.problem.jacobian(x)  # the fit's own is weighted by its loss
         return _Found(x, jacobian, chi2, float(best.cost), bool(best.status > 0 and agree))
 
 

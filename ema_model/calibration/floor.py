@@ -2,17 +2,18 @@
 
 Two parts, for each signal and block: the sensors' noise, estimated from the recording itself, and the model
 floor, how far the Monitor Model is from its three-phase twin under the same command (MODEL §2).  The twin
-differs most in transients, so its floor is local: the rms within 12.5 ms on either side.
+differs most in transients, so its floor is local: the rms within 12.5 ms on either side.  Where the motor stands,
+friction holds it at any place in a band, and the model's error there is one error, however long it stands.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.ndimage import uniform_filter1d
+from scipy.ndimage import label, maximum_filter1d, minimum_filter1d, uniform_filter1d
 
 from ema_model.actuator import Actuator
 from ema_model.commands import Recorded
@@ -24,6 +25,8 @@ from ema_model.simulation import Run, simulate_reference
 Array = NDArray[np.float64]
 
 CORRELATED_S = 0.025  # how long the model's error, and a sensor's inaccuracy, stay alike
+_STILL = 8.0  # of a position's noise, within which it stands
+_POSITIONS = ("motor_position_rad", "user_position_rad")
 _SIGNALS = ("current_A", "motor_speed_rad_s", "motor_position_rad", "user_position_rad", "motor_torque_Nm")
 
 
@@ -32,7 +35,8 @@ class Floor:
     """Standard deviations per block of one window, by signal, in the signals' units."""
 
     noise: dict[str, float]  # white
-    model: dict[str, Array]  # (blocks,), alike over `CORRELATED_S`
+    model: dict[str, Array]  # (blocks,)
+    repeats: Array  # (blocks,), over how many blocks the model's error stays alike
     block_s: float
 
     def sigma(self, signal: str) -> Array:
@@ -41,8 +45,16 @@ class Floor:
 
     def fit_sigma(self, signal: str) -> Array:
         """What to weight a fit by: the correlated part counts as often as it repeats, (blocks,)."""
-        repeats = max(1.0, CORRELATED_S / self.block_s)
-        return np.hypot(self.noise[signal], np.sqrt(repeats) * self.model[signal])
+        return np.hypot(self.noise[signal], np.sqrt(self.repeats) * self.model[signal])
+
+    @property
+    def counts(self) -> Array:
+        """How much each block counts in a mean over time, (blocks,): 25 ms of motion as much as a whole standstill."""
+        return np.min(self.repeats) / self.repeats
+
+    def beside(self, other: Floor) -> Floor:
+        """The greater model floor of two, block by block."""
+        return replace(self, model={name: np.maximum(self.model[name], other.model[name]) for name in self.model})
 
     def rms(self, signal: str) -> float:
         """Both together over the whole window."""
@@ -74,7 +86,7 @@ def floor(
         assert isinstance(plant, ClosedLoop)
         model = _twins(plant, window, k, names)
     slow = {name: np.hypot(model[name], known[name].get("accuracy", 0.0)) for name in names}
-    return Floor(noise, slow, window.block_s)
+    return Floor(noise, slow, _repeats(window, noise), window.block_s)
 
 
 def twin_error(plant: ClosedLoop, window: Window, actuator: Actuator, k: ArrayLike = HEALTHY) -> dict[str, Array]:
@@ -108,7 +120,23 @@ def _twins(plant: ClosedLoop, window: Window, k: ArrayLike, names: list[str]) ->
         return {name: np.zeros(window.blocks) for name in names}
     width = max(3, round(CORRELATED_S / window.block_s) | 1)
     error = twin_error(plant, window, plant.actuator, k)
-    return {name: np.sqrt(uniform_filter1d(error[name] ** 2, width, mode="nearest")) for name in names}
+    return {name: np.sqrt(np.maximum(uniform_filter1d(error[name] ** 2, width, mode="nearest"), 0.0)) for name in names}
+
+
+def _repeats(window: Window | Stretch, noise: Mapping[str, float]) -> Array:
+    """Blocks over which the model's error stays alike: 25 ms, or as long as the motor stands, (blocks,)."""
+    repeats = np.full(window.blocks, max(1.0, CORRELATED_S / window.block_s))
+    name = next((name for name in _POSITIONS if name in window.measured), None)
+    width = round(CORRELATED_S / window.block_s)
+    if name is None or width < 2:
+        return repeats
+    position = window.measured[name]
+    moved = maximum_filter1d(position, width) - minimum_filter1d(position, width)
+    stands, count = label(moved < _STILL * noise[name])
+    for i in range(1, count + 1):
+        standing = stands == i
+        repeats[standing] = np.maximum(repeats[standing], np.count_nonzero(standing))
+    return repeats
 
 
 def _of_runs(measurement: Measurement, name: str) -> float:

@@ -82,14 +82,18 @@ class Problem:
 
     def jacobian(self, x: Array) -> Array:
         """∂residual/∂x, (values + unknowns, unknowns), by central differences in one population."""
+        return self.linearised(x)[1]
+
+    def linearised(self, x: Array) -> tuple[Array, Array]:
+        """Residual and Jacobian in one population: together they cost little more than the residual alone."""
         n = len(x)
-        points = np.repeat(x[None, :], 2 * n, axis=0)
+        points = np.repeat(x[None, :], 2 * n + 1, axis=0)
         least, greatest = self.bounds
         low, high = np.clip(x - _STEP, least, greatest), np.clip(x + _STEP, least, greatest)
         points[np.arange(n), np.arange(n)] = low
         points[n + np.arange(n), np.arange(n)] = high
         residuals = self._residuals(points)
-        return ((residuals[n:] - residuals[:n]) / (high - low)[:, None]).T
+        return residuals[2 * n], ((residuals[n : 2 * n] - residuals[:n]) / (high - low)[:, None]).T
 
     def split(self, jacobian: Array, *, weighted: bool = False) -> list[dict[str, Array]]:
         """A Jacobian per window and signal, in the signals' own units unless weighted: (blocks, unknowns) each."""

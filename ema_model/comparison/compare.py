@@ -197,6 +197,7 @@ def _typical_floor(floors: list[Floor], blocks: int) -> Floor:
         model={
             name: np.full(blocks, np.sqrt(np.mean([np.mean(one.model[name] ** 2) for one in floors]))) for name in names
         },
+        repeats=np.full(blocks, np.median([np.median(one.repeats) for one in floors])),
         block_s=floors[0].block_s,
     )
 

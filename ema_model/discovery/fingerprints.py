@@ -1,7 +1,8 @@
 """Fingerprints: what each effect would change in the signals, for all of them in one population.
 
-Effects that can be switched off by their first parameter share one stack, in which every lane has one of them
-on; the others get stacks of their own.
+Effects that can be switched off by their first parameter share one stack, that of the whole library, in which every
+lane has one of them on: it is compiled once and serves whatever the model already holds.  The others need stacks of
+their own, and keep their first fingerprints while effects are added beside them.
 """
 
 from __future__ import annotations
@@ -14,12 +15,14 @@ from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.discovery.fitting import Data, Fit
-from ema_model.effects import CATALOGUE, Effect
+from ema_model.effects import CATALOGUE, Effect, find
 from ema_model.faults import HEALTHY
 
 Array = NDArray[np.float64]
+Lane = tuple[Effect, dict[str, float]]
 
-_TOGETHER = 6  # effects in one stack
+_FAR = 30.0  # times what there is to explain
+_ATTEMPTS = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,13 +60,20 @@ def variants(effect: Effect, orders: Sequence[int]) -> list[list[dict[str, float
     return [[{first: severity}] for severity in effect.severities]
 
 
-def fingerprints(data: Data, found: Fit, names: Iterable[str], orders: Sequence[int]) -> list[Fingerprint]:
-    """Those of all effects that are not yet in the model, at the model's calibrated parameters."""
-    wanted = [CATALOGUE[name] for name in names if name not in found.effects]
-    shared = [effect for effect in wanted if off(effect) is not None]
+def fingerprints(
+    data: Data, found: Fit, names: Iterable[str], orders: Sequence[int], earlier: Sequence[Fingerprint] = ()
+) -> list[Fingerprint]:
+    """Those of all effects that are not yet in the model, at the model's calibrated parameters.
+
+    earlier: those of a model with fewer effects.
+    """
+    wanted = [find(name) for name in names if name not in found.effects]
     alone = [effect for effect in wanted if off(effect) is None]
-    groups = [shared[i : i + _TOGETHER] for i in range(0, len(shared), _TOGETHER)] + [[effect] for effect in alone]
-    return [print_ for group in groups for print_ in _of_group(data, found, group, orders)]
+    prints = _of_group(data, found, [effect for effect in wanted if off(effect) is not None], orders)
+    for effect in alone:
+        known = [one for one in earlier if one.name == effect.name]
+        prints += known or _of_group(data, found, [effect], orders)
+    return prints
 
 
 def _of_group(data: Data, found: Fit, effects: list[Effect], orders: Sequence[int]) -> list[Fingerprint]:
@@ -71,23 +81,40 @@ def _of_group(data: Data, found: Fit, effects: list[Effect], orders: Sequence[in
     lanes = [(effect, one) for effect, settings in tried for one in settings]
     if not lanes:
         return []
+    switchable = off(effects[0]) is not None
+    for attempt in range(_ATTEMPTS):
+        change = _changes(data, found, lanes, switchable)
+        if attempt == _ATTEMPTS - 1:
+            break
+        size = np.sqrt(np.mean(change**2, axis=1))
+        gentle = [_gentler(effect, one, s, found.error()) for (effect, one), s in zip(lanes, size)]
+        if all(new is None for new in gentle):
+            break
+        lanes = [(effect, new or one) for (effect, one), new in zip(lanes, gentle)]
+    prints, lane = [], 0
+    for effect, settings in tried:
+        columns = np.nan_to_num(change[lane : lane + len(settings)]).T
+        prints.append(Fingerprint(effect.name, dict(lanes[lane][1]), columns))
+        lane += len(settings)
+    return prints
+
+
+def _changes(data: Data, found: Fit, lanes: list[Lane], switchable: bool) -> Array:
+    """What each lane's effect changes, over the floor: (lanes, values)."""
     actuator: Actuator = found.calibration.actuator
-    resting = {effect.name: effect.settings({}) for effect in effects}
-    for effect in effects:
-        neutral = off(effect)
-        if neutral is not None:
-            resting[effect.name] = {**resting[effect.name], effect.parameters[0].name: neutral}
+    effects = {effect.name: effect for effect, _ in lanes}
+    resting = {name: effect.settings({}) for name, effect in effects.items()}
+    if switchable:
+        resting = {**{name: _switched_off(effect) for name, effect in effects.items()}, **_library_off()}
+    resting |= actuator.effects
     varied = {
-        **actuator.effects,
-        **{
-            name: {parameter: np.full(len(lanes) + 1, value) for parameter, value in values.items()}
-            for name, values in resting.items()
-        },
+        name: {parameter: np.full(len(lanes) + 1, value) for parameter, value in values.items()}
+        for name, values in resting.items()
     }
     for lane, (effect, settings) in enumerate(lanes, 1):
         for parameter, value in effect.settings(settings).items():
             varied[effect.name][parameter][lane] = value
-    plant = data.plant(replace(actuator, effects={**actuator.effects, **resting}))
+    plant = data.plant(replace(actuator, effects=resting))
     model = replace(actuator, effects=varied)
     k = np.tile(np.asarray(HEALTHY, float), (len(lanes) + 1, 1))
     parts = []
@@ -99,15 +126,27 @@ def _of_group(data: Data, found: Fit, effects: list[Effect], orders: Sequence[in
             shown[name] * (data.signals[name] / one.fit_sigma(name)) for name in data.signals if name in window.measured
         ]
     signals = np.concatenate(parts, axis=1)
-    if off(effects[0]) is None:
-        signals[0] = _resting(data, found)
-    change = np.nan_to_num(signals[1:] - signals[0])
-    prints, lane = [], 0
-    for effect, settings in tried:
-        columns = change[lane : lane + len(settings)].T
-        lane += len(settings)
-        prints.append(Fingerprint(effect.name, settings[0], columns))
-    return prints
+    return signals[1:] - (signals[0] if switchable else _resting(data, found))
+
+
+def _gentler(effect: Effect, settings: dict[str, float], size: float, error: float) -> dict[str, float] | None:
+    """Settings that change about as much as there is to explain, where these change far more (another actuator's)."""
+    first = effect.parameters[0]
+    if size <= _FAR * max(1.0, error) or first.low > 0.0:
+        return None
+    share = 2.0 * max(1.0, error) / size if np.isfinite(size) else 1e-3
+    return {**settings, first.name: max(share, 1e-4) * settings[first.name]}
+
+
+def _switched_off(effect: Effect) -> dict[str, float]:
+    neutral = off(effect)
+    assert neutral is not None
+    return {**effect.settings({}), effect.parameters[0].name: neutral}
+
+
+def _library_off() -> dict[str, dict[str, float]]:
+    """Every effect that can be switched off, switched off."""
+    return {name: _switched_off(effect) for name, effect in CATALOGUE.items() if off(effect) is not None}
 
 
 def _resting(data: Data, found: Fit) -> Array:

@@ -36,6 +36,12 @@ class Data:
         """The recordings beside this actuator's model."""
         return plant_for(self.measurements, actuator, stretches=self.stretches)
 
+    def beside(self, found: Fit) -> Data:
+        """The data with the model's floor at a calibrated model as well, where that is greater."""
+        plant = self.plant(found.calibration.actuator)
+        again = [floor(plant, window) for window in plant.windows]
+        return replace(self, floors=[one.beside(other) for one, other in zip(self.floors, again)])
+
 
 @dataclass(frozen=True, eq=False)
 class Fit:
@@ -116,18 +122,37 @@ def fit(
 
 def holdout_error(data: Data, found: Fit) -> float:
     """The same as `floor_ratio` on recordings that were not fitted; only their starts are."""
+    return holdout_fit(data, found)[0]
+
+
+def holdout_fit(data: Data, found: Fit) -> tuple[float, dict[str, float]]:
+    """`floor_ratio` of recordings that were not fitted, and `rms_by_signal`; only their starts are fitted."""
     plant = data.plant(found.calibration.actuator)
     calibration = calibrate(plant, data.floors, free=(), signals=data.signals)
     ratio = floor_ratio(data, plant, calibration.signals)
-    return ratio if math.isfinite(ratio) else math.inf
+    return ratio if math.isfinite(ratio) else math.inf, rms_by_signal(data, plant, calibration.signals)
+
+
+def rms_by_signal(data: Data, plant: Plant, shown: Sequence[Mapping[str, Array]]) -> dict[str, float]:
+    """rms of model − measurement, in the signals' units."""
+    parts: dict[str, list[Array]] = {}
+    for window, signals in zip(plant.windows, shown):
+        for name in data.signals:
+            if name in window.measured:
+                parts.setdefault(name, []).append(signals[name] - window.measured[name])
+    return {name: float(np.sqrt(np.mean(np.concatenate(part) ** 2))) for name, part in parts.items()}
 
 
 def floor_ratio(data: Data, plant: Plant, shown: Sequence[Mapping[str, Array]]) -> float:
-    """rms of measurement − model in units of the floor, pooled over windows and signals: 1 is the floor."""
-    parts = [
-        (signals[name] - window.measured[name]) / one.sigma(name)
+    """rms of measurement − model in units of the floor, pooled over windows and signals: 1 is the floor.
+
+    A standstill counts as 25 ms of motion do.
+    """
+    each = [
+        (((signals[name] - window.measured[name]) / one.sigma(name)) ** 2, one.counts)
         for window, one, signals in zip(plant.windows, data.floors, shown)
         for name in data.signals
         if name in window.measured
     ]
-    return float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
+    squared, counts = (np.concatenate(parts) for parts in zip(*each))
+    return float(np.sqrt(np.average(squared, weights=counts)))

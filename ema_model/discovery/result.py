@@ -15,7 +15,7 @@ from ema_model.plants import Plant
 
 Array = NDArray[np.float64]
 
-VERDICTS = ("effects_found", "adequate", "unknown_effect", "not_converged")
+VERDICTS = ("effects_found", "adequate", "unknown_effect", "not_converged", "not_repeatable")
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,17 @@ class Rung:
     rmse: float
     holdout_rmse: float | None
     signals: dict[str, float]  # rms by signal, in its unit
+    holdout_signals: dict[str, float]  # the same of what was held out
     signals_per_window: Sequence[dict[str, Array]]  # the fitted model's, (blocks,) each
+
+
+@dataclass(frozen=True)
+class StoodIn:
+    """A calibrated parameter that moved back as an effect was added: it had masked the effect."""
+
+    path: str
+    before: float  # σ from the file's value
+    after: float
 
 
 @dataclass(frozen=True)
@@ -51,6 +61,22 @@ class Added:
     holdout_before: float | None
     holdout_after: float | None
     same_as: tuple[str, ...]  # effects that this recording cannot tell from it
+    key: str  # under which the model holds it: `name`, or `name_2` for a second order of the same
+    chosen: dict[str, float] = field(default_factory=dict)  # parameters that are not fitted: a whole order
+    stood_in: tuple[StoodIn, ...] = ()  # parameters that had been standing in for it
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """A test to do next, and what it would separate."""
+
+    command: str
+    settings: dict[str, float]
+    duration_s: float
+    load_torque_Nm: float  # at the user
+    add_signal: str | None  # to record as well
+    separates: tuple[str, str]
+    expected_chi2: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,4 +92,5 @@ class Discovery:
     actuator: Actuator  # with the effects, as calibrated
     plant: Plant  # the recordings as they were fitted: windows with their blocks
     unknown: Explanation | None = None
+    next_experiment: Experiment | None = None
     warnings: Sequence[str] = field(default_factory=tuple)

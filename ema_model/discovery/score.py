@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ema_model.discovery.fingerprints import Fingerprint
 from ema_model.discovery.fitting import Fit
 from ema_model.discovery.result import Candidate
-from ema_model.effects import CATALOGUE
+from ema_model.effects import find
 
 Array = NDArray[np.float64]
 
@@ -24,15 +24,36 @@ _AT_BOUND = 0.02
 
 def scored(found: Fit, prints: Sequence[Fingerprint]) -> list[Candidate]:
     """A candidate for each effect, at the best of its variants, the most promising first."""
+    best: dict[str, Candidate] = {}
+    for candidate in scored_all(found, prints):
+        other = best.get(candidate.name)
+        if other is None or candidate.predicted_drop > other.predicted_drop:
+            best[candidate.name] = candidate
+    return sorted(best.values(), key=lambda candidate: -candidate.predicted_drop)
+
+
+def scored_all(found: Fit, prints: Sequence[Fingerprint]) -> list[Candidate]:
+    """A candidate for each fingerprint, in their order."""
     jacobian = _movable(found)
     gram = jacobian.T @ jacobian + np.eye(jacobian.shape[1])
-    best: dict[str, Candidate] = {}
-    for one in prints:
-        candidate = _scored(found, one, jacobian, gram)
-        other = best.get(one.name)
-        if other is None or candidate.predicted_drop > other.predicted_drop:
-            best[one.name] = candidate
-    return sorted(best.values(), key=lambda candidate: -candidate.predicted_drop)
+    return [_scored(found, one, jacobian, gram) for one in prints]
+
+
+def scored_together(found: Fit, prints: Sequence[Fingerprint], most: int) -> list[Candidate]:
+    """Up to `most` fingerprints that tell most beside each other, each scored beside those before it."""
+    jacobian = _movable(found)
+    prior = np.ones(jacobian.shape[1])
+    left = list(prints)
+    chosen: list[Candidate] = []
+    while left and len(chosen) < most:
+        gram = jacobian.T @ jacobian + np.diag(prior)
+        candidates = [_scored(found, one, jacobian, gram) for one in left]
+        best = int(np.argmax([candidate.predicted_drop for candidate in candidates]))
+        chosen.append(candidates[best])
+        columns = left.pop(best).columns
+        jacobian = np.concatenate([jacobian, columns], axis=1)
+        prior = np.concatenate([prior, np.zeros(columns.shape[1])])
+    return chosen
 
 
 def _movable(found: Fit) -> Array:
@@ -49,7 +70,7 @@ def _scored(found: Fit, one: Fingerprint, jacobian: Array, gram: Array) -> Candi
     own = columns - jacobian @ np.linalg.solve(gram, shared)
     energy = columns.T @ own
     toward = -(own.T @ found.residual)  # the residual is model − measurement
-    effect = CATALOGUE[one.name]
+    effect = find(one.name)
     first = effect.parameters[0]
     strong = effect.severities[2] / one.settings[first.name]
     reason = ""

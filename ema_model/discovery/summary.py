@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ema_model.comparison.summary import calibration_dict, parameter_dict, plain
-from ema_model.discovery.result import Added, Discovery, Rung
+from ema_model.discovery.result import Added, Discovery, Experiment, Rung
 
 
 def as_dict(found: Discovery) -> dict[str, Any]:
@@ -40,19 +40,42 @@ def as_dict(found: Discovery) -> dict[str, Any]:
                 "r2": unknown.r2,
                 "curve": np.column_stack([unknown.centres, unknown.curve, unknown.error]).tolist(),
             },
+            "next_experiment": _experiment(found.next_experiment),
             "warnings": list(found.warnings),
         }
     )
 
 
 def _rung(one: Rung) -> dict[str, Any]:
-    return {"label": one.label, "rmse": one.rmse, "holdout_rmse": one.holdout_rmse, "signals": one.signals}
+    return {
+        "label": one.label,
+        "rmse": one.rmse,
+        "holdout_rmse": one.holdout_rmse,
+        "signals": one.signals,
+        "holdout_signals": one.holdout_signals,
+    }
+
+
+def _experiment(one: Experiment | None) -> dict[str, Any] | None:
+    if one is None:
+        return None
+    return {
+        "command": one.command,
+        "settings": {**one.settings, "duration_s": one.duration_s},
+        "load": one.load_torque_Nm,
+        "add_signal": one.add_signal,
+        "separates": list(one.separates),
+        "expected_chi2": one.expected_chi2,
+    }
 
 
 def _added(one: Added) -> dict[str, Any]:
     return {
         "name": one.name,
-        "parameters": {name: parameter_dict(parameter) for name, parameter in one.parameters.items()},
+        "parameters": {
+            **{name: parameter_dict(parameter) for name, parameter in one.parameters.items()},
+            **{name: {"value": value, "interval90": [value, value], "unit": ""} for name, value in one.chosen.items()},
+        },
         "rmse_before": one.rmse_before,
         "rmse_after": one.rmse_after,
         "holdout_rmse_before": one.holdout_before,

@@ -8,22 +8,46 @@ from __future__ import annotations
 import importlib
 import pkgutil
 from dataclasses import replace
+from typing import TypeVar
 
 from ema_model.effects.effect import Effect, Parameter
 from ema_model.errors import InputError
 
-__all__ = ["CATALOGUE", "Effect", "Parameter", "find"]
+__all__ = ["CATALOGUE", "Effect", "Parameter", "find", "catalogue_name", "register"]
+
+AnyEffect = TypeVar("AnyEffect", bound=Effect)
 
 CATALOGUE: dict[str, Effect] = {
     module.name: replace(importlib.import_module(f"{__name__}.{module.name}").EFFECT, name=module.name)
     for module in sorted(pkgutil.iter_modules(__path__), key=lambda module: module.name)
     if module.name != "effect"
 }
+_OF_THE_USER: dict[str, Effect] = {}  # made at run time by `ema_model.user_effects`; not part of the catalogue
 
 
 def find(name: str) -> Effect:
-    """The effect of that name; InputError lists the names there are."""
-    try:
-        return CATALOGUE[name]
-    except KeyError:
-        raise InputError(f"no effect {name!r}; effects are {', '.join(CATALOGUE)}") from None
+    """The effect of that name, of the catalogue or registered; InputError lists the catalogue's names.
+
+    A model may hold an effect several times, as cogging at several orders: the second is `cogging_torque_2`.
+    """
+    effect = CATALOGUE.get(name) or _OF_THE_USER.get(name)
+    if effect is None:
+        again = CATALOGUE.get(catalogue_name(name))
+        if again is None:
+            raise InputError(f"no effect {name!r}; effects are {', '.join(CATALOGUE)}")
+        return replace(again, name=name)
+    return effect
+
+
+def catalogue_name(name: str) -> str:
+    """The catalogue's name of an effect that a model may hold several times."""
+    kind, _, number = name.rpartition("_")
+    return kind if number.isdecimal() and int(number) > 1 and kind in CATALOGUE else name
+
+
+def register(effect: AnyEffect) -> AnyEffect:
+    """Lets `find`, and so every model of this process, know a user's effect under its name."""
+    if effect.name in CATALOGUE:
+        raise InputError(f"effect {effect.name} is part of the catalogue; give the user's effect another name")
+    _OF_THE_USER[effect.name] = effect
+    return effect

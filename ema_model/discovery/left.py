@@ -1,0 +1,52 @@
+"""What a fitted model leaves in the recordings: whether it is anything, what explains it, its strongest orders."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ema_model.comparison.assemble import residuals_of
+from ema_model.comparison.compare import known_error
+from ema_model.comparison.curves import orders_in
+from ema_model.comparison.explain import advance_of, explain, used_blocks
+from ema_model.comparison.orders import Order
+from ema_model.comparison.orders import orders as orders_of
+from ema_model.comparison.residuals import Residuals
+from ema_model.comparison.result import Explanation
+from ema_model.comparison.verdict import ORDER_OF_PRIMARY
+from ema_model.discovery.fitting import Data, Fit
+
+_ORDERS = 4  # of the residual's strongest, tried for periodic effects
+
+
+@dataclass(frozen=True)
+class Left:
+    """Of the residual that `comparison` would explain: the current's, where it is measured."""
+
+    explanation: Explanation | None  # the most significant
+    orders: list[int]  # that a periodic effect may have, the strongest first
+
+
+def left_by(data: Data, found: Fit) -> Left:
+    """What a fit leaves."""
+    known = [known_error(found.plant, window, found.calibration) for window in found.plant.windows]
+    residuals = residuals_of(
+        found.plant, data.floors, found.calibration.signals, known, found.calibration.actuator, found.calibration
+    )
+    primary = next(name for name in ORDER_OF_PRIMARY if name in residuals.values)
+    significant = [one for one in explain(residuals, primary, found.actuator.axes) if one.significant]
+    orders = sorted(_orders(residuals, primary), key=lambda one: -one.significance)
+    return Left(
+        significant[0] if significant else None,
+        [one.order for one in orders[:_ORDERS]],
+    )
+
+
+def _orders(residuals: Residuals, primary: str) -> list[Order]:
+    used = used_blocks(residuals, primary)
+    angle = residuals.variables.get("motor_angle")
+    if used is None or angle is None:
+        return []
+    advance = advance_of(residuals, used)
+    if not len(orders_in(residuals.turns, advance)):
+        return []
+    return orders_of(angle[used.chosen], used.values, residuals.turns, advance)

@@ -1,0 +1,65 @@
+"""Whether a closed loop can be simulated at all: two models that hardly differ must behave alike.
+
+A limit cycle of backlash, or a motor that sticks now here, now there, makes them drift apart; a comparison in time
+means nothing then, and what the motor needed (inverse dynamics) is compared instead.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
+
+from ema_model.actuator import Actuator
+from ema_model.calibration.floor import CORRELATED_S
+from ema_model.discovery.fitting import Data, Fit
+from ema_model.faults import HEALTHY
+from ema_model.plants import ClosedLoop
+
+Array = NDArray[np.float64]
+
+_APART = 5e-4  # of the inertia
+_LOST = 0.5  # of the blocks, from which on a recording cannot be compared in time
+
+
+def with_divergence(data: Data, found: Fit) -> tuple[Data, float]:
+    """The data with what such neighbours differ by in the model's floor, and the share of blocks that are lost.
+
+    A block is lost where the neighbours' currents (or positions) differ by more than the noise.
+    """
+    plant = found.plant
+    if not isinstance(plant, ClosedLoop):
+        return data, 0.0
+    fitted = found.calibration.actuator
+    inertia = fitted.value("motor.inertia_kgm2")
+    neighbour = fitted.varied({"motor.inertia_kgm2": inertia * np.array([1.0, 1.0 + _APART])})
+    k = np.tile(np.asarray(HEALTHY, float), (2, 1))
+    floors, lost = [], []
+    for i, (window, one) in enumerate(zip(plant.windows, data.floors)):
+        starts = found.calibration.starts
+        at = [starts[f"{kind} {i}"].value if f"{kind} {i}" in starts else 0.0 for kind in ("turned", "play")]
+        shown = plant.signals(window, neighbour, k, *at)
+        width = max(3, round(CORRELATED_S / window.block_s) | 1)
+        apart = {
+            name: np.sqrt(np.maximum(uniform_filter1d((shown[name][1] - shown[name][0]) ** 2, width), 0.0))
+            for name in one.model
+        }
+        floors.append(one.beside(replace(one, model=apart)))
+        lost += [apart[name] > one.noise[name] for name in data.signals if name in apart][:1]
+    return replace(data, floors=floors), float(np.mean(np.concatenate(lost)) if lost else 0.0)
+
+
+def is_lost(share: float) -> bool:
+    """Whether too little is left to compare in time."""
+    return share > _LOST
+
+
+def by_inverse_dynamics(data: Data, actuator: Actuator) -> Actuator | None:
+    """The actuator without its controller, where the recordings tell what the motor needed; None where they do not."""
+    if all(
+        "motor_position_rad" in one and ("current_A" in one or "motor_torque_Nm" in one) for one in data.measurements
+    ):
+        return replace(actuator, controller=replace(actuator.controller, kind="unknown"))
+    return None

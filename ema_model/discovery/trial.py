@@ -1,0 +1,81 @@
+"""A candidate in the model, refitted, and whether the data pay for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ema_model.discovery.fitting import Data, Fit, fit, holdout_error, with_effect
+from ema_model.discovery.result import Candidate
+from ema_model.effects import find
+
+Progress = Callable[[str], None]
+
+LEAST_BIC = 10.0
+_LEAST_FALL = 0.01  # of the error: what is less is immaterial
+_LEAST_T = 2.4  # of the mean gain over blocks of time: 1 % of chance
+_HELD = 0.01  # of the held-out error: at the floor chance may raise it so much, above the floor it must fall so much
+AT_FLOOR = 1.1  # of the floor, up to which an error counts as at it
+_CORRELATED = 50  # values of a signal that may share their error
+_FAINT = 0.1  # of the suggested strength, from which a fit that went astray begins anew
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Effects in the model: settings by name."""
+
+    candidate: Candidate
+    effects: Mapping[str, Mapping[str, float]]
+    fit: Fit
+    drop: float  # of χ²
+
+
+def tried(
+    data: Data, current: Fit, candidate: Candidate, effects: Mapping[str, Mapping[str, float]], tell: Progress
+) -> Trial:
+    """The effects in the model, refitted together with all that it holds."""
+    best = _refitted(data, current, effects, tell)
+    if best.chi2 > current.chi2:  # it began too strong to find back
+        faint = {name: _weakened(name, settings) for name, settings in effects.items()}
+        best = min(best, _refitted(data, current, faint, tell), key=lambda one: one.chi2)
+    return Trial(candidate, effects, best, current.chi2 - best.chi2)
+
+
+def pays(current: Fit, trial: Trial, data: Data, held: Data | None) -> bool:
+    """Whether the data pay for the parameters: most of the time, materially, and where they were not fitted."""
+    values = len(current.residual)
+    count = sum(not parameter.integer for name in trial.effects for parameter in find(name).parameters)
+    if trial.drop - count * np.log(values) < LEAST_BIC:
+        return False
+    if trial.fit.error() > (1.0 - _LEAST_FALL) * current.error():
+        return False
+    gains = np.array_split(current.residual**2 - trial.fit.residual**2, max(8, values // _CORRELATED))
+    sums = np.array([gain.sum() for gain in gains])
+    if sums.sum() < _LEAST_T * np.std(sums, ddof=1) * np.sqrt(len(sums)):
+        return False
+    return held is None or _holds(holdout_error(held, current), holdout_error(held, trial.fit))
+
+
+def _holds(before: float, after: float) -> bool:
+    """Whether what was not fitted agrees: an effect need not show in every recording, but must not be at odds."""
+    return after < (1.0 - _HELD if before > AT_FLOOR else 1.0 + _HELD) * before
+
+
+def _refitted(data: Data, current: Fit, effects: Mapping[str, Mapping[str, float]], tell: Progress) -> Fit:
+    actuator = current.actuator
+    for name, settings in effects.items():
+        actuator = with_effect(actuator, name, settings)
+    return fit(data, actuator, current.starts, tell)
+
+
+def _weakened(name: str, settings: Mapping[str, float]) -> dict[str, float]:
+    first = find(name).parameters[0]
+    return {**settings, first.name: max(first.low, _FAINT * settings[first.name])}
+
+
+def promising(ranked: Sequence[Candidate], share: float, most: int) -> list[Candidate]:
+    """Candidates worth a refit."""
+    chosen = [c for c in ranked if not c.untestable_reason and c.predicted_drop > LEAST_BIC]
+    return [c for c in chosen if c.predicted_drop >= share * chosen[0].predicted_drop][:most]

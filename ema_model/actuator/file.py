@@ -114,28 +114,34 @@ def _effects(
     given: dict[str, Any], axes: Axes, tolerances: dict[str, Tolerance], where: str
 ) -> dict[str, dict[str, float]]:
     """The effects that belong to the actuator's model, checked by the catalogue."""
-    from ema_model.effects import find  # the catalogue's kernels need not be loaded for an actuator without effects
+    # the catalogue's kernels need not be loaded for an actuator without effects
+    from ema_model.effects import find
+    from ema_model.user_effects.entries import kind_of, read_entries
 
-    effects = {}
-    for effect_name in given:
-        table = _table(given, effect_name, f"{where}: [effects]")
+    effects: dict[str, dict[str, float]] = {}
+    for given_name in given:
+        inside = f"[effects.{given_name}]"
+        table = _table(given, given_name, f"{where}: [effects]")
+        kind = kind_of(given_name)
         try:
-            effect = find(effect_name)
+            effect, table = (find(given_name), table) if kind is None else read_entries(kind, table)
         except InputError as error:
-            raise InputError(f"{where}: [effects] {error}") from None
+            raise InputError(f"{where}: {'[effects]' if kind is None else inside} {error}") from None
+        if effect.name in effects:
+            raise InputError(f"{where}: {inside} is the same as another one; write them as one")
+        names = {axes.parameter(p.name) if kind is None else p.name: p.name for p in effect.parameters}
         values = {}
-        inside = {axes.parameter(parameter.name): parameter.name for parameter in effect.parameters}
         for shown, entry in table.items():
-            if shown not in inside:
-                raise InputError(f"{where}: [effects.{effect_name}] has no {shown!r}; it has {', '.join(inside)}")
-            value, tolerance = _number_and_tolerance(f"effects.{effect_name}", shown, entry, where)
-            values[inside[shown]] = value
+            if shown not in names:
+                raise InputError(f"{where}: {inside} has no {shown!r}; it has {', '.join(names)}")
+            value, tolerance = _number_and_tolerance(f"effects.{given_name}", shown, entry, where)
+            values[names[shown]] = value
             if tolerance is not None:
-                tolerances[f"effects.{effect_name}.{inside[shown]}"] = tolerance
+                tolerances[f"effects.{effect.name}.{names[shown]}"] = tolerance
         try:
-            effects[effect_name] = effect.settings(values)
+            effects[effect.name] = effect.settings(values)
         except InputError as error:
-            raise InputError(f"{where}: [effects.{effect_name}] {error}") from None
+            raise InputError(f"{where}: {inside} {error}") from None
     return effects
 
 

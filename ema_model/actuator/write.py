@@ -7,10 +7,14 @@ import math
 import os
 import tempfile
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ema_model.actuator.layout import KINDS, layout
 from ema_model.actuator.parameters import SECTIONS, Actuator
 from ema_model.errors import InputError
+
+if TYPE_CHECKING:
+    from ema_model.user_effects import UserEffect
 
 
 def save_actuator(actuator: Actuator, path: str | os.PathLike[str]) -> None:
@@ -45,9 +49,7 @@ def as_toml(actuator: Actuator) -> str:
             value = float(getattr(getattr(actuator, section), name))
             if math.isfinite(value):
                 lines.append(_entry(actuator, f"{section}.{name}", axes.parameter(name), value))
-    for effect, settings in actuator.effects.items():
-        lines += ["", f"[effects.{effect}]"]
-        lines += [_entry(actuator, f"effects.{effect}.{n}", axes.parameter(n), float(v)) for n, v in settings.items()]
+    lines += _effects(actuator)
     if actuator.mapping or actuator.rules:
         lines += ["", "[recordings]", f"mapping = [{', '.join(_text(text) for text in actuator.mapping)}]"]
     for rule in actuator.rules:
@@ -58,12 +60,58 @@ def as_toml(actuator: Actuator) -> str:
     return "\n".join([*lines, ""])
 
 
+def _effects(actuator: Actuator) -> list[str]:
+    """The tables of its effects; a user's are numbered where there are several of a kind."""
+    from ema_model.effects import find  # the kernels need not be loaded for an actuator without effects
+    from ema_model.user_effects import UserEffect
+
+    lines: list[str] = []
+    kinds: list[str] = []
+    for name, settings in actuator.effects.items():
+        effect = find(name)
+        if isinstance(effect, UserEffect):
+            kinds.append(effect.kind)
+            count = kinds.count(effect.kind)
+            lines += ["", f"[effects.{effect.kind}{f'_{count}' if count > 1 else ''}]"]
+            lines += _users(actuator, effect)
+        else:
+            lines += ["", f"[effects.{name}]"]
+            lines += [
+                _entry(actuator, f"effects.{name}.{n}", actuator.axes.parameter(n), float(v))
+                for n, v in settings.items()
+            ]
+    return lines
+
+
+def _users(actuator: Actuator, effect: UserEffect) -> list[str]:
+    """The entries of a user's effect, as `ema_model.user_effects.entries` reads them."""
+    lines = [f"{key} = {_text(v) if isinstance(v, str) else repr(v)}" for key, v in effect.definition.items()]
+    values = {name: float(value) for name, value in actuator.effects[effect.name].items()}
+    path = f"effects.{effect.name}"
+    if effect.kind == "torque_curve":
+        knots = [f"    {_value(actuator, f'{path}.{name}', value)}," for name, value in values.items()]
+        return [*lines, "values = [", *knots, "]"]
+    from ema_model.user_effects.entries import parameter_ranges
+
+    ranges = parameter_ranges(effect)
+    for name, value in values.items():
+        lines.append(f"{name} = {_value(actuator, f'{path}.{name}', value, ranges.get(name))}")
+    return lines
+
+
 def _entry(actuator: Actuator, path: str, shown: str, value: float) -> str:
+    return f"{shown} = {_value(actuator, path, value)}"
+
+
+def _value(actuator: Actuator, path: str, value: float, limits: tuple[float, float] | None = None) -> str:
+    """A number, or a table of it with its tolerance and its limits, where it has some."""
     tolerance = actuator.tolerances.get(path)
-    if tolerance is None:
-        return f"{shown} = {value!r}"
-    free = "" if tolerance.free else ", free = false"
-    return f"{shown} = {{ value = {value!r}, sigma = {float(tolerance.sigma)!r}{free} }}"
+    parts = [f"value = {value!r}"]
+    if tolerance is not None:
+        parts += [f"sigma = {float(tolerance.sigma)!r}"] + ([] if tolerance.free else ["free = false"])
+    if limits is not None:
+        parts += [f"low = {limits[0]!r}", f"high = {limits[1]!r}"]
+    return repr(value) if len(parts) == 1 else f"{{ {', '.join(parts)} }}"
 
 
 def _text(text: str) -> str:

@@ -25,7 +25,7 @@ from ema_model.discovery.left import left_by
 from ema_model.discovery.repeatability import by_inverse_dynamics, is_lost, with_divergence
 from ema_model.discovery.result import Added, Candidate, Discovery, Experiment, Rung, StoodIn
 from ema_model.discovery.score import scored
-from ema_model.discovery.trial import AT_FLOOR, LEAST_BIC, Trial, pays, promising, tried
+from ema_model.discovery.trial import LEAST_BIC, Trial, pays, promising, tried
 from ema_model.effects import CATALOGUE, catalogue_name, find
 from ema_model.measurement import Measurement
 from ema_model.recordings import check_same_actuator
@@ -120,7 +120,7 @@ def discover(
         others = [trial for trial in tied if trial is not best]
         rivals = rivals or [best, *others] if others else rivals
         story.add(best, _label(best, actuator), tuple(trial.candidate.name for trial in others))
-        if is_periodic(best.candidate.name) and story.ladder[-1].rmse > AT_FLOOR:
+        if is_periodic(best.candidate.name):
             more = with_further_orders(data, held, story.current, best.candidate.name, tell)
             if more:
                 numbers = ", ".join(f"{settings['order']:g}" for settings in more.effects.values())

@@ -17,7 +17,7 @@ LEAST_BIC = 10.0
 _LEAST_FALL = 0.01  # of the error: what is less is immaterial
 _LEAST_T = 2.4  # of the mean gain over blocks of time: 1 % of chance
 _HELD = 0.01  # of the held-out error: at the floor chance may raise it so much, above the floor it must fall so much
-AT_FLOOR = 1.1  # of the floor, up to which an error counts as at it
+_FLOOR = 1.1  # of the floor, up to which an error counts as at it
 _CORRELATED = 50  # values of a signal that may share their error
 _FAINT = 0.1  # of the suggested strength, from which a fit that went astray begins anew
 
@@ -60,7 +60,7 @@ def pays(current: Fit, trial: Trial, data: Data, held: Data | None) -> bool:
 
 def _holds(before: float, after: float) -> bool:
     """Whether what was not fitted agrees: an effect need not show in every recording, but must not be at odds."""
-    return after < (1.0 - _HELD if before > AT_FLOOR else 1.0 + _HELD) * before
+    return after < (1.0 - _HELD if before > _FLOOR else 1.0 + _HELD) * before
 
 
 def _refitted(data: Data, current: Fit, effects: Mapping[str, Mapping[str, float]], tell: Progress) -> Fit:

@@ -13,6 +13,7 @@ from ema_model.effects import find
 from ema_model.errors import InputError
 from ema_model.measurement import read_measurement
 from ema_model.simulation import Run
+from ema_model.user_effects.entries import kind_of, read_entries
 
 
 def add_actuator(parser: argparse.ArgumentParser) -> None:
@@ -42,7 +43,11 @@ def add_mapping(parser: argparse.ArgumentParser) -> None:
 def add_effects(parser: argparse.ArgumentParser) -> None:
     """--effect, repeated"""
     parser.add_argument(
-        "--effect", action="append", default=[], metavar="NAME:param=value,…", help="a physical effect; repeat for more"
+        "--effect",
+        action="append",
+        default=[],
+        metavar="NAME:param=value,…",
+        help="a physical effect, or your own torque 'user_torque:expression=c*omega,c=-1e-4'; repeat for more",
     )
 
 
@@ -79,13 +84,50 @@ def faults_of(arguments: argparse.Namespace) -> Any:
 
 
 def effects_of(arguments: argparse.Namespace) -> dict[str, dict[str, float]]:
-    """Effects from --effect NAME:param=value,…"""
+    """Effects from --effect NAME:param=value,…, or user_torque:expression=…,param=value,…"""
     effects: dict[str, dict[str, float]] = {}
     for text in arguments.effect:
         name, _, rest = text.partition(":")
-        given = dict(_pair(part, f"--effect {name}") for part in rest.split(",") if part)
-        effects[name] = find(name).settings(given)
+        parts = split_at_commas(rest)
+        if (kind := kind_of(name)) is None:
+            effect, given = find(name), dict(_pair(part, f"--effect {name}") for part in parts)
+        else:
+            try:
+                effect, given = read_entries(kind, dict(_user_entry(part) for part in parts))
+            except InputError as error:
+                raise InputError(f"--effect {name}: {error}") from None
+        if effect.name in effects:
+            raise InputError(f"--effect {name}: given twice; write it once")
+        effects[effect.name] = effect.settings(given)
     return effects
+
+
+def split_at_commas(text: str) -> list[str]:
+    """The parts between commas that stand outside parentheses and brackets; empty ones are left out."""
+    parts, depth = [""], 0
+    for character in text:
+        depth += (character in "([") - (character in ")]")
+        if character == "," and depth <= 0:
+            parts.append("")
+        else:
+            parts[-1] += character
+    return [part for part in parts if part]
+
+
+def _user_entry(part: str) -> tuple[str, str | float | list[float]]:
+    """One entry of a user's effect: a text, a number, or a list of numbers in brackets."""
+    name, separator, value = (piece.strip() for piece in part.partition("="))
+    if not separator:
+        raise InputError(f"{part.strip()}: write it as name=value")
+    if name in ("expression", "variable", "modulator"):
+        return name, value
+    try:
+        if name == "values":
+            return name, [float(one) for one in value.removeprefix("[").removesuffix("]").split(",")]
+        return name, float(value)
+    except ValueError:
+        as_what = "values=[number,number,…]" if name == "values" else "name=number"
+        raise InputError(f"{part.strip()}: write it as {as_what}") from None
 
 
 def weights_of(texts: list[str] | None) -> dict[str, float] | None:

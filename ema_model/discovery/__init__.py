@@ -2,8 +2,21 @@
 
 from __future__ import annotations
 
-from ema_model.discovery.discover import discover, settings_of
-from ema_model.discovery.result import Added, Candidate, Discovery, Rung
+from ema_model.discovery.discover import discover, result_of, settings_of
+from ema_model.discovery.result import Added, Candidate, Discovery, Experiment, Rung
+from ema_model.discovery.story import Story, begun
 from ema_model.discovery.summary import as_dict
 
-__all__ = ["Added", "Candidate", "Discovery", "Rung", "as_dict", "discover", "settings_of"]
+__all__ = [
+    "Added",
+    "Candidate",
+    "Discovery",
+    "Experiment",
+    "Rung",
+    "Story",
+    "as_dict",
+    "begun",
+    "discover",
+    "result_of",
+    "settings_of",
+]

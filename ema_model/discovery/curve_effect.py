@@ -12,14 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator, Tolerance
-from ema_model.comparison.assemble import residuals_of
-from ema_model.comparison.compare import known_error
 from ema_model.comparison.curves import HIGHEST_ORDER
 from ema_model.comparison.explain import modulator_of, used_blocks
 from ema_model.comparison.residuals import Residuals
 from ema_model.comparison.result import Explanation
 from ema_model.comparison.verdict import ORDER_OF_PRIMARY
 from ema_model.discovery.fitting import Data, Fit
+from ema_model.discovery.left import residuals_left
 from ema_model.errors import InputError
 from ema_model.user_effects import UserEffect, torque_curve
 from ema_model.user_effects.curve import MOST_KNOTS
@@ -57,7 +56,7 @@ def with_curve(data: Data, found: Fit, explanation: Explanation) -> tuple[Actuat
             f"a residual of {explanation.signal} over {explanation.variable} cannot be made a torque curve; "
             f"variables are {', '.join(VARIABLES)}"
         )
-    effect = curve_of(_residuals(data, found), explanation, found.calibration.actuator)
+    effect = curve_of(residuals_left(data, found), explanation, found.calibration.actuator)
     knots = {parameter.name: parameter.default for parameter in effect.parameters}
     size = float(np.sqrt(np.mean(np.square(list(knots.values())))))
     tolerances = {
@@ -102,13 +101,6 @@ def curve_of(residuals: Residuals, explanation: Explanation, actuator: Actuator)
     if best.chi2 > (1.0 - _FINER) * curves[0].chi2:
         best = curves[0]  # the simplest
     return torque_curve(factor * best.knots, best.low, best.high, VARIABLES[explanation.variable], best.modulator)
-
-
-def _residuals(data: Data, found: Fit) -> Residuals:
-    known = [known_error(found.plant, window, found.calibration) for window in found.plant.windows]
-    return residuals_of(
-        found.plant, data.floors, found.calibration.signals, known, found.calibration.actuator, found.calibration
-    )
 
 
 def _inside(explanation: Explanation, actuator: Actuator) -> str:

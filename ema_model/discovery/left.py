@@ -28,16 +28,21 @@ class Left:
 
 def left_by(data: Data, found: Fit) -> Left:
     """What a fit leaves."""
-    known = [known_error(found.plant, window, found.calibration) for window in found.plant.windows]
-    residuals = residuals_of(
-        found.plant, data.floors, found.calibration.signals, known, found.calibration.actuator, found.calibration
-    )
+    residuals = residuals_left(data, found)
     primary = next(name for name in ORDER_OF_PRIMARY if name in residuals.values)
     significant = [one for one in explain(residuals, primary, found.actuator.axes) if one.significant]
     orders = sorted(_orders(residuals, primary), key=lambda one: -one.significance)
     return Left(
         significant[0] if significant else None,
         [one.order for one in orders[:_ORDERS]],
+    )
+
+
+def residuals_left(data: Data, found: Fit) -> Residuals:
+    """The residuals of a fit beside the variables that may explain them."""
+    known = [known_error(found.plant, window, found.calibration) for window in found.plant.windows]
+    return residuals_of(
+        found.plant, data.floors, found.calibration.signals, known, found.calibration.actuator, found.calibration
     )
 
 

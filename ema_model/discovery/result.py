@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
-from ema_model.calibration import Calibrated, Calibration
+from ema_model.calibration import Calibrated, Calibration, Floor
 from ema_model.comparison.result import Explanation
 from ema_model.plants import Plant
 
@@ -91,6 +91,8 @@ class Discovery:
     parameters_outside_tolerance: Sequence[str]
     actuator: Actuator  # with the effects, as calibrated
     plant: Plant  # the recordings as they were fitted: windows with their blocks
+    floors: Sequence[Floor]  # of its windows
     unknown: Explanation | None = None
+    curve: Added | None = None  # the torque curve that was added for what is unknown
     next_experiment: Experiment | None = None
     warnings: Sequence[str] = field(default_factory=tuple)

@@ -39,6 +39,7 @@ def as_dict(found: Discovery) -> dict[str, Any]:
                 "modulator": unknown.modulator,
                 "r2": unknown.r2,
                 "curve": np.column_stack([unknown.centres, unknown.curve, unknown.error]).tolist(),
+                "added": None if found.curve is None else _added(found.curve),
             },
             "next_experiment": _experiment(found.next_experiment),
             "warnings": list(found.warnings),

@@ -13,7 +13,7 @@ from typing import TypeVar
 from ema_model.effects.effect import Effect, Parameter
 from ema_model.errors import InputError
 
-__all__ = ["CATALOGUE", "Effect", "Parameter", "find", "catalogue_name", "register"]
+__all__ = ["CATALOGUE", "Effect", "Parameter", "catalogue_name", "find", "register"]
 
 AnyEffect = TypeVar("AnyEffect", bound=Effect)
 

@@ -8,16 +8,12 @@ from pathlib import Path
 from ema_model.actuator import save_actuator
 from ema_model.discovery import Discovery, as_dict, discover
 from ema_model.effects import find
+from ema_model.errors import InputError
 from ema_model.recordings import read_recording
 from emaviz.cli import options, output
+from emaviz.discovery_words import VERDICTS, next_experiment, settings
 
 HELP = "find the physical effects that the model lacks, and add them"
-_VERDICTS = {
-    "effects_found": "effects are missing, and have been added",
-    "adequate": "nothing is missing: what is left is noise and the model's own floor",
-    "unknown_effect": "something is missing that none of the known effects explains",
-    "not_converged": "the calibration has not converged; what looks like missing physics may be an unfinished fit",
-}
 _CURRENT_ONLY = ("current_A",)
 
 
@@ -33,15 +29,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--max-effects", type=int, default=3, metavar="N", help="at most so many are added")
     parser.add_argument("--seed", type=int, default=0, help="of all random numbers")
     parser.add_argument("--save-actuator", metavar="FILE.toml", help="write the improved model as an actuator file")
+    parser.add_argument("--record", metavar="FILE.rrd", help="write the discovery for the Rerun viewer")
+    parser.add_argument("--report", metavar="FILE.html", help="write a report that opens in any browser, offline")
     parser.add_argument("--json", metavar="FILE", help="write the result there")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Reads, discovers, writes and prints."""
     actuator = options.actuator_of(arguments)
-    for path, option in ((arguments.json, "--json"), (arguments.save_actuator, "--save-actuator")):
+    written = {
+        "--json": arguments.json,
+        "--save-actuator": arguments.save_actuator,
+        "--record": arguments.record,
+        "--report": arguments.report,
+    }
+    for option, path in written.items():
         if path is not None:
             output.check_target(Path(path), option)
+    if arguments.record and not arguments.record.endswith(".rrd"):
+        raise InputError(f"--record {arguments.record}: the name of a recording must end in .rrd")
     progress = output.Progress()
     try:
         progress.show("reading")
@@ -63,18 +69,30 @@ def run(arguments: argparse.Namespace) -> int:
         save_actuator(found.actuator, arguments.save_actuator)
     output.write_json(arguments.json, as_dict(found), arguments.seed, output.configuration(arguments))
     print(text(found))
+    _write(found, arguments)
     return 0
+
+
+def _write(found: Discovery, arguments: argparse.Namespace) -> None:
+    """The recording and the report, last: if one fails, the answer is there."""
+    if arguments.record:
+        from emaviz.recording.discovery import write_discovery  # rerun takes a second to import
+
+        write_discovery(found, arguments.record, output.configuration(arguments))
+    if arguments.report:
+        from emaviz.report import write_discovery_report  # as does plotly
+
+        write_discovery_report(found, arguments.report, output.configuration(arguments))
 
 
 def text(found: Discovery) -> str:
     """The answer as the terminal shows it: the verdict, the effects, the ladder, the candidates."""
-    lines = [f"{found.verdict}: {_VERDICTS[found.verdict]}"]
+    lines = [f"{found.verdict}: {VERDICTS[found.verdict]}"]
+    lines += [f"! {warning}" for warning in found.warnings]
     for one in found.effects:
         effect = find(one.name)
         lines += ["", f"{effect.title}: {effect.equation}"]
-        for name, parameter in one.parameters.items():
-            half = 0.5 * (parameter.interval90[1] - parameter.interval90[0])
-            lines.append(f"  {name:24}{parameter.value:12.4g} ± {half:.2g} {parameter.unit}")
+        lines += [f"  {name:24}  {told}" for name, told in settings(found, one).items()]
         if one.same_as:
             lines.append(f"  these recordings cannot tell it from {', '.join(one.same_as)}")
     lines += ["", f"{'error ladder':34}{'fitted':>10}{'held out':>10}   (1 is the floor)"]
@@ -92,4 +110,6 @@ def text(found: Discovery) -> str:
         lines += ["", f"outside their tolerance: {outside}"]
     if found.unknown is not None:
         lines += ["", found.unknown.sentence]
+    if experiment := next_experiment(found):
+        lines += ["", *experiment]
     return "\n".join(lines)

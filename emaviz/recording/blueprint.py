@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import rerun as rr
@@ -76,8 +77,13 @@ def build(contents: Contents) -> rrb.Blueprint:
             tabs.append(_identification_tab(name, algorithm))
     if contents.config:
         tabs.append(rrb.TextDocumentView(origin="/config", name="Configuration"))
+    return arranged(contents, tabs)
+
+
+def arranged(contents: Contents, tabs: Sequence[rrb.Container | rrb.View], active: int = 0) -> rrb.Blueprint:
+    """A layout of these tabs, its panels folded away."""
     return rrb.Blueprint(
-        rrb.Tabs(*tabs, active_tab=0 if tabs else None),
+        rrb.Tabs(*tabs, active_tab=active if tabs else None),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
         rrb.TimePanel(
@@ -110,7 +116,7 @@ def send(stream: rr.RecordingStream, layout: rrb.Blueprint) -> None:
 
 
 def _signals_tab(contents: Contents) -> rrb.Container | None:
-    views = [_signal_view(contents, name) for name in _MAIN if contents.groups_with(name)]
+    views = [signal_view(contents, name) for name in _MAIN if contents.groups_with(name)]
     residual = contents.signals.get("residual", [])
     if "current_A" in residual:
         views.append(_residual_view(contents, "current_A"))
@@ -126,7 +132,7 @@ def _comparison_tabs(contents: Contents) -> list[rrb.Container | rrb.View]:
     text = [rrb.TextDocumentView(origin=f"{COMPARISON}/{name}", name=name.capitalize()) for name in contents.findings]
     tabs: list[rrb.Container | rrb.View] = []
     if compared:
-        tabs.append(rrb.Vertical(*(_signal_view(contents, name) for name in compared), name="Overlay"))
+        tabs.append(rrb.Vertical(*(signal_view(contents, name) for name in compared), name="Overlay"))
         tabs.append(rrb.Vertical(*(_residual_view(contents, name) for name in compared), name="Residuals"))
     first = [_residual_view(contents, name) for name in compared[:1]]
     tabs.append(rrb.Horizontal(rrb.Vertical(*text), *first, name="Where it fails"))
@@ -142,10 +148,10 @@ def _more_tab(contents: Contents) -> rrb.Container | None:
     views = []
     phases = [f"/{g}/{name}" for name in _PHASES for g in contents.groups_with(name)]
     if phases:
-        views.append(_plot("Phase currents [A]", phases))
+        views.append(plot("Phase currents [A]", phases))
     shown = _compared(contents) if contents.findings else list(_MAIN)
     others = [name for name in contents.names() if name not in [*shown, *_PHASES] and contents.groups_with(name)]
-    views += [_signal_view(contents, name) for name in others]
+    views += [signal_view(contents, name) for name in others]
     if not contents.findings:
         views += [
             _residual_view(contents, name) for name in contents.signals.get("residual", []) if name != "current_A"
@@ -155,7 +161,7 @@ def _more_tab(contents: Contents) -> rrb.Container | None:
 
 def _fit_tab(name: str, contents: Contents) -> rrb.View:
     targets = [f"/{group}/current_A" for group in contents.groups_with("current_A") if group != "monitor"]
-    return _plot(f"Fit {name}: MM current through the iterations [A]", [*targets, f"{algorithm_path(name)}/monitor/**"])
+    return plot(f"Fit {name}: MM current through the iterations [A]", [*targets, f"{algorithm_path(name)}/monitor/**"])
 
 
 def _identification_tab(name: str, algorithm: Algorithm) -> rrb.Container:
@@ -163,7 +169,7 @@ def _identification_tab(name: str, algorithm: Algorithm) -> rrb.Container:
     left: list[rrb.Container | rrb.View] = []
     right: list[rrb.Container | rrb.View] = []
     if algorithm.iterations:
-        left.append(_plot("Convergence: log10 of best RMSE [A]", [f"{root}/log10_rmse"], legend=False, linked=False))
+        left.append(plot("Convergence: log10 of best RMSE [A]", [f"{root}/log10_rmse"], legend=False, linked=False))
         right.append(rrb.Grid(*(_k_view(root, k) for k in K_NAMES), grid_columns=2))
     if algorithm.result:
         left.append(rrb.TextDocumentView(origin=f"{root}/result", name="Result"))
@@ -175,19 +181,20 @@ def _identification_tab(name: str, algorithm: Algorithm) -> rrb.Container:
 
 def _k_view(root: str, k: str) -> rrb.TimeSeriesView:
     contents = [f"{root}/population/{k}", f"{root}/truth/{k}", f"{root}/best/{k}"]
-    return _plot(K_TITLES[k], contents, legend=False, linked=False, range_=(-0.05, 1.05))
+    return plot(K_TITLES[k], contents, legend=False, linked=False, range_=(-0.05, 1.05))
 
 
-def _signal_view(contents: Contents, name: str) -> rrb.TimeSeriesView:
-    return _plot(signal_title(name), [f"/{group}/{name}" for group in contents.groups_with(name)])
+def signal_view(contents: Contents, name: str) -> rrb.TimeSeriesView:
+    """A signal of every group that has it, in one plot."""
+    return plot(signal_title(name), [f"/{group}/{name}" for group in contents.groups_with(name)])
 
 
 def _residual_view(contents: Contents, name: str) -> rrb.TimeSeriesView:
     paths = [f"/{group}/{name}" for group in _BESIDE if name in contents.signals.get(group, ())]
-    return _plot(series_title("residual", name), paths)
+    return plot(series_title("residual", name), paths)
 
 
-def _plot(
+def plot(
     title: str,
     paths: list[str],
     *,
@@ -195,6 +202,7 @@ def _plot(
     linked: bool = True,
     range_: tuple[float, float] | None = None,
 ) -> rrb.TimeSeriesView:
+    """Entities over time in one plot; linked: with the same part of time as all others that are."""
     return rrb.TimeSeriesView(
         origin="/",
         contents=paths,

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import rerun as rr
 from numpy.typing import NDArray
 
 from ema_model.comparison.result import Compared, Comparison
@@ -15,13 +14,13 @@ from ema_model.comparison.summary import as_dict
 from ema_model.errors import InputError
 from emaviz.figures.theme import FLOOR_WIDTH
 from emaviz.recording.errors import RecordingError
-from emaviz.recording.style import COMPARISON, SIM_TIME, plain
+from emaviz.recording.markdown import escaped
+from emaviz.recording.style import COMPARISON, plain
 from emaviz.recording.writer import RecordingWriter
 
 Array = NDArray[np.float64]
 
 _PAUSE_S = 0.2  # between recordings, so that one is seen to end
-_CELLS = str.maketrans({"|": r"\|", "\n": " ", "\r": " ", "`": "'", "<": "&lt;", "[": r"\[", "*": r"\*", "_": r"\_"})
 
 
 def write_comparison(comparison: Comparison, path: str | Path, configuration: Mapping[str, Any] | None = None) -> None:
@@ -64,12 +63,6 @@ class ComparisonWriter(RecordingWriter):
             if plain(name) not in self._contents.findings:
                 self._contents.findings.append(name)
             self._text(f"{COMPARISON}/{name}", text_markdown)
-
-    def gap(self, group: str, name: str, time_s: float) -> None:
-        """Ends a signal's line there, so that none is drawn to the value that follows."""
-        time = [rr.TimeColumn(SIM_TIME, duration=[np.timedelta64(round(time_s * 1e9), "ns")])]
-        clear = rr.Clear.columns(is_recursive=[False])
-        self._file.do(lambda stream: stream.send_columns(f"/{group}/{plain(name)}", time, clear))
 
 
 def _one_after_another(recordings: Sequence[Compared]) -> tuple[list[Array], list[float]]:
@@ -149,11 +142,11 @@ def _not_compared(comparison: Comparison) -> list[str]:
 
 def _answer(comparison: Comparison) -> str:
     verdict = "The model is adequate." if comparison.adequate else "The model is not adequate."
-    lines = [f"# {_escaped(verdict)}", "", *(f"{_escaped(sentence)}\n" for sentence in comparison.sentences)]
-    lines += [f"- ⚠ {_escaped(warning)}" for warning in comparison.warnings]
+    lines = [f"# {escaped(verdict)}", "", *(f"{escaped(sentence)}\n" for sentence in comparison.sentences)]
+    lines += [f"- ⚠ {escaped(warning)}" for warning in comparison.warnings]
     lines += ["", "| signal | rmse | before calibration | floor |", "|---|---|---|---|"]
     for name, error in comparison.signals.items():
-        lines.append(f"| {_escaped(name)} | {error.rmse:.4g} | {error.rmse_initial:.4g} | {error.noise_floor:.4g} |")
+        lines.append(f"| {escaped(name)} | {error.rmse:.4g} | {error.rmse_initial:.4g} | {error.noise_floor:.4g} |")
     return "\n".join(lines)
 
 
@@ -164,7 +157,7 @@ def _regions(comparison: Comparison, times: Sequence[Array]) -> str:
         size = np.abs(residuals.values[region.signal]) / residuals.sigma[region.signal]
         at = int(np.argmax(np.where(region.blocks & np.isfinite(size), size, -1.0)))
         lines.append(
-            f"{i + 1}. **{_escaped(region.sentence)}** {region.excess:.3g} times the floor; worst at {time[at]:.4g} s."
+            f"{i + 1}. **{escaped(region.sentence)}** {region.excess:.3g} times the floor; worst at {time[at]:.4g} s."
         )
     return "\n".join(lines if comparison.worst_regions else [*lines, "No region stands out of the floor."])
 
@@ -174,11 +167,11 @@ def _configuration(
 ) -> str:
     settings = {"actuator": comparison.actuator.name, **configuration}
     lines = ["# Comparison", "", "| setting | value |", "|---|---|"]
-    lines += [f"| {_escaped(k)} | {_escaped(v)} |" for k, v in settings.items() if v not in (None, [], "")]
+    lines += [f"| {escaped(k)} | {escaped(v)} |" for k, v in settings.items() if v not in (None, [], "")]
     lines.append(f"| block | {1e3 * comparison.residuals.block_s:.4g} ms |")
     for i, (one, time, shift) in enumerate(zip(comparison.recordings, times, shifts)):
         moved = f", moved by {shift:.4g} s" if shift else ""
-        lines.append(f"| recording {i + 1} | {_escaped(one.name)}: {time[0]:.4g} … {time[-1]:.4g} s{moved} |")
+        lines.append(f"| recording {i + 1} | {escaped(one.name)}: {time[0]:.4g} … {time[-1]:.4g} s{moved} |")
     fit = comparison.calibration
     if fit is not None:
         lines += [
@@ -192,11 +185,6 @@ def _configuration(
             name = comparison.actuator.axes.path(path)
             low, high = found.interval90
             lines.append(
-                f"| {_escaped(name)} | {found.value:.5g} | {low:.5g} … {high:.5g} | {found.unit} | {found.z:.2f} |"
+                f"| {escaped(name)} | {found.value:.5g} | {low:.5g} … {high:.5g} | {found.unit} | {found.z:.2f} |"
             )
     return "\n".join(lines) + "\n"
-
-
-def _escaped(value: object) -> str:
-    """Text that Markdown shows as it is, and that cannot break a table."""
-    return str(value).translate(_CELLS)

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import rerun as rr
+import rerun.blueprint as rrb
 from numpy.typing import ArrayLike, NDArray
 
 from emaviz.recording import series, style
@@ -100,6 +101,12 @@ class RecordingWriter:
                 self._send(f"/{group}/{name}", series.signal_style(group, name), time, values)
             self.flush()
 
+    def gap(self, group: str, name: str, time_s: float) -> None:
+        """Ends a signal's line there, so that none is drawn to the value that follows."""
+        time, _ = _durations([time_s])
+        clear = rr.Clear.columns(is_recursive=[False])
+        self._file.do(lambda stream: stream.send_columns(f"/{group}/{name}", time, clear))
+
     def truth(self, k: ArrayLike) -> None:
         """The true k (8,), if known: static values, and a line beside every identified k from now on."""
         truth = _column("k", k, len(style.K_NAMES))
@@ -166,7 +173,11 @@ class RecordingWriter:
     def _last(self) -> None:
         self.flush()
         # Only now is it known what to arrange; the viewer would stumble through several layouts in one file.
-        self._file.do(lambda stream: send(stream, build(self._contents)))
+        self._file.do(lambda stream: send(stream, self._layout()))
+
+    def _layout(self) -> rrb.Blueprint:
+        """How what is in the file opens."""
+        return build(self._contents)
 
     def _flush_regularly(self) -> None:
         while not self._ending:

@@ -1,5 +1,6 @@
 """Reports: what was found, as one HTML file that needs nothing beside it."""
 
 from emaviz.report.comparison import write_report
+from emaviz.report.discovery import write_discovery_report
 
-__all__ = ["write_report"]
+__all__ = ["write_discovery_report", "write_report"]

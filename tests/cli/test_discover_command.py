@@ -8,6 +8,7 @@ import pytest
 
 from ema_model.actuator import load_actuator
 from emaviz.cli import main
+from emaviz.recording import read
 
 
 @pytest.fixture(scope="module")
@@ -37,6 +38,18 @@ def test_effect_is_found_and_the_model_saved(rig, tmp_path, capsys):
     assert json.loads(out.read_text())["adequate"] is True
 
 
+def test_recording_and_report_tell_the_same(rig, tmp_path):
+    record, report, out = tmp_path / "d.rrd", tmp_path / "d.html", tmp_path / "d.json"
+    arguments = ["--max-effects", "1", "--record", str(record), "--report", str(report), "--json", str(out)]
+    assert main(["discover", str(rig / "sine.csv"), *arguments]) == 0
+    result, recording = json.loads(out.read_text()), read(record)
+    told = recording.properties["discovery"]
+    assert told["ladder"] == result["ladder"] and told["effects"] == result["effects"]
+    assert "sine.csv" in recording.config
+    text = report.read_text(encoding="utf-8")
+    assert "The model lacks cogging torque." in text and f"{result['ladder'][-1]['rmse']:.3f}" in text
+
+
 @pytest.mark.parametrize(
     "arguments, says",
     [
@@ -45,6 +58,9 @@ def test_effect_is_found_and_the_model_saved(rig, tmp_path, capsys):
         (["SINE", "--signals", "some"], "--signals"),
         (["SINE", "--max-effects", "many"], "--max-effects"),
         (["SINE", "--save-actuator", "nowhere/a.toml"], "the folder nowhere does not exist"),
+        (["SINE", "--report", "nowhere/a.html"], "the folder nowhere does not exist"),
+        (["SINE", "--record", "nowhere/a.rrd"], "the folder nowhere does not exist"),
+        (["SINE", "--record", "a.html"], "must end in .rrd"),
         (["SINE", "--map", "x=y"], "no signal 'x'"),
     ],
 )

@@ -1,0 +1,51 @@
+"""What a challenge gives away: its title, its story and its recordings."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+
+from ema_model.errors import InputError
+
+_FILE = "challenge.toml"
+
+
+@dataclass(frozen=True)
+class Challenge:
+    """Recordings of one actuator that is the thesis's but for tolerances, and for what may be hidden."""
+
+    name: str  # of its folder
+    title: str
+    grade: int  # 1, easy, to 5
+    story: str
+    training: tuple[Path, ...]  # to fit
+    holdout: tuple[Path, ...]  # not to fit; must improve as well
+
+
+def folder() -> Path:
+    """Where the challenges that come with the package are."""
+    inside = Path(str(resources.files("ema_model") / "assets" / "challenges"))
+    return inside if inside.is_dir() else Path(__file__).parents[2] / "assets" / "challenges"
+
+
+def challenges(where: Path | None = None) -> list[Challenge]:
+    """All challenges of a folder (the package's own without one), the easy ones first; InputError tells a mistake."""
+    found = [_read(path) for path in sorted((where or folder()).glob(f"*/{_FILE}"))]
+    return sorted(found, key=lambda one: (one.grade, one.name))
+
+
+def _read(path: Path) -> Challenge:
+    try:
+        told = tomllib.loads(path.read_text(encoding="utf-8"))
+        files = [tuple(path.with_name(str(name)) for name in told[which]) for which in ("training", "holdout")]
+        found = Challenge(path.parent.name, str(told["title"]), int(told["grade"]), str(told["story"]).strip(), *files)
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, TypeError, ValueError) as error:
+        raise InputError(f"{path}: not a challenge: {error}; mend it or remove its folder") from None
+    except KeyError as error:
+        raise InputError(f"{path}: {error.args[0]} is missing; add it") from None
+    missing = [file.name for file in (*found.training, *found.holdout) if not file.is_file()]
+    if missing:
+        raise InputError(f"{path}: there is no {missing[0]} beside it; run python -m ema_model.challenges")
+    return found

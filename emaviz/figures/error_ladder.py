@@ -1,0 +1,61 @@
+"""The error ladder: how far the model is from the recordings, step by step, in units of the floor."""
+
+from __future__ import annotations
+
+import plotly.graph_objects as go
+
+from ema_model.discovery import Discovery
+from emaviz.discovery_words import rung_title
+from emaviz.figures import quantity, theme
+
+FITTED, HELD_OUT = theme.MEASURED, theme.MODEL
+
+
+def figure(found: Discovery, *, dark: bool = False) -> go.Figure:
+    """A line for what was fitted, one for what was held out, and the floor at 1."""
+    chart = theme.new("Error after each step", "", "rms error / floor [-]", dark=dark)
+    # Numbered within: two steps may have the same title.
+    places = list(range(len(found.ladder)))
+    titles = [theme.plain(rung_title(rung.label, found.actuator.axes)) for rung in found.ladder]
+    lines = [("fitted", FITTED, "circle", [rung.rmse for rung in found.ladder])]
+    held = [rung.holdout_rmse for rung in found.ladder]
+    if any(value is not None for value in held):
+        lines.append(("held out", HELD_OUT, "diamond", [float("nan") if v is None else v for v in held]))
+    for name, colour, symbol, values in lines:
+        other = next((line[3] for line in lines if line[0] != name), values)
+        chart.add_trace(
+            go.Scatter(
+                x=places,
+                y=values,
+                mode="lines+markers+text",
+                name=name,
+                line={"color": colour, "width": 2.5},
+                marker={"size": 10, "symbol": symbol},
+                text=[quantity.number(value) for value in values],
+                # The number of the upper line above it, of the lower one below.
+                textposition=[
+                    "top center" if value > its or (value == its and name == "fitted") else "bottom center"
+                    for value, its in zip(values, other)
+                ],
+                textfont={"color": colour, "size": 12},
+                customdata=titles,
+                hovertemplate="%{customdata}: %{y:.3f} × the floor",
+                cliponaxis=False,
+            )
+        )
+    chart.add_trace(
+        go.Scatter(
+            x=[-0.5, len(places) - 0.5],
+            y=[1.0, 1.0],
+            mode="lines",
+            name="floor",
+            line={"color": theme.EDGE, "width": 1.5, "dash": "dash"},
+            hoverinfo="skip",
+        )
+    )
+    most = max(value for *_, values in lines for value in values if value == value)
+    chart.update_xaxes(
+        tickvals=places, ticktext=titles, range=[-0.5, len(places) - 0.5], showgrid=False, zeroline=False, nticks=0
+    )
+    chart.update_yaxes(range=[0.0, 1.2 * max(most, 1.0)], rangemode="tozero")
+    return chart

@@ -1,0 +1,56 @@
+"""What is left of a signal over time before and after a discovery, about the band of a perfect model."""
+
+from __future__ import annotations
+
+import numpy as np
+import plotly.graph_objects as go
+
+from ema_model.measurement import SIGNALS
+from emaviz.figures import quantity, theme
+from emaviz.figures.discovery_tracks import Track
+from emaviz.figures.lines import band, line
+
+BEFORE, AFTER = theme.MODEL, theme.MEASURED
+
+
+def figure(track: Track, signal: str, first: int = 0, last: int = -1, *, dark: bool = False) -> go.Figure:
+    """The residual of two steps of the ladder: the first and the last one, unless told otherwise."""
+    told = SIGNALS[signal]
+    title = told.title.removeprefix("Equivalent ")
+    title = f"Residual {title[0].lower()}{title[1:]}"
+    if signal not in track.measured:
+        return theme.missing(title, "not recorded here", dark=dark)
+    before, after = track.residual(signal, first), track.residual(signal, last)
+    shown = quantity.Quantity(title, told.unit, symbol=f"Δ{told.symbol}").scaled(before)
+    chart = theme.new(f"{title} (measured − model)", "Time [s]", shown.short_label, dark=dark)
+    sigma = theme.FLOOR_WIDTH * shown.factor * track.sigma[signal]
+    x, y = band(track.time_s, -sigma, sigma, theme.POINTS)
+    chart.add_trace(
+        go.Scatter(
+            x=x,
+            y=y,
+            fill="toself",
+            fillcolor=theme.FLOOR,
+            line={"width": 0},
+            mode="lines",
+            name=theme.FLOOR_NAME,
+            legendgroup="floor",
+            hoverinfo="skip",
+        )
+    )
+    changed = len(track.models) > 1
+    drawn = [(before, "without the added effects", BEFORE)] if changed else []
+    drawn.append((after, "with them" if changed else "residual", AFTER))
+    for values, name, colour in drawn:
+        x, y = line(track.time_s, shown.factor * values, theme.POINTS)
+        style = {"width": 1, "color": colour}
+        chart.add_trace(go.Scatter(x=x, y=y, mode="lines", name=name, line=style, hovertemplate="%{y:.4g}"))
+    for edge in (-sigma, sigma):  # once more, because dense noise hides the band below it
+        x, y = line(track.time_s, edge, theme.POINTS // 2)
+        style = {"width": 1.4, "color": theme.EDGE}
+        chart.add_trace(
+            go.Scatter(x=x, y=y, mode="lines", line=style, hoverinfo="skip", legendgroup="floor", showlegend=False)
+        )
+    most = float(np.max(np.abs(np.concatenate([before, after])))) * shown.factor
+    chart.update_yaxes(range=[-1.05 * most, 1.05 * most])
+    return chart

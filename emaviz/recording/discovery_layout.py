@@ -1,0 +1,76 @@
+"""How a discovery's recording opens: Signals, Ladder, Candidates, Residuals, Configuration."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import rerun.blueprint as rrb
+
+from emaviz.recording.blueprint import Contents, arranged, plot, signal_view
+from emaviz.recording.style import series_title
+
+LADDER, CANDIDATES, VERDICT = "/discovery/ladder", "/discovery/candidates", "/discovery/verdict"
+_AIR = 1.05
+
+
+@dataclass(frozen=True)
+class Step:
+    """The residual of one signal after one step of the ladder."""
+
+    number: int
+    title: str  # of the step
+    signal: str
+    largest: float  # of the residuals of all steps, in the signal's unit: one scale for all
+
+
+def build(contents: Contents, steps: Sequence[Step]) -> rrb.Blueprint:
+    """The tabs, of which the ladder with the verdict beside it is open."""
+    fitted = contents.signals.get("residual", [])
+    tabs: list[rrb.Container | rrb.View] = []
+    if fitted:
+        tabs.append(rrb.Vertical(*(signal_view(contents, name) for name in fitted), name="Signals"))
+    tabs.append(_ladder())
+    tabs.append(_candidates())
+    if steps:
+        tabs.append(rrb.Vertical(*(_residual(step) for step in steps), name="Residuals"))
+    if contents.config:
+        tabs.append(rrb.TextDocumentView(origin="/config", name="Configuration"))
+    tabs.append(_steps())
+    return arranged(contents, tabs, active=1 if fitted else 0)
+
+
+def _ladder() -> rrb.Container:
+    bars = rrb.BarChartView(
+        origin="/",
+        contents=[f"{LADDER}/fitted", f"{LADDER}/held_out", f"{LADDER}/floor"],
+        name="Error over floor after each step (blue: fitted, orange: held out, grey: the floor, 1)",
+        plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop),
+    )
+    words = rrb.TextDocumentView(origin=VERDICT, name="What was found")
+    return rrb.Horizontal(words, bars, column_shares=[1, 1], name="Ladder")
+
+
+def _steps() -> rrb.View:
+    # It stays empty until that timeline is chosen, and a file has no means to change it with the tab.
+    return plot("Ladder by step (below, choose the timeline: iteration)", [LADDER], linked=False)
+
+
+def _candidates() -> rrb.Container:
+    bars = rrb.BarChartView(
+        origin="/",
+        contents=[f"{CANDIDATES}/predicted", f"{CANDIDATES}/refitted"],
+        name="Fall of χ² by rank (blue: predicted, orange: refitted)",
+        plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop),
+    )
+    table = rrb.TextDocumentView(origin=CANDIDATES, name="Ranking")
+    return rrb.Horizontal(table, bars, column_shares=[1, 1], name="Candidates")
+
+
+def _residual(step: Step) -> rrb.View:
+    limit = _AIR * step.largest
+    return plot(
+        f"{series_title('residual', step.signal)}, step {step.number}: {step.title}",
+        [f"/{group}/{step.signal}" for group in (f"residual/step_{step.number}", "floor_high", "floor_low")],
+        range_=(-limit, limit) if limit > 0.0 else None,
+    )

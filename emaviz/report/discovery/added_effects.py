@@ -1,0 +1,63 @@
+"""Each effect that was added: what it is, how large, how sure, and what else it could be."""
+
+from __future__ import annotations
+
+from ema_model.discovery.result import Added
+from ema_model.effects import Effect, find
+from emaviz.discovery_words import effect_title, fitted_of, small
+from emaviz.figures import quantity
+from emaviz.report.discovery.subject import Told
+from emaviz.report.markup import escape, paragraph, table
+from emaviz.report.section import Figures, Section
+
+
+class AddedEffects(Section[Told]):
+    """A card for each, in the order in which they were added; left out where none was."""
+
+    title = "What was added"
+    anchor = "added"
+
+    def body(self, subject: Told, figures: Figures) -> str:
+        """Equation, cause, parameters, errors before and after, rivals."""
+        return "".join(_card(subject, i, one) for i, one in enumerate(subject.found.effects, 1))
+
+
+def _card(told: Told, index: int, one: Added) -> str:
+    effect = find(one.name)
+    same = "" if not one.same_as else f"Could as well be: {', '.join(small(effect_title(n)) for n in one.same_as)}."
+    return (
+        f'<div class="region" id="effect-{index}"><h3>{index}. {escape(effect.title)}</h3>'
+        + f'<p class="equation">{escape(effect.equation)}</p>'
+        + paragraph(effect.explanation)
+        + _parameters(told, one)
+        + paragraph(_fall(one))
+        + (paragraph(same, "warning") if same else "")
+        + paragraph(_known(effect), "small")
+        + "</div>"
+    )
+
+
+def _known(effect: Effect) -> str:
+    facts = {"Where it shows": effect.shows, "Mistaken for": effect.mistaken_for, "Source": effect.source}
+    return " ".join(f"{name}: {fact}." for name, fact in facts.items() if fact)
+
+
+def _parameters(told: Told, one: Added) -> str:
+    meanings = {parameter.name: parameter.meaning for parameter in find(one.name).parameters}
+    rows = []
+    for name, setting in one.chosen.items():
+        rows.append([meanings.get(name, ""), name, f"{setting:g}", "chosen", "–"])
+    for name in one.parameters:
+        fitted = fitted_of(told.found, one, name)
+        low, high = (quantity.number(edge) for edge in fitted.interval90)
+        value = quantity.number(fitted.value)
+        rows.append([meanings.get(name, ""), name, value, f"{low} … {high}", fitted.unit or "–"])
+    return table(["Parameter", "name", "value", "90 % interval", "unit"], rows, text_columns=2)
+
+
+def _fall(one: Added) -> str:
+    number = quantity.number
+    text = f"The error falls from {number(one.rmse_before)} to {number(one.rmse_after)} times the floor"
+    if one.holdout_before is None or one.holdout_after is None:
+        return f"{text}; nothing was held out."
+    return f"{text}, and on what was not fitted from {number(one.holdout_before)} to {number(one.holdout_after)}."

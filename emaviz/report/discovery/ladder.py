@@ -1,0 +1,45 @@
+"""The error after each step, fitted and held out, and by signal."""
+
+from __future__ import annotations
+
+from ema_model.measurement import SIGNALS
+from emaviz.discovery_words import FLOOR_NOTE, rung_title
+from emaviz.figures import error_ladder, quantity
+from emaviz.figures.quantity import Quantity
+from emaviz.report.discovery.subject import Told
+from emaviz.report.markup import paragraph, table
+from emaviz.report.section import Figures, Section
+
+
+class Ladder(Section[Told]):
+    """Figure and table."""
+
+    title = "The ladder"
+    anchor = "ladder"
+
+    def body(self, subject: Told, figures: Figures) -> str:
+        """Always there."""
+        found = subject.found
+        held = any(rung.holdout_rmse is not None for rung in found.ladder)
+        shown = {
+            name: _quantity(found.actuator.axes.signal(name)).scaled([rung.signals[name] for rung in found.ladder])
+            for name in found.ladder[0].signals
+        }
+        heads = ["Step", "fitted / floor", *(["held out / floor"] if held else [])]
+        heads += [f"{one.title}, rms" for one in shown.values()]
+        rows = []
+        for rung in found.ladder:
+            row = [rung_title(rung.label, found.actuator.axes), quantity.number(rung.rmse)]
+            if held:
+                row.append("–" if rung.holdout_rmse is None else quantity.number(rung.holdout_rmse))
+            rows.append([*row, *(one.text(rung.signals[name]) for name, one in shown.items())])
+        return (
+            figures.place(error_ladder.figure(found), 360, "error-ladder")
+            + table(heads, rows)
+            + paragraph(FLOOR_NOTE, "small")
+        )
+
+
+def _quantity(name: str) -> Quantity:
+    signal = SIGNALS.get(name)
+    return Quantity(name, "") if signal is None else Quantity(signal.title, signal.unit)

@@ -1,0 +1,28 @@
+"""The verdict in plain words, first of all."""
+
+from __future__ import annotations
+
+from emaviz.discovery_words import headline, sentences
+from emaviz.report.discovery.subject import Told
+from emaviz.report.markup import bullets, escape, paragraph
+from emaviz.report.section import Figures, Section
+
+_KINDS = {"adequate": "good", "effects_found": "note"}
+
+
+class Verdict(Section[Told]):
+    """The headline, what follows from it, and what to be warned of."""
+
+    title = "The verdict"
+    anchor = "verdict"
+
+    def body(self, subject: Told, figures: Figures) -> str:
+        """Always there."""
+        found = subject.found
+        kind = _KINDS.get(found.verdict, "bad")
+        return (
+            f'<p><span class="verdict {kind}">{escape(found.verdict.replace("_", " "))}</span></p>'
+            + paragraph(headline(found), "answer")
+            + "".join(paragraph(sentence) for sentence in sentences(found))
+            + bullets(found.warnings, "warning")
+        )

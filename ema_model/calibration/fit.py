@@ -178,9 +178,9 @@ class _Search:
             fun = self.problem.residual(np.zeros(0))
             return _Found(np.zeros(0), np.zeros((len(fun), 0)), float(fun @ fun) / self.problem.values, 0.0, True)
         if start is not None:
-            known = np.array([start.get(u.name, 0.0) for u in self.problem.unknowns])
-            return self._from([known], 1.0, "linear")
-        starts = [np.zeros(count), *_promising(self.problem)]
+            starts = [np.array([start.get(u.name, 0.0) for u in self.problem.unknowns])]
+        else:
+            starts = [np.zeros(count), *_promising(self.problem)]
         found = self._from(starts, 1.0, "linear")
         if found.chi2 > _MISFIT:
             scale = np.sqrt(found.chi2) / 3.0

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.ndimage import label, maximum_filter1d, minimum_filter1d, uniform_filter1d
+from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter1d
 
 from ema_model.actuator import Actuator
 from ema_model.commands import Recorded
@@ -132,10 +132,10 @@ def _repeats(window: Window | Stretch, noise: Mapping[str, float]) -> Array:
         return repeats
     position = window.measured[name]
     moved = maximum_filter1d(position, width) - minimum_filter1d(position, width)
-    stands, count = label(moved < _STILL * noise[name])
-    for i in range(1, count + 1):
-        standing = stands == i
-        repeats[standing] = np.maximum(repeats[standing], np.count_nonzero(standing))
+    stands = np.concatenate([[False], moved < _STILL * noise[name], [False]])
+    ends = np.flatnonzero(np.diff(stands.astype(int)))
+    for first, last in zip(ends[::2], ends[1::2]):
+        repeats[first:last] = np.maximum(repeats[first:last], last - first)
     return repeats
 
 

@@ -41,7 +41,7 @@ def next_experiment(data: Data, first: Fit, second: Fit) -> Experiment | None:
     """
     if not isinstance(first.plant, ClosedLoop):
         return None
-    rivals = tuple(_names(first, second))
+    rivals = _names(first, second)
     further = [name for name in SIGNALS[2:] if name not in data.signals or not _is_measured(first, name)]
     for signals in (dict(data.signals), {**data.signals, **dict.fromkeys(further, 1.0)}):
         found = []
@@ -60,7 +60,7 @@ def next_experiment(data: Data, first: Fit, second: Fit) -> Experiment | None:
 def allowed(data: Data, found: Fit) -> list[tuple[str, dict[str, float], float]]:
     """Commands within the range and speed of the recordings: name, settings, duration in s."""
     actuator = found.calibration.actuator
-    spans = [float(np.ptp(window.command)) for window in found.plant.windows if isinstance(window.command, np.ndarray)]
+    spans = [float(np.ptp(window.command)) for window in found.plant.windows if isinstance(window, Window)]
     reach = 0.5 * max([*spans, 1e-9])
     turns = _TURNS * 2.0 * math.pi * actuator.transmission.gear_ratio
     speeds = [

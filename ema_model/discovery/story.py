@@ -9,6 +9,9 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ema_model.actuator import Actuator
 from ema_model.comparison.compare import prepared, weights_of
 from ema_model.comparison.result import Explanation
@@ -26,7 +29,10 @@ from ema_model.measurement import Measurement
 from ema_model.recordings import check_same_actuator
 
 Progress = Callable[[str], None]
+Array = NDArray[np.float64]
 
+_SAME_CHI2 = 25.0  # between two effects, below which they cannot be told apart
+_SAME_DIRECTION = 1.0 - 0.98**2  # sin² between their signatures, likewise
 _MOVED = 1.5  # σ that a parameter comes back by, when it had been standing in for an effect
 _NOT_LOOKED_FOR = ("pendulum_load",)  # whoever has an arm on the shaft knows of it
 
@@ -83,10 +89,31 @@ class Story:
         self._prints = fingerprints(self.data, self.current, wanted, orders, self._prints)
         return scored(self.current, self._prints)
 
+    def signatures(self, ranked: Sequence[Candidate]) -> dict[str, Array]:
+        """What each candidate, of the last `ranked`, would take from what is measured less the model.
+
+        (values,), over the floor, at the strength that suits best; only what the calibration cannot do as well.
+        """
+        jacobian = np.concatenate(
+            [part[name] for part in self.current.calibration.weighted_sensitivities for name in part]
+        )
+        gram = jacobian.T @ jacobian + np.eye(jacobian.shape[1])
+        told = {}
+        for one in ranked:
+            prints = [found for found in self._prints if found.name == one.name]
+            order = one.settings.get("order")
+            parts = []
+            for columns in (found.columns for found in prints if found.settings.get("order") == order):
+                own = columns - jacobian @ np.linalg.solve(gram, jacobian.T @ columns)
+                parts.append(own @ np.linalg.lstsq(own, -self.current.residual, rcond=None)[0])
+            if parts:
+                told[one.name] = min(parts, key=lambda part: float(np.sum((self.current.residual + part) ** 2)))
+        return told
+
     def tried(self, ranked: Sequence[Candidate], share: float, most: int, tell: Progress) -> list[Trial]:
         """The most promising candidates, each in the model and refitted, the best first."""
         trials = []
-        for candidate in promising(ranked, share, most):
+        for candidate in promising(self.current, ranked, share, most):
             tell(f"trying {candidate.name}")
             trials.append(self.trial(candidate, tell))
         return sorted(trials, key=lambda trial: -trial.drop)
@@ -225,3 +252,19 @@ def _refreshed(one: Added, found: Fit) -> Added:
     settings = found.calibration.actuator.effects[one.key]
     chosen = {name: value for name, value in settings.items() if name not in fitted}
     return replace(one, parameters=fitted, chosen=chosen)
+
+
+def alike(signatures: Mapping[str, Array]) -> dict[str, tuple[str, ...]]:
+    """Effects whose signatures no refit is expected to tell apart, by name."""
+    return {
+        name: tuple(other for other, its in signatures.items() if other != name and _same(own, its))
+        for name, own in signatures.items()
+    }
+
+
+def _same(one: Array, other: Array) -> bool:
+    first, second, shared = one @ one, other @ other, one @ other
+    if min(first, second) == 0.0:
+        return False
+    apart = 1.0 - max(shared, 0.0) ** 2 / (first * second)
+    return bool(apart < _SAME_DIRECTION or max(first, second) * apart < _SAME_CHI2)

@@ -19,6 +19,7 @@ _LEAST_T = 2.4  # of the mean gain over blocks of time: 1 % of chance
 _HELD = 0.01  # of the held-out error: at the floor chance may raise it so much, above the floor it must fall so much
 _FLOOR = 1.1  # of the floor, up to which an error counts as at it
 _CORRELATED = 50  # values of a signal that may share their error
+_SCORE = 0.4  # of what a refit gives, that a score may have fallen short of predicting
 _FAINT = 0.1  # of the suggested strength, from which a fit that went astray begins anew
 
 
@@ -46,7 +47,7 @@ def tried(
 def pays(current: Fit, trial: Trial, data: Data, held: Data | None) -> bool:
     """Whether the data pay for the parameters: most of the time, materially, and where they were not fitted."""
     values = len(current.residual)
-    count = sum(not parameter.integer for name in trial.effects for parameter in find(name).parameters)
+    count = sum(_fitted(name) for name in trial.effects)
     if trial.drop - count * np.log(values) < LEAST_BIC:
         return False
     if trial.fit.error() > (1.0 - _LEAST_FALL) * current.error():
@@ -75,7 +76,17 @@ def _weakened(name: str, settings: Mapping[str, float]) -> dict[str, float]:
     return {**settings, first.name: max(first.low, _FAINT * settings[first.name])}
 
 
-def promising(ranked: Sequence[Candidate], share: float, most: int) -> list[Candidate]:
-    """Candidates worth a refit."""
-    chosen = [c for c in ranked if not c.untestable_reason and c.predicted_drop > LEAST_BIC]
+def promising(current: Fit, ranked: Sequence[Candidate], share: float, most: int) -> list[Candidate]:
+    """Candidates worth a refit: near the best, and such that a refit might make the data pay for them."""
+    values = len(current.residual)
+    material = (1.0 - (1.0 - _LEAST_FALL) ** 2) * current.chi2
+    chosen = [c for c in ranked if not c.untestable_reason]
+    chosen = [
+        c for c in chosen if c.predicted_drop > _SCORE * max(material, _fitted(c.name) * np.log(values) + LEAST_BIC)
+    ]
     return [c for c in chosen if c.predicted_drop >= share * chosen[0].predicted_drop][:most]
+
+
+def _fitted(name: str) -> int:
+    """Number of an effect's parameters that are fitted."""
+    return sum(not parameter.integer for parameter in find(name).parameters)

@@ -1,144 +1,213 @@
 """How sure an identification is: intervals, a joint test of health, and what the data cannot separate.
 
-Everything is linearised at the answer.  The covariance has three parts:
-- the residual's, by the sandwich (J'J)⁻¹ J'ΩJ (J'J)⁻¹ with Ω from the residual itself, correlated over up to
-  25 ms (Newey & West, Econometrica 55, 1987), since what a low-fidelity model misses is not white;
-- the tolerances of the actuator's own parameters, carried to k through their sensitivities;
-- the model's floor: what the Monitor Model would misread a Reference Model of this very k for, run under
-  the recordings' own commands.
+Everything is linearised at the best fit, in which the base parameters, the starts and unrecorded loads moved with
+k.  The covariance is the sandwich H⁻¹ M H⁻¹: H from the weighted derivatives and the tolerances' prior, M from what
+the errors really are — the recordings' white noise, the tolerances, and the twins' deviations, which last.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
 from ema_model import faults
-from ema_model.commands import Recorded
-from ema_model.identification.objective import Objective
-from ema_model.simulation import Run, simulate_reference
+from ema_model.identification.adequacy import Adequacy, adequacy
+from ema_model.identification.belts import above_zero, length_of_vector
+from ema_model.identification.fit import Fitted
+from ema_model.identification.separation import separating
+from ema_model.identification.twin import TWINS
+from ema_model.identification.unknowns import ECCENTRICITY, FAULTS, GAIN, to_x
 
 Array = NDArray[np.floating]
 
-_STEP = 0.01
-_CORRELATED_S = 0.025
-_PRIOR_SIGMA = 0.29  # of a k that may be anything in [0, 1]
 _Z90 = 1.645
-_INSEPARABLE = 0.95
-_WIDE = 0.05
+_ALARM = 0.01 / 7  # of each of seven k, so that all together give a false one in 1 % of healthy actuators
+_ALARM_Z = 2.98  # one-sided, of a k that is healthy at 0
+_ALARM_Z_BOTH = 3.19  # two-sided
+_ALARM_LENGTH = float(np.sqrt(-2.0 * np.log(_ALARM)))  # of a vector
+_INSEPARABLE = 0.9
+_WIDE = 0.03  # σ of a k below which it counts as known
+_LEAST_SPREAD = 0.02  # of a fit that left the base parameters where they were
+_SLIGHT = 2e-5  # least σ
 
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """What the recordings leave open about k."""
+    """What the recordings leave open about k.
+
+    k7 is an angle: its interval stands about k7 and may reach beyond 0 or 1; it is 0 … 1 where k6 may be 0.
+    """
 
     interval90: Array  # (8, 2)
-    healthy: bool  # joint test at 1 %
-    alarms: tuple[str, ...]  # the k whose interval excludes its healthy value
+    healthy: bool  # joint test at 1 %, of a model that fits
+    alarms: tuple[str, ...]  # the k that are surely not healthy; none where the model does not fit
     ambiguous: tuple[tuple[str, ...], ...]  # groups that these recordings cannot separate
+    adequate: bool = True  # the model with this k leaves no more than the floor
+    warnings: tuple[str, ...] = ()
+    separated_by: str = ""  # the run, as options of `emaviz simulate`, that would tell the groups apart
+    covariance: Array = field(default_factory=lambda: np.zeros((FAULTS, FAULTS)))  # of the faults' part of x
 
 
-def uncertainty(objective: Objective, k: Array, *, parameters_known: bool = False) -> Uncertainty:
-    """Intervals and tests at an answer k (8,); with parameters_known the tolerances do not count."""
-    jacobian, residual = _jacobian(objective, k)
-    variance = max(float(residual @ residual) / max(len(residual) - 8, 1), 1e-12)
-    information = jacobian.T @ jacobian + variance * np.eye(8) / _PRIOR_SIGMA**2
-    inverse = np.linalg.inv(information)
-    white = variance * inverse
-    covariance = inverse @ _meat(jacobian, residual, objective.windows[0].block_s) @ inverse
-    covariance = np.maximum(1.0, np.diag(white) / np.maximum(np.diag(covariance), 1e-30)) ** 0.5 * covariance
-    covariance = 0.5 * (covariance + covariance.T)
-    if not parameters_known:
-        shift = inverse @ jacobian.T @ _tolerance_shifts(objective, k)
-        covariance += shift @ shift.T
-    misread = inverse @ jacobian.T @ _model_floor(objective, k)
-    covariance += np.diag(misread**2) + 1e-12 * np.eye(8)
+def uncertainty(found: Fitted, k: Array) -> Uncertainty:
+    """Intervals and tests of a best fit; the intervals contain the answer k (8,) that is shown."""
+    covariance = _covariance(found)[:FAULTS, :FAULTS]
+    fit = adequacy(found)
+    if not fit.adequate:  # a misfit says how wrong the model is, and the intervals with it
+        covariance = covariance * max(1.0, fit.ratio) ** 2
+    free = _unbounded(found)[:FAULTS]
     sigma = np.sqrt(np.diag(covariance))
-    interval = np.clip(np.stack([k - _Z90 * sigma, k + _Z90 * sigma], axis=1), 0.0, 1.0)
-
-    eccentric = interval[5, 0] > 0.0
-    if not eccentric:
-        interval[6] = 0.0, 1.0  # a centred rotor has no direction
-    tested = [i for i in range(8) if i != 6]
-    outside = [i for i in tested if not interval[i, 0] <= faults.HEALTHY[i] <= interval[i, 1]]
-    deviation = (k - faults.HEALTHY)[tested]
-    joint = float(deviation @ np.linalg.solve(covariance[np.ix_(tested, tested)], deviation))
+    interval = _intervals(free, covariance, k)
+    deviation = _from_healthy(free, covariance)
+    healthy = deviation < float(chdtri(FAULTS, 0.01))
+    groups = _groups(covariance, sigma)
+    suggestion = separating(found, covariance, [name for group in groups for name in group]) if groups else None
     return Uncertainty(
         interval90=interval,
-        healthy=joint < float(chdtri(len(tested), 0.01)),
-        alarms=tuple(faults.NAMES[i] for i in outside),
-        ambiguous=_groups(white, sigma, eccentric),
+        healthy=bool(healthy and fit.adequate),
+        alarms=() if healthy or not fit.adequate else _alarms(free, sigma, covariance),
+        ambiguous=groups,
+        adequate=fit.adequate,
+        warnings=_warnings(fit),
+        separated_by=suggestion.text if suggestion else "",
+        covariance=covariance,
     )
 
 
-def _jacobian(objective: Objective, k: Array) -> tuple[Array, Array]:
-    """∂(current)/∂k (blocks, 8) by differences inside the box, and the residual (blocks,), A."""
-    low, high = np.clip(k - _STEP, 0.0, 1.0), np.clip(k + _STEP, 0.0, 1.0)
-    points = np.repeat(k[None, :], 17, axis=0)
-    for i in range(8):
-        points[2 * i, i], points[2 * i + 1, i] = low[i], high[i]
-    current = objective.currents(points)
-    columns = [(current[2 * i + 1] - current[2 * i]) / (high[i] - low[i]) for i in range(8)]
-    return np.stack(columns, axis=1), objective.target - current[16]
+def _covariance(found: Fitted) -> Array:
+    """Of x, (unknowns, unknowns)."""
+    problem, slopes = found.problem, found.slopes
+    rows = slice(0, problem.values)
+    held = problem.prior.copy()  # as the fit had it; what is really unknown is the whole tolerance
+    held[problem.base] /= max(found.spread, _LEAST_SPREAD)
+    hessian = slopes[rows].T @ slopes[rows] + np.diag(held**2)
+    inverse = np.linalg.inv(hessian)
+    meat = np.diag(held**4 / problem.prior**2)
+    for window, name, rows in problem.parts():
+        part = slopes[rows]
+        noise = np.full(rows.stop - rows.start, problem.weights[window].noise[name])
+        if found.twins is None:  # the model's own error, taken to last as its weight says
+            noise = 1.0 / problem.over_sigma(window, name, np.ones(len(noise)))
+        weighted = part * problem.over_sigma(window, name, noise)[:, None]
+        meat = meat + weighted.T @ weighted
+    if found.twins is not None:
+        scores = _twin_scores(found)
+        rounds = len(scores) // TWINS
+        meat = meat + (1.0 + 1.0 / TWINS) * scores.T @ scores / (rounds * (TWINS - 1))
+    covariance = inverse @ meat @ inverse + _SLIGHT**2 * np.eye(len(inverse))
+    return 0.5 * (covariance + covariance.T)
 
 
-def _meat(jacobian: Array, residual: Array, block_s: float) -> Array:
-    """J'ΩJ with the residual's own correlation, Bartlett's weights."""
-    score = jacobian * residual[:, None]
-    total = score.T @ score
-    lags = min(int(_CORRELATED_S / block_s), len(residual) // 4)
-    # sums of neighbours rather than of every lag's product: the same Bartlett kernel, in one pass
-    if lags > 1:
-        padded = np.concatenate([np.zeros((lags, 8)), score, np.zeros((lags, 8))])
-        running = np.cumsum(padded, axis=0)
-        windows = running[lags:] - running[:-lags]
-        total = windows.T @ windows / lags
-    return total
+def _twin_scores(found: Fitted) -> Array:
+    """What each twin's deviation would move the fit by, before the curvature: (twins, unknowns)."""
+    assert found.twins is not None
+    total = 0.0
+    for window, name, rows in found.problem.parts():
+        deviations = found.problem.over_sigma(window, name, found.twins.deviations[window][name])
+        total = total + deviations @ found.slopes[rows]
+    return np.asarray(total)
 
 
-def _tolerance_shifts(objective: Objective, k: Array) -> Array:
-    """Change of the current, A, for 1 σ of each parameter with a tolerance, (blocks, parameters)."""
-    actuator = objective.actuator
-    paths = [p for p in actuator.tolerances if not p.startswith("sensors.") and p != "motor.rotor_offset_rad"]
-    if not paths:
-        return np.zeros((objective.blocks, 0))
-    n = len(paths) + 1
-    values = {path: np.full(n, actuator.value(path)) for path in paths}
-    for i, path in enumerate(paths):
-        values[path][i] += actuator.tolerances[path].sigma
-    varied = actuator.varied(values)
-    current = objective.currents(np.repeat(k[None, :], n, axis=0), varied)
-    return (current[:-1] - current[-1]).T
+def _unbounded(found: Fitted) -> Array:
+    """Where x would be without its bounds: a Gauss–Newton step from the fit, the prior as the fit had it."""
+    problem, x = found.problem, found.x
+    moves = np.ones(problem.count, dtype=bool)
+    prior = problem.prior.copy()
+    if found.spread > 0.0:
+        prior[problem.base] /= found.spread
+    else:
+        moves &= ~problem.base
+    rows = slice(0, problem.values)
+    slopes, residual = found.slopes[rows][:, moves], found.residual[rows]
+    hessian = slopes.T @ slopes + np.diag(prior[moves] ** 2)
+    gradient = slopes.T @ residual + (prior**2 * (x - problem.middle))[moves]
+    at_bound = (x <= problem.low + 1e-6) | (x >= problem.high - 1e-6)
+    step = np.zeros(problem.count)
+    if (at_bound & moves)[:FAULTS].any():  # elsewhere the fit is there already
+        step[moves] = -np.linalg.solve(hessian + 1e-9 * np.diag(np.diag(hessian)), gradient)
+    return x + step
 
 
-def _model_floor(objective: Objective, k: Array) -> Array:
-    """Current of the Reference Model less that of the Monitor Model, both at k, A, (blocks,)."""
-    reference = []
-    for window in objective.windows:
-        count = len(window.command)
-        times = np.arange(count) * window.step_s
-        run = Run(
-            Recorded(times, window.command),
-            duration_s=count * window.step_s,
-            sample_rate_Hz=1.0 / window.block_s,
-            load_torque_Nm=float(window.load.mean()),
-        )
-        twin = simulate_reference(run, objective.actuator, k, objective.effects, start_rad=window.user_rad)
-        reference.append(twin["current_A"][1:])
-    return np.concatenate(reference) - objective.currents(k)[0]
+def _intervals(free: Array, covariance: Array, k: Array) -> Array:
+    sigma = np.sqrt(np.diag(covariance))
+    interval = np.zeros((8, 2))
+    for i in range(5):
+        interval[i] = _bounded(free[i], sigma[i])
+    gain = free[GAIN]
+    interval[7] = gain - _Z90 * sigma[GAIN], gain + _Z90 * sigma[GAIN]
+    along, across, length = _polar(free, covariance)
+    low, high = length_of_vector(length / along)
+    interval[5] = low * along, high * along
+    interval = np.clip(interval, 0.0, 1.0)
+    interval[:, 0], interval[:, 1] = np.minimum(interval[:, 0], k), np.maximum(interval[:, 1], k)
+    half = _Z90 * across / max(length, 1e-9) / (2.0 * np.pi)
+    interval[6] = (0.0, 1.0) if interval[5, 0] <= 0.0 or half >= 0.5 else (k[6] - half, k[6] + half)
+    return interval
 
 
-def _groups(white: Array, sigma: Array, eccentric: bool) -> tuple[tuple[str, ...], ...]:
+def _bounded(value: float, sigma: float) -> tuple[float, float]:
+    """Of a k between 0 and 1, the nearer end counting."""
+    if value > 0.5:
+        low, high = above_zero((1.0 - value) / sigma)
+        return 1.0 - high * sigma, 1.0 - low * sigma
+    low, high = above_zero(value / sigma)
+    return low * sigma, high * sigma
+
+
+def _polar(free: Array, covariance: Array) -> tuple[float, float, float]:
+    """σ along and across the eccentricity's vector, and its length."""
+    index = list(ECCENTRICITY)
+    vector = free[index]
+    part = covariance[np.ix_(index, index)]
+    length = float(np.hypot(*vector))
+    if length < 1e-9:
+        both = float(np.sqrt(np.trace(part) / 2.0))
+        return both, both, length
+    along = vector / length
+    across = np.array([-along[1], along[0]])
+    return float(np.sqrt(along @ part @ along)), float(np.sqrt(across @ part @ across)), length
+
+
+def _from_healthy(free: Array, covariance: Array) -> float:
+    """χ² by which health fits worse than the best k that can be."""
+    from scipy.optimize import lsq_linear  # takes a third of a second to import
+
+    root = np.linalg.inv(np.linalg.cholesky(covariance))
+    low = np.array([0.0] * 5 + [-1.0, -1.0, 0.0])
+    best = lsq_linear(root, root @ free, bounds=(low, np.ones(FAULTS)))
+    healthy = root @ (to_x(faults.HEALTHY) - free)
+    return float(healthy @ healthy - 2.0 * best.cost)
+
+
+def _alarms(free: Array, sigma: Array, covariance: Array) -> tuple[str, ...]:
+    outside = [faults.NAMES[i] for i in range(5) if free[i] > _ALARM_Z * sigma[i]]
+    along, _, length = _polar(free, covariance)
+    if length > _ALARM_LENGTH * along:
+        outside.append("k6")
+    if abs(free[GAIN] - faults.HEALTHY[7]) > _ALARM_Z_BOTH * sigma[GAIN]:
+        outside.append("k8")
+    return tuple(outside)
+
+
+def _groups(covariance: Array, sigma: Array) -> tuple[tuple[str, ...], ...]:
     """k that trade against each other: strongly correlated and, each, poorly known."""
-    scale = np.sqrt(np.diag(white))
-    correlation = np.abs(white / np.outer(scale, scale))
-    groups: list[set[int]] = []
-    for i in range(8):
+    names = [*faults.NAMES[:5], "k6", "k6", "k8"]
+    correlation = np.abs(covariance / np.outer(sigma, sigma))
+    groups: list[set[str]] = []
+    for i in range(FAULTS):
         for j in range(i):
-            if correlation[i, j] > _INSEPARABLE and min(sigma[i], sigma[j]) > _WIDE and (eccentric or 6 not in (i, j)):
-                touching = [g for g in groups if i in g or j in g]
-                groups = [g for g in groups if g not in touching] + [set.union({i, j}, *touching)]
-    return tuple(tuple(faults.NAMES[i] for i in sorted(group)) for group in groups)
+            if correlation[i, j] > _INSEPARABLE and min(sigma[i], sigma[j]) > _WIDE and names[i] != names[j]:
+                touching = [g for g in groups if names[i] in g or names[j] in g]
+                groups = [g for g in groups if g not in touching] + [set.union({names[i], names[j]}, *touching)]
+    return tuple(tuple(sorted(group)) for group in groups)
+
+
+def _warnings(fit: Adequacy) -> tuple[str, ...]:
+    if fit.adequate:
+        return ()
+    return (
+        f"The model does not fit, whatever k: {fit.reason}. What is found here may stand in for physics that the model "
+        "lacks; `emaviz discover` on the same recordings looks for it.",
+    )

@@ -12,11 +12,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from ema_model import faults
 from ema_model.errors import InputError
+from ema_model.identification.fit import Setting, refine, refine_best, setting
 from ema_model.identification.intervals import Uncertainty, uncertainty
 from ema_model.identification.objective import Objective
-from ema_model.identification.optimisers import create
+from ema_model.identification.optimisers import OPTIMISERS, Optimiser, create
+from ema_model.identification.search import search
+from ema_model.identification.unknowns import to_k
 
 Array = NDArray[np.float64]
+
+ROBUST = "robust"
+ALGORITHMS: dict[str, str] = {ROBUST: "Robust"} | {name: one.title for name, one in OPTIMISERS.items()}  # by name
 
 
 @dataclass(frozen=True)
@@ -41,7 +47,7 @@ class Identification:
     algorithm: str
     seed: int
     k: Array
-    rmse: float  # A
+    rmse: float  # A, of the Monitor Model at k, the other parameters as the actuator's file says
     evaluations: int
     elapsed_s: float  # without compilation
     compile_s: float
@@ -50,6 +56,8 @@ class Identification:
     stopped: bool  # by the user, before its last iteration
     uncertainty: Uncertainty
     truth: Array | None = None
+    polished: bool = False  # by a least-squares fit after the search
+    searched_k: Array | None = None  # (8,), where the search alone ended
 
     @property
     def error_percent(self) -> float | None:
@@ -59,74 +67,125 @@ class Identification:
 
 def steps(
     objective: Objective,
-    algorithm: str = "hba",
+    algorithm: str = ROBUST,
     *,
     population: int = 50,
     iterations: int = 150,
     seed: int = 0,
     truth: ArrayLike | None = None,
     parameters_known: bool = False,
+    polish: bool = False,
     **settings: float,
 ) -> Generator[Progress, bool | None, Identification]:
     """Fits k1…k8 to the objective's recordings, an iteration (about 5 ms) at a time.
 
     Yields where it stands after each iteration; a true value sent back stops it there.  Returns the answer.
+    `robust` starts `population` niches, which settle long before 150 iterations, and always polishes; the
+    others answer what they found unless `polish` is true.
     parameters_known: the actuator's own parameters are exact, as in a simulation of the same file, so that
-    their tolerances do not widen the intervals.  settings: the algorithm's own.
+    they do not move and their tolerances do not widen the intervals.  settings: the algorithm's own.
     Raises InputError for an unknown algorithm or impossible settings.
     """
-    try:
-        optimiser = create(algorithm, dimension=8, population=population, iterations=iterations, seed=seed, **settings)
-    except (ValueError, TypeError) as error:
-        raise InputError(str(error)) from None
-    compile_s = warm_up(objective)
-    elapsed = 0.0
-    rmse_history: list[float] = []
-    k_history: list[Array] = []
-    stopped = False
-    while not (optimiser.done or stopped):
-        started = time.perf_counter()
-        iteration = optimiser.iteration if rmse_history else -1
-        while optimiser.iteration == iteration or not optimiser.evaluations:
-            optimiser.tell(objective(optimiser.ask()))
-        elapsed += time.perf_counter() - started
-        rmse_history.append(float(optimiser.best_f))
-        k_history.append(optimiser.best_x.copy())
-        stopped = bool(
-            (
-                yield Progress(
-                    algorithm,
-                    optimiser.iteration,
-                    iterations,
-                    float(optimiser.best_f),
-                    optimiser.best_x.copy(),
-                    optimiser.population_x.copy(),
-                    optimiser.population_f.copy(),
-                    optimiser.evaluations,
-                    elapsed,
-                )
+    if algorithm == ROBUST:
+        if settings:
+            raise InputError(f"the robust algorithm has no setting {next(iter(settings))!r}")
+        _check_size("population", population, 2)
+        _check_size("iterations", iterations, 1)
+        running = _robust(objective, population, iterations, seed, parameters_known)
+    else:
+        try:
+            optimiser = create(
+                algorithm, dimension=8, population=population, iterations=iterations, seed=seed, **settings
             )
-        )
-    k = optimiser.best_x.copy()
+        except (ValueError, TypeError) as error:
+            known = "" if algorithm in OPTIMISERS else f" and {ROBUST}"
+            raise InputError(f"{error}{known}") from None
+        running = _optimise(objective, optimiser)
+    compile_s = warm_up(objective)
+    history: list[Progress] = []
+    stopped = False
+    given: Setting | None = None
+    for at in running:
+        history.append(at)
+        stopped = bool((yield at))
+        if stopped:
+            break
+    started = time.perf_counter()
+    last = history[-1]
+    given = setting(objective, parameters_known=parameters_known)
+    first_compile = _warm_up_fit(given)
+    found = refine_best(given, last.population, seed) if algorithm == ROBUST else refine(given, last.k, seed)
+    polishes = (polish or algorithm == ROBUST) and not stopped
+    k = found.k if polishes else last.k
+    sure = uncertainty(found, k)
+    after = time.perf_counter() - started - first_compile
     return Identification(
         algorithm=algorithm,
         seed=seed,
         k=k,
-        rmse=float(optimiser.best_f),
-        evaluations=optimiser.evaluations,
-        elapsed_s=elapsed,
-        compile_s=compile_s,
-        rmse_history=np.array(rmse_history),
-        k_history=np.array(k_history),
-        stopped=stopped and not optimiser.done,
-        uncertainty=uncertainty(objective, k, parameters_known=parameters_known),
+        rmse=float(objective(k)[0]) if polishes else last.rmse,
+        evaluations=last.evaluations + (found.evaluations if polishes else 0),
+        elapsed_s=last.elapsed_s + (after if polishes else 0.0),
+        compile_s=compile_s + first_compile,
+        rmse_history=np.array([at.rmse for at in history]),
+        k_history=np.array([at.k for at in history]),
+        stopped=stopped and last.iteration < last.iterations,
+        uncertainty=sure,
         truth=None if truth is None else np.asarray(truth, dtype=float),
+        polished=polishes,
+        searched_k=last.k,
     )
+
+
+def _optimise(objective: Objective, optimiser: Optimiser) -> Generator[Progress, None, None]:
+    """One of the metaheuristics, as its paper has it."""
+    elapsed, iteration = 0.0, -1
+    while not optimiser.done:
+        started = time.perf_counter()
+        while optimiser.iteration == iteration or not optimiser.evaluations:
+            optimiser.tell(objective(optimiser.ask()))
+        iteration = optimiser.iteration
+        elapsed += time.perf_counter() - started
+        yield Progress(
+            optimiser.name,
+            optimiser.iteration,
+            optimiser.iterations,
+            float(optimiser.best_f),
+            optimiser.best_x.copy(),
+            optimiser.population_x.copy(),
+            optimiser.population_f.copy(),
+            optimiser.evaluations,
+            elapsed,
+        )
+
+
+def _robust(
+    objective: Objective, population: int, iterations: int, seed: int, parameters_known: bool
+) -> Generator[Progress, None, None]:
+    """Niches that go downhill together."""
+    started = time.perf_counter()
+    given = setting(objective, parameters_known=parameters_known)
+    compiled = _warm_up_fit(given)
+    evaluations, waited = 0, compiled
+    for number, basins in enumerate(search(given.coarse(), population, iterations, seed)):
+        k = to_k(basins.x)
+        rmse = objective(k)
+        evaluations = basins.evaluations
+        elapsed = time.perf_counter() - started - waited
+        at = time.perf_counter()
+        last = number if basins.done else iterations
+        yield Progress(ROBUST, number, last, float(rmse[0]), k[0], k, rmse, evaluations, elapsed)
+        waited += time.perf_counter() - at
+
+
+def _check_size(what: str, value: int, least: int) -> None:
+    if value != int(value) or value < least:
+        raise InputError(f"{what} must be a whole number of at least {least}, got {value!r}")
 
 
 def identify(
     objective: Objective,
-    algorithm: str = "hba",
+    algorithm: str = ROBUST,
     *,
     on_iteration: Callable[[Progress], bool | None] | None = None,
     **options: Any,
@@ -152,3 +211,13 @@ def warm_up(objective: Objective) -> float:
     if not objective.stack.monitor.traces.signatures:
         objective.currents(faults.HEALTHY)
     return time.perf_counter() - started
+
+
+def _warm_up_fit(given: Setting) -> float:
+    """The same for what the fit needs beside: the twin, and the stack of an unrecorded load."""
+    started = time.perf_counter()
+    plant = given.plant
+    if not plant.stack.monitor.traces.signatures:
+        plant.signals(plant.windows[0])
+        return time.perf_counter() - started
+    return 0.0

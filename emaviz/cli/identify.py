@@ -9,10 +9,10 @@ import numpy as np
 
 from ema_model import faults
 from ema_model.actuator import Actuator
+from ema_model.discovery.fitting import with_effect
 from ema_model.errors import InputError
 from ema_model.identification.objective import FITNESSES, Objective, simulated
-from ema_model.identification.optimisers import OPTIMISERS
-from ema_model.identification.run import Identification, Progress, identify
+from ema_model.identification.run import ALGORITHMS, ROBUST, Identification, Progress, identify
 from ema_model.measurement import Measurement, read_measurement
 from ema_model.sensors import Sensors
 from emaviz.cli import options, output
@@ -23,13 +23,19 @@ HELP = "find the faults k1 … k8 of recordings, or of a simulated actuator"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of INTERFACES, and those of the run that is simulated when no file is given."""
     parser.add_argument("files", nargs="*", metavar="FILE", help="recordings of one actuator, fitted together")
-    parser.add_argument("--algorithm", choices=tuple(OPTIMISERS), default="hba")
+    parser.add_argument(
+        "--algorithm", choices=tuple(ALGORITHMS), default=ROBUST, help="robust, or one of the thesis's as published"
+    )
+    parser.add_argument(
+        "--polish", action="store_true", help="let a least-squares fit follow ssa, hba or do (robust always has it)"
+    )
     parser.add_argument("--population", type=int, default=50, metavar="N")
     parser.add_argument("--iterations", type=int, default=150, metavar="N")
     parser.add_argument("--fitness", choices=FITNESSES, default="filtered", help="0.5 ms means, or every sample")
     parser.add_argument("--circuit", choices=("reduced", "thesis"), default="reduced", help="of the monitor model")
     options.add_actuator(parser)
     options.add_faults(parser)
+    options.add_effects(parser)
     options.add_run(parser)
     parser.add_argument("--record", metavar="FILE.rrd", help="write the identification for the Rerun viewer")
     parser.add_argument("--json", metavar="FILE", help="write the result there")
@@ -38,6 +44,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Fits, records and prints."""
     actuator = options.actuator_of(arguments)
+    for name, settings in options.effects_of(arguments).items():
+        actuator = with_effect(actuator, name, settings)
     truth = options.faults_of(arguments) if arguments.fault or not arguments.files else None
     measurements = _recordings(arguments, actuator, truth)
     objective = Objective(measurements, actuator, circuit=arguments.circuit, fitness=arguments.fitness)
@@ -58,6 +66,7 @@ def run(arguments: argparse.Namespace) -> int:
             seed=arguments.seed,
             truth=truth,
             parameters_known=not arguments.files,
+            polish=arguments.polish,
             on_iteration=on_iteration,
         )
     except BaseException:
@@ -84,12 +93,17 @@ def result(answer: Identification, actuator: Actuator) -> dict[str, Any]:
         "healthy": bool(sure.healthy),
         "alarms": sure.alarms,
         "ambiguous": sure.ambiguous,
+        "separated_by": sure.separated_by,
+        "adequate": bool(sure.adequate),
+        "warnings": sure.warnings,
         "physical": faults.readings(answer.k, actuator),
         "rmse": answer.rmse,
         "evaluations": answer.evaluations,
         "elapsed_s": answer.elapsed_s,
         "compile_s": answer.compile_s,
         "algorithm": answer.algorithm,
+        "polished": answer.polished,
+        "searched_k": answer.searched_k,
         "history": {"rmse": answer.rmse_history, "k": answer.k_history},
     }
     if answer.truth is not None:
@@ -119,15 +133,27 @@ def _table(answer: Identification, actuator: Actuator) -> str:
         alarm = "  ← not healthy" if name in sure.alarms else ""
         lines.append(f"{name:4}{answer.k[i]:8.4f}  {low:7.4f} … {high:.4f}  {truth}   {phrase}{alarm}")
     lines.append("")
-    lines.append("healthy" if sure.healthy else f"not healthy: {', '.join(sure.alarms) or 'no single k stands out'}")
+    lines.append(_verdict(answer))
     if sure.ambiguous:
         lines.append("cannot be told apart here: " + "; ".join(" / ".join(group) for group in sure.ambiguous))
+    if sure.separated_by:
+        lines.append(f"would tell them apart: {sure.separated_by}")
+    lines += sure.warnings
     error = "" if answer.truth is None else f", Err {answer.error_percent:.2f} %"
     lines.append(
         f"rmse {answer.rmse:.4f} A{error}; {answer.evaluations} simulations in {answer.elapsed_s:.2f} s "
         f"({answer.algorithm}), compiled in {answer.compile_s:.1f} s"
     )
     return "\n".join(lines)
+
+
+def _verdict(answer: Identification) -> str:
+    sure = answer.uncertainty
+    if not sure.adequate:
+        return "the model does not fit: no fault can be told"
+    if sure.healthy:
+        return "healthy"
+    return f"not healthy: {', '.join(sure.alarms) or 'no single k stands out'}"
 
 
 class _Recorder:

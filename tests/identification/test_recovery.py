@@ -11,6 +11,8 @@ from ema_model.actuator import load_actuator
 from ema_model.commands import command
 from ema_model.errors import InputError
 from ema_model.faults import HEALTHY, NAMES, error_percent, vector
+from ema_model.identification.fit import refine, setting
+from ema_model.identification.intervals import uncertainty
 from ema_model.identification.objective import Objective, simulated
 from ema_model.identification.run import Identification, Progress, identify, steps
 from ema_model.sensors import Sensors
@@ -85,10 +87,10 @@ def test_healthy_actuator_is_called_healthy():
 def test_tolerances_widen_the_intervals():
     answer = best_of_two((("k1", 0.25),))
     objective = Objective([recorded((("k1", 0.25),))], ACTUATOR)
-    from ema_model.identification.intervals import uncertainty
-
-    known = uncertainty(objective, answer.k, parameters_known=True).interval90
-    open_ = uncertainty(objective, answer.k).interval90
+    known, open_ = (
+        uncertainty(found, found.k).interval90
+        for found in (refine(setting(objective, parameters_known=flag), answer.k) for flag in (True, False))
+    )
     assert open_[0, 1] - open_[0, 0] > known[0, 1] - known[0, 0]
     assert open_[0, 0] <= 0.25 <= open_[0, 1]
 

@@ -1,0 +1,193 @@
+"""From a k that a search found to the best fit: everything that is not exactly known moves, the twin's bias is out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ema_model.calibration.floor import floor
+from ema_model.faults import HEALTHY
+from ema_model.identification.descent import Descent
+from ema_model.identification.problem import Problem, Weights
+from ema_model.identification.twin import Twins, twins
+from ema_model.identification.unknowns import FAULTS, LOAD, Nuisance, nuisances, to_k, to_x
+from ema_model.plants import ClosedLoop
+
+Array = NDArray[np.float64]
+
+_ROUNDS = 3  # of twin and refit
+_STEPS = 25  # of a refit
+_CLOSE = 40.0  # χ²: the search's weights are coarse, and basins this close may change their order
+_CANDIDATES = 3
+_SETTLED = 1e-3  # of x's faults, between two rounds
+_SPREADS = (0.0, 0.05, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """What is to be fitted: recordings, weights, what is not exactly known."""
+
+    plant: ClosedLoop
+    weights: list[Weights]
+    nuisances: list[Nuisance]
+    parameters_known: bool
+
+    def coarse(self) -> Problem:
+        """The faults alone, with the Monitor Model's own error in the weights: for the search."""
+        return Problem(self.plant, self.weights, [])
+
+    def problem(self, *, with_base: bool) -> Problem:
+        """The faults and what is not exactly known, with the actuator's base parameters or without."""
+        return Problem(self.plant, self.weights, [n for n in self.nuisances if with_base or not n.is_base])
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """A best fit, and its surroundings."""
+
+    problem: Problem
+    x: Array  # (unknowns,)
+    cost: float
+    residual: Array  # (values + unknowns,), over σ
+    slopes: Array  # (values + unknowns, unknowns)
+    twins: Twins | None
+    k: Array  # (8,)
+    spread: float  # how far the data want the base parameters from the file's values, 1 being the tolerances
+    evaluations: int
+
+
+def setting(objective: ClosedLoop, *, parameters_known: bool) -> Setting:
+    """For an objective's recordings; a load that is not recorded is unknown too, unless all parameters are known."""
+    effects: dict[str, Mapping[str, float]] = dict(objective.effects)
+    unrecorded = any("load_torque_Nm" not in m for m in objective.measurements)
+    if unrecorded and not parameters_known and LOAD not in (*effects, *objective.actuator.effects):
+        effects[LOAD] = {"torque_Nm": 0.0}
+    plant = ClosedLoop(objective.recorded, objective.actuator, effects=effects, circuit=objective.stack.circuit)
+    bare = ClosedLoop(
+        objective.recorded, objective.actuator, effects=objective.effects, circuit=objective.stack.circuit
+    )
+    floors = [floor(bare, window) for window in bare.windows]
+    unknown = nuisances(plant, floors, parameters_known=parameters_known)
+    return Setting(plant, [Weights.of(one) for one in floors], unknown, parameters_known)
+
+
+def refine_best(given: Setting, k: ArrayLike, seed: int = 0) -> Fitted:
+    """The best fit near any of k (n, 8), or near health: of those that the search cannot tell from its best."""
+    candidates = np.concatenate([np.atleast_2d(np.asarray(k, dtype=float)), [HEALTHY]])
+    costs = np.sum(given.coarse().residuals(to_x(candidates)) ** 2, axis=1)
+    order = np.argsort(costs, kind="stable")
+    close = order[costs[order] < costs[order[0]] + _CLOSE][:_CANDIDATES]
+    fits = [refine(given, candidates[i], seed) for i in close]
+    return min(fits, key=lambda one: one.cost)
+
+
+def refine(given: Setting, k: ArrayLike, seed: int = 0) -> Fitted:
+    """The best fit near k (8,): refits with the twin's difference added, until the answer stays.
+
+    The base parameters keep their file's values at first, and then move as far as the data want them to.
+    """
+    problem = given.problem(with_base=False)
+    x = np.concatenate([to_x(k), np.zeros(problem.count - FAULTS)])
+    x, _, evaluations = _descend(problem, x)
+    x, found, more = _with_twins(given, problem, x, None, seed)
+    spread = 0.0
+    if any(n.is_base for n in given.nuisances):
+        full = given.problem(with_base=True)
+        start = np.zeros(full.count)
+        start[~full.base] = x
+        found = twins(full, start, seed + _ROUNDS)
+        _reweight(full, given, found)
+        problem, x = full, start
+        spread = _spread(problem, x)
+        if spread > 0.0:
+            problem.believe(spread)
+            x, _, again = _descend(problem, x)
+            x, found, again2 = _with_twins(given, problem, x, found, seed + _ROUNDS + 1)
+            more += again + again2
+            if not _better(problem, given, x, start, seed + 2 * _ROUNDS + 1):
+                x, spread = start, 0.0  # the twin does not follow where the Monitor Model led
+            found = twins(problem, x, seed + 2 * _ROUNDS + 1, found)
+            _reweight(problem, given, found)
+            problem.believe(1.0)
+    residuals, slopes = problem.jacobians(x[None, :])
+    residual = residuals[0]
+    return Fitted(
+        problem, x, float(residual @ residual), residual, slopes[0], found, to_k(x), spread, evaluations + more
+    )
+
+
+def _with_twins(
+    given: Setting, problem: Problem, x: Array, found: Twins | None, seed: int
+) -> tuple[Array, Twins | None, int]:
+    """Twin and refit in turn; the problem is left with the last twins, x is the fit with them."""
+    evaluations = 0
+    for number in range(_ROUNDS):
+        found = twins(problem, x, seed + number, found)
+        _reweight(problem, given, found)
+        if found is None:
+            break
+        before = x
+        x, _, more = _descend(problem, x)
+        evaluations += more
+        if np.max(np.abs(x - before)[:FAULTS]) < _SETTLED:
+            break
+    return x, found, evaluations
+
+
+def _better(problem: Problem, given: Setting, x: Array, other: Array, seed: int) -> bool:
+    """Whether the Reference Model itself is closer to the recordings at x than at the other."""
+    _reweight(problem, given, twins(problem, other, seed))
+    # both are counted with the same weights
+    weights = [problem.over_sigma(i, name, np.ones(rows.stop - rows.start)) for i, name, rows in problem.parts()]
+    return _cost(problem, given, x, seed, weights) < _cost(problem, given, other, seed, weights)
+
+
+def _cost(problem: Problem, given: Setting, x: Array, seed: int, weights: list[Array]) -> float:
+    """χ² at x with its own twin, for given 1/σ of each part, and the prior."""
+    _reweight(problem, given, twins(problem, x, seed))
+    residual = problem.residuals(x[None, :])[0]
+    total = float(np.sum(residual[problem.values :] ** 2))
+    for weight, (i, name, rows) in zip(weights, problem.parts()):
+        own = problem.over_sigma(i, name, np.ones(rows.stop - rows.start))
+        total += float(np.sum((residual[rows] / own * weight) ** 2))
+    return total
+
+
+def _reweight(problem: Problem, given: Setting, found: Twins | None) -> None:
+    if found is None:
+        problem.reweighted(given.weights)
+    else:
+        problem.reweighted(found.weights(given.weights), found.added)
+
+
+def _descend(problem: Problem, x: Array) -> tuple[Array, float, int]:
+    descent = Descent.begin(problem, x)
+    for _ in range(_STEPS):
+        descent.step()
+        if descent.done:
+            break
+    return descent.x[0], float(descent.cost[0]), descent.evaluations
+
+
+def _spread(problem: Problem, x: Array) -> float:
+    """How far the base parameters are from their file's values, in units of their tolerances, as the data say.
+
+    x: the best fit with the file's values.  The likelihood of the data with k and the base parameters integrated
+    out, these with a prior of `spread` σ, at its maximum (empirical Bayes).  A rig that is as its file says gets its
+    k with hardly any cost of tolerances that it does not use.
+    """
+    residuals, all_slopes = problem.jacobians(x[None, :])
+    residual, slopes, base = residuals[0], all_slopes[0], problem.base
+    free = ~base
+    free[:FAULTS] &= (x > problem.low + 1e-9)[:FAULTS] & (x < problem.high - 1e-9)[:FAULTS]
+    q, _ = np.linalg.qr(slopes[:, free])
+    columns = slopes[:, base].copy()
+    columns[problem.values :] = 0.0  # their prior is what is asked for
+    columns -= q @ (q.T @ columns)
+    u, s, _ = np.linalg.svd(columns, full_matrices=False)
+    z = u.T @ (residual - q @ (q.T @ residual))
+    likelihood = [-0.5 * np.sum(np.log1p((t * s) ** 2) + z**2 / (1.0 + (t * s) ** 2)) for t in _SPREADS]
+    return _SPREADS[int(np.argmax(likelihood))]

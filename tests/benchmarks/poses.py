@@ -1,0 +1,71 @@
+"""Poses of the 3D actuator per second with software GL at 1000 × 650: python tests/benchmarks/poses.py
+
+On a busy machine frames per second say little; the browser's processor time per frame says what a frame costs.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import shutil
+import sys
+import time
+from pathlib import Path
+
+import psutil
+from playwright.sync_api import sync_playwright
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from conftest import SOFTWARE_GL
+
+from emaviz.safe_server import open_server
+from emaviz.scene.actuator import ActuatorScene
+
+SECONDS, PUSHED_PER_S = 8.0, 32.0
+COUNT = """() => { window.__drawn = 0; const poses = new Set();
+  const watch = () => { const pose = window.__viserMutable.nodePoseData['/actuator/motor/axis/rotor'];
+    if (pose && !poses.has(String(pose.wxyz))) { poses.add(String(pose.wxyz)); window.__drawn++; }
+    requestAnimationFrame(watch); }; watch(); }"""
+
+
+def processor_s() -> float:
+    """Of all processes of the browser."""
+    total = 0.0
+    for process in psutil.Process().children(recursive=True):
+        try:
+            times = process.cpu_times()
+        except psutil.Error:
+            continue
+        total += times.user + times.system
+    return total
+
+
+def main() -> None:
+    server = open_server("127.0.0.1", 0)
+    scene = ActuatorScene(server)
+    path = os.environ.get("EMAVIZ_CHROMIUM") or shutil.which("chromium")
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=path, args=SOFTWARE_GL)
+        page = chromium.new_page(viewport={"width": 1000, "height": 650})
+        page.goto(f"http://127.0.0.1:{server.get_port()}")
+        page.wait_for_function("window.__viserMutable?.nodePoseData !== undefined", timeout=60_000)
+        page.wait_for_timeout(4000)
+        page.evaluate(COUNT)
+        started, used, step = time.perf_counter(), processor_s(), 0
+        before = page.evaluate("window.__drawn")
+        while time.perf_counter() - started < SECONDS:
+            step += 1
+            phases = tuple(math.sin(0.1 * step + 2.0 * math.pi * i / 3.0) for i in range(3))
+            scene.pose(0.05 * step, 0.3 * math.sin(0.1 * step), 0.0, phases, 0.0)
+            time.sleep(1.0 / PUSHED_PER_S)
+        drawn = page.evaluate("window.__drawn") - before
+        elapsed, used = time.perf_counter() - started, processor_s() - used
+        print(f"{drawn / elapsed:.1f} poses/s drawn, {1e3 * used / max(drawn, 1):.0f} ms of processor time each")
+        print(f"load of this machine: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
+        chromium.close()
+    server.stop()
+
+
+if __name__ == "__main__":
+    main()

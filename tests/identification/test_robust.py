@@ -1,0 +1,144 @@
+"""The robust identification: right from every start, as sure as it may be, silent where the model does not fit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from ema_model import faults
+from ema_model.actuator import load_actuator
+from ema_model.commands import command
+from ema_model.discovery.fitting import with_effect
+from ema_model.errors import InputError
+from ema_model.identification.belts import above_zero, length_of_vector
+from ema_model.identification.descent import Descent
+from ema_model.identification.fit import refine, setting
+from ema_model.identification.objective import Objective, simulated
+from ema_model.identification.run import identify
+from ema_model.identification.unknowns import to_k, to_x
+from ema_model.sensors import Sensors
+from ema_model.simulation import Run, simulate_reference
+
+ACTUATOR = load_actuator()
+MULTI = {"k1": 0.0133, "k2": 0.05, "k3": 0.003, "k6": 0.012, "k8": 0.35}
+NOISY = Sensors(0.45, 12)
+
+
+def of(fault: dict[str, float], sensors: Sensors | None = None, seed: int = 1, **options):
+    truth = faults.vector(fault)
+    recording = simulated(Run(), ACTUATOR, truth)
+    objective = Objective([sensors.record(recording, seed) if sensors else recording], ACTUATOR)
+    return identify(objective, seed=seed, truth=truth, **{"parameters_known": True, **options})
+
+
+@pytest.mark.parametrize("fault", [{"k1": 0.75}, {"k3": 0.75}, {"k6": 0.25}, {"k6": 0.6, "k7": 0.02}, MULTI])
+def test_noise_free_faults_are_found_from_every_start(fault):
+    for seed in (0, 1):
+        answer = of(fault, seed=seed)
+        assert answer.error_percent is not None and answer.error_percent <= 0.5, answer.k
+        assert answer.polished and answer.algorithm == "robust" and answer.uncertainty.adequate
+
+
+def test_noise_is_met_with_intervals():
+    answer = of({"k1": 0.3, "k2": 0.2, "k3": 0.4, "k8": 0.6}, NOISY)
+    assert answer.error_percent is not None and answer.error_percent <= 1.5
+    assert set(answer.uncertainty.alarms) == {"k1", "k2", "k3", "k8"} and not answer.uncertainty.healthy
+    width = np.ptp(answer.uncertainty.interval90, axis=1)
+    assert np.all(width[[0, 1, 2, 7]] > 0.0) and np.all(width[:6] < 0.05)
+    assert tuple(answer.uncertainty.interval90[6]) == (0.0, 1.0), "a centred rotor has no direction"
+
+
+def test_healthy_is_healthy_and_tolerances_widen():
+    known, open_ = of({}, NOISY), of({}, NOISY, parameters_known=False)
+    for answer in (known, open_):
+        assert answer.uncertainty.healthy and answer.uncertainty.alarms == () and answer.uncertainty.adequate
+    assert np.ptp(open_.uncertainty.interval90[0]) > 3.0 * np.ptp(known.uncertainty.interval90[0])
+
+
+def test_polish_repairs_a_short_search():
+    truth = {"k1": 0.25, "k6": 0.3}
+    plain, polished = (
+        of(truth, algorithm="ssa", population=10, iterations=8, polish=polish) for polish in (False, True)
+    )
+    np.testing.assert_array_equal(plain.k, polished.searched_k)
+    assert not plain.polished and polished.polished
+    assert (polished.error_percent or 0.0) < 0.5 < (plain.error_percent or 0.0)
+
+
+def test_hidden_effect_raises_no_alarm_and_is_identified_once_added():
+    effect = {"cogging_torque": {"amplitude_Nm": 0.012, "order": 12.0, "phase_rad": 0.0}}
+    truth = faults.vector({"k2": 0.2})
+    recording = Sensors(0.1, 12).record(simulate_reference(Run(), ACTUATOR, truth, effect), 4)
+    bare = identify(Objective([recording], ACTUATOR), seed=1).uncertainty
+    assert not bare.adequate and not bare.healthy and bare.alarms == ()
+    assert "discover" in bare.warnings[0] and "\n" not in bare.warnings[0]
+    guessed = with_effect(ACTUATOR, "cogging_torque", {"amplitude_Nm": 0.01, "order": 12.0})
+    answer = identify(Objective([recording], guessed), seed=1, truth=truth)
+    assert answer.uncertainty.adequate and "k2" in answer.uncertainty.alarms
+    assert answer.error_percent is not None and answer.error_percent <= 2.0
+
+
+def test_unrecorded_load_and_two_recordings():
+    truth = faults.vector({"k3": 0.3})
+    recordings = []
+    for run in (Run(load_torque_Nm=15.0), Run(command("sine", {"frequency_Hz": "6"}), 0.3)):
+        one = NOISY.record(simulated(run, ACTUATOR, truth), 3).with_signals()
+        one.signals.pop("load_torque_Nm", None)
+        recordings.append(one)
+    answer = identify(Objective(recordings, ACTUATOR), seed=1, truth=truth)
+    assert answer.uncertainty.adequate and answer.uncertainty.alarms == ("k3",)
+    assert answer.error_percent is not None and answer.error_percent <= 2.0
+
+
+def test_eccentricity_as_a_vector_and_back():
+    k = np.random.default_rng(0).random((200, 8))
+    np.testing.assert_allclose(to_k(to_x(k)), k, atol=1e-12)
+    near = [to_x(faults.vector({"k6": 0.5, "k7": k7})) for k7 in (0.001, 0.999)]
+    assert np.linalg.norm(near[0] - near[1]) < 0.01, "k7 = 0 and 1 are one direction"
+
+
+def test_descent_ends_where_the_gradient_does_or_at_a_bound():
+    objective = Objective([simulated(Run(), ACTUATOR, faults.vector({"k1": 0.4}))], ACTUATOR)
+    problem = setting(objective, parameters_known=True).coarse()
+    descent = Descent.begin(problem, to_x(np.array([faults.HEALTHY, faults.vector({"k2": 0.5, "k8": 0.9})])))
+    for _ in range(40):
+        if descent.done:
+            break
+        descent.step()
+    assert descent.done
+    np.testing.assert_allclose(descent.x[0], descent.x[1], atol=5e-3)
+    residual, slopes = problem.jacobians(descent.x[:1])
+    gradient = slopes[0].T @ residual[0]
+    scale = np.linalg.norm(slopes[0], axis=0) * np.linalg.norm(residual[0])
+    inside = (descent.x[0] > problem.low + 1e-9) & (descent.x[0] < problem.high - 1e-9)
+    assert np.all(np.abs(gradient[inside]) < 0.05 * scale[inside])
+    assert np.all(gradient[descent.x[0] <= problem.low] > -0.05 * scale[descent.x[0] <= problem.low])
+
+
+@pytest.mark.parametrize("truth", [0.0, 0.3, 1.0, 2.5, 5.0])
+def test_belts_cover_every_truth_alike(truth):
+    """Near a bound, where k̂ ± 1.645 σ does not."""
+    outcomes = truth + norm.ppf((np.arange(400) + 0.5) / 400)
+    share = np.mean([low - 0.011 <= truth <= high + 0.011 for low, high in map(above_zero, outcomes)])
+    assert 0.88 <= share <= 0.93
+    random = np.random.default_rng(1)
+    lengths = np.hypot(truth + random.standard_normal(3000), random.standard_normal(3000))
+    share = np.mean([low - 0.011 <= truth <= high + 0.011 for low, high in map(length_of_vector, lengths)])
+    assert 0.87 <= share <= 0.94
+
+
+def test_twin_takes_the_low_fidelity_bias_out(monkeypatch):
+    truth = faults.vector({"k1": 0.75})
+    objective = Objective([simulated(Run(), ACTUATOR, truth)], ACTUATOR)
+    given = setting(objective, parameters_known=True)
+    with_twin = faults.error_percent(refine(given, truth).k, truth)
+    monkeypatch.setattr("ema_model.identification.fit.twins", lambda *_: None)
+    assert with_twin < 0.5 * faults.error_percent(refine(given, truth).k, truth)
+
+
+@pytest.mark.parametrize("options", [{"population": 1}, {"iterations": 0}, {"colour": 1.0}, {"population": 2.5}])
+def test_impossible_settings_are_refused(options):
+    with pytest.raises(InputError) as error:
+        of({"k1": 0.25}, **options)
+    assert "\n" not in str(error.value)

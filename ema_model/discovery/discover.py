@@ -74,9 +74,7 @@ def discover(
     _drop_idle(story, tell)
     unknown = story.left().explanation
     if unknown is not None and not _named(story):
-        curve = curve or story.curve(unknown, tell)
-        if curve:
-            story.add(curve)
+        unknown = _with_curve(story, curve, unknown, tell)
     experiment = None
     if rivals:
         tell("looking for a test that tells the rivals apart")
@@ -109,6 +107,26 @@ def _drop_idle(story: Story, tell: Progress) -> None:
         count = sum(not parameter.integer for parameter in find(one.key).parameters)
         if smaller.chi2 - story.current.chi2 < count * np.log(len(smaller.residual)) + LEAST_BIC:
             story.remove(one.key, smaller)
+
+
+def _with_curve(story: Story, curve: Trial | None, unknown: Explanation, tell: Progress) -> Explanation:
+    """Adds the curve of what is unknown, and tells what it stands for.
+
+    Parameters that only bent toward it go back: the curve is drawn beside the calibrated model, if one can be.
+    """
+    bent = story.steps[1:]
+    if bent:
+        story.restart()
+        whole = story.left().explanation
+        curve = story.curve(whole, tell)
+        if curve is None or whole is None:
+            story.steps += bent
+        else:
+            unknown = whole
+    curve = curve or story.curve(unknown, tell)
+    if curve:
+        story.add(curve)
+    return unknown
 
 
 def _named(story: Story) -> list[str]:

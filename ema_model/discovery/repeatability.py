@@ -39,9 +39,7 @@ def with_divergence(data: Data, found: Fit) -> tuple[Data, float]:
     floors, lost = [], []
     for i, (window, one) in enumerate(zip(plant.windows, data.floors)):
         starts = found.calibration.starts
-        turned, play = (
-            starts[f"{kind} {i}"].value if f"{kind} {i}" in starts else 0.0 for kind in ("turned", "play")
-        )
+        turned, play = (starts[f"{kind} {i}"].value if f"{kind} {i}" in starts else 0.0 for kind in ("turned", "play"))
         shown = plant.signals(window, neighbour, k, turned, play)
         width = max(3, round(CORRELATED_S / window.block_s) | 1)
         apart = {

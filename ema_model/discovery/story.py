@@ -151,6 +151,10 @@ class Story:
         self.steps.pop()
         return True
 
+    def restart(self) -> None:
+        """Takes all steps back."""
+        del self.steps[1:]
+
     def label(self, trial: Trial) -> str:
         """What a step that adds this is called."""
         name = trial.candidate.name

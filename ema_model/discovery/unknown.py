@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import numpy as np
-
 from ema_model.comparison.result import Explanation
 from ema_model.discovery.curve_effect import is_torque, with_curve
 from ema_model.discovery.fitting import Data, Fit, fit
@@ -14,6 +12,7 @@ from ema_model.discovery.trial import LEAST_BIC, Trial, pays
 from ema_model.effects import find
 
 _HALF = 0.5
+_KNOT = 3.0  # χ² that each knot must be worth beside a parameter: knots lie on one smooth line
 _TEETH = 4  # periods in a turn from which on a torque is one of teeth or poles
 
 
@@ -53,7 +52,7 @@ def curve_instead(
     if curve is None:
         return None
     knots = sum(len(find(name).parameters) for name in curve.effects) - len(best.effects)
-    worth = curve.drop - best.drop > knots * np.log(len(best.fit.residual)) + LEAST_BIC
+    worth = curve.drop - best.drop > _KNOT * knots + LEAST_BIC
     return curve if worth and (stands_in or best.drop < _HALF * curve.drop) else None
 
 

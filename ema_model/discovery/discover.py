@@ -79,6 +79,9 @@ def discover(
     if rivals:
         tell("looking for a test that tells the rivals apart")
         experiment = next_experiment(story.data, rivals[0].fit, rivals[1].fit)
+        if experiment is None:
+            names = " from ".join(trial.candidate.name for trial in rivals[:2])
+            story.warnings.append(f"No command within the range of these recordings tells {names}.")
     return result_of(story, first, unknown, experiment)
 
 

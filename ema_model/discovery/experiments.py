@@ -113,18 +113,25 @@ def expected_chi2(
     run = Run(command(name, settings), seconds, rate, load)
     try:
         recording = simulate_monitor(run, first.calibration.actuator)
-        plant = ClosedLoop([recording], second.actuator)
-        floors = [_floor(data, plant, window) for window in plant.windows]
-        problem = Problem(plant, floors, default_free(second.actuator), HEALTHY, signals)
-        known = {unknown: value for unknown, value in second.starts.items() if "." in unknown}
-        x = np.array([known.get(unknown.name, 0.0) for unknown in problem.unknowns])
-        residual, jacobian = problem.linearised(x)
+        plants = [ClosedLoop([recording], rival.actuator) for rival in (first, second)]
+        floors = [_floor(data, plants[0], window) for window in plants[0].windows]
+        played, problem = (Problem(plant, floors, default_free(plant.actuator), HEALTHY, signals) for plant in plants)
+        # Both models go the same way from the command to the blocks, so that the rivals alone make the difference.
+        as_played = played.residual(_fitted(first, played))
+        residual, jacobian = problem.linearised(_fitted(second, problem))
     except FloatingPointError:  # a command that this actuator does not stand
         return 0.0
-    residual, jacobian = residual[: problem.values], jacobian[: problem.values]
+    values = problem.values
+    residual, jacobian = residual[:values] - as_played[:values], jacobian[:values]
     prior = _information(second, [unknown.name for unknown in problem.unknowns])
     moved = np.linalg.solve(jacobian.T @ jacobian + prior, -(jacobian.T @ residual))
     return float(np.sum((residual + jacobian @ moved) ** 2) + moved @ prior @ moved)
+
+
+def _fitted(found: Fit, problem: Problem) -> Array:
+    """A fit's parameters as the unknowns of another problem, whose runs start where they should."""
+    known = {name: value for name, value in found.starts.items() if "." in name}
+    return np.array([known.get(unknown.name, 0.0) for unknown in problem.unknowns])
 
 
 def _information(found: Fit, names: Sequence[str]) -> Array:

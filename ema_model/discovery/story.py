@@ -31,6 +31,7 @@ from ema_model.recordings import check_same_actuator
 Progress = Callable[[str], None]
 Array = NDArray[np.float64]
 
+_AT_BOUND = 0.02  # σ, from which on a parameter cannot move any further
 _SAME_CHI2 = 25.0  # between two effects, below which they cannot be told apart
 _SAME_DIRECTION = 1.0 - 0.98**2  # sin² between their signatures, likewise
 _MOVED = 1.5  # σ that a parameter comes back by, when it had been standing in for an effect
@@ -94,9 +95,10 @@ class Story:
 
         (values,), over the floor, at the strength that suits best; only what the calibration cannot do as well.
         """
-        jacobian = np.concatenate(
-            [part[name] for part in self.current.calibration.weighted_sensitivities for name in part]
-        )
+        calibration = self.current.calibration
+        low, high = calibration.room
+        jacobian = np.concatenate([part[name] for part in calibration.weighted_sensitivities for name in part])
+        jacobian = jacobian[:, np.minimum(-low, high) > _AT_BOUND]
         gram = jacobian.T @ jacobian + np.eye(jacobian.shape[1])
         told = {}
         for one in ranked:

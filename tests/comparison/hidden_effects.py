@@ -40,9 +40,10 @@ def recorded(
     extra: Mapping[str, float] | None = None,
     load: float = 0.0,
     noise_A: float = 0.45,
+    plant_seed: int | None = None,
 ) -> list[Measurement]:
-    """Recordings at 10 kHz of one such plant, 12 bits a motor turn."""
-    actuator, sensors = plant(seed, extra), Sensors(noise_A, 12)
+    """Recordings at 10 kHz of one such plant, 12 bits a motor turn; plant_seed: another than the noise's."""
+    actuator, sensors = plant(seed if plant_seed is None else plant_seed, extra), Sensors(noise_A, 12)
     return [
         sensors.record(
             simulate_reference(

@@ -217,3 +217,49 @@ def test_outside_the_library(law):
     print(f"  unknown_effect in {unknown} of {count}; excess down by {100.0 * np.median(falls):.0f} % (median)")
     assert unknown >= 0.9 * count
     assert np.median(falls) >= 0.8
+
+
+SHORT = {"slow sine": [SINE], "small step": [("step", {"final_rad": 0.005}, 0.5)], "chirp": [("chirp", {}, 0.5)]}
+
+
+def test_next_experiment_breaks_ties():
+    """One recording alone leaves ties; the suggested experiment is made with the same plant, and both are fitted."""
+    counts: Counter[str] = Counter()
+    print("\nties after one recording: named, the same as, suggestion, then what both recordings name")
+    for title, commands in SHORT.items():
+        for name in HIDDEN:
+            for seed in SEEDS[:2]:
+                answer = remembered_or(f"tie/{title}/{name}/{seed}", partial(after_suggestion, name, seed, commands))
+                if not answer["tie"]:
+                    continue
+                counts["ties"] += 1
+                counts["suggested"] += answer["suggested"] is not None
+                counts["broken"] += bool(answer["broken"])
+                counts["right"] += bool(answer["broken"]) and answer["then"] == name
+                print(f"  {title}, {name}: {answer['tie']} → {answer['suggested']} → {answer['then']}")
+    print(f"  {counts['ties']} ties, {counts['suggested']} with a suggestion, {counts['broken']} broken by it, "
+          f"{counts['right']} of them for the truth")  # fmt: skip
+    assert counts["broken"] >= 0.9 * counts["suggested"]
+
+
+def after_suggestion(name: str, seed: int, commands) -> dict[str, object]:
+    """The tie that a recording leaves, the suggested experiment, and what is named with it."""
+    effects = {name: settings_of(name, 2, seed)}
+    load = 20.0 if name in NEEDS_LOAD else 0.0
+    recordings = recorded(seed, commands=commands, effects=effects, load=load)
+    found = discover(recordings, ACTUATOR, most_effects=1)
+    one, best = (found.effects or [None])[0], found.next_experiment
+    answer: dict[str, object] = {"tie": None, "suggested": None, "broken": False, "then": None}
+    if one is None or not one.same_as:
+        return answer
+    answer["tie"] = [one.name, *one.same_as]
+    if best is None:
+        return answer
+    answer["suggested"] = f"{best.command} {best.settings}, {best.duration_s:g} s, load {best.load_torque_Nm:g} N·m"
+    more = recorded(seed + 1, commands=[(best.command, best.settings, best.duration_s)], effects=effects,
+                    load=best.load_torque_Nm, plant_seed=seed)  # fmt: skip
+    again = discover([*recordings, *more], ACTUATOR, candidates=[one.name, *one.same_as], most_effects=1)
+    first = [other for other in again.effects if other.name in answer["tie"]]
+    answer["then"] = first[0].name if first else ", ".join(again.parameters_outside_tolerance) or again.verdict
+    answer["broken"] = bool(first) and not set(first[0].same_as) & set(best.separates)
+    return answer

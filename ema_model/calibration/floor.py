@@ -90,14 +90,15 @@ def floor(
 
 
 def twin_error(plant: ClosedLoop, window: Window, actuator: Actuator, k: ArrayLike = HEALTHY) -> dict[str, Array]:
-    """Reference Model less Monitor Model under the window's command, by signal, (blocks,) each."""
+    """Reference Model less Monitor Model under the window's command and mean load, by signal, (blocks,) each."""
     count = len(window.command)
+    window = replace(window, load=np.full(count, window.load.mean()))
     times = np.arange(count) * window.step_s
     run = Run(
         Recorded(times, window.command),
         duration_s=count * window.step_s,
         sample_rate_Hz=1.0 / (window.steps_per_sample * window.step_s),
-        load_torque_Nm=float(window.load.mean()),
+        load_torque_Nm=float(window.load[0]),
     )
     twin = simulate_reference(
         run,

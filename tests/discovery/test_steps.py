@@ -137,3 +137,12 @@ def test_allowed_commands_stay_within_what_was_recorded():
         reach = max(settings.get("amplitude_rad", 0.0), settings.get("final_rad", 0.0))
         assert reach <= max(0.0301, 1.01 * turns)
         assert 0.3 <= seconds <= 3.0
+
+
+def test_floor_of_a_varying_load_is_the_models_own():
+    """Both twins bear the same load: the floor of a load that comes and goes is no larger than that of its mean."""
+    [steady] = recorded(45, commands=[SINE], load=10.0)
+    wave = 10.0 + 10.0 * np.sin(2.0 * np.pi * 7.0 * steady["time_s"])
+    varying = steady.with_signals(load_torque_Nm=wave)
+    floors = [data_of([one]).floors[0].rms("current_A") for one in (steady, varying)]
+    assert floors[1] == pytest.approx(floors[0], rel=0.05)

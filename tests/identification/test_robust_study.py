@@ -38,7 +38,7 @@ EFFECTS = (
 
 
 def kept(study: str, keys: list[str], run: Callable[[str], dict[str, Any]]) -> Iterator[dict[str, Any]]:
-    """Results of a run for each key, those of an earlier session read back."""
+    """Results of a run for each key, those of an earlier run read back."""
     folder = os.environ.get("EMAVIZ_STUDY_DIR")
     path = Path(folder) / f"{study}.jsonl" if folder else None
     known = {}

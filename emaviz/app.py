@@ -9,6 +9,7 @@ import time
 import traceback
 import webbrowser
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 import viser
@@ -17,16 +18,30 @@ from ema_model.actuator import load_actuator
 from ema_model.comparison.result import Comparison
 from emaviz.comparing import Comparing
 from emaviz.data_folder import DataFolder
-from emaviz.figures.signals import LiveSignals
+from emaviz.discovering import Discovering
+from emaviz.identifying import measured
+from emaviz.library import Library
 from emaviz.panels.compare import ComparePanel
 from emaviz.panels.compare_keep import KeepControls
 from emaviz.panels.compare_moment import hold
 from emaviz.panels.compare_result import ResultPanel
+from emaviz.panels.discover import DiscoverPanel
+from emaviz.panels.discover_cards import TABS
+from emaviz.panels.discover_keep import DiscoveryKeep
+from emaviz.panels.discover_load import load_into_explore
+from emaviz.panels.discover_result import DiscoveryPanel
 from emaviz.panels.explore import ExplorePanel
+from emaviz.panels.explore_charts import ChartsPanel
+from emaviz.panels.explore_export import ExportControls
 from emaviz.panels.identify import IdentifyPanel
+from emaviz.panels.identify_result import IdentifyResult
+from emaviz.panels.library import EffectPage, LibraryPanel
 from emaviz.panels.page import Page
+from emaviz.panels.page_playback import PlaybackStrip
 from emaviz.panels.recordings import RecordingsPanel
-from emaviz.recording.recover import recover
+from emaviz.panels.recordings_result import RecordingsResult
+from emaviz.panels.sessions import SessionControls, parts
+from emaviz.recorded import Recorded
 from emaviz.recording.viewer import ViewerHost
 from emaviz.safe_server import LOOPBACK, open_server
 from emaviz.scene.actuator import ActuatorScene
@@ -35,6 +50,9 @@ from emaviz.session import Session, Simulation
 from emaviz.worker import Worker
 
 _FASTEST_REDRAW_S = 0.05
+_SLOW_REDRAW_S = 0.3  # of what nobody watches while dragging
+_LEFT_PX, _RIGHT_PX, _VIEWER_PX = 380, 500, 640
+_BRAND = (47, 111, 222)
 
 
 class App:
@@ -50,15 +68,20 @@ class App:
         given = [data.take_in(file) for file in files]
         recordings = data.recordings
         self.server = open_server(host, port)
-        self.viewer = _viewer(recordings)
+        self.viewer, no_viewer = _viewer(recordings)
         self.session = Session(actuator, recordings)
         self.screen = Worker("emaviz-screen", self._on_screen_error, rest_s=_FASTEST_REDRAW_S)
+        self._slow_screen = Worker("emaviz-slow-screen", self._on_screen_error, rest_s=_SLOW_REDRAW_S)
+        self._recording_files = Worker("emaviz-recordings", self._on_screen_error)
         self.page = Page(self.server, self.session, self.screen)
         self.comparing = Comparing(self.session, data)
-        self.scene = ActuatorScene(self.server)
-        self.playback = Playback(self.scene)
+        self.session.open_file = partial(measured, self.comparing)
+        self.discovering = Discovering(self.session, self.comparing)
+        self.scene = ActuatorScene(self.server, round(actuator.motor.pole_pairs))
+        self.strip = PlaybackStrip(self.page, self.scene, lambda: self.charts.window_s, self._theme)
+        self.playback = Playback(self.scene, actuator, self.strip.moved)
         self._build(recordings, compare_first=bool(given))
-        self._play.on_update(lambda _: self.playback.play(bool(self._play.value)))
+        self.strip.connect(self.playback)
         self._first = threading.Event()
         self.first_picture_s = 0.0
         events = self.session.events
@@ -68,19 +91,29 @@ class App:
         self.session.start()
         for path in given:
             self.comparing.add(data.name_of(path))
-        for found in recover(recordings):
-            self.explore.status.content = f"Recovered a recording of an interrupted run: {found}"
+        for line in _recovered(recordings):
+            self.explore.status.content = line
+        if no_viewer:
+            self.server.on_client_connect(lambda _: self.page.notify("The Rerun viewer cannot be shown", no_viewer))
 
     def _build(self, recordings: Path, compare_first: bool) -> None:
         gui = self.server.gui
-        gui.configure_theme(show_logo=False, show_share_button=False, brand_color=(47, 111, 222))
+        self._theme(dark=False)
         gui.set_panel_label("emaviz")
         gui.main_panel.dock_left()
-        gui.main_panel.set_width(370)
-        # Of the two panels on the right one is seen: the one that belongs to what was done last.
+        gui.main_panel.set_width(_LEFT_PX)
+        # Of the panels on the right one is seen: the one that belongs to what was done last.
         self._signals_panel, self._result_panel = gui.add_panel(), gui.add_panel(visible=False)
-        with self._signals_panel.add_tab("Signals", viser.Icon.CHART_LINE):
-            self.signals = LiveSignals(gui)
+        self._discovery_panel, self._library_panel = gui.add_panel(visible=False), gui.add_panel(visible=False)
+        self._search_panel = gui.add_panel(visible=False)
+        search = IdentifyResult(
+            self.page, self._slow_screen, self._search_panel, lambda: self._bring(self._search_panel)
+        )
+        self._recordings_panel = gui.add_panel(visible=False)
+        opened = RecordingsResult(self.page, self._recordings_panel, lambda: self._bring(self._recordings_panel))
+        export = ExportControls(self.page, self.scene, self.playback)
+        self.charts = ChartsPanel(self.page, self._slow_screen, self._signals_panel, export.build)
+        export.connect(lambda: self.charts.ghost, lambda: self.charts.window_s)
         with self._result_panel.add_tab("Comparison", viser.Icon.ARROWS_DIFF):
             result = ResultPanel(
                 self.page,
@@ -88,44 +121,79 @@ class App:
                 self._hold,
                 lambda: KeepControls(self.page, self.comparing, self.viewer),
             )
-        for panel in (self._signals_panel, self._result_panel):
+        with self._discovery_panel.add_tab("Discovery", viser.Icon.BULB):
+            discovery = DiscoveryPanel(
+                self.page,
+                self.discovering,
+                lambda: self._bring(self._discovery_panel),
+                lambda: DiscoveryKeep(self.page, self.discovering, self.viewer),
+                lambda one: load_into_explore(self.explore, self.page, one),
+            )
+        library = Library(self.session)
+        with self._library_panel.add_tab("Effect", viser.Icon.BOOK):
+            effect = EffectPage(self.page, library, lambda: self._bring(self._library_panel))
+        self._right = [self._signals_panel, self._result_panel, self._discovery_panel, self._library_panel]
+        self._right += [self._search_panel, self._recordings_panel]
+        for panel in self._right:
             panel.dock_right()
-            panel.set_width(540)
+            panel.set_width(_VIEWER_PX if panel is self._recordings_panel else _RIGHT_PX)
         builders = [
             lambda tabs: self._build_explore(tabs),
-            lambda tabs: self._build_identify(tabs),
+            lambda tabs: self._build_identify(tabs, search),
             lambda tabs: self._build_compare(tabs, result),
+            lambda tabs: self._build_discover(tabs, discovery),
+            lambda tabs: self._build_library(tabs, library, effect),
+            lambda tabs: self._build_recordings(tabs, Recorded(recordings), opened),
         ]
+        if compare_first:
+            builders.insert(0, builders.pop(2))
+        gui.add_html(TABS)
         tabs = gui.add_tab_group()
-        for build in (builders[-1:] + builders[:-1]) if compare_first else builders:
+        for build in builders:
             build(tabs)
-        with tabs.add_tab("Recordings", viser.Icon.LIST):
-            RecordingsPanel(self.page, self.viewer, recordings)
+        self.sessions.connect(
+            parts(self.page, self.comparing, self.strip, self.explore, self.identify, search, self.compare)
+        )
+        self.compare.session_uploaded = self.sessions.uploaded
+
+    def _theme(self, dark: bool) -> None:
+        self.server.gui.configure_theme(show_logo=False, show_share_button=False, brand_color=_BRAND, dark_mode=dark)
 
     def _build_explore(self, tabs: viser.GuiTabGroupHandle) -> None:
-        gui = self.server.gui
         with tabs.add_tab("Explore", viser.Icon.ADJUSTMENTS):
             self.explore = ExplorePanel(self.page)
-            with gui.add_folder("Picture"):
-                self._caption = gui.add_markdown("")
-                self._play = gui.add_checkbox("Play", True)
 
-    def _build_identify(self, tabs: viser.GuiTabGroupHandle) -> None:
+    def _build_recordings(self, tabs: viser.GuiTabGroupHandle, recorded: Recorded, result: RecordingsResult) -> None:
+        with tabs.add_tab("Recordings", viser.Icon.LIST):
+            panel = RecordingsPanel(self.page, self.viewer, recorded, self._recording_files, result)
+            self.sessions = SessionControls(self.page, self.comparing, self._recording_files)
+        self.comparing.events.kept.append(lambda _: panel.refresh_soon())
+
+    def _build_identify(self, tabs: viser.GuiTabGroupHandle, result: IdentifyResult) -> None:
         with tabs.add_tab("Identify", viser.Icon.SEARCH):
-            self.identify = IdentifyPanel(self.page, self.viewer)
+            self.identify = IdentifyPanel(self.page, self.comparing, self.viewer, result)
 
     def _build_compare(self, tabs: viser.GuiTabGroupHandle, result: ResultPanel) -> None:
         with tabs.add_tab("Compare", viser.Icon.ARROWS_DIFF):
             self.compare = ComparePanel(self.page, self.comparing, result)
 
+    def _build_discover(self, tabs: viser.GuiTabGroupHandle, result: DiscoveryPanel) -> None:
+        with tabs.add_tab("Discover", viser.Icon.BULB):
+            self.discover = DiscoverPanel(self.page, self.discovering, result)
+
+    def _build_library(self, tabs: viser.GuiTabGroupHandle, library: Library, effect: EffectPage) -> None:
+        with tabs.add_tab("Library", viser.Icon.BOOK):
+            LibraryPanel(self.page, library, effect)
+
     def _bring(self, panel: viser.PanelHandle) -> None:
-        """To the front, on the right; the other one gives way."""
-        for one in (self._signals_panel, self._result_panel):
+        """To the front, on the right; the others give way."""
+        for one in self._right:
             if one.visible != (one is panel):
                 one.visible = one is panel
+                one.set_width(_VIEWER_PX if one is self._recordings_panel else _RIGHT_PX)  # lost while it was hidden
 
     def _hold(self, comparison: Comparison, recording: int, time_s: float) -> None:
-        self._play.value = False
+        self.strip.play(False)
         hold(self.playback, self.scene, comparison, recording, time_s)
 
     @property
@@ -140,26 +208,28 @@ class App:
     def close(self) -> None:
         """Ends everything that was started."""
         self.playback.close()
+        self.discovering.close()
         self.comparing.close()
         self.session.close()
         self.screen.close()
+        self._slow_screen.close()
+        self._recording_files.close()
         if self.viewer is not None:
             self.viewer.close()
         self.server.stop()
 
     def _draw(self, simulation: Simulation, started: float) -> None:
-        with self.server.atomic():
-            self.signals.show(simulation.reference, simulation.monitor)
+        self.charts.show(simulation)
         self.playback.show(simulation)
-        caption = self.playback.caption(simulation)
-        if self._caption.content != caption:
-            self._caption.content = caption
+        if self.playback.motion is not None:
+            self.strip.say(self.playback.motion.sentence())
+        self.explore.show_preset()
         if self.explore.monitor.value != self.session.settings.monitor:
             self.explore.show_monitor(self.session.settings.monitor)
         if not self._first.is_set():
             self.first_picture_s = time.perf_counter() - started
             self._first.set()
-        else:
+        elif simulation.asked:
             self._bring(self._signals_panel)
 
     def _status(self, text: str) -> None:
@@ -167,7 +237,6 @@ class App:
 
     def _told(self, title: str, text: str) -> None:
         self.page.notify(title, text)
-        self.screen.post("told", self.identify.failed)
 
     def _on_screen_error(self, error: BaseException) -> None:
         traceback.print_exception(error)
@@ -191,9 +260,19 @@ def serve(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _viewer(recordings: Path) -> ViewerHost | None:
-    """The Rerun viewer's host; the app works without."""
+def _viewer(recordings: Path) -> tuple[ViewerHost | None, str]:
+    """The Rerun viewer's host, or why there is none: the app works without."""
     try:
-        return ViewerHost(recordings)
-    except OSError:
-        return None
+        return ViewerHost(recordings), ""
+    except OSError as error:
+        return None, str(error)
+
+
+def _recovered(recordings: Path) -> list[str]:
+    """What became of recordings of interrupted runs, a line each."""
+    try:
+        from emaviz.recording.recover import recover
+
+        return [f"Recovered a recording of an interrupted run: {found}" for found in recover(recordings)]
+    except (OSError, ImportError) as error:
+        return [f"Interrupted recordings cannot be recovered: {error}"]

@@ -19,6 +19,7 @@ from ema_model.measurement.formats import FORMATS
 from ema_model.measurement.refusal import shown
 
 ACTUATOR_SUFFIX = ".toml"
+SESSION_SUFFIX = ".emaviz"
 _MOST_LISTED = 500
 _DEEPEST = 3
 _LONGEST_NAME = 100
@@ -30,9 +31,10 @@ class DataFolder:
     """Recordings, uploads and actuator files below one folder.  Raises InputError, one line, for what is refused."""
 
     def __init__(self, folder: Path) -> None:
-        """Makes the folder with `recordings`, `uploads` and `actuators` in it."""
+        """Makes the folder with `recordings`, `uploads`, `actuators` and `sessions` in it."""
         self.recordings, self.uploads, self.actuators = (folder / n for n in ("recordings", "uploads", "actuators"))
-        for made in (self.recordings, self.uploads, self.actuators):
+        self.sessions = folder / "sessions"
+        for made in (self.recordings, self.uploads, self.actuators, self.sessions):
             try:
                 made.mkdir(parents=True, exist_ok=True)
             except OSError as error:
@@ -46,6 +48,14 @@ class DataFolder:
     def actuator_files(self) -> list[str]:
         """Names of the uploaded actuator files."""
         return self._files(self.actuators, (ACTUATOR_SUFFIX,))
+
+    def session_files(self) -> list[str]:
+        """Names of the saved sessions, the newest first."""
+        return self._files(self.sessions, (SESSION_SUFFIX,))
+
+    def session(self, name: str) -> Path:
+        """The saved session of that name, relative to the folder."""
+        return self._existing(name, (SESSION_SUFFIX,))
 
     def measurement(self, name: str) -> Path:
         """The file of that name, relative to the folder."""
@@ -72,16 +82,18 @@ class DataFolder:
     def place(self, filename: str) -> Path:
         """Where an upload of that name is to be kept: safe, and not yet taken.
 
-        Measurements go to `uploads`, .toml to `actuators`.
+        Measurements go to `uploads`, .toml to `actuators`, .emaviz to `sessions`.
         """
         name = sanitised(filename)
         suffix = Path(name).suffix.lower()
-        if suffix not in (*FORMATS, ACTUATOR_SUFFIX):
+        if suffix not in (*FORMATS, ACTUATOR_SUFFIX, SESSION_SUFFIX):
             known = ", ".join(FORMATS)
             raise InputError(
-                f"{shown(name)}: the page takes measurements ({known}) and actuator files (.toml); convert it"
+                f"{shown(name)}: the page takes measurements ({known}), actuator files (.toml) and sessions (.emaviz); "
+                "convert it"
             )
-        return self._free(self.actuators if suffix == ACTUATOR_SUFFIX else self.uploads, name)
+        folders = {ACTUATOR_SUFFIX: self.actuators, SESSION_SUFFIX: self.sessions}
+        return self._free(folders.get(suffix, self.uploads), name)
 
     def part(self) -> Path:
         """A new file in `uploads` for a transfer on its way; `measurements` leaves it out."""

@@ -5,4 +5,6 @@ MONITOR = "#f08c00"
 DIFFERENCE = "#e03131"
 COMMAND = "#868e96"
 TRUTH = "#2b8a3e"
-ALGORITHMS = {"ssa": "#9c36b5", "hba": "#f08c00", "do": "#1098ad"}
+GHOST = "#9c6ade"  # a frozen run
+PHASES = ("#ec403a", "#28be5a", "#3878ff")  # A, B, C, in the charts and in the windings
+ALGORITHMS = {"robust": "#4c6ef5", "ssa": "#9c36b5", "hba": "#f08c00", "do": "#1098ad"}

@@ -1,42 +1,73 @@
-"""The live chart of an identification: the best error of each iteration."""
+"""The live chart of identifications: the best error of each iteration, all optimisers in one plot."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import viser
 
-from emaviz.figures.colours import ALGORITHMS
+from ema_model.identification.run import ALGORITHMS as TITLES
+from emaviz.figures.colours import ALGORITHMS, MONITOR
+from emaviz.figures.signals import AXIS, legend
+
+_LEAST_A = 1e-9  # a logarithmic axis has no zero
 
 
 class LiveConvergence:
-    """RMSE against iteration, logarithmic."""
+    """RMSE against iteration, logarithmic; an optimiser that has ended keeps its level."""
 
-    def __init__(self, gui: viser.GuiApi, height: int = 190) -> None:
-        grey = {"stroke": "#868e96", "labelSize": 16, "labelGap": 0, "grid": {"stroke": "#86868625", "width": 1}}
-        axes: Any = ({**grey, "label": "iteration", "size": 26}, {**grey, "label": "rmse [A]", "size": 52})
+    def __init__(self, gui: viser.GuiApi, height: int = 200) -> None:
+        axes: Any = ({**AXIS, "label": "iteration", "size": 30}, {**AXIS, "label": "best rmse [A]", "size": 56})
+        self._algorithms: tuple[str, ...] = ()
+        self._iterations = 150
+        self._legend: Any = gui.add_html("")
         self._handle: Any = gui.add_uplot(
             data=(np.array([0.0, 1.0]), np.array([1.0, 1.0])),
-            series=({"label": "iteration"}, {"label": "best rmse [A]", "stroke": ALGORITHMS["hba"], "width": 2}),
+            series=({"label": "iteration"}, _line("")),
             title="Convergence",
-            scales={"x": {"time": False, "range": (0.0, 150.0)}, "y": {"distr": 3}},
+            scales=_scales(150),
             axes=axes,
             legend={"show": False},
             height=height,
         )
 
-    def begin(self, algorithm: str, iterations: int) -> None:
-        """A new run: its colour and the length of its axis (which builds the chart anew)."""
-        line = {"label": "best rmse [A]", "stroke": ALGORITHMS.get(algorithm, "#868e96"), "width": 2}
-        self._handle.series = ({"label": "iteration"}, line)
-        self._handle.scales = {"x": {"time": False, "range": (0.0, float(iterations))}, "y": {"distr": 3}}
+    def begin(self, algorithms: Sequence[str], iterations: int) -> None:
+        """A new race: its colours and the length of its axis, which build the chart anew."""
+        if tuple(algorithms) != self._algorithms:
+            self._algorithms = tuple(algorithms)
+            self._handle.data = (np.array([0.0, 1.0]), *(np.array([1.0, 1.0]) for _ in algorithms))
+            self._handle.series = ({"label": "iteration"}, *(_line(name) for name in algorithms))
+            self._legend.content = legend(*((colour(name), TITLES.get(name, name)) for name in algorithms))
+        if iterations != self._iterations:
+            self._iterations = iterations
+            self._handle.scales = _scales(iterations)
 
-    def show(self, rmse: Sequence[float]) -> None:
-        """Draws the errors so far, A."""
-        y = np.maximum(np.asarray(rmse, dtype=float), 1e-9)
-        x = np.arange(len(y), dtype=float)
-        if len(y) == 1:
-            x, y = np.array([0.0, 0.1]), np.repeat(y, 2)
-        self._handle.data = (x, y)
+    def show(self, rmse: Mapping[str, Sequence[float]]) -> None:
+        """Draws the errors so far, A, by algorithm."""
+        if tuple(rmse) != self._algorithms:
+            return
+        count = max([2, *map(len, rmse.values())])
+        lines = [_to_length(values, count) for values in rmse.values()]
+        self._handle.data = (np.arange(count, dtype=float), *lines)
+
+
+def colour(algorithm: str) -> str:
+    """The algorithm's own colour; the monitor's for one without."""
+    return ALGORITHMS.get(algorithm, MONITOR)
+
+
+def _to_length(rmse: Sequence[float], count: int) -> np.ndarray:
+    """The last value goes on: it stays the best."""
+    values = np.asarray(rmse if len(rmse) else [1.0], dtype=float)
+    values = np.maximum(np.where(np.isfinite(values), values, 1e3), _LEAST_A)
+    return np.concatenate([values, np.full(count - len(values), values[-1])])
+
+
+def _line(algorithm: str) -> Any:
+    return {"label": f"{algorithm} [A]", "stroke": colour(algorithm), "width": 2, "points": {"show": False}}
+
+
+def _scales(iterations: int) -> Any:
+    return {"x": {"time": False, "range": (0.0, float(iterations))}, "y": {"distr": 3}}

@@ -1,4 +1,4 @@
-"""The live charts of one run: reference, monitor, and their difference on an axis of its own."""
+"""The live charts of one run: reference, monitor, a frozen run, and the difference on an axis of its own."""
 
 from __future__ import annotations
 
@@ -10,24 +10,12 @@ import viser
 from numpy.typing import NDArray
 
 from ema_model.measurement import Measurement
-from emaviz.figures.colours import COMMAND, DIFFERENCE, MONITOR, REFERENCE
+from emaviz.figures.colours import COMMAND, DIFFERENCE, GHOST, MONITOR, PHASES, REFERENCE
 from emaviz.figures.decimate import envelope
 
 Array = NDArray[np.float64]
+POINTS = 800  # of a line, at most
 _GREY = "#868e96"
-_LEGEND = (
-    '<div style="font-size:12px;padding:0 10px">'
-    + " &nbsp; ".join(
-        f'<span style="color:{colour}">━</span> {name}'
-        for name, colour in (
-            ("reference model", REFERENCE),
-            ("monitor model", MONITOR),
-            ("monitor − reference (right axis)", DIFFERENCE),
-            ("command", COMMAND),
-        )
-    )
-    + "</div>"
-)
 
 
 @dataclass(frozen=True)
@@ -49,73 +37,183 @@ CHARTS = (
     SignalChart("motor_position_rad", "Motor position", "rad", 1.0, "mrad", 1e3),
     SignalChart("motor_speed_rad_s", "Motor speed", "rad/s", difference_unit="rad/s"),
 )
+PHASE_SIGNALS = ("phase_a_current_A", "phase_b_current_A", "phase_c_current_A")
+
+
+def legend(*names: tuple[str, str]) -> str:
+    """Colours and names, in a line."""
+    return (
+        '<div style="font-size:12px;padding:0 10px;line-height:1.5">'
+        + " &nbsp; ".join(
+            f'<span style="white-space:nowrap"><span style="color:{colour}">━</span> {name}</span>'
+            for colour, name in names
+        )
+        + "</div>"
+    )
 
 
 class LiveSignals:
     """The charts in a panel of the page."""
 
-    def __init__(self, gui: viser.GuiApi, height: int = 154) -> None:
+    def __init__(self, gui: viser.GuiApi, height: int = 132) -> None:
         empty = np.array([0.0, 1.0])
-        gui.add_html(_LEGEND)
+        gui.add_html(
+            legend(
+                (REFERENCE, "plant"),
+                (MONITOR, "monitor"),
+                (DIFFERENCE, "monitor − plant, right axis"),
+                (COMMAND, "command"),
+                (GHOST, "frozen"),
+            )
+        )
         self._charts: list[tuple[SignalChart, Any]] = []
         for chart in CHARTS:
-            count = 5 + chart.with_command
+            count = 6 + chart.with_command
+            last = chart is CHARTS[-1]
             handle = gui.add_uplot(
                 data=tuple(empty for _ in range(count)),
                 series=_series(chart),
                 title=chart.title,
                 scales={"x": {"time": False}, "y": {"auto": True}, "difference": {"auto": True}},
-                axes=_axes(chart, last=chart is CHARTS[-1]),
-                cursor={"sync": {"key": "time"}},
+                axes=(time_axis(last), value_axis(chart.unit), _difference_axis(chart.difference_unit)),
+                cursor=CURSOR,
                 legend={"show": False},
-                height=height + (16 if chart is CHARTS[-1] else 0),
+                padding=(0, 4, 0, 0),
+                height=height + (16 if last else 0),
             )
             self._charts.append((chart, handle))
 
-    def show(self, reference: Measurement, monitor: Measurement) -> None:
-        """Draws a run of both models on one time base."""
-        time = reference.time_s
+    def show(
+        self, reference: Measurement, monitor: Measurement, ghost: Measurement | None, window_s: tuple[float, float]
+    ) -> None:
+        """Draws a run of both models on one time base, and the frozen one, from and to these times."""
+        shown = _within(reference.time_s, window_s)
+        time = reference.time_s[shown]
         for chart, handle in self._charts:
-            rm, mm = reference[chart.signal], monitor[chart.signal]
+            rm, mm = reference[chart.signal][shown], monitor[chart.signal][shown]
             difference = chart.difference_scale * (mm - rm)
-            lines = [difference, chart.scale * rm, chart.scale * mm]
+            frozen = beneath(at(ghost, chart.signal, time), rm)
+            lines = [difference, chart.scale * frozen, chart.scale * rm, chart.scale * mm]
             if chart.with_command:
-                lines.append(chart.scale * reference["command_rad"])
+                lines.append(chart.scale * reference["command_rad"][shown])
             # in the middle third of the chart, so that it does not cover the signals
-            drawn = envelope(time, lines)
+            drawn = envelope(time, lines, POINTS)
             most = 3.0 * max(float(np.max(np.abs(difference))), 1e-6)
             frame = np.full(len(drawn[0]), most)
             frame[0] = -most
             handle.data = (*drawn, frame)
 
 
+class LivePhases:
+    """Phase currents, and the equivalent current that they make."""
+
+    def __init__(self, gui: viser.GuiApi, height: int = 250) -> None:
+        empty = np.array([0.0, 1.0])
+        gui.add_html(legend(*((colour, f"phase {name}, plant") for colour, name in zip(PHASES, "ABC"))))
+        common = {"scales": {"x": {"time": False}, "y": {"auto": True}}, "legend": {"show": False}, "cursor": CURSOR}
+        self._phases: Any = gui.add_uplot(
+            data=(empty,) * 4,
+            series=({"label": "t [s]"}, *(_line(f"phase {name}", colour) for name, colour in zip("ABC", PHASES))),
+            title="Phase currents",
+            axes=(time_axis(False), value_axis("A")),
+            height=height,
+            **common,  # type: ignore[arg-type]
+        )
+        gui.add_html(legend((REFERENCE, "I₃eq of the phases, plant"), (MONITOR, "monitor"), (GHOST, "frozen")))
+        self._equivalent: Any = gui.add_uplot(
+            data=(empty,) * 4,
+            series=(
+                {"label": "t [s]"},
+                _GHOST_LINE,
+                _line("reference", REFERENCE),
+                _line("monitor", MONITOR),
+            ),
+            title="Equivalent single-phase current",
+            axes=(time_axis(True), value_axis("A")),
+            height=height + 16,
+            **common,  # type: ignore[arg-type]
+        )
+
+    def show(
+        self, reference: Measurement, monitor: Measurement, ghost: Measurement | None, window_s: tuple[float, float]
+    ) -> None:
+        """As `LiveSignals.show`."""
+        shown = _within(reference.time_s, window_s)
+        time = reference.time_s[shown]
+        self._phases.data = envelope(time, [reference[name][shown] for name in PHASE_SIGNALS], POINTS)
+        current = reference["current_A"][shown]
+        lines = [beneath(at(ghost, "current_A", time), current), current, monitor["current_A"][shown]]
+        self._equivalent.data = envelope(time, lines, POINTS)
+
+
+def at(run: Measurement | None, signal: str, time_s: Array) -> Array:
+    """A run's signal at other times; NaN where it has none, or there is no run."""
+    if run is None:
+        return np.full(len(time_s), np.nan)
+    return np.interp(time_s, run.time_s, run[signal], left=np.nan, right=np.nan)
+
+
+def beneath(frozen: Array, shown: Array) -> Array:
+    """The frozen line, hidden under the one that is shown where it has no values: uPlot has no gaps in numbers."""
+    return np.where(np.isfinite(frozen), frozen, shown)
+
+
+# A drag would zoom one chart alone; the window of time above the charts zooms all of them, in full resolution.
+CURSOR: Any = {"sync": {"key": "time"}, "drag": {"x": False, "y": False}}
+
+
+def time_axis(labelled: bool) -> Any:
+    """The axis below a chart; only the last of a column needs its label."""
+    return {**AXIS, "label": "time [s]" if labelled else "", "size": 30, "labelSize": 16 if labelled else 0}
+
+
+def value_axis(unit: str) -> Any:
+    """The axis at the left of a chart."""
+    return {**AXIS, "scale": "y", "label": f"[{unit}]", "size": 48, "space": 24}
+
+
+def _difference_axis(unit: str) -> Any:
+    return {
+        **value_axis(unit),
+        "scale": "difference",
+        "side": 1,
+        "label": f"difference [{unit}]",
+        "stroke": DIFFERENCE,
+        "grid": {"show": False},
+    }
+
+
+AXIS: dict[str, Any] = {
+    "stroke": _GREY, "labelSize": 16, "labelGap": 0, "font": "11px system-ui", "labelFont": "12px system-ui",
+    "grid": {"stroke": "#86868625", "width": 1}, "ticks": {"stroke": "#86868640", "width": 1, "size": 5},
+}  # fmt: skip
+
+
+def _line(label: str, colour: str) -> Any:
+    return {"label": label, "stroke": colour, "width": 1.5, "points": {"show": False}}
+
+
+_GHOST_LINE: Any = {**_line("frozen", GHOST), "dash": [5, 3]}
+
+
 def _series(chart: SignalChart) -> Any:
     series: list[dict[str, Any]] = [
         {"label": "t [s]"},
-        {"label": "difference", "stroke": DIFFERENCE + "b0", "width": 1, "scale": "difference"},
-        {"label": "reference", "stroke": REFERENCE, "width": 1.5},
-        {"label": "monitor", "stroke": MONITOR, "width": 1.5},
+        {**_line("difference", DIFFERENCE + "b0"), "width": 1, "scale": "difference"},
+        _GHOST_LINE,
+        _line("reference", REFERENCE),
+        _line("monitor", MONITOR),
     ]
     if chart.with_command:
-        series.append({"label": "command", "stroke": COMMAND, "width": 1, "dash": [4, 4]})
+        series.append({**_line("command", COMMAND), "width": 1, "dash": [4, 4]})
     # unseen; it sets the range of the difference's axis, which viser cannot change without a new chart
-    unseen = {"stroke": "#00000000", "width": 0, "points": {"show": False}}
-    series.append({"label": "range", "scale": "difference", **unseen})
+    series.append({**_line("range", "#00000000"), "width": 0, "scale": "difference"})
     return tuple(series)
 
 
-def _axes(chart: SignalChart, last: bool) -> Any:
-    common = {"stroke": _GREY, "labelSize": 16, "labelGap": 0, "grid": {"stroke": "#86868625", "width": 1}}
-    return (
-        {**common, "label": "time [s]" if last else "", "size": 30, "labelSize": 16 if last else 0},
-        {**common, "scale": "y", "label": f"[{chart.unit}]", "size": 48},
-        {
-            **common,
-            "scale": "difference",
-            "side": 1,
-            "label": f"difference [{chart.difference_unit}]",
-            "size": 48,
-            "stroke": DIFFERENCE,
-            "grid": {"show": False},
-        },
-    )
+def _within(time_s: Array, window_s: tuple[float, float]) -> slice:
+    """The samples of a window; two at least."""
+    first = int(np.searchsorted(time_s, window_s[0] - 1e-9))
+    last = int(np.searchsorted(time_s, window_s[1] + 1e-9, side="right"))
+    first = min(first, len(time_s) - 2)
+    return slice(first, max(last, first + 2))

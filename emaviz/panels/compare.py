@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import viser
@@ -10,7 +11,7 @@ from ema_model.comparison.result import Comparison
 from ema_model.errors import InputError
 from ema_model.measurement.formats import FORMATS
 from emaviz.comparing import UPLOADED, Comparing, Opened
-from emaviz.data_folder import ACTUATOR_SUFFIX
+from emaviz.data_folder import ACTUATOR_SUFFIX, SESSION_SUFFIX
 from emaviz.panels.compare_asked import AskedControls
 from emaviz.panels.compare_cards import health_card, recordings_list
 from emaviz.panels.compare_mapping import MappingStep
@@ -28,6 +29,7 @@ class ComparePanel:
         self._page, self._comparing, self._result = page, comparing, result
         self._shown: str | None = None
         self._again = False
+        self.session_uploaded: Callable[[Path], None] = lambda path: None  # a whole session, not a recording
         gui = page.server.gui
         self.uploads = Uploads(page.server, comparing.folder, self._uploaded, self._refused)
         gui.add_markdown("Upload a recording of a test bench, or **drop it anywhere** on the page.")
@@ -46,7 +48,7 @@ class ComparePanel:
         self._health_folder = gui.add_folder("Data health", visible=False)
         with self._health_folder:
             self._health = gui.add_html("")
-        self._asked = AskedControls(page, comparing, self.uploads)
+        self.asked = AskedControls(page, comparing, self.uploads)
         add.on_click(lambda _: self._add())
         self._which.on_update(lambda event: event.client and self._post_show(str(self._which.value)))
         self._columns.on_click(lambda _: page.screen.post("columns", self._open_columns))
@@ -72,8 +74,11 @@ class ComparePanel:
     def _uploaded(self, path: Path) -> None:
         """A file is kept; on the server's thread."""
         name = self._comparing.folder.name_of(path)
+        if path.suffix.lower() == SESSION_SUFFIX:
+            self.session_uploaded(path)
+            return
         if path.suffix.lower() == ACTUATOR_SUFFIX:
-            self._page.screen.post("actuator", lambda: self._asked.choose(UPLOADED + name))
+            self._page.screen.post("actuator", lambda: self.asked.choose(UPLOADED + name))
         else:
             self._comparing.add(name)
         self._page.screen.post("files", self.refresh_files)
@@ -118,7 +123,7 @@ class ComparePanel:
         for control in (self._columns, self._remove):
             control.visible = opened is not None
         self._start.disabled = self._comparing.session.worker.busy or opened is None
-        self._asked.show_signals()
+        self.asked.show_signals()
         card = opened.health if opened is not None else None
         self._health_folder.visible = card is not None
         self._health.content = "" if card is None else health_card(card)

@@ -51,6 +51,19 @@ class AskedControls:
         self._actuator.value = self._comparing.actuator_name
         self._list_free()
 
+    def show_settings(self) -> None:
+        """All controls as the session's part has them; on the screen's thread."""
+        comparing = self._comparing
+        window = comparing.window_s  # kept, since the controls' own callbacks may set it
+        self._calibrate.value = comparing.calibrate
+        for name, box in self._signals.items():
+            box.value = comparing.weights.get(name, 0.0)
+        self._windowed.value = window is not None
+        self._from.visible = self._to.visible = window is not None
+        if window is not None:
+            self._from.value, self._to.value = window
+        self.show_actuator()
+
     def show_signals(self) -> None:
         """Only the signals that every recording has can be chosen."""
         known = self._comparing.signals_available()

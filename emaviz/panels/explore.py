@@ -11,18 +11,27 @@ import viser
 
 from ema_model.commands import COMMANDS
 from ema_model.faults import FAULTS, HEALTHY, sentences
+from emaviz.panels.explore_labels import readable
+from emaviz.panels.explore_plant import PlantControls
+from emaviz.panels.explore_presets import CUSTOM, PRESETS, name_of
+from emaviz.panels.explore_start import StartHere
 from emaviz.panels.page import Page
+from emaviz.panels.page_style import LONG_LABELS
 from emaviz.state import MONITORS
 
 
 class ExplorePanel:
-    """Sliders of the faults, the command and its settings, the load."""
+    """Presets and sliders of the faults, the command and its settings, the load, and what the plant hides."""
 
     def __init__(self, page: Page) -> None:
         self._page = page
+        self._reads: list[tuple[Any, Callable[[], Any]]] = []  # controls, and what the session holds for them
         gui = page.server.gui
         self.status = gui.add_markdown("Starting…")
-        with gui.add_folder("Faults"):
+        self.start = StartHere(page)
+        with gui.add_folder("Faults of the plant"):
+            gui.add_html(LONG_LABELS)
+            self._preset = gui.add_dropdown("Preset", (*PRESETS, CUSTOM), initial_value="healthy")
             self._sliders = [self._fault(i) for i in range(len(FAULTS))]
             reset = gui.add_button("Reset to healthy", icon=viser.Icon.HEART)
             reset.on_click(lambda _: self.set_faults(HEALTHY))
@@ -34,22 +43,54 @@ class ExplorePanel:
             self._show_group()
             duration = gui.add_number("Duration [s]", 0.5, min=0.01, max=5.0, step=0.01)
             load = gui.add_number("Load torque [N·m]", 0.0, min=-1000.0, max=1000.0, step=1.0)
+        self._plant = PlantControls(page)
         with gui.add_folder("Monitor model"):
-            self.monitor = gui.add_dropdown("Faults of the monitor", MONITORS, initial_value="healthy")
+            self.monitor = gui.add_dropdown(
+                "Its faults", MONITORS, initial_value="healthy", hint="Whose faults the monitor model is drawn with"
+            )
         settings = page.session.settings
+        self._preset.on_update(lambda event: event.client and page.screen.post("preset", self._take_preset))
         self._command.on_update(lambda _: self._choose_command())
-        for entry, setter in (
-            (duration, settings.set_duration),
-            (load, settings.set_load),
-            (self.monitor, settings.set_monitor),
-        ):
-            self._listen(entry, setter)
+        self._listen(duration, settings.set_duration, lambda: settings.duration_s)
+        self._listen(load, settings.set_load, lambda: settings.load_torque_Nm)
+        # Set by the session as well, after which nothing is to be simulated again.
+        self.monitor.on_update(lambda event: event.client and self._take_monitor())
+
+    def _take_monitor(self) -> None:
+        self._change(lambda: self._page.session.settings.set_monitor(self.monitor.value))
+
+    def _take_preset(self) -> None:
+        k = PRESETS.get(str(self._preset.value))
+        if k is not None:
+            self.set_faults(k)
+
+    def show_preset(self) -> None:
+        """Names the preset that the sliders make; on the screen's thread."""
+        name = name_of(self._page.session.settings.k)
+        if self._preset.value != name:
+            self._preset.value = name
 
     def set_faults(self, k: Any) -> None:
         """Moves every slider, and simulates once."""
-        for i, slider in enumerate(self._sliders):
-            slider.value = float(k[i])
+        settings = self._page.session.settings
+        for i, value in enumerate(k):
+            settings.set_fault(i, value)
+        with self._page.server.atomic():
+            for i, slider in enumerate(self._sliders):
+                slider.value = float(k[i])
+                slider.label = self._label(i)
         self._page.session.refresh()
+
+    def show_settings(self) -> None:
+        """Sets every control to what the session holds, and simulates; on the screen's thread."""
+        settings = self._page.session.settings
+        self._command.value = COMMANDS[settings.command].title
+        self._show_group()
+        for entry, read in self._reads:
+            entry.value = str(read()) if isinstance(entry.value, str) else read()
+        self._plant.show_settings()
+        self.show_monitor(settings.monitor)
+        self.set_faults(settings.k)
 
     def show_monitor(self, monitor: str) -> None:
         """Sets the dropdown to what the session has chosen."""
@@ -60,7 +101,7 @@ class ExplorePanel:
         slider = self._page.server.gui.add_slider(
             self._label(index), 0.0, 1.0, 0.005, fault.healthy, hint=f"{fault.name}: {fault.title}, 0 … 1"
         )
-        slider.on_update(lambda _: self._slide(index))
+        slider.on_update(lambda event: event.client and self._slide(index))
         return slider
 
     def _label(self, index: int) -> str:
@@ -79,17 +120,22 @@ class ExplorePanel:
         inputs = []
         for f in fields(COMMANDS[name]):
             default: Any = f.default
-            label = _label(f.name)
+            label = readable(f.name)
             if isinstance(default, tuple):
                 entry = self._page.server.gui.add_text(label, "+".join(f"{value:g}" for value in default))
             else:
                 entry = self._page.server.gui.add_number(label, float(default), step=_step(float(default)))
-            self._listen(entry, partial(self._page.session.settings.set_command_setting, name, f.name))
+            setter = partial(self._page.session.settings.set_command_setting, name, f.name)
+            self._listen(entry, setter, partial(self._command_setting, name, f.name, entry.value))
             inputs.append(entry)
         return inputs
 
-    def _listen(self, entry: Any, setter: Callable[[Any], None]) -> None:
-        """A control's new value goes through its setter, then both models run."""
+    def _command_setting(self, name: str, setting: str, usual: Any) -> Any:
+        return self._page.session.settings.command_settings[name].get(setting, usual)
+
+    def _listen(self, entry: Any, setter: Callable[[Any], None], read: Callable[[], Any]) -> None:
+        """A control's new value goes through its setter, then both models run; read() is what the session holds."""
+        self._reads.append((entry, read))
 
         def changed(_: Any) -> None:
             self._change(lambda: setter(entry.value))
@@ -112,14 +158,6 @@ class ExplorePanel:
         if good:
             self._page.session.refresh()
         return good
-
-
-def _label(setting: str) -> str:
-    """`amplitude_rad` as "Amplitude [rad]"."""
-    for unit, shown in (("_rad_s", "rad/s"), ("_rad", "rad"), ("_Hz", "Hz"), ("_s", "s")):
-        if setting.endswith(unit):
-            return f"{setting.removesuffix(unit).replace('_', ' ').capitalize()} [{shown}]"
-    return setting.replace("_", " ").capitalize()
 
 
 def _step(default: float) -> float:

@@ -1,4 +1,4 @@
-"""The Identify tab: find the faults that the sliders set, while one watches."""
+"""The Identify tab: what is identified, by which algorithms, and the race that one watches."""
 
 from __future__ import annotations
 
@@ -7,51 +7,96 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import viser
 
-from ema_model.faults import HEALTHY
 from ema_model.identification.objective import FITNESSES
-from ema_model.identification.optimisers import OPTIMISERS
-from ema_model.identification.run import Identification, Progress
-from emaviz.figures.convergence import LiveConvergence
-from emaviz.figures.fault_bars import fault_bars
+from ema_model.identification.run import ALGORITHMS
+from emaviz.comparing import Comparing
+from emaviz.figures.convergence import colour
+from emaviz.identifying import Race
+from emaviz.panels.identify_result import IdentifyResult
 from emaviz.panels.page import Page
 from emaviz.recording.viewer import ViewerHost
+from emaviz.state import SLIDERS
+
+PLANT = "The plant of Explore's sliders"
 
 
 class IdentifyPanel:
-    """Algorithm and its settings, run and stop, convergence, k bars, the recording's link."""
+    """The tab's controls.  `result` is the panel on the right."""
 
-    def __init__(self, page: Page, viewer: ViewerHost | None) -> None:
-        self._page = page
-        self._viewer = viewer
-        self._rmse: list[float] = []
+    def __init__(self, page: Page, comparing: Comparing, viewer: ViewerHost | None, result: IdentifyResult) -> None:
+        self._page, self._comparing, self._viewer, self._result = page, comparing, viewer, result
         gui, settings = page.server.gui, page.session.settings
-        algorithm = gui.add_dropdown("Algorithm", tuple(OPTIMISERS), initial_value=settings.algorithm)
-        population = gui.add_number("Population", settings.population, min=4, max=1000, step=1)
-        iterations = gui.add_number("Iterations", settings.iterations, min=1, max=5000, step=1)
-        fitness = gui.add_dropdown("Fitness", FITNESSES, initial_value=settings.fitness)
-        seed = gui.add_number("Seed", settings.seed, min=0, step=1)
+        self._source: Any = gui.add_dropdown(
+            "Identify", (PLANT,), hint="The sliders' plant, whose faults are known, or a recording of the data folder"
+        )
+        with gui.add_folder("Algorithms, one or several at once"):
+            self._ticks = {
+                name: gui.add_checkbox(title, name in settings.algorithms) for name, title in ALGORITHMS.items()
+            }
+        self._population = gui.add_number("Population", settings.population, min=4, max=1000, step=1)
+        self._iterations = gui.add_number("Iterations", settings.iterations, min=1, max=5000, step=1)
+        self._fitness: Any = gui.add_dropdown("Fitness", FITNESSES, initial_value=settings.fitness)
+        self._seed = gui.add_number("Seed", settings.seed, min=0, step=1)
         for entry, change in (
-            (algorithm, settings.set_algorithm),
-            (population, settings.set_population),
-            (iterations, settings.set_iterations),
-            (fitness, settings.set_fitness),
-            (seed, settings.set_seed),
+            (self._population, settings.set_population),
+            (self._iterations, settings.set_iterations),
+            (self._fitness, settings.set_fitness),
+            (self._seed, settings.set_seed),
         ):
             self._listen(entry, change)
         self._start = gui.add_button("Identify", icon=viser.Icon.SEARCH)
+        self._pause = gui.add_button("Pause the search", icon=viser.Icon.PLAYER_PAUSE, color="gray", disabled=True)
         self._stop = gui.add_button("Stop", icon=viser.Icon.PLAYER_STOP, color="red", disabled=True)
         self._progress = gui.add_progress_bar(0.0)
-        self._text = gui.add_markdown("Finds the faults that the sliders of *Explore* have set.")
-        self._convergence = LiveConvergence(gui)
-        self._bars = gui.add_html(fault_bars(HEALTHY, page.session.actuator))
+        self._text = gui.add_html(_line("Finds the faults from the current alone."))
         self._link = gui.add_html("")
+        self._again = gui.add_button("Show the search", icon=viser.Icon.CHART_DOTS, color="gray")
+        self._source.on_update(lambda event: event.client and page.screen.post("identify source", self._take_source))
+        for tick in self._ticks.values():
+            tick.on_update(lambda event: event.client and page.screen.post("algorithms", self._take_algorithms))
         self._start.on_click(lambda _: self._begin())
+        self._pause.on_click(lambda _: page.screen.post("pause", self._toggle))
         self._stop.on_click(lambda _: page.session.stop())
-        page.session.events.progressed.append(self._progressed)
-        page.session.events.identified.append(self._identified)
+        self._again.on_click(lambda _: page.screen.post("bring", result.to_front))
+        events = page.session.events
+        events.progressed.append(self._progressed)
+        events.identified.append(lambda race: page.screen.post("identification", lambda: self._draw_answer(race)))
+        events.ended.append(lambda: page.screen.post("search ended", self.free))
+        comparing.events.opened.append(lambda _: page.screen.post("sources", self.refresh_sources))
+        self.refresh_sources()
+
+    # --- what is asked ----------------------------------------------------------------------------------------------
+
+    def refresh_sources(self) -> None:
+        """Reads the data folder's list again; the chosen one stays as long as it exists."""
+        names = (PLANT, *self._comparing.folder.measurements())
+        if tuple(self._source.options) != names:
+            self._source.options = names
+        self._source.value = self._page.session.settings.source or PLANT
+
+    def show_settings(self) -> None:
+        """Sets the controls to what the session holds; on the screen's thread."""
+        settings = self._page.session.settings
+        self.refresh_sources()
+        for name, tick in self._ticks.items():
+            tick.value = name in settings.algorithms
+        self._population.value, self._iterations.value = settings.population, settings.iterations
+        self._fitness.value, self._seed.value = settings.fitness, settings.seed
+
+    def _take_source(self) -> None:
+        name = str(self._source.value)
+        settings = self._page.session.settings
+        if not self._page.checked(lambda: settings.set_source(SLIDERS if name == PLANT else name)):
+            self.refresh_sources()
+
+    def _take_algorithms(self) -> None:
+        settings = self._page.session.settings
+        chosen = [name for name, tick in self._ticks.items() if tick.value]
+        if not self._page.checked(lambda: settings.set_algorithms(chosen)):
+            for name, tick in self._ticks.items():
+                tick.value = name in settings.algorithms
 
     def _listen(self, entry: Any, setter: Callable[[Any], None]) -> None:
         def changed(_: Any) -> None:
@@ -59,69 +104,97 @@ class IdentifyPanel:
 
         entry.on_update(changed)
 
+    # --- the race ---------------------------------------------------------------------------------------------------
+
     def _begin(self) -> None:
-        if not self._page.session.ready.is_set():
+        session = self._page.session
+        if not session.ready.is_set():
             self._page.notify("One moment", "The models are still being compiled.", "yellow")
             return
-        settings = self._page.session.settings
-        if not self._page.session.identify():
-            self._page.notify("One at a time", "An identification is running; stop it first.", "yellow")
+        if not session.identify():
+            self._page.notify("One at a time", "A long calculation is running; stop it first.", "yellow")
             return
-        self._stop.disabled = False
-        self._start.disabled = True
+        self._start.disabled, self._pause.disabled, self._stop.disabled = True, False, False
+        self._show_paused(False)
         self._link.content = ""
-        self._text.content = "Starting…"
-        self._convergence.begin(settings.algorithm, settings.iterations)
+        self._text.content = _line("Starting…")
+        self._page.screen.post("bring", self._result.to_front)
 
-    def failed(self) -> None:
+    def _toggle(self) -> None:
+        session = self._page.session
+        session.pause(not session.reins.paused)
+        self._show_paused(session.reins.paused)
+        self._result.draw()
+
+    def _show_paused(self, paused: bool) -> None:
+        self._pause.label = "Go on" if paused else "Pause the search"
+        self._pause.icon = viser.Icon.PLAYER_PLAY if paused else viser.Icon.PLAYER_PAUSE
+
+    def free(self) -> None:
         """Gives the button back when no identification runs any more."""
-        if not self._page.session.worker.busy:
-            self._start.disabled, self._stop.disabled = False, True
+        self._start.disabled, self._pause.disabled, self._stop.disabled = False, True, True
+        self._show_paused(False)
+        if "Starting" in self._text.content:
+            self._text.content = _line("Ended without an answer.")
 
-    def _progressed(self, at: Progress, truth: np.ndarray) -> None:
-        if at.iteration == 0:
-            self._rmse = []
-        self._rmse.append(at.rmse)
-        rmse = list(self._rmse)
-        self._page.screen.post("identification", lambda: self._draw(at, truth, rmse))
+    def _progressed(self, race: Race) -> None:
+        self._result.progressed(race)
+        self._page.screen.post("identification", lambda: self._draw(race))
 
-    def _draw(self, at: Progress, truth: np.ndarray, rmse: list[float]) -> None:
-        self._progress.value = 100.0 * at.iteration / max(at.iterations, 1)
-        self._text.content = (
-            f"**{OPTIMISERS[at.algorithm].title}** · iteration {at.iteration} of {at.iterations} · "
-            f"rmse {at.rmse:.4f} A · {at.elapsed_s:.1f} s"
-        )
-        self._convergence.show(rmse)
-        self._bars.content = fault_bars(at.k, self._page.session.actuator, truth)
+    def _draw(self, race: Race) -> None:
+        shares = [1.0 if track.answer else len(track.rmse) / (track.iterations + 2.0) for track in race.tracks.values()]
+        self._progress.value = 100.0 * sum(shares) / len(shares)
+        lines = []
+        for name, track in race.tracks.items():
+            if not track.rmse:
+                continue
+            at = "done" if track.answer else f"iteration {len(track.rmse) - 1} of {track.iterations}"
+            lines.append(_line(f"{_title(name)} · {at} · rmse {track.rmse[-1]:.4f} A"))
+        if race.growing is not None and not self._link.content:
+            self._link.content = recording_link(self._viewer, race.growing, "Watch it live in Rerun ↗")
+        self._text.content = "".join(lines)
 
-    def _identified(self, answer: Identification, path: Path | None) -> None:
-        self._page.screen.post("identification", lambda: self._draw_answer(answer, path))
-
-    def _draw_answer(self, answer: Identification, path: Path | None) -> None:
-        sure = answer.uncertainty
-        self._start.disabled, self._stop.disabled = False, True
+    def _draw_answer(self, race: Race) -> None:
         self._progress.value = 100.0
-        verdict = "healthy" if sure.healthy else f"not healthy: {', '.join(sure.alarms) or 'no single k stands out'}"
-        stopped = "stopped · " if answer.stopped else ""
-        self._text.content = (
-            f"**{OPTIMISERS[answer.algorithm].title}** · {stopped}Err {answer.error_percent:.2f} % · "
-            f"rmse {answer.rmse:.4f} A · {answer.evaluations} simulations in {answer.elapsed_s:.2f} s · **{verdict}**"
-        )
-        self._convergence.show(answer.rmse_history.tolist())
-        self._bars.content = fault_bars(
-            answer.k, self._page.session.actuator, answer.truth, sure.interval90, sure.alarms
-        )
-        if path is not None:
-            self._link.content = recording_link(self._viewer, path)
+        best = race.best
+        lines = []
+        for answer in race.answers:
+            sure = answer.uncertainty
+            verdict = (
+                "healthy" if sure.healthy else f"not healthy: {', '.join(sure.alarms) or 'no single k stands out'}"
+            )
+            if not sure.adequate:
+                verdict = "the model does not fit: no fault can be told"
+            stopped = "stopped · " if answer.stopped else ""
+            error = "" if answer.error_percent is None else f"Err {answer.error_percent:.2f} % · "
+            star = "★ " if best is not None and len(race.tracks) > 1 and answer is best.answer else ""
+            lines.append(
+                _line(
+                    f"{star}{_title(answer.algorithm)} · {stopped}{error}rmse {answer.rmse:.4f} A · "
+                    f"{answer.evaluations} simulations in {answer.elapsed_s:.2f} s · <b>{html.escape(verdict)}</b>"
+                )
+            )
+        self._text.content = "".join(lines)
+        self._result.finished(race)
+        if race.path is not None:
+            self._link.content = recording_link(self._viewer, race.path)
 
 
-def recording_link(viewer: ViewerHost | None, path: Path) -> str:
+def recording_link(viewer: ViewerHost | None, path: Path, text: str = "") -> str:
     """A link that opens a recording in the Rerun viewer, or its name where there is none."""
     name = html.escape(path.name)
     if viewer is None:
         return f'<div style="padding:2px 10px;font-size:13px">{name}</div>'
     url: Any = html.escape(viewer.url_of(path.name), quote=True)
     return (
-        f'<div style="padding:2px 10px;font-size:13px"><a href="{url}" target="_blank" rel="noopener">'
-        f"Open {name} in Rerun ↗</a></div>"
+        f'<div style="padding:2px 10px;font-size:13px;overflow-wrap:anywhere"><a href="{url}" target="_blank" '
+        f'rel="noopener">{text or f"Open {name} in Rerun ↗"}</a></div>'
     )
+
+
+def _title(name: str) -> str:
+    return f'<b style="color:{colour(name)}">{html.escape(ALGORITHMS.get(name, name))}</b>'
+
+
+def _line(inner: str) -> str:
+    return f'<div style="padding:1px 10px;font-size:13px;line-height:1.4">{inner}</div>'

@@ -12,12 +12,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
-from rerun.chunk import RrdReader
 
 from emaviz.recording import binary
 from emaviz.recording.errors import RecordingError
-from emaviz.recording.style import GROUPS, ITERATION, K_NAMES, SIM_TIME
-from emaviz.recording.writer import PROPERTIES
+from emaviz.recording.style import GROUPS, ITERATION, K_NAMES, PROPERTIES, SIM_TIME
 
 Array = NDArray[np.float64]
 _MAGIC = b"RRF"
@@ -103,11 +101,30 @@ def read(path: str | Path) -> Recording:
     return recording
 
 
+def properties(path: str | Path) -> dict[str, Any]:
+    """What `RecordingWriter.properties` has written, without reading the rest; RecordingError as in `read`."""
+    path = check(path)
+    found: dict[str, Any] = {}
+    try:
+        from rerun.chunk import RrdReader
+
+        for chunk in RrdReader(path).stream().filter(content=f"/__properties/{PROPERTIES}"):
+            batch = chunk.to_record_batch()
+            for name in batch.schema.names[1:]:
+                for value in filter(None, batch.column(name).to_pylist()):
+                    found[name] = json.loads(value[0])
+    except Exception as error:  # whatever the native part makes of damage
+        raise RecordingError(f"{path}: cannot be read: {' '.join(str(error).split())}") from error
+    return found
+
+
 def repair(source: Path, target: Path, layout: Path | None = None) -> None:
     """Writes what can be read of `source` to `target` as a whole file.  RecordingError if that is nothing.
 
     layout: a file of a blueprint (.rbl) to go with it.
     """
+    from rerun.chunk import RrdReader
+
     sources = [str(path) for path in (source, layout) if path is not None]
     binary.run("rrd", "optimize", *sources, "-o", str(target), timeout_s=_REPAIR_TIMEOUT_S)
     if not target.is_file() or not RrdReader(target).recordings():
@@ -120,6 +137,8 @@ class _Chunks:
     def __init__(self, path: Path) -> None:
         self.static: dict[str, dict[str, list]] = defaultdict(dict)
         self._rows: dict[str, list[tuple[NDArray, NDArray[np.int64], Array]]] = defaultdict(list)
+        from rerun.chunk import RrdReader
+
         newest: dict[tuple[str, str], bytes] = {}
         for chunk in RrdReader(path).stream():
             batch = chunk.to_record_batch()

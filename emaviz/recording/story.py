@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,8 @@ from ema_model.measurement import Measurement
 from ema_model.simulation import Run, simulate_monitor
 from emaviz.recording.writer import RecordingWriter
 
+_RESIDUAL = ("current_A", "user_position_rad", "motor_position_rad", "motor_speed_rad_s")
+_FITTED = ("command_rad", "user_position_rad", "motor_position_rad", "motor_speed_rad_s", "current_A")
 _KEPT_MONITORS = 6  # of the search's best monitor currents, spread over the iterations
 
 
@@ -31,17 +33,26 @@ class IdentificationStory:
         source: str,
         truth: NDArray[np.float64] | None,
         configuration: Mapping[str, Any],
+        algorithms: Sequence[str] = (),
     ) -> None:
-        """source: "reference" for a simulated actuator, "measurement" for a recording."""
+        """source: "reference" for a simulated actuator, "measurement" for a recording.
+
+        algorithms: those that will tell their iterations; with them the file is arranged from the start.
+        """
         self.path = Path(path)
         self._writer = RecordingWriter(path)
         self._objective = objective
         self._measurement = measurement
         self._source = source
+        self._configuration = dict(configuration)
         self._writer.config(_configuration(configuration))
         self._writer.signals(source, measurement.time_s, _signals(measurement))
         if truth is not None:
             self._writer.truth(truth)
+        if algorithms:
+            residual = [name for name in _RESIDUAL if name in measurement]
+            groups = {source: list(_signals(measurement)), "monitor": list(_FITTED), "residual": residual}
+            self._writer.expect(groups, algorithms)
 
     @property
     def failed(self) -> str | None:
@@ -58,18 +69,21 @@ class IdentificationStory:
             time = self._measurement.time_s[0] + window.block_s * (1.0 + np.arange(len(current)))
             self._writer.monitor_iteration(at.algorithm, at.iteration, time, current)
 
-    def finish(self, answer: Identification) -> None:
-        """The fitted monitor, the residual, the result; closes the file."""
-        monitor = self._fitted(answer)
+    def finish(self, best: Identification, *others: Identification) -> None:
+        """The fitted monitor and the residual of the best answer, the result of each; closes the file."""
+        monitor = self._fitted(best)
         time = self._measurement.time_s
         self._writer.signals("monitor", time[: monitor.samples], _signals(monitor))
         residual = {
             name: monitor[name] - self._measurement[name][: monitor.samples]
-            for name in ("current_A", "user_position_rad", "motor_position_rad", "motor_speed_rad_s")
+            for name in _RESIDUAL
             if name in self._measurement
         }
         self._writer.signals("residual", time[: monitor.samples], residual)
-        self._writer.result(_result(answer, self._objective))
+        for answer in (best, *others):
+            self._writer.result(_result(answer, self._objective), answer.algorithm)
+        found = {answer.algorithm: _facts(answer) for answer in (best, *others)}
+        self._writer.properties({"settings": self._configuration, "found": found, "best": best.algorithm})
         self.close()
 
     def close(self) -> None:
@@ -122,3 +136,19 @@ def _result(answer: Identification, objective: Objective) -> dict[str, Any]:
     if answer.error_percent is not None:
         result["Err (T 5.2)"] = f"{answer.error_percent:.2f} %"
     return result
+
+
+def _facts(answer: Identification) -> dict[str, Any]:
+    """What a list of recordings shows, and a comparison of two needs."""
+    sure = answer.uncertainty
+    return {
+        "k": answer.k,
+        "k_interval90": sure.interval90,
+        "rmse_A": answer.rmse,
+        "error_percent": answer.error_percent,
+        "evaluations": answer.evaluations,
+        "elapsed_s": answer.elapsed_s,
+        "healthy": bool(sure.healthy),
+        "alarms": list(sure.alarms),
+        "stopped": answer.stopped,
+    }

@@ -19,6 +19,7 @@ def _rgba(hexadecimal: str, alpha: int = 255) -> Colour:
 
 
 APPLICATION = "emaviz"
+PROPERTIES = "emaviz"
 SIM_TIME = "sim_time"
 ITERATION = "iteration"
 K_NAMES = tuple(fault.name for fault in FAULTS)

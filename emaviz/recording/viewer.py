@@ -14,9 +14,11 @@ from urllib.parse import quote, unquote, urlsplit
 
 from emaviz.recording.assets import viewer_assets
 from emaviz.recording.errors import RecordingError
+from emaviz.recording.paths import lock_of, part_of
 from emaviz.recording.read import check
 
 _FOLDER = "/recordings/"
+_FOLLOW_S = 0.1  # between two looks at a recording that grows
 _CSP = "; ".join(
     (
         "default-src 'self'",
@@ -35,6 +37,8 @@ _CSP = "; ".join(
 class ViewerHost:
     """Serves the viewer and the .rrd files of one folder to browsers on this machine, until `close`.
 
+    A recording that is still being written is served as it grows, so that the viewer shows it live.
+
     The viewer's files are fetched from the installed rerun-sdk on the first request.
     """
 
@@ -49,6 +53,7 @@ class ViewerHost:
         except (OSError, OverflowError) as error:
             why = error.strerror.lower() if isinstance(error, OSError) and error.strerror else str(error)
             raise RecordingError(f"port {port} cannot be used: {why}; choose another, or 0 for a free one") from error
+        self.closing = threading.Event()
         self._server.host = self
         self.port: int = self._server.server_address[1]
         self.address = f"http://127.0.0.1:{self.port}"
@@ -60,6 +65,10 @@ class ViewerHost:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+    def check(self) -> None:
+        """RecordingError if the viewer's own files cannot be had, so that a browser would be shown nothing."""
+        viewer_assets()
 
     def url_of(self, name: str) -> str:
         """The address at which a browser shows this recording of the folder."""
@@ -73,8 +82,16 @@ class ViewerHost:
         path = (self.folder / name).resolve()  # a link could lead outside
         return path if path.parent == self.folder and path.is_file() else None
 
+    def find_growing(self, name: str) -> Path | None:
+        """The part of the recording that will have that name, while it is being written."""
+        if Path(name).name != name or not name.endswith(".rrd") or "\0" in name or self.only not in (None, name):
+            return None
+        part = part_of(self.folder / name)
+        return part if part.is_file() and not part.is_symlink() and lock_of(part).exists() else None
+
     def close(self) -> None:
         """Stops serving and frees the port."""
+        self.closing.set()
         self._server.shutdown()
         self._server.server_close()
         self._thread.join(5.0)
@@ -158,6 +175,9 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _recording(self, name: str) -> None:
         path = self.server.host.find(name)
+        if path is None and (growing := self.server.host.find_growing(name)) is not None:
+            self._follow(growing)
+            return
         if path is None:
             self._refuse(HTTPStatus.NOT_FOUND, "no such recording")
             return
@@ -167,6 +187,21 @@ class _Handler(BaseHTTPRequestHandler):
             self._head(HTTPStatus.OK, {**headers, "Cache-Control": "no-store"})
             if self.command == "GET":
                 shutil.copyfileobj(file, self.wfile, 1 << 20)
+
+    def _follow(self, part: Path) -> None:
+        """A recording that is being written, as it grows, until its writer is done with it."""
+        lock = lock_of(part)
+        with part.open("rb") as file:  # stays the same file when it gets its name
+            headers = {"Content-Type": "application/octet-stream", "Connection": "close", "Cache-Control": "no-store"}
+            self._head(HTTPStatus.OK, headers)
+            self.close_connection = True
+            while self.command == "GET":
+                done = not (part.exists() and lock.exists()) or self.server.host.closing.is_set()
+                while chunk := file.read(1 << 16):
+                    self.wfile.write(chunk)
+                if done:
+                    return
+                self.server.host.closing.wait(_FOLLOW_S)
 
     def _refuse(self, status: HTTPStatus, message: str) -> None:
         body = f"{status.value}: {message}\n".encode()

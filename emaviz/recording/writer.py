@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import threading
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -21,7 +21,6 @@ from emaviz.recording.iterations import IterationBuffer
 from emaviz.recording.markdown import table
 from emaviz.recording.paths import MIN_FREE_BYTES
 
-PROPERTIES = "emaviz"
 _ROWS_PER_CHUNK = 25
 _FLUSH_EVERY_S = 0.25
 
@@ -50,6 +49,7 @@ class RecordingWriter:
         self._file = RrdFile(self.path, name or self.path.stem, min_free_bytes)
         self._close_timeout_s = close_timeout_s
         self._contents = Contents()
+        self._expected: Contents | None = None  # as far as the file is arranged for it already
         self._styled: set[str] = set()
         self._truth: NDArray[np.float64] | None = None
         # Iterations come fast: they only go through this gate, and a thread of their own sends them.
@@ -85,7 +85,7 @@ class RecordingWriter:
         bundle = rr.AnyValues()
         for name, value in values.items():
             bundle.with_component_from_data(str(name), json.dumps(value, default=_for_json))
-        self._file.do(lambda stream: stream.send_property(PROPERTIES, bundle))
+        self._file.do(lambda stream: stream.send_property(style.PROPERTIES, bundle))
 
     def signals(self, group: str, time_s: ArrayLike, signals: Mapping[str, ArrayLike]) -> None:
         """Signals (n,) by canonical name at time_s (n,), of reference, monitor, measurement or residual."""
@@ -159,6 +159,19 @@ class RecordingWriter:
             self._algorithm(algorithm).result = True
             self._text(f"{style.algorithm_path(algorithm)}/result", table(f"Result of {algorithm}", values))
 
+    def expect(self, signals: Mapping[str, Sequence[str]], algorithms: Sequence[str]) -> None:
+        """Arranges the file now for what will come, so that a viewer that follows it is arranged from the start.
+
+        signals: names by group, in the order in which they will come.
+        """
+        with self._file.lock:
+            self._expected = Contents(
+                signals={group: list(names) for group, names in signals.items()},
+                algorithms={name: Algorithm(iterations=True, monitor=True, result=True) for name in algorithms},
+                config=self._contents.config,
+            )
+            self._file.do(lambda stream: send(stream, build(self._expected or Contents())))
+
     def flush(self) -> None:
         """Brings everything so far to the file."""
         self._file.do(lambda _: self._send_iterations())
@@ -173,6 +186,8 @@ class RecordingWriter:
     def _last(self) -> None:
         self.flush()
         # Only now is it known what to arrange; the viewer would stumble through several layouts in one file.
+        if self._contents == self._expected:
+            return
         self._file.do(lambda stream: send(stream, self._layout()))
 
     def _layout(self) -> rrb.Blueprint:

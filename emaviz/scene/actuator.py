@@ -1,82 +1,129 @@
-"""A simple moving actuator: motor with a marked rotor, screw, and the control surface that it turns."""
+"""The actuator in 3D: motor and drivetrain, lights, labels, the first view.  Built once; poses only move it."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import viser
 
-from emaviz.figures.colours import MONITOR, REFERENCE
+from emaviz.scene.drivetrain import Drivetrain
+from emaviz.scene.motor import Motor
 
 _ROOT = "/actuator"
-_STEEL = (150, 155, 165)
-_DARK = (70, 75, 85)
+_LOOK_AT = (0.63, 0.0, -0.06)
+_VIEW = (-0.62, -0.66, 0.44)  # direction from there to the camera
+_FIELD_RAD = 0.6
+_WIDTH, _HEIGHT = 2.15, 1.75  # of the actuator, as that view sees it
+_LABELS = (
+    ("housing", (0.12, -0.05, 0.31)),
+    ("phase A", (-0.25, 0.0, 0.235)),
+    ("phase B", (-0.25, 0.21, -0.02)),
+    ("phase C", (-0.25, -0.21, -0.10)),
+    ("rotor", (-0.43, 0.0, 0.02)),
+    ("bearing", (0.33, 0.0, 0.15)),
+    ("gear", (0.46, -0.05, -0.34)),
+    ("ball screw", (0.66, 0.0, -0.29)),
+    ("nut, with play", (0.80, 0.0, 0.0)),
+    ("horn", (1.34, 0.0, -0.05)),
+    ("control surface (user)", (1.62, 0.0, 0.2)),
+)
 
 
 class ActuatorScene:
-    """Built once; `pose` only turns frames."""
+    """Angles, lengths and colours as they are drawn; what they enlarge is `emaviz.scene.motion`'s matter."""
 
-    def __init__(self, server: viser.ViserServer) -> None:
+    def __init__(self, server: viser.ViserServer, pole_pairs: int = 2) -> None:
+        self._server = server
         scene = server.scene
         scene.set_up_direction("+z")
         scene.configure_environment_map(None)
-        scene.configure_default_lights(cast_shadow=False)  # shadows halve the frame rate without a GPU
-        scene.add_light_ambient("/light/ambient", intensity=1.4)
-        scene.add_light_hemisphere("/light/sky", intensity=1.2)
-        server.initial_camera.position = (0.75, -2.9, 1.3)
-        server.initial_camera.look_at = (0.5, 0.0, 0.0)
-        along_x = (np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0)
-        scene.add_grid("/ground", width=4.0, height=4.0, position=(0.4, 0.0, -0.36), cell_size=0.2)
+        scene.configure_default_lights(enabled=False)
+        scene.add_light_ambient("/light/ambient", intensity=0.9)
+        scene.add_light_hemisphere("/light/sky", sky_color=(255, 255, 255), ground_color=(120, 120, 130), intensity=1.6)
+        scene.add_light_directional("/light/key", intensity=2.2, position=(-1.5, -2.0, 3.0), cast_shadow=False)
+        scene.add_grid(
+            "/ground",
+            width=6.0,
+            height=6.0,
+            position=(0.5, 0.0, -0.37),
+            cell_size=0.2,
+            section_size=1.0,
+            fade_distance=6.0,
+            shadow_opacity=0.0,
+        )
+        self._motor = Motor(scene, f"{_ROOT}/motor", pole_pairs)
+        self._rotor = self._motor.rotor
+        self._drivetrain = Drivetrain(scene, f"{_ROOT}/drive")
+        self._labels: list[Any] = [
+            scene.add_label(f"/labels/{i}", text, position=place, visible=False, anchor="bottom-center")
+            for i, (text, place) in enumerate(_LABELS)
+        ]
+        self._frame_camera(server.initial_camera, 0.7)
 
-        scene.add_cylinder(
-            f"{_ROOT}/housing", radius=0.26, height=0.62, color=(90, 120, 160), opacity=0.22, wxyz=along_x
-        )
-        for i, colour in enumerate(((214, 69, 65), (72, 160, 90), (60, 110, 200))):  # phases A, B, C
-            for side in (0.0, np.pi):
-                angle = 2.0 * np.pi * i / 3.0 + side
-                scene.add_box(
-                    f"{_ROOT}/winding_{i}_{int(side > 0)}",
-                    dimensions=(0.42, 0.055, 0.1),
-                    color=colour,
-                    position=(0.0, 0.205 * np.cos(angle), 0.205 * np.sin(angle)),
-                    wxyz=(np.cos(angle / 2.0), np.sin(angle / 2.0), 0.0, 0.0),
-                )
-        self._rotor = scene.add_frame(f"{_ROOT}/rotor", show_axes=False)
-        scene.add_cylinder(f"{_ROOT}/rotor/core", radius=0.11, height=0.46, color=_STEEL, wxyz=along_x)
-        scene.add_cylinder(
-            f"{_ROOT}/rotor/shaft", radius=0.035, height=1.1, color=_DARK, wxyz=along_x, position=(0.35, 0.0, 0.0)
-        )
-        for i in range(4):  # two pole pairs
-            angle = np.pi / 2.0 * i
-            scene.add_box(
-                f"{_ROOT}/rotor/magnet_{i}",
-                dimensions=(0.4, 0.12, 0.035),
-                color=(225, 85, 70) if i % 2 else (240, 240, 240),
-                position=(0.0, 0.115 * -np.sin(angle), 0.115 * np.cos(angle)),
-                wxyz=(np.cos(angle / 2.0), np.sin(angle / 2.0), 0.0, 0.0),
-            )
-        scene.add_cylinder(
-            f"{_ROOT}/gearbox", radius=0.17, height=0.2, color=_DARK, wxyz=along_x, position=(0.55, 0.0, 0.0)
-        )
-        scene.add_box(
-            f"{_ROOT}/rotor/mark", dimensions=(0.02, 0.03, 0.1), color=_hex(MONITOR), position=(-0.32, 0.0, 0.06)
-        )
-        self._surface = scene.add_frame(f"{_ROOT}/surface", show_axes=False, position=(0.95, 0.0, 0.0))
-        scene.add_cylinder(
-            f"{_ROOT}/surface/hinge", radius=0.05, height=0.7, color=_STEEL, wxyz=(np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0)
-        )
-        scene.add_box(
-            f"{_ROOT}/surface/flap", dimensions=(0.5, 0.66, 0.03), color=_hex(REFERENCE), position=(0.27, 0.0, 0.0)
-        )
-        self._server = server
+        @server.on_client_connect
+        def _(client: viser.ClientHandle) -> None:
+            self._keep_framed(client)
 
-    def pose(self, motor_rad: float, surface_rad: float) -> None:
-        """Turns the rotor about x and the surface about y."""
+    def reset_view(self, client: viser.ClientHandle) -> None:
+        """The whole actuator in a browser's picture, whatever its shape."""
+        camera = client.camera
+        if camera.image_height > 0:
+            self._frame_camera(camera, camera.image_width / camera.image_height)
+
+    def _keep_framed(self, client: viser.ClientHandle) -> None:
+        """Frames the actuator anew when the picture changes its shape, until the user moves the camera."""
+        camera = client.camera
+        framed: list[Any] = [0.0, None]  # aspect and position
+
+        @camera.on_update
+        def _(_: Any) -> None:
+            if camera.image_height <= 0:
+                return
+            aspect = camera.image_width / camera.image_height
+            untouched = framed[1] is None or np.allclose(camera.position, framed[1], atol=0.02)
+            if untouched and abs(aspect - framed[0]) > 0.01:
+                self._frame_camera(camera, aspect)
+                framed[:] = aspect, self._place(aspect)
+
+    def set_opacity(self, opacity: float) -> None:
+        """Of the housing, 0 … 1."""
+        self._motor.set_opacity(opacity)
+
+    def show_labels(self, shown: bool) -> None:
+        """Names of the parts."""
+        for label in self._labels:
+            label.visible = shown
+
+    def damage(self, turns: Sequence[float], eccentricity: float, phase_rad: float, play: float) -> None:
+        """What a fault changes for good: live shares of the turns, the rotor's offset, the pin's room in the nut."""
+        self._motor.damage(turns, eccentricity, phase_rad)
+        self._drivetrain.set_play(play)
+
+    def pose(
+        self,
+        motor_rad: float,
+        surface_rad: float,
+        play: float = 0.0,
+        glow: Sequence[float] = (0.0, 0.0, 0.0),
+        heat: float = 0.0,
+    ) -> None:
+        """Rotor and surface, the nut before the pin (a length), brightness of the phases, heat of the screw 0 … 1."""
         with self._server.atomic():
-            half = 0.5 * motor_rad
-            self._rotor.wxyz = (np.cos(half), np.sin(half), 0.0, 0.0)
-            half = -0.5 * surface_rad
-            self._surface.wxyz = (np.cos(half), 0.0, np.sin(half), 0.0)
+            self._motor.turn(motor_rad)
+            self._motor.glow(glow)
+            self._drivetrain.move(motor_rad, surface_rad, play)
+            self._drivetrain.heat(heat)
 
+    def _frame_camera(self, camera: Any, aspect: float) -> None:
+        camera.fov = _FIELD_RAD
+        camera.position = self._place(aspect)
+        camera.look_at = _LOOK_AT
 
-def _hex(colour: str) -> tuple[int, int, int]:
-    return int(colour[1:3], 16), int(colour[3:5], 16), int(colour[5:7], 16)
+    @staticmethod
+    def _place(aspect: float) -> tuple[float, ...]:
+        """Of a camera that sees the whole actuator; aspect is width over height of its picture."""
+        distance = 0.5 * max(_HEIGHT, _WIDTH / max(aspect, 0.2)) / np.tan(0.5 * _FIELD_RAD)
+        norm = sum(part**2 for part in _VIEW) ** 0.5
+        return tuple(float(at + distance * part / norm) for at, part in zip(_LOOK_AT, _VIEW))

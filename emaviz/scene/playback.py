@@ -2,69 +2,110 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from ema_model.actuator import Actuator
 from emaviz.scene.actuator import ActuatorScene
+from emaviz.scene.motion import Motion, enlargement, motion
 from emaviz.session import Simulation
 
-_POSES_PER_S = 25.0
-_LARGEST_TURN_RAD = 0.6  # to which the surface's motion is exaggerated
+_POSES_PER_S = 30.0
+_TOLD_PER_S = 8.0  # play-heads are redrawn at this pace
+SPEEDS = {"1 : 1": 1.0, "1 : 5": 0.2, "1 : 10": 0.1, "1 : 20": 0.05, "1 : 50": 0.02, "1 : 200": 0.005}
 
 
 class Playback:
-    """A thread that turns the scene; `run_s` seconds of the run take `run_s / speed` on the screen."""
+    """A thread that poses the scene: a second on the screen is `speed` seconds of the run.
 
-    def __init__(self, scene: ActuatorScene, speed: float = 0.1) -> None:
-        self._scene = scene
-        self._speed = speed
-        self._simulation: Simulation | None = None
-        self._closing = threading.Event()
-        self._playing = True
+    moved(time_s, duration_s) is called on that thread, a few times a second, and after `seek`.
+    """
+
+    def __init__(self, scene: ActuatorScene, actuator: Actuator, moved: Callable[[float, float], None]) -> None:
+        self._scene, self._actuator, self._moved = scene, actuator, moved
+        self.speed = 0.1
+        self.playing = True
+        self.motion: Motion | None = None
+        self._clock_s = 0.0
+        self._stale = False  # what the scene shows is not the run at the clock
+        self._posing = threading.Lock()
+        self._wake = threading.Event()
+        self._closing = False
         self._thread = threading.Thread(target=self._run, name="emaviz-playback", daemon=True)
         self._thread.start()
 
     def show(self, simulation: Simulation) -> None:
         """Plays this run from now on, from the same moment."""
-        self._simulation = simulation
+        shown = motion(simulation.reference, simulation.k, self._actuator)
+        with self._posing:
+            self.motion = shown
+            shown.damage(self._scene)
+            self._stale = True
+        self._wake.set()
 
     def play(self, playing: bool) -> None:
         """Lets the picture move or rest."""
-        self._playing = playing
+        self.playing = playing
+        self._wake.set()
 
-    def caption(self, simulation: Simulation) -> str:
-        """What of the picture is not to scale."""
-        enlarged = self.exaggeration(simulation)
-        return f"Played {1.0 / self._speed:g} × slower; the surface's motion is enlarged {enlarged:g} ×."
+    def seek(self, time_s: float) -> None:
+        """Goes to a moment of the run."""
+        if np.isfinite(time_s):
+            self._clock_s = max(time_s, 0.0)
+            self._stale = True
+            self._wake.set()
+
+    @property
+    def time_s(self) -> float:
+        """The moment that is shown."""
+        return self._clock_s
 
     def exaggeration(self, simulation: Simulation) -> float:
-        """By how much the surface's motion is enlarged: a round number."""
-        user = simulation.reference["user_position_rad"]
-        largest = float(np.max(np.abs(user)))
-        if largest <= 0.0:
-            return 1.0
-        factor = max(1.0, _LARGEST_TURN_RAD / largest)
-        return float(np.floor(factor / 10.0 ** np.floor(np.log10(factor))) * 10.0 ** np.floor(np.log10(factor)))
+        """By how much the surface's motion of a run is enlarged: a round number."""
+        return enlargement(float(np.max(np.abs(simulation.reference["user_position_rad"]))))
+
+    @contextlib.contextmanager
+    def still(self) -> Iterator[Motion | None]:
+        """Nothing is posed meanwhile; gives the run that is shown."""
+        with self._posing:
+            yield self.motion
+            self._stale = True
+        self._wake.set()
 
     def close(self) -> None:
         """Ends the thread."""
-        self._closing.set()
+        self._closing = True
+        self._wake.set()
         self._thread.join(timeout=2.0)
 
     def _run(self) -> None:
-        clock, last = 0.0, time.monotonic()
-        while not self._closing.wait(1.0 / _POSES_PER_S):
+        last, told = time.monotonic(), 0.0
+        while not self._closing:
             now = time.monotonic()
-            clock, last = clock + (now - last) * self._speed, now
-            simulation = self._simulation
-            if simulation is None or not self._playing:
-                continue
-            reference = simulation.reference
-            clock %= reference.duration_s
-            at = int(clock / reference.sample_period_s)
-            self._scene.pose(
-                float(reference["motor_position_rad"][at]),
-                self.exaggeration(simulation) * float(reference["user_position_rad"][at]),
-            )
+            passed, last = now - last, now
+            with self._posing:
+                shown = self.motion
+                if shown is not None:
+                    if self.playing:
+                        self._clock_s += passed * self.speed
+                    if self._clock_s > shown.duration_s:
+                        self._clock_s = self._clock_s % shown.duration_s if self.playing else shown.duration_s
+                    moves = self.playing or self._stale
+                    if moves:
+                        shown.pose(self._scene, self._clock_s)
+                else:
+                    moves = False
+                stale, self._stale = self._stale, False
+            if shown is not None and moves and (stale or now - told >= 1.0 / _TOLD_PER_S):
+                told = now
+                self._moved(self._clock_s, shown.duration_s)
+            if self.playing:
+                time.sleep(max(0.0, 1.0 / _POSES_PER_S - (time.monotonic() - now)))
+            elif not self._stale:
+                self._wake.wait()
+                last = time.monotonic()
+            self._wake.clear()

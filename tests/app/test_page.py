@@ -46,7 +46,7 @@ def test_charts_show_both_models_with_units(page):
         data = chart(page, title)
         assert data.shape[1] > 300 and np.all(np.isfinite(data))
         assert data[0, 0] == 0.0 and data[0, -1] == pytest.approx(0.5, abs=0.01)
-        reference, monitor = data[2], data[3]
+        reference, monitor = data[3], data[4]
         assert np.std(reference) > 0 and np.corrcoef(reference, monitor)[0, 1] > 0.99, unit
 
 
@@ -58,11 +58,11 @@ def test_a_slider_breaks_the_actuator_and_reset_heals_it(page, app):
     row(page, "k1 friction × 2.60").wait_for()
     page.wait_for_timeout(300)
     broken = chart(page, "Equivalent current")
-    assert np.abs(broken[2]).mean() > 1.2 * np.abs(before[2]).mean()
+    assert np.abs(broken[3]).mean() > 1.2 * np.abs(before[3]).mean()
     assert np.abs(broken[1]).max() > 3.0 * np.abs(before[1]).max()  # the healthy monitor does not follow
     page.get_by_role("button", name="Reset to healthy").click()
     wait_until(lambda: app.session.settings.k[0] == 0.0)
-    wait_until(lambda: np.allclose(chart(page, "Equivalent current")[2], before[2]))
+    wait_until(lambda: np.allclose(chart(page, "Equivalent current")[3], before[3]))
 
 
 def test_the_command_and_its_settings_reach_the_plant(page, app):
@@ -72,7 +72,7 @@ def test_the_command_and_its_settings_reach_the_plant(page, app):
     page.get_by_label("Frequency [Hz]", exact=True).fill("4")
     page.get_by_label("Frequency [Hz]", exact=True).press("Enter")
     wait_until(lambda: app.session.settings.run().command.settings()["frequency_Hz"] == 4.0)
-    wait_until(lambda: abs(np.abs(chart(page, "Motor speed")[2]).max() - 0.005 * 500 * 2 * np.pi * 4) < 15.0)
+    wait_until(lambda: abs(np.abs(chart(page, "Motor speed")[3]).max() - 0.005 * 500 * 2 * np.pi * 4) < 15.0)
     page.get_by_label("Command", exact=True).click()
     page.get_by_role("option", name="Chirp", exact=True).click()
     wait_until(lambda: app.session.settings.command == "chirp")
@@ -93,12 +93,13 @@ def test_identify_runs_ends_and_is_recorded(page, app):
     set_slider(page, "k1", 0.25)
     wait_until(lambda: app.session.settings.k[0] == 0.25)
     page.get_by_role("tab", name="Identify").click()
-    page.get_by_label("Algorithm", exact=True).click()
-    page.get_by_role("option", name="do", exact=True).click()
-    wait_until(lambda: app.session.settings.algorithm == "do")
+    page.get_by_label("Dandelion", exact=True).click()
+    wait_until(lambda: app.session.settings.algorithms == ("robust", "do"))
+    page.get_by_label("Robust", exact=True).click()
+    wait_until(lambda: app.session.settings.algorithms == ("do",))
     page.get_by_role("button", name="Identify").dblclick()  # one run, not two
     page.get_by_role("link", name="in Rerun").wait_for(timeout=120_000)
-    page.get_by_text("Err").wait_for()
+    page.get_by_text("· Err").first.wait_for()
     curve = chart(page, "Convergence")
     assert curve.shape[1] == 151 and np.all(np.diff(curve[1]) <= 0.0)
 

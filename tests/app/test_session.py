@@ -28,7 +28,7 @@ def session(tmp_path):
 def identified(session, seconds=60.0):
     """Starts an identification and waits for its answer and path."""
     done, result = threading.Event(), []
-    session.events.identified.append(lambda answer, path: (result.append((answer, path)), done.set()))
+    session.events.identified.append(lambda race: (result.append((race.best.answer, race.path)), done.set()))
     assert session.identify()
     assert done.wait(seconds)
     return result[-1]
@@ -71,10 +71,11 @@ def test_only_one_identification_runs_however_often_it_is_asked(session):
 
 def test_stop_keeps_the_best_so_far(session):
     session.settings.set_iterations(5000)
+    session.settings.set_algorithm("hba")
     done, result = threading.Event(), []
-    session.events.identified.append(lambda answer, path: (result.append(answer), done.set()))
+    session.events.identified.append(lambda race: (result.append(race.best.answer), done.set()))
     begun = threading.Event()
-    session.events.progressed.append(lambda at, truth: begun.set())
+    session.events.progressed.append(lambda race: begun.set())
     assert session.identify()
     assert begun.wait(30.0)
     asked = time.perf_counter()

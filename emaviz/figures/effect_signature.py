@@ -1,0 +1,82 @@
+"""What an effect does to a run: live charts with and without it, and a small picture for a card."""
+
+from __future__ import annotations
+
+from typing import Any
+from urllib.parse import quote
+
+import numpy as np
+import viser
+
+from emaviz.figures.colours import DIFFERENCE, MONITOR, REFERENCE
+from emaviz.figures.decimate import envelope
+from emaviz.figures.signals import CHARTS, legend, time_axis, value_axis
+from emaviz.library import SHOWN, Felt
+
+_POINTS, _SMALL_POINTS = 800, 160
+_WIDTH, _HEIGHT = 120, 44  # of a small picture, pixels
+
+
+class EffectCharts:
+    """A chart for each signal, and one of what changes in it."""
+
+    def __init__(self, gui: viser.GuiApi, height: int = 118) -> None:
+        empty = np.array([0.0, 1.0])
+        gui.add_html(legend((REFERENCE, "without"), (MONITOR, "with the effect"), (DIFFERENCE, "difference, below")))
+        self._charts: list[tuple[Any, Any, Any]] = []
+        for chart in (one for one in CHARTS if one.signal in SHOWN):
+            both = gui.add_uplot(
+                data=(empty, empty, empty),
+                series=({}, _line("without", REFERENCE, 1.5), _line("with", MONITOR, 1.5)),
+                title=chart.title,
+                axes=(time_axis(False), value_axis(chart.unit)),
+                **_layout(height),
+            )
+            change = gui.add_uplot(
+                data=(empty, empty),
+                series=({}, _line("difference", DIFFERENCE, 1.5)),
+                title="",
+                axes=(time_axis(chart.signal == SHOWN[-1]), value_axis(chart.difference_unit)),
+                **_layout(height - 18),
+            )
+            self._charts.append((chart, both, change))
+
+    def show(self, felt: Felt) -> None:
+        """Draws a run."""
+        time = felt.with_it.time_s
+        for chart, both, change in self._charts:
+            with_it, without = felt.with_it[chart.signal], felt.without[chart.signal]
+            both.data = envelope(time, [chart.scale * without, chart.scale * with_it], _POINTS)
+            change.data = envelope(time, [chart.difference_scale * (with_it - without)], _POINTS)
+
+
+def _line(label: str, colour: str, width: float) -> Any:
+    return {"label": label, "stroke": colour, "width": width}
+
+
+def _layout(height: int) -> dict[str, Any]:
+    return {
+        "scales": {"x": {"time": False}, "y": {"auto": True}},
+        "cursor": {"sync": {"key": "library"}},
+        "legend": {"show": False},
+        "padding": (0, 8, 0, 0),
+        "height": height,
+    }
+
+
+def small_picture(felt: Felt) -> str:
+    """An SVG as a data address: what changes in the signal that shows the effect most."""
+    change = felt.change(felt.shows)[1]
+    most = float(np.max(np.abs(change)))
+    if most == 0.0 or not np.isfinite(most):
+        return ""
+    x, y = envelope(felt.with_it.time_s, [change], _SMALL_POINTS)
+    across = _WIDTH * (x - x[0]) / (x[-1] - x[0])
+    down = 0.5 * _HEIGHT * (1.0 - 0.92 * y / most)
+    points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(across, down))
+    svg = (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH} {_HEIGHT}" preserveAspectRatio="none">'
+        f'<line x1="0" x2="{_WIDTH}" y1="{_HEIGHT / 2}" y2="{_HEIGHT / 2}" stroke="#868e96" stroke-width=".5"/>'
+        f'<polyline points="{points}" fill="none" stroke="{DIFFERENCE}" stroke-width="1"/></svg>'
+    )
+    return f"data:image/svg+xml,{quote(svg)}"

@@ -1,0 +1,75 @@
+"""The measured current and the monitor's of each optimiser, live, and what they leave."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import viser
+from numpy.typing import NDArray
+
+from ema_model.identification.run import ALGORITHMS as TITLES
+from emaviz.figures.colours import REFERENCE
+from emaviz.figures.convergence import colour
+from emaviz.figures.decimate import envelope
+from emaviz.figures.signals import CURSOR, POINTS, legend, time_axis, value_axis
+
+Array = NDArray[np.float64]
+
+
+class LiveFit:
+    """Two charts on one time base: the currents, and monitor − measured."""
+
+    def __init__(self, gui: viser.GuiApi, height: int = 150) -> None:
+        empty = np.array([0.0, 1.0])
+        self._algorithms: tuple[str, ...] = ()
+        self._legend: Any = gui.add_html("")
+        common: Any = {
+            "scales": {"x": {"time": False}, "y": {"auto": True}},
+            "legend": {"show": False},
+            "cursor": CURSOR,
+        }
+        self._currents: Any = gui.add_uplot(
+            data=(empty, empty),
+            series=({"label": "t [s]"}, _line("measured", REFERENCE)),
+            title="Measured and fitted current",
+            axes=(time_axis(False), value_axis("A")),
+            height=height,
+            **common,
+        )
+        self._left: Any = gui.add_uplot(
+            data=(empty, empty),
+            series=({"label": "t [s]"}, _line("left", REFERENCE)),
+            title="Monitor − measured",
+            axes=(time_axis(True), value_axis("A")),
+            height=height,
+            **common,
+        )
+
+    def show(self, time_s: Array, measured_A: Array, fitted_A: Mapping[str, Array]) -> None:
+        """All arrays (blocks,); fitted by algorithm."""
+        if not fitted_A:
+            return
+        if tuple(fitted_A) != self._algorithms:
+            self._algorithms = tuple(fitted_A)
+            names = [(name, colour(name)) for name in fitted_A]
+            blank = np.array([0.0, 1.0])
+            self._currents.data = (blank,) * (2 + len(names))
+            self._left.data = (blank,) * (1 + len(names))
+            self._currents.series = (
+                {"label": "t [s]"},
+                _line("measured", REFERENCE),
+                *(_line(name, drawn) for name, drawn in names),
+            )
+            self._left.series = ({"label": "t [s]"}, *(_line(name, drawn) for name, drawn in names))
+            self._legend.content = legend(
+                (REFERENCE, "measured"), *((drawn, TITLES.get(name, name)) for name, drawn in names)
+            )
+        fitted = list(fitted_A.values())
+        self._currents.data = envelope(time_s, [measured_A, *fitted], POINTS)
+        self._left.data = envelope(time_s, [one - measured_A for one in fitted], POINTS)
+
+
+def _line(label: str, drawn: str) -> Any:
+    return {"label": label, "stroke": drawn, "width": 1.5, "points": {"show": False}}

@@ -1,0 +1,70 @@
+"""Identifications in numbers, a row each: error, time, simulations, performance coefficient."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ema_model.identification.run import ALGORITHMS as TITLES
+from emaviz.figures.convergence import colour
+
+_MISSING = "–"
+_NUMBER = 'style="text-align:right;padding:1px 4px"'
+
+
+@dataclass(frozen=True)
+class Row:
+    """One optimiser's answer."""
+
+    race: int  # number of the race it ran in
+    source: str
+    algorithm: str
+    population: int
+    iterations: int
+    fitness: str
+    seed: int
+    error_percent: float | None  # T 5.2, where the truth is known
+    rmse_A: float
+    evaluations: int
+    elapsed_s: float  # of this optimiser alone, without compilation
+    performance: float | None  # %, T 5.4, over the optimisers of its race
+    stopped: bool = False
+
+
+def table(rows: Sequence[Row]) -> str:
+    """HTML, the newest race first."""
+    if not rows:
+        return '<div style="padding:6px 12px;opacity:.7">Nothing has been identified yet.</div>'
+    heads = ("", "Err [%]", "rmse [A]", "time [s]", "simulations", "PC [%]")
+    head = "".join(f"<th {_NUMBER}>{name}</th>" for name in heads)
+    body = []
+    for race in sorted({row.race for row in rows}, reverse=True):
+        mine = [row for row in rows if row.race == race]
+        first = mine[0]
+        said = (
+            f"{race}: {first.source} · population {first.population}, {first.iterations} iterations, "
+            f"{first.fitness}, seed {first.seed}"
+        )
+        body.append(f'<tr><td colspan="6" style="padding-top:8px;opacity:.75">{html.escape(said)}</td></tr>')
+        body += [_row(row) for row in mine]
+    return (
+        '<div style="padding:4px 10px;font-size:12.5px;font-variant-numeric:tabular-nums">'
+        f'<table style="width:100%;border-collapse:collapse"><tr>{head}</tr>{"".join(body)}</table>'
+        '<div style="font-size:11px;opacity:.7;padding-top:8px">Err: T 5.2, where the truth is known. Time: of the '
+        "optimiser alone. PC: the performance coefficient of the thesis (T 5.4), 100 (1 − Err·t / Σ Err·t) over the "
+        "optimisers of one race; higher is better.</div></div>"
+    )
+
+
+def _row(row: Row) -> str:
+    name = f'<b style="color:{colour(row.algorithm)}">{html.escape(TITLES.get(row.algorithm, row.algorithm))}</b>'
+    cells = (
+        _MISSING if row.error_percent is None else f"{row.error_percent:.2f}",
+        f"{row.rmse_A:.4f}",
+        f"{row.elapsed_s:.2f}",
+        f"{row.evaluations}",
+        _MISSING if row.performance is None else f"{row.performance:.1f}",
+    )
+    stopped = " (stopped)" if row.stopped else ""
+    return f"<tr><td>{name}{stopped}</td>{''.join(f'<td {_NUMBER}>{cell}</td>' for cell in cells)}</tr>"

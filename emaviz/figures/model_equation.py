@@ -1,0 +1,71 @@
+"""The model's equations as HTML, with the terms of added effects in colour."""
+
+from __future__ import annotations
+
+import html
+import re
+from collections.abc import Sequence
+
+from ema_model.discovery import Discovery
+from ema_model.discovery.result import Added
+from ema_model.effects import Effect, find
+from emaviz.discovery_words import effect_title, settings
+from emaviz.figures.colours import ALGORITHMS, MONITOR, TRUTH
+
+COLOURS = (MONITOR, ALGORITHMS["ssa"], ALGORITHMS["do"], TRUTH)
+# Where an effect acts, the equation of the base model that it stands in, in the order of the page.
+_LINES = {
+    "motion": "J dω/dt = k_t i − T_f(ω) − τ T_load",
+    "current": "L di/dt = v − R i − k_e ω",
+    "friction": "T_f = T_s at rest, T_d sgn ω in motion",
+    "output": "θ_user = τ θ, with play",
+    "sensors": "read: θ_user, i",
+}
+_OF_PLACE = {
+    "moving_friction": "friction",
+    "friction": "friction",
+    "electric_torque": "motion",
+    "shaft_torque": "motion",
+    "inverse_inertia": "motion",
+    "back_emf": "current",
+    "winding_resistance": "current",
+    "bus_voltage": "current",
+    "user_position": "output",
+    "position_reading": "sensors",
+    "current_reading": "sensors",
+}
+
+
+def equation(found: Discovery, added: Sequence[Added]) -> str:
+    """The lines that added effects change, each with its terms and their fitted values; "" without an effect."""
+    by_line: dict[str, list[str]] = {}
+    for i, one in enumerate(added):
+        effect = find(one.key)
+        values = ", ".join(f"{_symbol(effect, name)}{text}" for name, text in settings(found, one).items())
+        if len(effect.parameters) > 6:
+            values = f"{len(effect.parameters)} knots, fitted"
+        colour = COLOURS[i % len(COLOURS)]
+        by_line.setdefault(_line(effect), []).append(
+            f'<div style="padding-left:14px;color:{colour}"><b>{html.escape(effect_title(one.name))}:</b> '
+            f'<span style="font-family:serif;font-size:15px">{html.escape(effect.equation)}</span>'
+            f'<div style="font-size:12px;opacity:.85">{html.escape(values)}</div></div>'
+        )
+    rows = []
+    for line, base in _LINES.items():
+        if line in by_line or line == "motion":
+            extra = "".join(by_line.get(line, []))
+            more = ' <span style="opacity:.65">and</span>' if extra else ""
+            rows.append(f'<div style="font-family:serif;font-size:15px">{html.escape(base)}{more}</div>{extra}')
+    return "".join(rows) if added else ""
+
+
+def _line(effect: Effect) -> str:
+    return next((_OF_PLACE[place.__name__] for place in effect.places if place.__name__ in _OF_PLACE), "motion")
+
+
+def _symbol(effect: Effect, name: str) -> str:
+    """'A = ' where the parameter's meaning names a symbol of the equation; else its own name."""
+    meaning = next((p.meaning for p in effect.parameters if p.name == name), "")
+    symbols = set(re.split(r"[^\w]+", effect.equation))
+    symbol = next((word for word in re.split(r"[^\w]+", meaning)[1:] if word and word in symbols), "")
+    return f"{symbol or name.rpartition('_')[0].replace('_', ' ') or name} = "

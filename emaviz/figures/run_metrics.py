@@ -1,0 +1,109 @@
+"""A run in numbers: currents, following error, rise time, and how far the monitor is from the plant."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ema_model.measurement import Measurement
+from emaviz.figures.signals import CHARTS
+
+_MISSING = "–"
+
+
+@dataclass(frozen=True)
+class Metric:
+    """A row of the table."""
+
+    name: str
+    unit: str
+
+
+METRICS = (
+    Metric("peak current", "A"),
+    Metric("rms current", "A"),
+    Metric("largest following error", "mrad"),
+    Metric("rms following error", "mrad"),
+    Metric("rise time 10–90 %", "ms"),
+    Metric("peak speed", "rad/s"),
+)
+
+
+def metrics(run: Measurement, command: str) -> dict[str, float]:
+    """The metrics of a run by name; NaN where one makes no sense, as a rise time without a step."""
+    current, user = run["current_A"], run["user_position_rad"]
+    error = 1e3 * (run["command_rad"] - user)
+    return {
+        "peak current": float(np.max(np.abs(current))),
+        "rms current": _rms(current),
+        "largest following error": float(np.max(np.abs(error))),
+        "rms following error": _rms(error),
+        "rise time 10–90 %": 1e3 * rise_time_s(run) if command == "step" else math.nan,
+        "peak speed": float(np.max(np.abs(run["motor_speed_rad_s"]))),
+    }
+
+
+def rise_time_s(run: Measurement) -> float:
+    """From 10 to 90 % of a step, s; NaN where the user does not get that far."""
+    demand = run["command_rad"]
+    low, high = float(run["user_position_rad"][0]), float(demand[-1])
+    if high == low:
+        return math.nan
+    share = (run["user_position_rad"] - low) / (high - low)
+    times = []
+    for level in (0.1, 0.9):
+        reached = np.flatnonzero(share >= level)
+        if not len(reached):
+            return math.nan
+        i = max(int(reached[0]), 1)
+        part = (level - share[i - 1]) / (share[i] - share[i - 1])
+        times.append(run.time_s[i - 1] + part * (run.time_s[i] - run.time_s[i - 1]))
+    return float(times[1] - times[0])
+
+
+def differences(reference: Measurement, monitor: Measurement) -> dict[str, tuple[float, str]]:
+    """RMSE of monitor − reference for each chart: by its title, the number and its unit."""
+    return {
+        chart.title: (chart.difference_scale * _rms(monitor[chart.signal] - reference[chart.signal]),
+                      chart.difference_unit)
+        for chart in CHARTS
+    }  # fmt: skip
+
+
+def table(
+    runs: Mapping[str, Mapping[str, float]], errors: Mapping[str, Mapping[str, tuple[float, str]]], colours: list[str]
+) -> str:
+    """HTML: the metrics of each run, and below the differences of each pair of runs."""
+    right = "text-align:right;font-weight:600"
+    heads = "".join(f'<th style="{right};color:{colour}">{name}</th>' for name, colour in zip(runs, colours))
+    rows = "".join(
+        f"<tr><td>{metric.name} [{metric.unit}]</td>"
+        + "".join(f'<td style="text-align:right">{_shown(run[metric.name])}</td>' for run in runs.values())
+        + "</tr>"
+        for metric in METRICS
+    )
+    heads_below = "".join(f'<th style="{right}">{name}</th>' for name in errors)
+    first = next(iter(errors.values()))
+    rows_below = "".join(
+        f"<tr><td>{title} [{unit}]</td>"
+        + "".join(f'<td style="text-align:right">{_shown(error[title][0])}</td>' for error in errors.values())
+        + "</tr>"
+        for title, (_, unit) in first.items()
+    )
+    style = 'style="width:100%;border-collapse:collapse;font-variant-numeric:tabular-nums;line-height:1.7"'
+    return (
+        f'<div style="padding:4px 12px;font-size:13px"><table {style}><tr><th></th>{heads}</tr>{rows}</table>'
+        '<div style="margin-top:14px;font-weight:600">RMSE over the whole run</div>'
+        f"<table {style}><tr><th></th>{heads_below}</tr>{rows_below}</table></div>"
+    )
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+def _shown(value: float) -> str:
+    return f"{value:.4g}" if math.isfinite(value) else _MISSING

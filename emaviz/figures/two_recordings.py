@@ -1,0 +1,126 @@
+"""Two identifications on the same axes: a signal, what each model leaves of it, and how each search converged."""
+
+from __future__ import annotations
+
+import html
+
+import numpy as np
+import plotly.graph_objects as go
+from numpy.typing import NDArray
+from plotly.subplots import make_subplots
+
+from ema_model.faults import FAULTS
+from ema_model.measurement import SIGNALS
+from emaviz.figures.colours import DIFFERENCE, MONITOR, REFERENCE
+from emaviz.figures.lines import line
+from emaviz.figures.theme import DARK, LIGHT
+from emaviz.recorded import Entry, as_text
+from emaviz.recording.read import IdentificationTrace, Recording
+
+FIRST, SECOND = REFERENCE, MONITOR
+_POINTS = 2000
+_DASHES = ("solid", "dash", "dot", "dashdot")
+
+
+def signals(*recordings: Recording) -> list[str]:
+    """Signals that all of them have in some group, in the first one's order."""
+    sets = [[name for group in one.signals.values() for name in group] for one in recordings]
+    return [name for name in dict.fromkeys(sets[0]) if all(name in others for others in sets[1:]) and name in SIGNALS]
+
+
+def figure(first: Recording, second: Recording, signal: str, *, dark: bool = False) -> go.Figure:
+    """Rows: the signal as recorded (thin) and fitted (bold), the residual, the best rmse of each iteration."""
+    drawn = make_subplots(rows=3, cols=1, vertical_spacing=0.1, row_heights=[0.4, 0.28, 0.32])
+    theme = DARK if dark else LIGHT
+    for recording, colour, name in ((first, FIRST, "A"), (second, SECOND, "B")):
+        for group, width, dash, said in (
+            ("reference", 1.2, "dot", "recorded"),
+            ("measurement", 1.2, "dot", "recorded"),
+            ("monitor", 1.8, "solid", "fitted"),
+        ):
+            series = recording.signals.get(group, {}).get(signal)
+            if series is not None:
+                _add(drawn, 1, series.time_s, series.values, f"{name} {said}", colour, dash, width)
+        residual = recording.signals.get("residual", {}).get(signal)
+        if residual is not None:
+            _add(drawn, 2, residual.time_s, residual.values, f"{name} residual", colour, "solid", 1.2)
+        for place, (algorithm, trace) in enumerate(recording.identification.items()):
+            _add_search(drawn, trace, f"{name} {algorithm}", colour, _DASHES[place % len(_DASHES)])
+    title, unit = SIGNALS[signal].title, SIGNALS[signal].unit or "-"
+    drawn.update_yaxes(title_text=f"{title}<br>[{unit}]", row=1, col=1)
+    drawn.update_yaxes(title_text=f"residual<br>[{unit}]", row=2, col=1)
+    drawn.update_yaxes(title_text="best rmse<br>[A]", type="log", row=3, col=1)
+    drawn.update_xaxes(title_text="time [s]", matches="x", row=2, col=1)
+    drawn.update_xaxes(title_text="iteration", row=3, col=1)
+    drawn.update_layout(
+        template=theme.template(),
+        margin={"l": 66, "r": 12, "t": 8, "b": 40},
+        legend={"orientation": "h", "x": 0.0, "y": -0.12, "yanchor": "top"},
+    )
+    return drawn
+
+
+def table(first: Entry, second: Entry) -> str:
+    """HTML: where settings differ, the results, and each k of the best answers."""
+    rows = [_row("", _named("A", FIRST), _named("B", SECOND))]
+    names = [n for n in dict.fromkeys([*first.settings, *second.settings])]
+    for name in names:
+        a, b = (as_text(one.settings.get(name, "–")) for one in (first, second))
+        if a != b:
+            rows.append(_row(name, html.escape(a), html.escape(b)))
+    if not any(first.settings.get(n) != second.settings.get(n) for n in names) and names:
+        rows.append(_row("settings", "the same", "the same"))
+    answers = (first.answer, second.answer)
+    rows.append(_row("algorithm", *(html.escape(one.best or "–") for one in (first, second))))
+    for title, key, form in (
+        ("Err [%]", "error_percent", ".2f"),
+        ("rmse [A]", "rmse_A", ".4f"),
+        ("time [s]", "elapsed_s", ".2f"),
+        ("simulations", "evaluations", "d"),
+    ):
+        rows.append(_row(title, *(_number(answer, key, form) for answer in answers)))
+    for i, fault in enumerate(FAULTS):
+        values = [answer["k"][i] if answer else None for answer in answers]
+        cells = ["–" if value is None else f"{value:.3f}" for value in values]
+        known = [value for value in values if value is not None]
+        apart = len(known) == 2 and abs(known[0] - known[1]) > 0.02
+        mark = f' style="color:{DIFFERENCE};font-weight:600"' if apart else ""
+        rows.append(_row(f"{fault.name} {fault.title.lower()}", *(f"<span{mark}>{cell}</span>" for cell in cells)))
+    return (
+        '<div style="padding:4px 10px;font-size:12.5px;font-variant-numeric:tabular-nums">'
+        f'<table style="width:100%;border-collapse:collapse">{"".join(rows)}</table></div>'
+    )
+
+
+def _add(drawn: go.Figure, row: int, x, y, name: str, colour: str, dash: str, width: float) -> None:
+    x, y = line(x, y, _POINTS)
+    drawn.add_trace(
+        go.Scatter(x=x, y=y, name=name, mode="lines", line={"color": colour, "width": width, "dash": dash}),
+        row=row,
+        col=1,
+    )
+
+
+def _add_search(drawn: go.Figure, trace: IdentificationTrace, name: str, colour: str, dash: str) -> None:
+    known: NDArray[np.bool_] = np.isfinite(trace.rmse) & (trace.rmse > 0.0)
+    x = trace.iteration[known].astype(float)
+    drawn.add_trace(
+        go.Scatter(x=x, y=trace.rmse[known], name=name, mode="lines", line={"color": colour, "dash": dash}),
+        row=3,
+        col=1,
+    )
+
+
+def _named(name: str, colour: str) -> str:
+    return f'<span style="color:{colour}">{name}</span>'
+
+
+def _number(answer: dict | None, key: str, form: str) -> str:
+    value = None if answer is None else answer.get(key)
+    return "–" if value is None else f"{value:{form}}"
+
+
+def _row(name: str, a: str, b: str) -> str:
+    cell = "td" if name else "th"
+    right = 'style="text-align:right;padding:1px 4px;overflow-wrap:anywhere"'
+    return f"<tr><td>{html.escape(name)}</td><{cell} {right}>{a}</{cell}><{cell} {right}>{b}</{cell}></tr>"

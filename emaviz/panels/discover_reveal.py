@@ -1,0 +1,82 @@
+"""A challenge's truth beside the answer."""
+
+from __future__ import annotations
+
+import html
+
+from ema_model.challenges.truth import Truth
+from ema_model.discovery import Discovery
+from ema_model.discovery.result import Added
+from ema_model.effects import CATALOGUE, find
+from emaviz.discovery_words import effect_title, fitted_of, small
+from emaviz.figures import quantity
+from emaviz.panels.discover_cards import BOX
+from emaviz.panels.explore_labels import readable
+
+_GOOD, _BAD = "#2b8a3e", "#e03131"
+_NEAR = 0.25  # of the true value, within which a strength counts as found where its interval misses it
+
+
+def agrees(truth: Truth, found: Discovery, added: tuple[Added, ...]) -> bool:
+    """Whether the answer names exactly what is hidden: the effects, or a torque of its own for an unknown one."""
+    named = {one.name for one in added if one.name in CATALOGUE and not find(one.name).duplicates}
+    own = any(one.name not in CATALOGUE for one in added)
+    return named == set(truth.effects) and own == bool(truth.torque)
+
+
+def reveal(truth: Truth, found: Discovery, added: tuple[Added, ...]) -> str:
+    """The truth in words, then effect by effect."""
+    good = agrees(truth, found, added)
+    verdict = "Your answer agrees." if good else "Your answer differs."
+    rows = [_effect(name, given, found, added) for name, given in truth.effects.items()]
+    if truth.torque:
+        own = next((one for one in added if one.name not in CATALOGUE), None)
+        what = f"an effect outside the library: T = {truth.torque}"
+        how = f"found as {small(effect_title(own.name))}" if own else "not found: add the curve of what is left"
+        rows.append(_row(own is not None, what, how))
+    for one in added:
+        if one.name in CATALOGUE and one.name not in truth.effects:
+            tied = [name for name in one.same_as if name in truth.effects]
+            if find(one.name).duplicates:
+                why = "a parameter outside its tolerance; nothing of the kind is hidden"
+            elif tied:
+                why = f"cannot be told from {small(effect_title(tied[0]))} by these recordings"
+            else:
+                why = "is not hidden here"
+            rows.append(_row(False, small(effect_title(one.name)), why))
+    if not truth.effects and not truth.torque and not added:
+        rows.append(_row(True, "nothing is hidden", "and you added nothing"))
+    head = f'<div style="font-size:16px;font-weight:600;color:{_GOOD if good else _BAD}">{verdict}</div>'
+    return f"<div {BOX}>{head}<div>{html.escape(truth.answer)}</div>{''.join(rows)}</div>"
+
+
+def _effect(name: str, given: dict[str, float], found: Discovery, added: tuple[Added, ...]) -> str:
+    title = small(effect_title(name))
+    order = given.get("order")
+    own = [one for one in added if one.name == name]
+    one = next((one for one in own if order is None or one.chosen.get("order") == order), own[0] if own else None)
+    if one is None:
+        return _row(False, title, "not found")
+    first = find(name).parameters[0]
+    fitted = fitted_of(found, one, first.name)
+    low, high = fitted.interval90
+    inside = low <= given[first.name] <= high
+    near = inside or abs(fitted.value - given[first.name]) <= _NEAR * abs(given[first.name])
+    label, _, unit = readable(first.name).rstrip("]").partition(" [")
+    shown = quantity.Quantity("", unit).scaled([given[first.name]])
+    half = quantity.number(shown.factor * 0.5 * (high - low), 2)
+    told = (
+        f"{label.lower()} {shown.text(given[first.name])} in truth, "
+        f"{quantity.number(shown.factor * fitted.value)} ± {half} {shown.unit} found".rstrip()
+    )
+    if order is not None:
+        told += f"; order {order:g} in truth, {one.chosen.get('order', 0.0):g} found"
+    return _row(near and (order is None or one.chosen.get("order") == order), title, told)
+
+
+def _row(good: bool, what: str, how: str) -> str:
+    mark, colour = ("✓", _GOOD) if good else ("✗", _BAD)
+    return (
+        f'<div style="padding-top:3px"><span style="color:{colour}"><b>{mark}</b></span> '
+        f"<b>{html.escape(what[:1].upper() + what[1:])}</b>: {html.escape(how)}</div>"
+    )

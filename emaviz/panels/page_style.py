@@ -1,0 +1,77 @@
+"""Style sheets that viser has no setting for: the playback strip below the page, the play-head, dark figures.
+
+They lean on names in viser's own page.  Where a name has changed, playback is an ordinary floating panel and the
+play-head stays away; nothing else depends on them.
+"""
+
+from __future__ import annotations
+
+import html
+
+from emaviz.figures.theme import DARK, MARK
+
+STRIP = '<div class="emaviz-strip"></div>'  # stands in the panel that becomes the strip
+TIME_CHARTS = '<div class="emaviz-time"></div>'  # stands beside charts over time
+LONG_LABELS = '<div class="emaviz-long"></div>'  # stands beside controls with long labels
+WIDE_MODAL = "<style>.mantine-Modal-root{--modal-size:min(960px,92vw)!important}</style>"
+STRIP_HEIGHT_PX = 68
+_ROW_PX = 48
+_LABEL = "> div > .mantine-Flex-root > div:first-child"
+
+
+def page() -> str:
+    """What holds for the whole page."""
+    return (
+        "<style>"
+        # all tabs of the main panel in one line
+        "[data-dock-region=left] [data-dock-tab]{padding-left:7px!important;padding-right:7px!important}"
+        f"div:has(> div > .emaviz-long) {_LABEL}{{width:10.4em!important}}"
+        "</style>" + _strip()
+    )
+
+
+def _strip() -> str:
+    """Lays the panel that holds `STRIP` along the bottom of the page, and ends everything else above it."""
+    panel = "[data-floating-window]:has(.emaviz-strip)"
+    row = f"{panel} div:has(> div > .emaviz-strip)"
+    handles = ("griphandle", "strip", "header", "resize")
+    rules = (
+        f"body:has(.emaviz-strip) [data-dock-root]{{height:calc(100% - {STRIP_HEIGHT_PX}px)!important;"
+        "overflow:visible!important}"
+        f"{panel}{{position:fixed!important;left:0!important;right:0!important;top:auto!important;bottom:0!important;"
+        f"width:100%!important;height:{STRIP_HEIGHT_PX}px!important;transform:none!important;"
+        "border-radius:0!important;box-shadow:none!important;border-top:1px solid rgba(134,142,150,.35)}"
+        + ",".join(f"{panel} [data-dock-{handle}]" for handle in handles)
+        + "{display:none!important}"
+        f"{row}{{display:flex;align-items:center;gap:2px;padding:0 6px!important;height:{_ROW_PX}px}}"
+        f"{row} > div{{flex:0 0 auto;padding-bottom:0!important}}"
+        f"{row} {_LABEL}{{width:auto!important;white-space:nowrap}}"
+        f"{row} > div:has(> button):first-of-type{{width:100px}}"
+        f"{row} > div:has(input[role=combobox],input[aria-haspopup=listbox]){{width:165px}}"
+        f"{row} > div:nth-of-type(4){{flex:1 1 auto}}"
+        f"{row} > div:nth-of-type(5){{width:200px}}"
+    )
+    return f"<style>@media (min-width: 900px){{{rules}}}</style>"
+
+
+def caption(text: str) -> str:
+    """A line of small print at the bottom of the strip."""
+    place = "position:fixed;left:18px;bottom:4px"
+    return f'<div style="{place};font-size:12px;opacity:.7;white-space:nowrap">{html.escape(text)}</div>'
+
+
+def play_head(share: float | None) -> str:
+    """An upright line in every chart over time, at a share of its width; None for none."""
+    if share is None or not 0.0 <= share <= 1.0:
+        return ""
+    return (
+        "<style>div:has(> div > .emaviz-time) .u-over::after{content:'';position:absolute;top:0;bottom:0;"
+        f"left:{100.0 * share:.2f}%;width:1.5px;background:{MARK};pointer-events:none}}</style>"
+    )
+
+
+def figures(dark: bool) -> str:
+    """Text of figures that were drawn for a light page, legible on a dark one."""
+    if not dark:
+        return ""
+    return f"<style>.js-plotly-plot .main-svg text{{fill:{DARK.ink}!important}}.u-title{{color:{DARK.ink}}}</style>"

@@ -1,0 +1,194 @@
+"""The motor in 3D: a housing cut open, coils of three phases, the rotor with its magnets, bearings.
+
+The coils of phase i lie about the azimuth −2πi/3 from phase A's, and the rotor's axis is off towards θ_m − φ:
+so the drawn gap under a phase is thin when the model's factor 1 + ζ cos(θ_m − φ + 2πi/3) is large.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import viser
+from numpy.typing import NDArray
+
+from emaviz.figures.colours import PHASES
+from emaviz.scene.solids import TURN, Solid, about_x, ball, block, joined, revolved, tube
+
+Colour = tuple[int, int, int]
+
+_PHASES: tuple[Colour, ...] = tuple((int(c[1:3], 16), int(c[3:5], 16), int(c[5:7], 16)) for c in PHASES)
+AIR_GAP = 0.025  # as drawn, where the rotor's radius is 0.125
+_BORE = 0.15
+_FIRST_AZIMUTH = 0.5 * np.pi  # of phase A: on top
+_LAYERS = 8  # turns drawn of each coil
+_OPEN_FROM, _OPEN_TO = np.radians(75.0), np.radians(215.0)  # the sector cut out of the housing
+_STEEL: Colour = (168, 174, 184)
+_IRON: Colour = (96, 102, 114)
+_BURNT: Colour = (18, 14, 12)
+
+
+class Motor:
+    """Built once; afterwards only frames move and colours change."""
+
+    def __init__(self, scene: viser.SceneApi, root: str, pole_pairs: int) -> None:
+        self._housing = _add(scene, f"{root}/housing", _housing(), (96, 130, 176), opacity=0.35)
+        _add(scene, f"{root}/stator", _stator(), _IRON)
+        self._phase_of, self._layer_of, places = _coil_places()
+        loop = _loop()
+        self._live = np.ones(len(self._phase_of), dtype=bool)
+        self._coils = scene.add_batched_meshes_simple(
+            f"{root}/coils",
+            loop.vertices,
+            loop.faces,
+            batched_wxyzs=np.array([about_x(azimuth) for _, azimuth, _ in places]),
+            batched_positions=np.array([(0.0, r * np.cos(azimuth), r * np.sin(azimuth)) for r, azimuth, _ in places]),
+            batched_scales=np.array([(1.0, 1.0, width) for _, _, width in places]),
+            batched_colors=np.zeros((len(places), 3), np.uint8),
+            lod="off",
+            flat_shading=True,
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+        self._axis = scene.add_frame(f"{root}/axis", show_axes=False)
+        self.rotor = scene.add_frame(f"{root}/axis/rotor", show_axes=False)
+        _add(scene, f"{root}/axis/rotor/core", _rotor_core(), _STEEL)
+        magnets = 2 * min(max(pole_pairs, 1), 6)
+        for pole, colour in enumerate(((206, 62, 72), (226, 230, 236))):
+            _add(scene, f"{root}/axis/rotor/magnets_{pole}", _magnets(magnets, pole), colour)
+        self._cage = scene.add_frame(f"{root}/cage", show_axes=False)
+        _add(scene, f"{root}/bearings", joined(*(_bearing(x) for x in (-0.31, 0.31))), _STEEL)
+        balls = [(x, 0.062, TURN * i / 8) for x in (-0.31, 0.31) for i in range(8)]
+        sphere = ball(0.0125)
+        scene.add_batched_meshes_simple(
+            f"{root}/cage/balls",
+            sphere.vertices,
+            sphere.faces,
+            batched_wxyzs=np.array([about_x(0.0)] * len(balls)),
+            batched_positions=np.array([(x, r * np.cos(a), r * np.sin(a)) for x, r, a in balls]),
+            batched_colors=(235, 238, 242),
+            lod="off",
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+        self._drawn = np.zeros((len(places), 3), np.uint8)
+        self._eccentricity, self._phase_rad = 0.0, 0.0
+        self.glow((0.0, 0.0, 0.0))
+
+    def set_opacity(self, opacity: float) -> None:
+        """Of the housing, 0 … 1."""
+        self._housing.visible = opacity > 0.0
+        self._housing.opacity = opacity
+
+    def damage(self, turns: Sequence[float], eccentricity: float, phase_rad: float) -> None:
+        """Healthy shares of the three phases' turns; how far the rotor is off, and towards where on it."""
+        healthy = np.round(_LAYERS * np.asarray(turns, dtype=float))
+        # A short, however small, shows as one turn.
+        healthy = np.where((healthy == _LAYERS) & (np.asarray(turns) < 0.995), _LAYERS - 1, healthy)
+        self._live = self._layer_of < healthy[self._phase_of]
+        self._eccentricity, self._phase_rad = eccentricity, phase_rad
+
+    def turn(self, motor_rad: float) -> None:
+        """Turns the rotor on its axis, which itself runs around where it is off centre."""
+        self.rotor.wxyz = about_x(motor_rad)
+        self._cage.wxyz = about_x(0.4 * motor_rad)  # balls roll at about this share of the shaft's speed
+        towards = _FIRST_AZIMUTH + motor_rad - self._phase_rad
+        off = 0.92 * AIR_GAP * self._eccentricity
+        self._axis.position = (0.0, off * np.cos(towards), off * np.sin(towards))
+
+    def glow(self, currents: Sequence[float]) -> None:
+        """Brightness of the phases by their currents, each as a share −1 … 1 of the brightest."""
+        colours = np.array([_lit(_PHASES[i], abs(currents[i])) for i in range(3)], dtype=np.uint8)
+        drawn = np.where(self._live[:, None], colours[self._phase_of], np.array(_BURNT, np.uint8))
+        if not np.array_equal(drawn, self._drawn):
+            self._drawn = drawn
+            self._coils.batched_colors = drawn
+
+
+def _lit(colour: Colour, share: float) -> NDArray[np.float64]:
+    """From dull at rest, over the phase's own colour, towards white at the most."""
+    share = min(max(share, 0.0), 1.0)
+    own = np.array(colour, dtype=float)
+    if share < 0.6:
+        return own * (0.3 + 0.7 * share / 0.6)
+    return own + (255.0 - own) * 0.75 * (share - 0.6) / 0.4
+
+
+def _add(scene: viser.SceneApi, name: str, solid: Solid, colour: Colour, opacity: float | None = None) -> Any:
+    return scene.add_mesh_simple(
+        name,
+        solid.vertices,
+        solid.faces,
+        color=colour,
+        opacity=opacity,
+        cast_shadow=False,
+        receive_shadow=False,
+    )
+
+
+def _housing() -> Solid:
+    start, stop = _OPEN_TO - TURN, _OPEN_FROM
+    return joined(
+        tube(-0.34, 0.34, 0.275, 0.295, start, stop),
+        tube(-0.345, -0.30, 0.08, 0.295, start, stop),
+        tube(0.30, 0.345, 0.08, 0.295, start, stop),
+        *(tube(x, x + 0.012, 0.295, 0.308, start, stop) for x in np.linspace(-0.26, 0.25, 6)),  # cooling fins
+    )
+
+
+def _stator() -> Solid:
+    teeth = [block(0.4, 0.09, 0.05).moved(y=0.195).turned(_azimuth(slot)) for slot in range(6)]
+    half = np.radians(17.0)
+    shoes = [tube(-0.2, 0.2, _BORE, _BORE + 0.012, _azimuth(slot) - half, _azimuth(slot) + half) for slot in range(6)]
+    return joined(tube(-0.2, 0.2, 0.236, 0.275, _OPEN_TO - TURN, _OPEN_FROM), *teeth, *shoes)
+
+
+def _azimuth(slot: int) -> float:
+    """Of a coil: two side by side for each phase."""
+    phase, second = divmod(slot, 2)
+    return _FIRST_AZIMUTH - TURN * phase / 3.0 + np.radians(30.0 if second else -30.0)
+
+
+def _coil_places() -> tuple[NDArray[np.intp], NDArray[np.intp], list[tuple[float, float, float]]]:
+    """Phase and layer of each drawn turn; its radius, azimuth and relative width."""
+    phases, layers, places = [], [], []
+    for slot in range(6):
+        for layer in range(_LAYERS):
+            phases.append(slot // 2)
+            layers.append(_LAYERS - 1 - layer)  # the innermost turns, which the eye meets first, burn first
+            radius = 0.169 + 0.0088 * layer
+            places.append((radius, _azimuth(slot), radius / 0.169))
+    return np.array(phases), np.array(layers), places
+
+
+def _loop() -> Solid:
+    """One turn about a tooth, at azimuth 0: long along x, narrow along z, thin along y."""
+    thick, wire, half_length, half_width = 0.0066, 0.034, 0.225, 0.044
+    legs = [block(2.0 * half_length, thick, wire).moved(z=side * half_width) for side in (-1.0, 1.0)]
+    ends = [
+        block(wire, thick, 2.0 * half_width + wire).moved(x=side * (half_length + 0.5 * wire)) for side in (-1.0, 1.0)
+    ]
+    return joined(*legs, *ends)
+
+
+def _rotor_core() -> Solid:
+    return joined(
+        tube(-0.22, 0.22, 0.0, 0.095),
+        revolved([(-0.42, 0.0), (-0.42, 0.030), (-0.41, 0.036), (0.52, 0.036), (0.52, 0.0)]),
+        block(0.05, 0.02, 0.012).moved(x=-0.40, z=0.036),  # the key shows the shaft's angle
+    )
+
+
+def _magnets(count: int, pole: int) -> Solid:
+    half = 0.43 * TURN / count
+    return joined(
+        *(
+            tube(-0.21, 0.21, 0.095, _BORE - AIR_GAP, TURN * i / count - half, TURN * i / count + half)
+            for i in range(pole, count, 2)
+        )
+    )
+
+
+def _bearing(x: float) -> Solid:
+    return joined(tube(x - 0.018, x + 0.018, 0.036, 0.05), tube(x - 0.018, x + 0.018, 0.074, 0.09))

@@ -1,0 +1,225 @@
+"""Discover in a real browser: the whole story on three challenges, as a person lives it."""
+
+from __future__ import annotations
+
+import time
+
+import pytest
+
+pytestmark = pytest.mark.browser
+
+FIGURES = """() => Array.from(document.querySelectorAll('.js-plotly-plot'), plot => ({
+  title: plot.layout?.title?.text ?? '', points: plot.calcdata?.[0]?.length ?? 0 }))"""
+
+
+def wait_until(condition, seconds=240.0):
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+def in_front(app, panel):
+    app.session.refresh()
+    time.sleep(0.2)
+    return panel.visible
+
+
+@pytest.fixture(autouse=True)
+def signals_in_front(app):
+    """As a new page is known by its charts."""
+    wait_until(lambda: not app.discovering.running)
+    wait_until(lambda: in_front(app, app._signals_panel))
+
+
+@pytest.fixture
+def discover(page, app):
+    """The page on its Discover tab."""
+    app.strip.play(False)
+    page.get_by_role("tab", name="Discover", exact=True).click()
+    page.get_by_label("Recordings", exact=True).wait_for()
+    page.set_default_timeout(20_000)
+    return page
+
+
+def begin(page, app, title):
+    """Chooses a challenge and waits for its cards."""
+    page.get_by_label("Recordings", exact=True).click()
+    page.get_by_role("option", name=title).click()
+    start = page.get_by_role("button", name="Start", exact=True)
+    again = page.get_by_role("button", name="Start again")  # where the same was chosen before
+    start.or_(again).click()
+    done(page, app)
+
+
+def done(page, app):
+    """Waits for the step that was asked for just now, and until the page may begin another one."""
+    page.get_by_role("button", name="Stop", exact=True).wait_for()
+    wait_until(lambda: not app.discovering.running)
+    page.get_by_role("button", name="Stop", exact=True).wait_for(state="hidden")
+
+
+def open_card(page, title):
+    page.get_by_role("button", name=title).first.click()
+    page.get_by_text("The error would fall from").wait_for()
+
+
+def add(page, app, title):
+    """Opens the card of that title and adds it."""
+    open_card(page, title)
+    page.get_by_role("button", name="Add it to the model").click()
+    done(page, app)
+
+
+def drawn(page, words):
+    """Points of the first line of the figure whose title has these words."""
+    return max([one["points"] for one in page.evaluate(FIGURES) if words in one["title"]], default=0)
+
+
+def errors(app):
+    ladder = app.discovering.look.found.ladder
+    return [rung.rmse for rung in ladder], [rung.holdout_rmse for rung in ladder]
+
+
+def revealed(page):
+    page.get_by_role("button", name="Reveal the truth").click()
+    verdict = page.get_by_text("Your answer")
+    verdict.wait_for()
+    return verdict.inner_text()
+
+
+def test_one_effect_with_the_guide(discover, app):
+    page = discover
+    page.get_by_role("button", name="Guided first challenge").click()
+    page.get_by_text("Step 1 of 6").wait_for()
+    page.get_by_role("button", name="Start", exact=True).click()
+    page.get_by_text("Step 2 of 6").wait_for()
+    page.get_by_text("Calibrating the model:").wait_for()  # what goes on, with its seconds
+    page.get_by_text("Step 3 of 6").wait_for(timeout=240_000)
+    wait_until(lambda: drawn(page, "Error after each step") == 1, 20.0)
+    open_card(page, "Cogging torque")
+    page.get_by_text("Step 4 of 6").wait_for()
+    wait_until(lambda: drawn(page, "beside what is left") > 20, 20.0)
+    page.get_by_text("The rotor's magnets pull toward the iron teeth").wait_for()
+    page.get_by_role("button", name="Add it to the model").click()
+    done(page, app)
+    page.get_by_text("Step 5 of 6").wait_for()
+    fitted, held = errors(app)
+    assert fitted[0] > 1.3 and fitted[-1] < 1.1 and held[-1] < 1.1
+    wait_until(lambda: drawn(page, "Error after each step") == 2, 20.0)
+    page.get_by_text("T = A sin(h θ + φ)").first.wait_for()
+    assert revealed(page) == "Your answer agrees."
+    page.get_by_text("Step 6 of 6").wait_for()
+    page.get_by_role("button", name="Leave the guide").click()
+    page.get_by_text("Step 6 of 6").wait_for(state="hidden")
+
+
+def test_two_effects_undo_and_a_wrong_answer(discover, app):
+    page = discover
+    begin(page, app, "After the overhaul")
+    add(page, app, "Cogging torque")
+    page.get_by_role("button", name="Undo the last step").click()
+    wait_until(lambda: app.discovering.look.steps == 1)
+    page.get_by_role("button", name="Remove Cogging torque").wait_for(state="hidden")
+    add(page, app, "Cogging torque")
+    assert errors(app)[0][-1] > 1.1
+    assert revealed(page) == "Your answer differs."
+    page.get_by_text("Load-dependent friction: not found").wait_for()
+    add(page, app, "Load-dependent friction")
+    fitted, held = errors(app)
+    assert fitted[0] > fitted[1] > fitted[2] and fitted[2] < 1.1 and held[2] < 1.1
+    page.get_by_text("Your answer agrees.").wait_for()
+    page.get_by_text("Load-dependent friction had been masked").wait_for()
+    page.get_by_text("Nothing of the library would take away more than chance does.").wait_for()
+
+
+def test_an_effect_outside_the_library_becomes_a_curve(discover, app):
+    page = discover
+    begin(page, app, "The prototype")
+    page.get_by_text("goes with the motor's speed").first.wait_for()
+    page.get_by_text("Your own effect").first.click()
+    page.get_by_role("button", name="From the curve").click()
+    done(page, app)
+    fitted, held = errors(app)
+    assert fitted[0] > 1.2 and fitted[-1] < 1.1 and held[-1] < 1.1
+    page.get_by_text("none of the known effects explains").first.wait_for()
+    assert revealed(page) == "Your answer agrees."
+
+
+def test_an_expression_is_checked_as_it_is_typed_and_fitted(discover, app):
+    page = discover
+    begin(page, app, "The prototype")
+    folder = page.get_by_role("button", name="Fit it in the model")
+    if not folder.is_visible():
+        page.get_by_text("Your own effect").first.click()
+    row = page.locator("label", has_text="T [N·m] =").locator("xpath=ancestor::div[contains(@class,'Flex-root')][1]")
+    entry = row.locator("input")
+    entry.fill("-c*sign(omega)*sqrt(abs(omega)")
+    page.get_by_text("column 20: this parenthesis is never closed").wait_for()
+    assert folder.is_disabled()
+    entry.fill('__import__("os")')
+    page.get_by_text("✗").wait_for()
+    assert folder.is_disabled()
+    entry.fill("-c*sign(omega)*sqrt(abs(omega))")
+    page.get_by_text("✓ uses omega; parameters to fit: c").wait_for()
+    page.get_by_label("c", exact=True).wait_for()
+    folder.click()
+    done(page, app)
+    (effect,) = app.discovering.look.added
+    assert effect.parameters["c"].value == pytest.approx(0.0025, rel=0.2)
+    assert errors(app)[0][-1] < 1.1
+
+
+def test_stop_works_and_the_page_stays_usable(discover, app):
+    page = discover
+    begin(page, app, "First bench run")
+    before = app.discovering.look
+    page.get_by_role("button", name="Find all").click()
+    page.get_by_role("button", name="Stop", exact=True).click()
+    page.get_by_text("Stopp").first.wait_for()
+    simulation = app.session.simulation
+    app.session.refresh()
+    wait_until(lambda: app.session.simulation is not simulation)
+    wait_until(lambda: not app.discovering.running)
+    page.get_by_text("Stopped;").wait_for()
+    assert app.discovering.look.steps == before.steps
+    page.get_by_role("button", name="Start again").wait_for()
+
+
+def test_the_next_test_goes_to_explore_and_to_a_file(discover, app):
+    page = discover
+    begin(page, app, "Two suspects")
+    page.get_by_role("button", name="Find the best test").click()
+    done(page, app)
+    page.get_by_text("Record a ").wait_for()
+    with page.expect_download() as sent:
+        page.get_by_role("button", name="Command as CSV").click()
+    assert open(sent.value.path()).readline().strip() == "time_s,command_rad,load_torque_Nm"
+    page.get_by_role("button", name="Load it into Explore").click()
+    wanted = app.discovering.experiment
+    settings = app.session.settings
+    wait_until(lambda: settings.command == wanted.command and settings.duration_s == wanted.duration_s)
+    run = settings.run()
+    assert {name: getattr(run.command, name) for name in wanted.settings} == wanted.settings
+    page.get_by_role("tab", name="Explore", exact=True).click()
+    shown = page.get_by_label("Duration [s]", exact=True)
+    assert float(shown.input_value()) == pytest.approx(wanted.duration_s)
+
+
+def test_the_library_is_searched_and_felt(page, app):
+    page.get_by_role("tab", name="Library", exact=True).click()
+    page.locator("label", has_text="Search").locator(
+        "xpath=ancestor::div[contains(@class,'mantine-Flex-root')][1]"
+    ).locator("input").fill("teeth")
+    page.get_by_role("button", name="Winding resistance").wait_for(state="hidden")
+    page.get_by_role("button", name="Cogging torque").click()
+    page.get_by_text("The rotor's magnets pull toward the iron teeth").wait_for()
+    charts = """() => Object.values(window.__viserTestpoints.uplots).map(u => u.chart)
+        .filter(c => c.data.length === 2).map(c => Math.max(...Array.from(c.data[1], Math.abs)))"""
+    wait_until(lambda: any(0.05 < most < 1.0 for most in page.evaluate(charts)), 120.0)
+    before = page.evaluate(charts)
+    row = page.locator("label", has_text="Amplitude [N·m]").last
+    row.locator("xpath=ancestor::div[contains(@class,'mantine-Flex-root')][1]").locator(
+        "input:not([type=hidden])"
+    ).fill("0.024")
+    wait_until(lambda: max(page.evaluate(charts)[:3]) > 1.5 * max(before[:3]), 30.0)

@@ -1,0 +1,207 @@
+"""The session's part of Discover without a browser: steps, stops, refusals, what stays."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+
+from ema_model.actuator import load_actuator
+from ema_model.errors import InputError
+from ema_model.user_effects import user_torque
+from emaviz.comparing import Comparing
+from emaviz.data_folder import DataFolder
+from emaviz.discovering import Discovering
+from emaviz.panels import discover_cards
+from emaviz.panels.discover_guide import STEPS, step
+from emaviz.panels.discover_next import as_csv
+from emaviz.panels.discover_reveal import agrees, reveal
+from emaviz.recording.read import read
+from emaviz.session import Session
+
+EASY = "first_bench_run"
+
+
+def wait_until(condition, seconds=240.0):
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+@pytest.fixture(scope="module")
+def discovering(tmp_path_factory):
+    """With the easy challenge calibrated, and nothing added."""
+    folder = DataFolder(tmp_path_factory.mktemp("data"))
+    session = Session(load_actuator(), folder.recordings)
+    comparing = Comparing(session, folder)
+    made = Discovering(session, comparing)
+    with pytest.raises(InputError, match="no recording to fit is chosen"):
+        made.start()
+    made.source.choose(EASY)
+    assert made.start()
+    wait_until(lambda: not made.running)
+    yield made
+    made.close()
+    comparing.close()
+    session.close()
+
+
+@pytest.fixture
+def fresh(discovering):
+    """The same, without what an earlier test has added."""
+    while discovering.look.steps > 1:
+        discovering.undo()
+        wait_until(lambda: not discovering.running)
+    return discovering
+
+
+def test_the_first_card_is_what_is_hidden(fresh):
+    look = fresh.look
+    best = look.promising[0]
+    assert best.name == "cogging_torque" and best.settings["order"] == 14
+    text = discover_cards.label(look, best)
+    assert "order 14" in text and "mN·m" in text and f"{100.0 * look.share(best):.0f} %" in text
+    amplitude, half = best.settings["amplitude_Nm"], look.uncertainty(best)
+    assert abs(amplitude - 0.02) < 2.0 * half < 0.005
+
+
+def test_a_prediction_is_what_the_refit_gives(fresh):
+    look = fresh.look
+    best = look.promising[0]
+    assert fresh.add(best.name)
+    wait_until(lambda: not fresh.running)
+    after = fresh.look.rmse
+    assert look.predicted_rmse(best) == pytest.approx(after, rel=0.25)
+    assert after < 1.1 < look.rmse
+    assert fresh.look.found.ladder[-1].holdout_rmse < 1.1
+    assert not fresh.look.promising, "nothing else is hidden"
+    truth = fresh.source.reveal()
+    assert agrees(truth, fresh.look.found, fresh.look.added)
+    assert "Your answer agrees" in reveal(truth, fresh.look.found, fresh.look.added)
+    assert not agrees(truth, fresh.look.found, ())
+
+
+def test_a_signature_is_beside_the_residual_that_it_explains(fresh):
+    look = fresh.look
+    signal = look.primary
+    left = look.residuals.values[signal]
+    right, wrong = (look.change(look.candidate(name), signal) for name in ("cogging_torque", "stribeck_friction"))
+    assert right.shape == left.shape
+    assert np.sum((left - right) ** 2) < 0.8 * np.sum(left**2)
+    assert np.sum((left - right) ** 2) < np.sum((left - wrong) ** 2)
+
+
+def test_a_stopped_step_leaves_the_model_as_it_was(fresh):
+    before = fresh.look
+    told = []
+    fresh.events.ended.append(told.append)
+    assert fresh.add("stribeck_friction")
+    with pytest.raises(InputError, match="a step is running"):
+        fresh.undo()
+    fresh.stop()
+    wait_until(lambda: told)
+    assert told[-1].startswith("Stopped") and not fresh.running
+    assert fresh.look is before
+    assert fresh.start(), "another step can begin"
+    fresh.stop()
+    wait_until(lambda: not fresh.running)
+
+
+def test_a_step_back_is_at_once_and_shows_the_same_cards(fresh):
+    before = [one.name for one in fresh.look.promising]
+    fresh.add("cogging_torque")
+    wait_until(lambda: not fresh.running)
+    began = time.perf_counter()
+    fresh.undo()
+    assert time.perf_counter() - began < 1.0 and not fresh.running
+    assert [one.name for one in fresh.look.promising] == before
+    with pytest.raises(InputError, match="no step to take back"):
+        fresh.undo()
+
+
+def test_an_effect_is_removed_as_a_step_of_its_own(fresh):
+    calibrated = fresh.look.rmse
+    fresh.add("cogging_torque")
+    wait_until(lambda: not fresh.running)
+    with pytest.raises(InputError, match="not in the model"):
+        fresh.remove("hinge_moment")
+    fresh.remove("cogging_torque")
+    wait_until(lambda: not fresh.running)
+    assert not fresh.look.added and fresh.look.steps == 3
+    assert fresh.look.rmse == pytest.approx(calibrated, rel=0.02)
+
+
+def test_an_expression_of_the_user_is_fitted(fresh):
+    effect = user_torque("A*sin(14*theta) + B*cos(14*theta)")
+    assert fresh.add_own(effect, {"A": 1e-3, "B": 1e-3})
+    wait_until(lambda: not fresh.running)
+    found = fresh.look.found.calibration.parameters
+    a, b = (found[f"effects.{effect.name}.{name}"].value for name in "AB")
+    assert np.hypot(a, b) == pytest.approx(0.02, rel=0.15)
+    assert fresh.look.rmse < 1.1
+    with pytest.raises(InputError, match="in the model already"):
+        fresh.add_own(effect, {})
+
+
+def test_what_is_kept_opens_again(fresh):
+    fresh.add("cogging_torque")
+    wait_until(lambda: not fresh.running)
+    kept = []
+    fresh.events.kept.append(kept.append)
+    for suffix in (".html", ".rrd", ".toml"):
+        fresh.keep(suffix)
+        wait_until(lambda suffix=suffix: any(path.suffix == suffix for path in kept))
+    report, recording, model = (next(p for p in kept if p.suffix == s) for s in (".html", ".rrd", ".toml"))
+    assert "Cogging torque" in report.read_text(encoding="utf-8")
+    assert read(recording) is not None
+    assert load_actuator(model).effects["cogging_torque"]["order"] == 14
+    assert fresh.folder.name_of(model) in fresh.folder.actuator_files()
+
+
+def test_the_next_test_is_between_the_two_best(fresh):
+    before = fresh.look.promising[:2]
+    assert fresh.suggest()
+    wait_until(lambda: not fresh.running)
+    found = fresh.experiment
+    assert found is not None and set(found.separates) == {one.name for one in before}
+    head, *rows = as_csv(found).decode().splitlines()
+    assert head == "time_s,command_rad,load_torque_Nm"
+    assert len(rows) == round(found.duration_s * 10_000)
+    assert fresh.look.found.next_experiment is found
+
+
+def test_the_guide_follows_the_story(fresh):
+    assert step(None, False, None, False)[0] == 1
+    assert step(None, True, None, False)[0] == 2
+    look = fresh.look
+    assert step(look, False, None, False)[0] == 3
+    assert step(look, False, "cogging_torque", False)[0] == 4
+    fresh.add("cogging_torque")
+    wait_until(lambda: not fresh.running)
+    assert step(fresh.look, False, None, False)[0] == 5
+    assert step(fresh.look, False, None, True)[0] == STEPS
+
+
+def test_recordings_of_compare_can_be_held_out(discovering):
+    source = discovering.source
+    comparing = discovering.comparing
+    paths = source.challenges[EASY].training[:2]
+    for path in paths:
+        copy = comparing.folder.take_in(path)
+        comparing.add(comparing.folder.name_of(copy))
+    wait_until(lambda: len(source.compared) == 2)
+    source.choose("")
+    names = list(source.compared)
+    source.hold_out(names[0], True)
+    given = source.read()
+    assert [one.name for one in given.held] == [source.compared[names[0]].name] and len(given.fitted) == 1
+    source.hold_out(names[1], True)
+    assert not source.ready
+    with pytest.raises(InputError, match="no recording to fit"):
+        source.read()
+    for name in names:
+        source.hold_out(name, False)
+        comparing.remove(name)
+    source.choose(EASY)

@@ -1,0 +1,251 @@
+"""Identify: races of optimisers, pause, the swarm, the table; without a browser and in a real one."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from ema_model.actuator import load_actuator
+from ema_model.commands import command
+from ema_model.errors import InputError
+from ema_model.faults import performance_coefficient, vector
+from ema_model.identification.run import ALGORITHMS, Progress
+from ema_model.measurement import read_measurement, write_measurement
+from ema_model.sensors import Sensors
+from ema_model.simulation import Run, simulate_reference
+from emaviz.figures import swarm
+from emaviz.figures.identified_table import Row, table
+from emaviz.identifying import MOST_FRAMES, Reins, Track
+from emaviz.panels.identify_swarm import at_iteration, telling
+from emaviz.session import Session
+from emaviz.state import Settings
+
+CHART = """(title) => {
+  const charts = Object.values(window.__viserTestpoints.uplots).map(u => u.chart);
+  const chart = charts.find(c => c.root.querySelector('.u-title')?.textContent === title);
+  return chart ? Array.from(chart.data, a => Array.from(a)) : null;
+}"""
+
+
+def wait_until(condition, seconds=30.0):
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory):
+    session = Session(load_actuator(), tmp_path_factory.mktemp("recordings"))
+    session.start()
+    assert session.ready.wait(120.0)
+    yield session
+    session.close()
+
+
+def raced(session, algorithms, seconds=120.0):
+    session.settings.set_algorithms(algorithms)
+    done, races = threading.Event(), []
+
+    def keep(race):
+        races.append(race)
+        done.set()
+
+    session.events.identified.append(keep)
+    try:
+        assert session.identify()
+        assert done.wait(seconds)
+    finally:
+        session.events.identified.remove(keep)
+    wait_until(lambda: not session.worker.busy)
+    return races[0]
+
+
+# --- without a browser ------------------------------------------------------------------------------------------------
+
+
+def test_a_race_gives_each_optimiser_the_answer_that_it_finds_alone(session):
+    session.settings.restore(Settings().saved())
+    session.settings.set_fault(0, 0.3)
+    session.settings.set_iterations(40)
+    race = raced(session, ["hba", "do"])
+    assert list(race.tracks) == ["do", "hba"] and len(race.answers) == 2
+    for name in ("do", "hba"):
+        alone = raced(session, [name]).answers[0]
+        together = race.tracks[name].answer
+        assert np.array_equal(alone.k, together.k) and alone.evaluations == together.evaluations
+        assert len(race.tracks[name].rmse) == 41
+        assert np.array_equal(race.tracks[name].rmse, together.rmse_history)
+    errors = [answer.error_percent for answer in race.answers]
+    times = [answer.elapsed_s for answer in race.answers]
+    assert list(race.performance().values()) == pytest.approx(performance_coefficient(errors, times))
+
+
+def test_the_overlay_is_the_answers_own_current(session):
+    session.settings.set_iterations(30)
+    race = raced(session, ["do"])
+    track = race.tracks["do"]
+    assert track.current_A.shape == race.measured_A.shape == race.time_s.shape
+    left = np.sqrt(np.mean((track.current_A - race.measured_A) ** 2))
+    assert left == pytest.approx(track.answer.rmse, rel=1e-6)
+    assert race.time_s[-1] == pytest.approx(session.settings.duration_s, abs=1e-3)
+
+
+def test_a_pause_stops_the_search_while_sliders_are_answered(session):
+    session.settings.set_iterations(400)
+    session.settings.set_algorithms(["hba"])
+    races, drawn = [], []
+    session.events.progressed.append(races.append)
+    session.events.simulated.append(drawn.append)
+    try:
+        assert session.identify()
+        wait_until(lambda: races)
+        session.pause(True)
+        time.sleep(0.4)
+        at, seen = len(races), len(drawn)
+        session.refresh()
+        wait_until(lambda: len(drawn) > seen)
+        assert len(races) == at and session.worker.busy and session.reins.paused
+        session.pause(False)
+        wait_until(lambda: len(races) > at)
+        session.pause(True)
+        session.stop()  # also ends one that rests
+        wait_until(lambda: not session.worker.busy)
+        assert races[0].answers[0].stopped
+    finally:
+        session.events.progressed.remove(races.append)
+        session.events.simulated.remove(drawn.append)
+
+
+def test_a_file_is_identified_without_a_truth(session, tmp_path):
+    plant = simulate_reference(Run(command("chirp", {}), 0.5, 10_000.0), load_actuator(), vector({"k1": 0.4}))
+    path = tmp_path / "bench.csv"
+    write_measurement(Sensors(0.05, 0).record(plant, 1), path)
+    session.open_file = lambda name: read_measurement(tmp_path / name)
+    session.settings.restore(Settings().saved())
+    session.settings.set_source("bench.csv")
+    monitor = session.settings.monitor
+    race = raced(session, ["robust"])
+    answer = race.best.answer
+    assert race.truth is None and answer.error_percent is None and race.source == "bench.csv"
+    assert answer.k[0] == pytest.approx(0.4, abs=0.05)
+    assert session.settings.monitor == monitor, "a file's faults are not those of the sliders' plant"
+    session.settings.set_source("")
+
+
+def test_what_cannot_be_chosen_is_refused():
+    settings = Settings()
+    for value in ([], ["none"], "hba", None, [7]):
+        with pytest.raises(InputError):
+            settings.set_algorithms(value)
+    assert settings.algorithms == Settings().algorithms
+    settings.set_algorithms(list(ALGORITHMS)[::-1])
+    assert settings.algorithms == tuple(ALGORITHMS)
+
+
+def progress(iteration, n=5):
+    rng = np.random.default_rng(iteration)
+    return Progress("do", iteration, 10_000, 1.0, rng.random(8), rng.random((n, 8)), np.ones(n), 1, 0.0)
+
+
+def test_a_long_search_keeps_few_frames_from_its_first_to_its_last():
+    track = Track("do", 10_000)
+    for iteration in range(5001):
+        track.add(progress(iteration))
+    kept = [frame.iteration for frame in track.frames]
+    assert len(kept) <= MOST_FRAMES and kept[0] == 0 and kept[-1] > 4900
+    assert len(set(np.diff(kept))) == 1
+    assert at_iteration(track, 1000).iteration <= 1000 < at_iteration(track, 1000).iteration + track.stride
+    assert at_iteration(track, 5000).iteration == 5000 and at_iteration(Track("do", 5), 3) is None
+
+
+def test_the_axes_are_those_on_which_the_faults_stand():
+    assert set(telling(vector({"k3": 0.4, "k8": 0.9}))) == {2, 7}
+    assert telling(vector({"k2": 0.4}))[0] == 1 and telling(vector({"k6": 0.4}))[0] == 5
+    assert telling(vector({"k7": 0.9})) != (6, 5), "a phase of no eccentricity is nothing to look at"
+
+
+def test_a_swarm_is_drawn_where_it_is():
+    one = swarm.Swarm("do", "#1098ad", np.array([[0.0] * 8, [1.0] * 8]), np.full(8, 0.5))
+    plane = swarm.plane([one], 0, 1, np.full(8, 0.25), [np.array([[0.0] * 8, [0.5] * 8])])
+    assert "M44.0 294.0h0M446.0 10.0h0" in plane and 'cx="245.0" cy="152.0"' in plane and "<polyline" in plane
+    lines = swarm.lines([one], np.full(8, 0.25))
+    assert lines.count("<path") == 8 + 3 and "M44 286.0" in lines
+
+
+def test_reins_wait_only_while_they_are_held():
+    reins = Reins()
+    assert list(reins.wait()) == [] and not reins.paused
+    reins.pause(True)
+    waiting = reins.wait()
+    next(waiting)
+    reins.stop()
+    assert list(waiting) == [] and reins.stopping and not reins.paused
+
+
+def test_the_table_escapes_names_and_shows_what_is_unknown():
+    row = Row(1, "<b>x</b>.csv", "hba", 50, 150, "filtered", 0, None, 0.5, 7500, 2.0, None, True)
+    shown = table([row])
+    assert "<b>x</b>" not in shown and "&lt;b&gt;x" in shown and "(stopped)" in shown and "–" in shown
+    assert "Nothing" in table([])
+
+
+# --- in the browser ---------------------------------------------------------------------------------------------------
+
+pictures = """() => Array.from(document.querySelectorAll('svg'))
+  .filter(s => s.textContent.includes('friction') || s.textContent.includes('k1')).map(s => s.outerHTML)"""
+
+
+@pytest.mark.browser
+def test_a_race_is_watched_paused_and_looked_back_at(page, app):
+    settings = app.session.settings
+    settings.set_fault(0, 0.25)
+    settings.set_fault(5, 0.3)
+    page.get_by_role("tab", name="Identify").click()
+    page.get_by_label("Robust", exact=True).click()
+    page.get_by_text("no algorithm is chosen").wait_for(timeout=10_000)
+    assert settings.algorithms == ("robust",)
+    page.get_by_label("Dandelion", exact=True).click()
+    page.get_by_label("Honey Badger", exact=True).click()
+    wait_until(lambda: settings.algorithms == ("robust", "do", "hba"))
+    for label, name, value in (("Population", "population", 30), ("Iterations", "iterations", 60), ("Seed", "seed", 3)):
+        page.get_by_label(label, exact=True).fill(str(value))
+        page.get_by_label(label, exact=True).press("Enter")
+        wait_until(lambda: getattr(settings, name) == value)  # noqa: B023
+    page.get_by_role("button", name="Identify", exact=True).click()
+    page.get_by_text("of 60").first.wait_for(timeout=60_000)
+    page.get_by_role("button", name="Pause the search").click()
+    wait_until(lambda: app.session.reins.paused)
+    page.wait_for_timeout(600)
+    before = page.evaluate(CHART, "Convergence")
+    page.wait_for_timeout(600)
+    assert page.evaluate(CHART, "Convergence") == before, "it rests"
+    page.get_by_role("button", name="Go on").click()
+    page.get_by_role("link", name="in Rerun").wait_for(timeout=180_000)
+    wait_until(lambda: np.array(page.evaluate(CHART, "Convergence")).shape == (4, 61))
+    curves = np.array(page.evaluate(CHART, "Convergence"))
+    assert np.all(np.diff(curves[1:], axis=1) <= 1e-9) and np.all(curves[1:] > 0.0)
+
+    last = page.evaluate(pictures)
+    box = page.locator("label", has_text="Iteration").last
+    box = box.locator("xpath=ancestor::div[contains(@class,'mantine-Flex-root')][1]").locator(
+        "input:not([type=hidden])"
+    )
+    box.first.fill("0")
+    box.first.press("Enter")
+    wait_until(lambda: page.evaluate(pictures) != last)
+    page.get_by_label("Swarm as", exact=True).click()
+    page.get_by_role("option", name="lines across all k").click()
+    page.get_by_text("backlash", exact=True).first.wait_for()
+
+    page.get_by_role("tab", name="Answer").click()
+    wait_until(lambda: np.array(page.evaluate(CHART, "Monitor − measured")).shape[0] == 4)
+    left = np.array(page.evaluate(CHART, "Monitor − measured"))[1:]
+    assert np.all(np.isfinite(left)) and np.abs(left).max() < 5.0
+    page.get_by_role("tab", name="Runs").click()
+    page.get_by_text("population 30, 60 iterations, filtered, seed 3").wait_for()
+    page.get_by_role("button", name="Clear the table").click()
+    page.get_by_text("Nothing has been identified yet").wait_for()

@@ -1,0 +1,202 @@
+"""The 3D actuator: its solids, what a run looks like on it, playback, and the pace of poses in a browser."""
+
+from __future__ import annotations
+
+import time
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from ema_model.actuator import load_actuator
+from ema_model.commands import command
+from ema_model.faults import vector
+from ema_model.simulation import Run, simulate_reference
+from emaviz.scene import drivetrain, motor, solids
+from emaviz.scene.motion import enlargement, motion
+from emaviz.scene.playback import Playback
+from emaviz.session import Simulation
+
+SOLIDS = {
+    "block": solids.block(1.0, 2.0, 3.0),
+    "pipe": solids.tube(0.0, 1.0, 0.2, 0.3),
+    "cut pipe": solids.tube(0.0, 1.0, 0.2, 0.3, 0.3, 4.0),
+    "ball": solids.ball(0.5),
+    "wheel": solids.gear_wheel(14, 0.1, 0.0, 0.1),
+    "thread": solids.thread(0.0, 1.0, 0.05, 0.05, 0.01),
+    "housing": motor._housing(),
+    "stator": motor._stator(),
+    "flap": drivetrain._flap(),
+}
+
+
+class Recorder:
+    """A scene that remembers what it is told."""
+
+    def __init__(self):
+        self.poses, self.damages = [], []
+
+    def pose(self, *values):
+        self.poses.append(values)
+
+    def damage(self, *values):
+        self.damages.append(values)
+
+
+@pytest.fixture(scope="module")
+def actuator():
+    return load_actuator()
+
+
+def run_of(actuator, **faults):
+    k = vector(faults)
+    return simulate_reference(Run(), actuator, k), k
+
+
+@pytest.mark.parametrize("name", SOLIDS)
+def test_a_solid_is_made_of_real_triangles(name):
+    solid = SOLIDS[name]
+    assert solid.faces.max() < len(solid.vertices) and np.all(np.isfinite(solid.vertices))
+    a, b, c = (solid.vertices[solid.faces[:, i]] for i in range(3))
+    areas = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    assert areas.min() > 0.0
+
+
+def test_the_whole_actuator_has_few_triangles():
+    parts = (motor._housing(), motor._stator(), motor._rotor_core(), drivetrain._flap(), drivetrain._rails())
+    assert sum(len(part.faces) for part in parts) < 6000
+
+
+@pytest.mark.parametrize("name", [name for name in SOLIDS if name not in ("thread", "stator")])
+def test_a_solid_is_seen_from_outside(name):
+    """Its volume is positive when its triangles look outward; a thread is open, and the stator's parts overlap."""
+    solid = SOLIDS[name]
+    a, b, c = (solid.vertices[solid.faces[:, i]].astype(float) for i in range(3))
+    volume = np.sum(a * np.cross(b, c)) / 6.0
+    unsigned = np.sum(np.abs(np.sum(a * np.cross(b, c), axis=1))) / 6.0
+    assert volume > 0.01 * unsigned > 0.0
+    edges = np.concatenate([solid.faces[:, pair] for pair in ([0, 1], [1, 2], [2, 0])])
+    ends = np.round(solid.vertices[edges].astype(float), 5)
+    whole = {tuple(end.ravel()) for end in ends}
+    back = {tuple(end[::-1].ravel()) for end in ends}
+    assert len(whole & back) > 0.97 * len(whole), "each edge is run through once in either direction"
+
+
+def test_a_block_has_its_volume_and_a_turn_keeps_it():
+    block = solids.block(1.0, 2.0, 3.0)
+    for solid in (block, block.turned(0.7), block.across(), block.moved(1.0, 2.0, 3.0)):
+        a, b, c = (solid.vertices[solid.faces[:, i]].astype(float) for i in range(3))
+        assert np.sum(a * np.cross(b, c)) / 6.0 == pytest.approx(6.0, rel=1e-5)
+
+
+def test_positive_azimuths_and_turns_agree():
+    turned = solids.block(0.1, 0.1, 0.1).moved(y=1.0).turned(0.5 * np.pi)
+    assert turned.vertices.mean(axis=0) == pytest.approx([0.0, 0.0, 1.0], abs=1e-6)
+    w, x, y, z = solids.about_x(0.5 * np.pi)
+    assert (2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x)) == pytest.approx((0.0, 0.0, 1.0))
+
+
+@pytest.mark.parametrize("turn", [-0.6, -0.2, 0.0, 0.3, 0.6])
+def test_the_rod_keeps_its_length(turn):
+    _, at_rest = drivetrain._rod_of(0.0)
+    pin, rod = drivetrain._rod_of(turn)
+    assert np.hypot(*rod) == pytest.approx(np.hypot(*at_rest), rel=1e-9)
+    assert pin[1] == pytest.approx(drivetrain._SCREW_Z + drivetrain._PIN_Z)
+    assert (pin[0] > drivetrain._NUT_X) == (turn > 0.0) or turn == 0.0
+
+
+@pytest.mark.parametrize("largest, factor", [(0.005, 100.0), (0.03, 20.0), (0.2, 3.0), (2.0, 1.0), (0.0, 1.0)])
+def test_motion_is_enlarged_by_round_numbers(largest, factor):
+    assert enlargement(largest) == factor
+
+
+def test_a_run_is_shown_as_it_is(actuator):
+    run, k = run_of(actuator, k3=0.5)
+    shown = motion(run, k, actuator)
+    assert np.array_equal(shown.motor_rad, run["motor_position_rad"]), "the rotor is to scale"
+    assert shown.surface_rad == pytest.approx(100.0 * run["user_position_rad"])
+    assert shown.turns == (0.5, 1.0, 1.0)
+    brightest = np.abs(shown.glow).max()
+    assert 0.5 < brightest <= 1.001
+    phase_a = run["phase_a_current_A"]
+    assert shown.glow[:, 0] * shown.full_A == pytest.approx(phase_a)
+    assert "× 100" in shown.sentence() and f"{shown.full_A:g} A" in shown.sentence()
+
+
+def test_play_moves_the_nut_from_one_jaw_to_the_other(actuator):
+    loose = motion(*run_of(actuator, k2=0.8), actuator)
+    tight = motion(*run_of(actuator), actuator)
+    assert loose.room > 10.0 * tight.room > 0.0
+    assert loose.play.max() > 0.45 * loose.room and loose.play.min() < -0.45 * loose.room
+    assert np.all(np.abs(loose.play) <= 0.5 * loose.room + 1e-12)
+
+
+def test_friction_heats_the_screw_and_nothing_else_does(actuator):
+    assert np.all(motion(*run_of(actuator, k2=0.5, k6=0.5), actuator).heat == 0.0)
+    hot = motion(*run_of(actuator, k1=1.0), actuator).heat
+    assert 0.3 < hot.min() and hot.max() == pytest.approx(1.0)
+
+
+def test_playback_plays_pauses_and_seeks(actuator):
+    run, k = run_of(actuator, k6=0.4)
+    scene, told = Recorder(), []
+    playback = Playback(scene, actuator, lambda time_s, duration_s: told.append((time_s, duration_s)))
+    try:
+        playback.show(Simulation(run, run, k, 0.0))
+        time.sleep(0.5)
+        assert len(scene.poses) > 5 and scene.damages[-1][1] == pytest.approx(0.4)
+        times = [time_s for time_s, _ in told]
+        assert times == sorted(times) and 0.0 < times[-1] < 0.2, "ten times slower than life"
+        playback.play(False)
+        time.sleep(0.15)
+        resting = len(scene.poses)
+        playback.seek(0.25)
+        time.sleep(0.15)
+        assert len(scene.poses) == resting + 1 and told[-1] == (0.25, pytest.approx(0.5))
+        assert scene.poses[-1][0] == pytest.approx(np.interp(0.25, run.time_s, run["motor_position_rad"]))
+        playback.seek(float("nan"))
+        playback.seek(99.0)
+        time.sleep(0.15)
+        assert told[-1][0] == pytest.approx(0.5), "no further than the end"
+    finally:
+        playback.close()
+
+
+def test_a_shorter_run_is_played_from_within(actuator):
+    scene = Recorder()
+    playback = Playback(scene, actuator, lambda *_: None)
+    try:
+        playback.play(False)
+        for duration in (0.5, 0.1):
+            run = simulate_reference(Run(command("step"), duration), actuator)
+            playback.show(Simulation(run, run, vector({}), 0.0))
+            playback.seek(0.4)
+            time.sleep(0.15)
+        assert playback.time_s == pytest.approx(0.1)
+    finally:
+        playback.close()
+
+
+def test_coils_burn_from_the_first_shorted_turn_on():
+    drawn = SimpleNamespace(batched_colors=None)
+    one = object.__new__(motor.Motor)
+    one._phase_of, one._layer_of, _ = motor._coil_places()
+    one._coils, one._drawn = drawn, np.zeros((len(one._phase_of), 3), np.uint8)
+    for turns, burnt in (((1.0, 1.0, 1.0), 0), ((0.97, 1.0, 1.0), 2), ((0.5, 1.0, 0.25), 8 + 12), ((0.02, 1, 1), 16)):
+        one.damage(turns, 0.0, 0.0)
+        one.glow((0.0, 1.0, 0.5))
+        black = np.all(drawn.batched_colors == motor._BURNT, axis=1)
+        assert black.sum() == burnt and not np.any(black[one._phase_of == 1])
+
+
+@pytest.mark.browser
+def test_the_rotor_in_the_browser_follows_the_run_at_a_pace(page, app):
+    """Poses that reach the browser; drawing them all at 25/s needs two free cores and is measured in benchmarks."""
+    page.evaluate(
+        """() => { window.__poses = new Set(); const watch = () => {
+             const pose = window.__viserMutable.nodePoseData['/actuator/motor/axis/rotor'];
+             if (pose) window.__poses.add(String(pose.wxyz)); requestAnimationFrame(watch); }; watch(); }"""
+    )
+    app.strip.play(True)
+    page.wait_for_timeout(3000)
+    assert page.evaluate("window.__poses.size") > 9

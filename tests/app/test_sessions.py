@@ -1,0 +1,232 @@
+"""Everything on the page as one file: round trips, what is refused, reloads, and two tabs in step."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+import zipfile
+
+import numpy as np
+import pytest
+
+from ema_model.actuator import load_actuator
+from ema_model.commands import command
+from ema_model.errors import InputError
+from ema_model.faults import HEALTHY
+from ema_model.measurement import write_measurement
+from ema_model.simulation import Run, simulate_reference
+from emaviz import session_file
+from emaviz.data_folder import DataFolder
+from emaviz.session_file import Part
+from emaviz.state import Settings
+
+
+def changed_settings():
+    settings = Settings()
+    for index, value in enumerate((0.1, 0.2, 0.3, 0.0, 0.05, 0.4, 0.6, 0.7)):
+        settings.set_fault(index, value)
+    settings.set_command("multisine")
+    settings.set_command_setting("multisine", "frequencies_Hz", "1+3")
+    settings.set_command_setting("chirp", "end_Hz", 20.0)
+    settings.set_duration(0.3)
+    settings.set_load(4.0)
+    settings.set_noise(0.25)
+    settings.set_encoder(12)
+    settings.set_start_offset(0.01)
+    settings.set_start_speed(5.0)
+    settings.set_start_side(-0.5)
+    settings.set_effect("cogging_torque", "amplitude_Nm", 0.012)
+    settings.set_monitor("same faults")
+    settings.set_source("uploads/a.csv")
+    settings.set_algorithms(["do", "robust"])
+    settings.set_population(20)
+    settings.set_iterations(33)
+    settings.set_fitness("raw")
+    settings.set_seed(9)
+    return settings
+
+
+def test_settings_survive_json_and_nothing_is_left_out():
+    settings, fresh = changed_settings(), Settings()
+    unchanged = [name for name in vars(fresh) if np.all(getattr(settings, name) == getattr(fresh, name))]
+    assert not unchanged, "the test changes every setting"
+    back = Settings()
+    back.restore(json.loads(json.dumps(settings.saved())))
+    assert np.array_equal(back.k, settings.k)
+    assert {n: v for n, v in vars(back).items() if n != "k"} == {n: v for n, v in vars(settings).items() if n != "k"}
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        None,
+        [],
+        {"k": [1.0] * 9},
+        {"k": "abcdefgh"},
+        {"k": [math.nan] * 8},
+        {"duration_s": 1e9},
+        {"command": "../x"},
+        {"command_settings": {"nothing": {"a": 1}}},
+        {"command_settings": {"chirp": {"colour": 1}}},
+        {"command_settings": 7},
+        {"effects": {"no_such_effect": {"a": 1}}},
+        {"algorithms": []},
+        {"algorithms": "robust"},
+        {"source": 7},
+        {"seed": -1},
+    ],
+)
+def test_damaged_settings_are_refused_and_change_nothing(damage):
+    settings = changed_settings()
+    before = json.dumps(settings.saved())
+    with pytest.raises(InputError) as told:
+        settings.restore(damage)
+    assert "\n" not in str(told.value) and json.dumps(settings.saved()) == before
+
+
+@pytest.fixture
+def folder(tmp_path):
+    return DataFolder(tmp_path / "data")
+
+
+def test_a_session_carries_its_files_to_another_folder(folder, tmp_path):
+    (folder.uploads / "a.csv").write_text("time_s,current_A\n0,1\n")
+    (folder.uploads / "a.toml").write_text("# side\n")
+    (folder.uploads / "left.csv").write_text("not part of it")
+    saved = {"a": Part(lambda: {"x": [1, 2]}, lambda *_: None)}
+    path = session_file.free_path(folder, "my session")
+    session_file.write(path, saved, folder, ["uploads/a.csv", "uploads/gone.csv", "../../etc/passwd"])
+    assert path.name == "my session.emaviz"
+    with zipfile.ZipFile(path) as archive:
+        assert sorted(archive.namelist()) == ["files/uploads/a.csv", "files/uploads/a.toml", "session.json"]
+
+    other = DataFolder(tmp_path / "other")
+    (other.uploads / "a.csv").write_text("another file of this name")
+    taken = []
+    session_file.read(path, {"a": Part(dict, lambda said, names: taken.append((said, dict(names))))}, other)
+    assert taken == [({"x": [1, 2]}, {"uploads/a.csv": "uploads/a-2.csv"})]
+    assert (other.uploads / "a-2.csv").read_text() == (folder.uploads / "a.csv").read_text()
+    assert (other.uploads / "a-2.toml").read_text() == "# side\n"
+    assert (other.uploads / "a.csv").read_text() == "another file of this name"
+    session_file.read(path, {}, other)
+    session_file.read(path, {}, folder)
+    assert len(list(folder.uploads.glob("*.csv"))) == 2, "what is there already is not kept twice"
+
+
+def archive_with(path, files):
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in files.items():
+            archive.writestr(name, content)
+    return path
+
+
+GOOD = json.dumps({"schema": 1, "files": []})
+
+
+def test_what_is_no_session_is_refused_in_one_line(folder, tmp_path, monkeypatch):
+    path = tmp_path / "x.emaviz"
+    path.write_bytes(b"nothing of the kind")
+    cases = [(path, "is no session")]
+    cases.append((archive_with(tmp_path / "a.emaviz", {"other.json": "{}"}), "is no session"))
+    cases.append((archive_with(tmp_path / "b.emaviz", {"session.json": "{"}), "is no session"))
+    cases.append((archive_with(tmp_path / "c.emaviz", {"session.json": '{"schema": 99}'}), "another version"))
+    cases.append((tmp_path / "none.emaviz", "is no session"))
+    cut = archive_with(tmp_path / "d.emaviz", {"session.json": GOOD, "files/uploads/a.csv": "x" * 999})
+    cut.write_bytes(cut.read_bytes()[:-30])
+    cases.append((cut, "is no session"))
+    for file, message in cases:
+        with pytest.raises(InputError, match=message) as told:
+            session_file.read(file, {}, folder)
+        assert "\n" not in str(told.value)
+    monkeypatch.setattr(session_file, "MOST_BYTES", 1000)
+    bomb = archive_with(tmp_path / "e.emaviz", {"session.json": GOOD, "files/uploads/a.csv": "0" * 5000})
+    with pytest.raises(InputError, match="too much for a session"):
+        session_file.read(bomb, {}, folder)
+
+
+def test_files_of_a_session_stay_inside_the_data_folder(folder, tmp_path):
+    document = json.dumps({"schema": 1, "files": ["../../evil.csv", "/etc/evil.csv", "uploads/evil.exe"]})
+    files = {"session.json": document, "files/../../evil.csv": "1", "files//etc/evil.csv": "2"}
+    session_file.read(archive_with(tmp_path / "a.emaviz", files), {}, folder)
+    outside = [p for p in tmp_path.rglob("*evil*") if not p.is_relative_to(folder.folder)]
+    assert not outside and {p.parent.name for p in folder.folder.rglob("*evil*")} == {"uploads"}
+    files["files/uploads/evil.exe"] = "3"
+    with pytest.raises(InputError, match="evil"):
+        session_file.read(archive_with(tmp_path / "b.emaviz", files), {}, folder)
+
+
+# --- in the browser ---------------------------------------------------------------------------------------------------
+
+
+def wait_until(condition, seconds=30.0):
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+def slider(page, label):
+    found = page.locator("label", has_text=label).first
+    row = found.locator("xpath=ancestor::div[contains(@class,'mantine-Flex-root')][1]")
+    return row.locator("input:not([type=hidden])").first
+
+
+@pytest.mark.browser
+def test_two_tabs_stay_in_step_and_a_reload_keeps_the_state(page, app, browser):
+    other = browser.new_page(viewport={"width": 1400, "height": 900})
+    other.goto(app.address)
+    other.get_by_role("tab", name="Explore").wait_for(timeout=60_000)
+    box = slider(page, "k1")
+    box.fill("0.35")
+    box.press("Enter")
+    wait_until(lambda: app.session.settings.k[0] == 0.35)
+    wait_until(lambda: float(slider(other, "k1").input_value()) == 0.35)
+    other.get_by_label("Load torque [N·m]", exact=True).fill("7")
+    other.get_by_label("Load torque [N·m]", exact=True).press("Enter")
+    wait_until(lambda: page.get_by_label("Load torque [N·m]", exact=True).input_value() == "7")
+    other.close()
+    page.reload()
+    page.get_by_role("tab", name="Explore").wait_for(timeout=60_000)
+    wait_until(lambda: float(slider(page, "k1").input_value()) == 0.35)
+    assert page.get_by_label("Load torque [N·m]", exact=True).input_value() == "7"
+    assert app.session.settings.load_torque_Nm == 7.0
+
+
+@pytest.mark.browser
+def test_a_session_is_saved_and_loaded_with_all_that_is_on_the_page(page, app, tmp_path):
+    run = simulate_reference(Run(command("chirp", {}), 0.2), load_actuator(), HEALTHY)
+    write_measurement(run, app.comparing.folder.uploads / "bench.csv")
+    settings = app.session.settings
+    app.comparing.add("uploads/bench.csv")
+    wait_until(lambda: "uploads/bench.csv" in app.comparing.opened)
+    saved = changed_settings().saved() | {"source": "uploads/bench.csv", "fitness": "filtered"}
+    settings.restore(saved)
+    app.comparing.calibrate = False
+    page.get_by_role("tab", name="Recordings").click()
+    slider(page, "Session name").fill("mine")
+    page.wait_for_timeout(300)
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Save session").click()
+    copy = tmp_path / "copy.emaviz"
+    download.value.save_as(copy)
+    kept = app.comparing.folder.sessions / "mine.emaviz"
+    wait_until(kept.is_file)
+    assert kept.read_bytes() == copy.read_bytes()
+
+    settings.restore(Settings().saved())
+    app.comparing.calibrate = True
+    app.comparing.remove("uploads/bench.csv")
+    page.get_by_role("button", name="Load session").click()
+    wait_until(lambda: settings.saved() == saved)
+    wait_until(lambda: "uploads/bench.csv" in app.comparing.opened and not app.comparing.calibrate)
+    page.get_by_role("tab", name="Explore").click()
+    wait_until(lambda: float(slider(page, "k6").input_value()) == 0.4)
+    wait_until(lambda: page.get_by_label("Duration [s]", exact=True).input_value() == "0.3")
+    assert page.get_by_label("Command", exact=True).input_value() == "Multisine"
+    page.get_by_role("tab", name="Identify").click()
+    assert page.get_by_label("Iterations", exact=True).input_value() == "33"
+    assert page.get_by_label("Dandelion", exact=True).is_checked()
+    assert not page.get_by_label("Honey Badger", exact=True).is_checked()
+    assert page.get_by_label("Identify", exact=True).input_value() == "uploads/bench.csv"
+    settings.restore(Settings().saved())

@@ -52,6 +52,7 @@ from emaviz.worker import Worker
 _FASTEST_REDRAW_S = 0.05
 _SLOW_REDRAW_S = 0.3  # of what nobody watches while dragging
 _LEFT_PX, _RIGHT_PX, _VIEWER_PX = 380, 500, 640
+_SETTLE_S = 0.15
 _BRAND = (47, 111, 222)
 
 
@@ -136,7 +137,7 @@ class App:
         self._right += [self._search_panel, self._recordings_panel]
         for panel in self._right:
             panel.dock_right()
-            panel.set_width(_VIEWER_PX if panel is self._recordings_panel else _RIGHT_PX)
+            panel.set_width(self._width(panel))
         builders = [
             lambda tabs: self._build_explore(tabs),
             lambda tabs: self._build_identify(tabs, search),
@@ -187,10 +188,15 @@ class App:
 
     def _bring(self, panel: viser.PanelHandle) -> None:
         """To the front, on the right; the others give way."""
+        changed = not panel.visible
         for one in self._right:
             if one.visible != (one is panel):
                 one.visible = one is panel
-                one.set_width(_VIEWER_PX if one is self._recordings_panel else _RIGHT_PX)  # lost while it was hidden
+        if changed:  # a panel that was hidden comes back narrow, and takes a width once it is there
+            threading.Timer(_SETTLE_S, lambda: panel.set_width(self._width(panel))).start()
+
+    def _width(self, panel: viser.PanelHandle) -> int:
+        return _VIEWER_PX if panel is self._recordings_panel else _RIGHT_PX
 
     def _hold(self, comparison: Comparison, recording: int, time_s: float) -> None:
         self.strip.play(False)

@@ -230,7 +230,7 @@ def test_a_race_is_watched_paused_and_looked_back_at(page, app):
     assert np.all(np.diff(curves[1:], axis=1) <= 1e-9) and np.all(curves[1:] > 0.0)
 
     last = page.evaluate(pictures)
-    box = page.locator("label", has_text="Iteration").last
+    box = page.locator('label:text-is("Iteration")')
     box = box.locator("xpath=ancestor::div[contains(@class,'mantine-Flex-root')][1]").locator(
         "input:not([type=hidden])"
     )

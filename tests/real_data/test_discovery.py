@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import pytest
-
 from ema_model.actuator import load_actuator
 from ema_model.discovery import discover
 from ema_model.recordings import read_recording

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from ema_model.comparison.result import Explanation
-from ema_model.discovery import Candidate, Story, begun, result_of
+from ema_model.discovery import Candidate, Story, begun, result_of, walk
 from ema_model.discovery.experiments import next_experiment
 from ema_model.discovery.result import Experiment
 from ema_model.discovery.story import Step, with_drops
@@ -21,7 +21,6 @@ from emaviz.discovery_keep import keep
 from emaviz.discovery_look import Assessment, Look, assessed, look_at
 from emaviz.discovery_run import DiscoverEvents, DiscoveryRun, Tell
 from emaviz.discovery_source import NOTHING, DiscoverySource
-from emaviz.discovery_walk import walk
 from emaviz.session import Session
 from emaviz.worker import Worker
 
@@ -77,6 +76,7 @@ class Discovering:
             given = self.source.read()
             story = begun(given.fitted, given.actuator, given.held, given.signals, tell)
             self._story, self._first, self.experiment = story, (), None
+            self.source.revealed = False
             self._known, self._trials = {}, {}
             self._assess(tell)
 

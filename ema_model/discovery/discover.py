@@ -7,6 +7,7 @@ when the data pay for its parameters (ΔBIC), on most stretches of time, materia
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -47,6 +48,33 @@ def discover(
     story = begun(measurements, actuator or load_actuator(), holdout, signals, tell)
     if not story.repeatable:
         return result_of(story)
+    walked = walk(story, tell, candidates=candidates, most_effects=most_effects)
+    experiment = None
+    if walked.rivals:
+        tell("looking for a test that tells the rivals apart")
+        experiment = next_experiment(story.data, walked.rivals[0].fit, walked.rivals[1].fit)
+        if experiment is None:
+            names = " from ".join(trial.candidate.name for trial in walked.rivals[:2])
+            story.warnings.append(f"No command within the range of these recordings tells {names}.")
+    return result_of(story, walked.candidates, walked.unknown, experiment)
+
+
+@dataclass(frozen=True)
+class Walked:
+    """What a walk saw besides the story's own steps."""
+
+    candidates: Sequence[Candidate]  # of its first round, the best first
+    rivals: Sequence[Trial]  # that could not be told apart, the chosen one first
+    unknown: Explanation | None  # what the last model leaves, or what the curve stands for
+
+
+def walk(
+    story: Story, tell: Progress = lambda text: None, *, candidates: Sequence[str] | None = None, most_effects: int = 3
+) -> Walked:
+    """Goes on by itself from where a story stands: adds what pays, takes out what became idle, draws what is unknown.
+
+    tell is told after each step, too, and may raise to stop; the story then stands at its last whole step.
+    """
     first: list[Candidate] = []
     rivals: list[Trial] = []
     curve: Trial | None = None
@@ -75,14 +103,7 @@ def discover(
     unknown = story.left().explanation
     if unknown is not None and not _named(story):
         unknown = _with_curve(story, curve, unknown, tell)
-    experiment = None
-    if rivals:
-        tell("looking for a test that tells the rivals apart")
-        experiment = next_experiment(story.data, rivals[0].fit, rivals[1].fit)
-        if experiment is None:
-            names = " from ".join(trial.candidate.name for trial in rivals[:2])
-            story.warnings.append(f"No command within the range of these recordings tells {names}.")
-    return result_of(story, first, unknown, experiment)
+    return Walked(first, rivals, unknown)
 
 
 def _chosen(accepted: Sequence[Trial]) -> tuple[Trial, list[Trial]]:
@@ -118,14 +139,17 @@ def _with_curve(story: Story, curve: Trial | None, unknown: Explanation, tell: P
     Parameters that only bent toward it go back: the curve is drawn beside the calibrated model, if one can be.
     """
     bent = story.steps[1:]
+    whole = None
     if bent:
-        story.restart()
-        whole = story.left().explanation
-        curve = story.curve(whole, tell)
-        if curve is None or whole is None:
+        try:
+            story.restart()
+            whole = story.left().explanation
+            curve = story.curve(whole, tell)
+        finally:  # also when it was stopped
             story.steps += bent
-        else:
-            unknown = whole
+    if bent and curve and whole:
+        story.restart()
+        unknown = whole
     curve = curve or story.curve(unknown, tell)
     if curve:
         story.add(curve)

@@ -151,7 +151,7 @@ class IdentifyPanel:
             at = "done" if track.answer else f"iteration {len(track.rmse) - 1} of {track.iterations}"
             lines.append(_line(f"{_title(name)} · {at} · rmse {track.rmse[-1]:.4f} A"))
         if race.growing is not None and not self._link.content:
-            self._link.content = recording_link(self._viewer, race.growing, "Watch it live in Rerun ↗")
+            self._link.content = recording_link(self._viewer, race.growing, "Watch it live ↗")
         self._text.content = "".join(lines)
 
     def _draw_answer(self, race: Race) -> None:

@@ -24,6 +24,7 @@ def page(browser: Any, app: App) -> Iterator[Any]:
     """A browser tab on the app, its controls and charts drawn, that failed on no request to elsewhere."""
     tab = browser.new_page(viewport={"width": 1400, "height": 900})
     asked: list[str] = []
+    app.session.refresh()  # brings the signals to the front, where an earlier test may have left another panel
     tab.on("request", lambda request: asked.append(request.url))
     tab.goto(app.address)
     tab.get_by_role("tab", name="Explore").wait_for(timeout=60_000)

@@ -10,14 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.comparison.assemble import residuals_of
+from ema_model.comparison.explain import explain
 from ema_model.comparison.residuals import Residuals
+from ema_model.comparison.result import Explanation
 from ema_model.comparison.verdict import ORDER_OF_PRIMARY
 from ema_model.discovery import Candidate, Discovery, Story
-from ema_model.discovery.left import Left
+from ema_model.discovery.left import Left, residuals_left
 from ema_model.discovery.result import Added
 from ema_model.discovery.story import alike
 from ema_model.discovery.trial import LEAST_BIC
 from ema_model.effects import find
+from emaviz.figures.discovery_tracks import primary
 
 Array = NDArray[np.float64]
 
@@ -34,6 +37,7 @@ class Assessment:
     candidates: Sequence[Candidate]
     signatures: Mapping[str, Array]  # (values,) over the floor
     alike: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    explained: Sequence[Explanation] = ()  # all that was tried to explain the primary signal's residual
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +54,7 @@ class Look:
     assessment: Assessment | None = None
     reach: tuple[str, ...] = ()  # names of recordings: fitted
     held: tuple[str, ...] = ()  # and held out
+    explained_before: Sequence[Explanation] = ()  # the calibrated model's residual, before any step
 
     @property
     def rmse(self) -> float:
@@ -75,6 +80,10 @@ class Look:
 
     def predicted_rmse(self, one: Candidate) -> float:
         """The error with a candidate in the model, in floors, before any refit."""
+        return min(self.error_with(one), self.rmse)
+
+    def error_with(self, one: Candidate) -> float:
+        """The same of a candidate that may make it worse."""
         squared, counted = 0.0, 0.0
         for signal in self.weights[0]:
             left, change = self.residuals.values.get(signal), self.change(one, signal)
@@ -82,7 +91,7 @@ class Look:
                 return self.rmse
             squared += float(np.sum(self.counts * ((left - change) / self.residuals.sigma[signal]) ** 2))
             counted += float(np.sum(self.counts))
-        return min(math.sqrt(squared / counted), self.rmse) if counted else self.rmse
+        return math.sqrt(squared / counted) if counted else self.rmse
 
     def share(self, one: Candidate) -> float:
         """Of the error, that a candidate would take away, 0 … 1."""
@@ -101,8 +110,7 @@ class Look:
     @property
     def primary(self) -> str:
         """The signal whose residual tells most."""
-        fitted = self.found.ladder[0].signals
-        return next((name for name in ORDER_OF_PRIMARY if name in fitted), next(iter(fitted)))
+        return primary(self.found)
 
     def change(self, one: Candidate, signal: str) -> Array | None:
         """What a candidate would change in a signal, (blocks,) beside `residuals`, in the signal's unit."""
@@ -126,11 +134,14 @@ def assessed(story: Story) -> Assessment:
     worth = [one for one in ranked if not one.untestable_reason]
     signatures = story.signatures(worth)
     rivals = {one.name: signatures[one.name] for one in worth if one.predicted_drop > _RIVAL and one.name in signatures}
-    return Assessment(left, ranked, signatures, alike(rivals))
+    residuals = residuals_left(story.data, story.current)
+    first = next(name for name in ORDER_OF_PRIMARY if name in residuals.values)
+    explained = explain(residuals, first, story.current.actuator.axes)
+    return Assessment(left, ranked, signatures, alike(rivals), explained)
 
 
-def look_at(story: Story, found: Discovery, assessment: Assessment | None) -> Look:
-    """A picture of a story that later steps leave as it is."""
+def look_at(story: Story, found: Discovery, assessment: Assessment | None, first: Assessment | None = None) -> Look:
+    """A picture of a story that later steps leave as it is; first: of its calibrated model."""
     fit, data = story.current, story.data
     known: list[dict[str, Array]] = [{} for _ in fit.plant.windows]
     weights, sigmas = [], []
@@ -149,4 +160,5 @@ def look_at(story: Story, found: Discovery, assessment: Assessment | None) -> Lo
         assessment=assessment,
         reach=tuple(one.name for one in data.measurements),
         held=() if story.held is None else tuple(one.name for one in story.held.measurements),
+        explained_before=first.explained if first is not None else (),
     )

@@ -183,6 +183,7 @@ def _calibration(before: Actuator, after: Actuator, recordings: Sequence[Compare
         starts={f"turned {i}": start for i in range(len(recordings))},
         actuator=after,
         k=np.zeros(8),
+        residual=np.zeros(0),
         chi2_per_value=1.3,
         signals=[one.model for one in recordings],
         before=[one.initial for one in recordings],

@@ -72,6 +72,7 @@ class Calibration:
     starts: dict[str, Calibrated]  # of the windows: "turned 0" and "play 0", rad at the motor
     actuator: Actuator  # with the fitted values
     k: Array  # (8,)
+    residual: Array  # (values,), model − measurement over the floor that weights the fit
     chi2_per_value: float  # of the signals over the floor they are weighted by
     signals: list[dict[str, Array]]  # the fitted model's, per window, (blocks,) each
     before: list[dict[str, Array]]  # the file's own model's
@@ -82,6 +83,11 @@ class Calibration:
     evaluations: int
     confounded: tuple[tuple[str, str], ...]  # pairs that trade against each other
     free: tuple[str, ...]
+
+    def start_of(self, window: int | None) -> tuple[float, float]:
+        """Where a fitted window began: the motor's angle and its place in the play, rad at the motor; 0 if unknown."""
+        turned, play = (self.starts.get(f"{kind} {window}") for kind in ("turned", "play"))
+        return 0.0 if turned is None else turned.value, 0.0 if play is None else play.value
 
     @property
     def outside_tolerance(self) -> tuple[str, ...]:
@@ -127,6 +133,7 @@ def calibrate(
         starts={name: one for name, one in found.items() if name not in chosen},
         actuator=actuator,
         k=fitted_k,
+        residual=fit.residual,
         chi2_per_value=chi2,
         signals=[{name: values[0] for name, values in one.items()} for one in after],
         before=[{name: values[0] for name, values in one.items()} for one in before],
@@ -143,6 +150,7 @@ def calibrate(
 @dataclass(frozen=True, eq=False)
 class _Found:
     x: Array
+    residual: Array  # (values,)
     jacobian: Array
     chi2: float  # of the signals, per value
     cost: float
@@ -176,7 +184,7 @@ class _Search:
         count = len(self.problem.unknowns)
         if not count:
             fun = self.problem.residual(np.zeros(0))
-            return _Found(np.zeros(0), np.zeros((len(fun), 0)), float(fun @ fun) / self.problem.values, 0.0, True)
+            return _Found(np.zeros(0), fun, np.zeros((len(fun), 0)), float(fun @ fun) / self.problem.values, 0.0, True)
         if start is not None:
             starts = [np.array([start.get(u.name, 0.0) for u in self.problem.unknowns])]
         else:
@@ -216,7 +224,7 @@ class _Search:
         x = best.x
         fun, jacobian = self.problem.linearised(x)  # the fit's own are weighted by its loss
         chi2 = float(fun @ fun - x @ x) / self.problem.values
-        return _Found(x, jacobian, chi2, float(best.cost), bool(best.status > 0 and agree))
+        return _Found(x, fun[: self.problem.values], jacobian, chi2, float(best.cost), bool(best.status > 0 and agree))
 
 
 def _promising(problem: Problem) -> Array:

@@ -86,7 +86,7 @@ def floor(
         assert isinstance(plant, ClosedLoop)
         model = _twins(plant, window, k, names)
     slow = {name: np.hypot(model[name], known[name].get("accuracy", 0.0)) for name in names}
-    return Floor(noise, slow, _repeats(window, noise), window.block_s)
+    return Floor(noise, slow, repeats_of(window, noise), window.block_s)
 
 
 def twin_error(plant: ClosedLoop, window: Window, actuator: Actuator, k: ArrayLike = HEALTHY) -> dict[str, Array]:
@@ -124,7 +124,7 @@ def _twins(plant: ClosedLoop, window: Window, k: ArrayLike, names: list[str]) ->
     return {name: np.sqrt(np.maximum(uniform_filter1d(error[name] ** 2, width, mode="nearest"), 0.0)) for name in names}
 
 
-def _repeats(window: Window | Stretch, noise: Mapping[str, float]) -> Array:
+def repeats_of(window: Window | Stretch, noise: Mapping[str, float]) -> Array:
     """Blocks over which the model's error stays alike: 25 ms, or as long as the motor stands, (blocks,)."""
     repeats = np.full(window.blocks, max(1.0, CORRELATED_S / window.block_s))
     name = next((name for name in _POSITIONS if name in window.measured), None)

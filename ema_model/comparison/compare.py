@@ -170,13 +170,9 @@ def _everywhere(
     started = {window.first: i for i, window in enumerate(fitted.windows)}
     for window in plant.windows:
         i = started.get(window.first)
-        turned, play = (
-            calibration.starts[f"{kind} {i}"].value if i is not None and f"{kind} {i}" in calibration.starts else 0.0
-            for kind in ("turned", "play")
-        )
         for target, model, faults, start in (
             (before, actuator, k, (0.0, 0.0)),
-            (after, calibration.actuator, calibration.k, (turned, play)),
+            (after, calibration.actuator, calibration.k, calibration.start_of(i)),
         ):
             signals: Any = plant.signals  # each plant knows its own windows
             one = signals(window, model, faults, *start)

@@ -17,8 +17,9 @@ from ema_model.discovery.experiments import next_experiment
 from ema_model.discovery.harmonics import is_periodic, with_further_orders
 from ema_model.discovery.result import Candidate, Discovery, Experiment
 from ema_model.discovery.story import Story, begun, with_drops
-from ema_model.discovery.trial import LEAST_BIC, Trial, pays
+from ema_model.discovery.trial import LEAST_BIC, Trial, fitted_count, pays
 from ema_model.discovery.unknown import curve_instead, is_a_shape
+from ema_model.discovery.worded import masked, untold
 from ema_model.effects import CATALOGUE, find
 from ema_model.measurement import Measurement
 
@@ -54,8 +55,7 @@ def discover(
         tell("looking for a test that tells the rivals apart")
         experiment = next_experiment(story.data, walked.rivals[0].fit, walked.rivals[1].fit)
         if experiment is None:
-            names = " from ".join(trial.candidate.name for trial in walked.rivals[:2])
-            story.warnings.append(f"No command within the range of these recordings tells {names}.")
+            story.warnings.append(untold(*(trial.candidate.name for trial in walked.rivals[:2])))
     return result_of(story, walked.candidates, walked.unknown, experiment)
 
 
@@ -128,8 +128,7 @@ def _drop_idle(story: Story, tell: Progress) -> None:
     for one in story.added[:-1]:
         tell(f"trying without {one.name}")
         smaller = story.without(one.key, tell)
-        count = sum(not parameter.integer for parameter in find(one.key).parameters)
-        if smaller.chi2 - story.current.chi2 < count * np.log(len(smaller.residual)) + LEAST_BIC:
+        if smaller.chi2 - story.current.chi2 < fitted_count(one.key) * np.log(len(smaller.residual)) + LEAST_BIC:
             story.remove(one.key, smaller)
 
 
@@ -185,7 +184,7 @@ def result_of(
         unknown=unknown,
         curve=next((one for one in story.added if one.name not in CATALOGUE), None),
         next_experiment=experiment,
-        warnings=[*story.warnings, *_masked(story)],
+        warnings=[*story.warnings, *masked(story.added, calibration.actuator.axes)],
     )
 
 
@@ -197,18 +196,6 @@ def _verdict(story: Story, unknown: Explanation | None) -> str:
     if not story.base.calibration.converged and not story.added:
         return "not_converged"  # an unfinished fit looks exactly like missing physics
     return "adequate" if unknown is None else "unknown_effect"
-
-
-def _masked(story: Story) -> list[str]:
-    """Warnings of parameters that had been standing in for an effect."""
-    axes = story.current.actuator.axes
-    return [
-        f"{axes.path(moved.path)} had been standing in for {one.name}: it stood {moved.before:+.1f} σ from the file's "
-        f"value and is at {moved.after:+.1f} σ now."
-        for one in story.added
-        for moved in one.stood_in
-        if moved.path != find(one.name).duplicates
-    ]
 
 
 def settings_of(found: Discovery) -> Mapping[str, Mapping[str, float]]:

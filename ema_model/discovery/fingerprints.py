@@ -119,9 +119,7 @@ def _changes(data: Data, found: Fit, lanes: list[Lane], switchable: bool) -> Arr
     k = np.tile(np.asarray(HEALTHY, float), (len(lanes) + 1, 1))
     parts = []
     for i, (window, one) in enumerate(zip(plant.windows, data.floors)):
-        starts = found.calibration.starts
-        at = [starts[f"{kind} {i}"].value if f"{kind} {i}" in starts else 0.0 for kind in ("turned", "play")]
-        shown = plant.signals(window, model, k, *at)  # pyright: ignore[reportArgumentType]
+        shown = plant.signals(window, model, k, *found.calibration.start_of(i))  # pyright: ignore[reportArgumentType]
         parts += [
             shown[name] * (data.signals[name] / one.fit_sigma(name)) for name in data.signals if name in window.measured
         ]

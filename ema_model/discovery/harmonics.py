@@ -9,7 +9,7 @@ from ema_model.discovery.fitting import Data, Fit
 from ema_model.discovery.result import Candidate
 from ema_model.discovery.score import scored_together
 from ema_model.discovery.trial import LEAST_BIC, Trial, pays, tried
-from ema_model.effects import find
+from ema_model.effects import catalogue_name, find
 
 _MOST = 5  # further orders
 _SHARE = 0.05  # of the strongest one's predicted drop
@@ -24,7 +24,8 @@ def with_further_orders(
     data: Data, held: Data | None, current: Fit, name: str, tell: Callable[[str], None]
 ) -> Trial | None:
     """The model with the effect at further orders as well, if the data pay for them: all at once, or the best alone."""
-    known = {values.get("order") for effect, values in current.actuator.effects.items() if effect.startswith(name)}
+    present = current.actuator.effects.items()
+    known = {values.get("order") for effect, values in present if catalogue_name(effect) == name}
     order = next(parameter for parameter in find(name).parameters if parameter.name == "order")
     tell(f"scoring further orders of {name}")
     left = [h for h in range(int(order.low), int(order.high) + 1) if h not in known]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 from ema_model.comparison.assemble import residuals_of
 from ema_model.comparison.compare import known_error
@@ -26,6 +27,7 @@ class Left:
     orders: list[int]  # that a periodic effect may have, the strongest first
 
 
+@lru_cache(maxsize=4)  # a walk asks before and after it has looked for the next effect
 def left_by(data: Data, found: Fit) -> Left:
     """What a fit leaves."""
     residuals = residuals_left(data, found)

@@ -38,9 +38,7 @@ def with_divergence(data: Data, found: Fit) -> tuple[Data, float]:
     k = np.tile(np.asarray(HEALTHY, float), (2, 1))
     floors, lost = [], []
     for i, (window, one) in enumerate(zip(plant.windows, data.floors)):
-        starts = found.calibration.starts
-        turned, play = (starts[f"{kind} {i}"].value if f"{kind} {i}" in starts else 0.0 for kind in ("turned", "play"))
-        shown = plant.signals(window, neighbour, k, turned, play)
+        shown = plant.signals(window, neighbour, k, *found.calibration.start_of(i))
         width = max(3, round(CORRELATED_S / window.block_s) | 1)
         apart = {
             name: np.sqrt(np.maximum(uniform_filter1d((shown[name][1] - shown[name][0]) ** 2, width), 0.0))

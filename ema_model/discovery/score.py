@@ -6,7 +6,7 @@ A fingerprint counts only as far as the calibrated parameters, within their prio
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +39,21 @@ def scored_all(found: Fit, prints: Sequence[Fingerprint]) -> list[Candidate]:
     return [_scored(found, one, jacobian, gram) for one in prints]
 
 
+def signatures(found: Fit, prints: Mapping[str, Sequence[Fingerprint]]) -> dict[str, Array]:
+    """What the best of each effect's fingerprints would take from measurement − model, over the floor: (values,).
+
+    At the strength that suits best, and only what the parameters cannot do as well.
+    """
+    jacobian = _movable(found)
+    gram = jacobian.T @ jacobian + np.eye(jacobian.shape[1])
+    told = {}
+    for name, its in prints.items():
+        own = [_beyond(jacobian, gram, one.columns) for one in its]
+        parts = [columns @ np.linalg.lstsq(columns, -found.residual, rcond=None)[0] for columns in own]
+        told[name] = min(parts, key=lambda part: float(np.sum((found.residual + part) ** 2)))
+    return told
+
+
 def scored_together(found: Fit, prints: Sequence[Fingerprint], most: int) -> list[Candidate]:
     """Up to `most` fingerprints that tell most beside each other, each scored beside those before it."""
     jacobian = _movable(found)
@@ -64,10 +79,14 @@ def _movable(found: Fit) -> Array:
     return np.concatenate(parts)[:, free] if parts else np.zeros((len(found.residual), 0))
 
 
+def _beyond(jacobian: Array, gram: Array, columns: Array) -> Array:
+    """What of some columns the parameters cannot do; gram: JᵀJ with the prior's weights."""
+    return columns - jacobian @ np.linalg.solve(gram, jacobian.T @ columns)
+
+
 def _scored(found: Fit, one: Fingerprint, jacobian: Array, gram: Array) -> Candidate:
     columns = one.columns
-    shared = jacobian.T @ columns
-    own = columns - jacobian @ np.linalg.solve(gram, shared)
+    own = _beyond(jacobian, gram, columns)
     energy = columns.T @ own
     toward = -(own.T @ found.residual)  # the residual is model − measurement
     effect = find(one.name)

@@ -21,9 +21,10 @@ from ema_model.discovery.fitting import Data, Fit, fit, floor_ratio, gather, hol
 from ema_model.discovery.left import Left, left_by
 from ema_model.discovery.repeatability import by_inverse_dynamics, is_lost, with_divergence
 from ema_model.discovery.result import Added, Candidate, Rung, StoodIn
-from ema_model.discovery.score import scored
+from ema_model.discovery.score import scored, signatures
 from ema_model.discovery.trial import Trial, promising, tried
 from ema_model.discovery.unknown import curve_for
+from ema_model.discovery.worded import NOT_REPEATABLE
 from ema_model.effects import CATALOGUE, catalogue_name, find
 from ema_model.measurement import Measurement
 from ema_model.recordings import check_same_actuator
@@ -31,7 +32,6 @@ from ema_model.recordings import check_same_actuator
 Progress = Callable[[str], None]
 Array = NDArray[np.float64]
 
-_AT_BOUND = 0.02  # σ, from which on a parameter cannot move any further
 _SAME_CHI2 = 25.0  # between two effects, below which they cannot be told apart
 _SAME_DIRECTION = 1.0 - 0.98**2  # sin² between their signatures, likewise
 _MOVED = 1.5  # σ that a parameter comes back by, when it had been standing in for an effect
@@ -95,22 +95,12 @@ class Story:
 
         (values,), over the floor, at the strength that suits best; only what the calibration cannot do as well.
         """
-        calibration = self.current.calibration
-        low, high = calibration.room
-        jacobian = np.concatenate([part[name] for part in calibration.weighted_sensitivities for name in part])
-        jacobian = jacobian[:, np.minimum(-low, high) > _AT_BOUND]
-        gram = jacobian.T @ jacobian + np.eye(jacobian.shape[1])
-        told = {}
-        for one in ranked:
-            prints = [found for found in self._prints if found.name == one.name]
-            order = one.settings.get("order")
-            parts = []
-            for columns in (found.columns for found in prints if found.settings.get("order") == order):
-                own = columns - jacobian @ np.linalg.solve(gram, jacobian.T @ columns)
-                parts.append(own @ np.linalg.lstsq(own, -self.current.residual, rcond=None)[0])
-            if parts:
-                told[one.name] = min(parts, key=lambda part: float(np.sum((self.current.residual + part) ** 2)))
-        return told
+        prints = {
+            one.name: [p for p in self._prints if p.name == one.name and p.settings.get("order") == order]
+            for one in ranked
+            for order in (one.settings.get("order"),)
+        }
+        return signatures(self.current, {name: its for name, its in prints.items() if its})
 
     def tried(self, ranked: Sequence[Candidate], share: float, most: int, tell: Progress) -> list[Trial]:
         """The most promising candidates, each in the model and refitted, the best first."""
@@ -191,10 +181,7 @@ def begun(
     if inverse is None:
         return story
     story = _calibrated(measurements, inverse, holdout, signals, tell)
-    story.warnings.append(
-        "The closed loop is not repeatable (a change of 0.05 % in the inertia moves its signals by more than the "
-        "noise): what the measured motion needs is compared instead."
-    )
+    story.warnings.append(NOT_REPEATABLE)
     return story
 
 

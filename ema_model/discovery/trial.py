@@ -47,7 +47,7 @@ def tried(
 def pays(current: Fit, trial: Trial, data: Data, held: Data | None) -> bool:
     """Whether the data pay for the parameters: most of the time, materially, and where they were not fitted."""
     values = len(current.residual)
-    count = sum(_fitted(name) for name in trial.effects)
+    count = sum(fitted_count(name) for name in trial.effects)
     if trial.drop - count * np.log(values) < LEAST_BIC:
         return False
     if trial.fit.error() > (1.0 - _LEAST_FALL) * current.error():
@@ -80,13 +80,11 @@ def promising(current: Fit, ranked: Sequence[Candidate], share: float, most: int
     """Candidates worth a refit: near the best, and such that a refit might make the data pay for them."""
     values = len(current.residual)
     material = (1.0 - (1.0 - _LEAST_FALL) ** 2) * current.chi2
-    chosen = [c for c in ranked if not c.untestable_reason]
-    chosen = [
-        c for c in chosen if c.predicted_drop > _SCORE * max(material, _fitted(c.name) * np.log(values) + LEAST_BIC)
-    ]
+    needed = {c.name: max(material, fitted_count(c.name) * np.log(values) + LEAST_BIC) for c in ranked}
+    chosen = [c for c in ranked if not c.untestable_reason and c.predicted_drop > _SCORE * needed[c.name]]
     return [c for c in chosen if c.predicted_drop >= share * chosen[0].predicted_drop][:most]
 
 
-def _fitted(name: str) -> int:
+def fitted_count(name: str) -> int:
     """Number of an effect's parameters that are fitted."""
     return sum(not parameter.integer for parameter in find(name).parameters)

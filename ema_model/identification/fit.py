@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,7 +18,7 @@ from ema_model.plants import ClosedLoop
 
 Array = NDArray[np.float64]
 
-_ROUNDS = 3  # of twin and refit
+_ROUNDS = 6  # of twin and refit, at most
 _STEPS = 25  # of a refit
 _CLOSE = 40.0  # χ²: the search's weights are coarse, and basins this close may change their order
 _CANDIDATES = 3
@@ -71,7 +71,7 @@ def setting(objective: ClosedLoop, *, parameters_known: bool) -> Setting:
     )
     floors = [floor(bare, window) for window in bare.windows]
     unknown = nuisances(plant, floors, parameters_known=parameters_known)
-    return Setting(plant, [Weights.of(one) for one in floors], unknown, parameters_known)
+    return Setting(plant, [Weights(one) for one in floors], unknown, parameters_known)
 
 
 def refine_best(given: Setting, k: ArrayLike, seed: int = 0) -> Fitted:
@@ -122,19 +122,30 @@ def refine(given: Setting, k: ArrayLike, seed: int = 0) -> Fitted:
 def _with_twins(
     given: Setting, problem: Problem, x: Array, found: Twins | None, seed: int
 ) -> tuple[Array, Twins | None, int]:
-    """Twin and refit in turn; the problem is left with the last twins, x is the fit with them."""
-    evaluations = 0
+    """Twin and refit in turn, back halfway where the Reference Model does not follow; ends with the best x's twins."""
+    evaluations, least, best, kept = 0, np.inf, x, found
     for number in range(_ROUNDS):
         found = twins(problem, x, seed + number, found)
         _reweight(problem, given, found)
         if found is None:
+            return _descend(problem, x)[0], None, evaluations
+        residual = problem.residuals(x[None, :])[0]
+        cost = float(residual @ residual)
+        moved = float(np.max(np.abs(x - best)[:FAULTS]))
+        if cost < least:
+            least, best, kept = cost, x, found
+            if number and moved < _SETTLED:
+                break
+            x, _, more = _descend(problem, x)
+            evaluations += more
+        elif moved < _SETTLED:
             break
-        before = x
-        x, _, more = _descend(problem, x)
-        evaluations += more
-        if np.max(np.abs(x - before)[:FAULTS]) < _SETTLED:
-            break
-    return x, found, evaluations
+        else:
+            x = 0.5 * (x + best)
+    assert kept is not None and found is not None
+    kept = replace(kept, deviations=found.deviations)  # of all rounds: the more, the better known is their spread
+    _reweight(problem, given, kept)
+    return best, kept, evaluations
 
 
 def _better(problem: Problem, given: Setting, x: Array, other: Array, seed: int) -> bool:

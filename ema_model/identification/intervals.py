@@ -2,7 +2,8 @@
 
 Everything is linearised at the best fit, in which the base parameters, the starts and unrecorded loads moved with
 k.  The covariance is the sandwich H⁻¹ M H⁻¹: H from the weighted derivatives and the tolerances' prior, M from what
-the errors really are — the recordings' white noise, the tolerances, and the twins' deviations, which last.
+the errors really are — the recordings' white noise, the tolerances, and the twins' deviations, which last.  A few twins
+tell their own spread roughly: what rests on it is widened as Student's t is beyond the normal distribution.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtri
+from scipy.special import chdtri, stdtrit
 
 from ema_model import faults
 from ema_model.identification.adequacy import Adequacy, adequacy
@@ -31,7 +32,7 @@ _ALARM_LENGTH = float(np.sqrt(-2.0 * np.log(_ALARM)))  # of a vector
 _INSEPARABLE = 0.9
 _WIDE = 0.03  # σ of a k below which it counts as known
 _LEAST_SPREAD = 0.02  # of a fit that left the base parameters where they were
-_SLIGHT = 2e-5  # least σ
+_SLIGHT = 3e-5  # least σ: as well as the models' steps in time let any k be told
 
 
 @dataclass(frozen=True)
@@ -77,7 +78,7 @@ def uncertainty(found: Fitted, k: Array) -> Uncertainty:
 
 
 def _covariance(found: Fitted) -> Array:
-    """Of x, (unknowns, unknowns)."""
+    """Of x, (unknowns, unknowns), such that z of the normal distribution is right for 90 %."""
     problem, slopes = found.problem, found.slopes
     rows = slice(0, problem.values)
     held = problem.prior.copy()  # as the fit had it; what is really unknown is the whole tolerance
@@ -92,11 +93,15 @@ def _covariance(found: Fitted) -> Array:
             noise = 1.0 / problem.over_sigma(window, name, np.ones(len(noise)))
         weighted = part * problem.over_sigma(window, name, noise)[:, None]
         meat = meat + weighted.T @ weighted
-    if found.twins is not None:
-        scores = _twin_scores(found)
-        rounds = len(scores) // TWINS
-        meat = meat + (1.0 + 1.0 / TWINS) * scores.T @ scores / (rounds * (TWINS - 1))
     covariance = inverse @ meat @ inverse + _SLIGHT**2 * np.eye(len(inverse))
+    if found.twins is not None:
+        scores = _twin_scores(found) @ inverse
+        freedom = len(scores) // TWINS * (TWINS - 1)
+        of_twins = (1.0 + 1.0 / TWINS) * scores.T @ scores / freedom
+        covariance += of_twins
+        share = np.diag(of_twins) / np.diag(covariance)
+        wider = stdtrit(freedom / np.maximum(share, 1e-6) ** 2, 0.95) / _Z90  # Welch and Satterthwaite's freedom
+        covariance *= np.outer(wider, wider)
     return 0.5 * (covariance + covariance.T)
 
 

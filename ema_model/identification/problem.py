@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ema_model.calibration.floor import CORRELATED_S, Floor
+from ema_model.calibration.floor import Floor
 from ema_model.faults import HEALTHY, NAMES
 from ema_model.identification.unknowns import ECCENTRICITY, FAULTS, LOAD, Nuisance, fault_bounds, to_k, to_x
 from ema_model.plants import ClosedLoop
@@ -24,21 +24,23 @@ _STEP = 0.1  # the same of what is counted in σ
 
 @dataclass(frozen=True, eq=False)
 class Weights:
-    """Standard deviations of one window by signal: white noise (a number), and the model's error (blocks,)."""
+    """A window's floor, and which signals' model error does not last from block to block while the motor moves."""
 
-    noise: dict[str, float]
-    model: dict[str, Array]
-    white: frozenset[str] = frozenset()  # signals whose model error does not last from block to block
+    floor: Floor
+    white: frozenset[str] = frozenset()
 
-    @classmethod
-    def of(cls, floor: Floor) -> Weights:
-        """From a comparison's floor, whose model error lasts."""
-        return cls(floor.noise, floor.model)
+    @property
+    def noise(self) -> dict[str, float]:
+        """White noise by signal, in its unit."""
+        return self.floor.noise
 
-    def sigma(self, name: str, block_s: float) -> Array:
+    def sigma(self, name: str) -> Array:
         """What to weight a fit by, (blocks,): an error that lasts counts as often as it repeats."""
-        repeats = 1.0 if name in self.white else max(1.0, CORRELATED_S / block_s)
-        return np.hypot(self.noise[name], np.sqrt(repeats) * self.model[name])
+        if name not in self.white:
+            return self.floor.fit_sigma(name)
+        repeats = self.floor.repeats
+        lasting = np.where(repeats > np.min(repeats), repeats, 1.0)
+        return np.hypot(self.noise[name], np.sqrt(lasting) * self.floor.model[name])
 
 
 class Problem:
@@ -73,8 +75,7 @@ class Problem:
         windows = self.plant.windows
         self.signals = [[name for name in SIGNALS if name in window.measured] for window in windows]
         self._inverse = [
-            {name: 1.0 / one.sigma(name, window.block_s) for name in names}
-            for one, names, window in zip(self.weights, self.signals, windows)
+            {name: 1.0 / one.sigma(name) for name in names} for one, names in zip(self.weights, self.signals)
         ]
         self.added = list(added)
         self.values = sum(window.blocks * len(names) for window, names in zip(windows, self.signals))

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ema_model.calibration.floor import Floor, repeats_of
 from ema_model.commands import command
 from ema_model.errors import InputError
 from ema_model.identification.fit import Fitted
@@ -69,13 +70,15 @@ def _information(found: Fitted, run: Run) -> Array | None:
         return None
     window = own.windows[0]
     typical = problem.weights[0]
+    known = typical.floor.model
     noise = {name: typical.noise.get(name, _CURRENT_A) for name in window.measured}
     model = {
-        name: np.full(window.blocks, np.sqrt(np.mean(typical.model[name] ** 2)) if name in typical.model else 0.0)
+        name: np.full(window.blocks, np.sqrt(np.mean(known[name] ** 2)) if name in known else 0.0)
         for name in window.measured
     }
     kept: list[Nuisance] = [n for n in problem.nuisances if " " not in n.name or n.name.endswith(" 0")]
-    own_problem = Problem(own, [Weights(noise, model, typical.white)], kept)
+    own_floor = Floor(noise, model, repeats_of(window, noise), window.block_s)
+    own_problem = Problem(own, [Weights(own_floor, typical.white)], kept)
     x = np.zeros(own_problem.count)
     x[:FAULTS] = found.x[:FAULTS]
     _, slopes = own_problem.jacobians(x[None, :])

@@ -10,7 +10,7 @@ twins, each with k changed by a hair, is what is known of the difference, and th
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,7 +40,7 @@ class Twins:
 
     def weights(self, before: Sequence[Weights]) -> list[Weights]:
         """The weights of a fit with this added."""
-        return [Weights(one.noise, spread, WHITE) for one, spread in zip(before, self.spread)]
+        return [Weights(replace(one.floor, model=spread), WHITE) for one, spread in zip(before, self.spread)]
 
 
 def twins(problem: Problem, x: Array, seed: int, before: Twins | None = None) -> Twins | None:

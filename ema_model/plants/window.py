@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
+from ema_model.commands.recorded import between
 from ema_model.errors import InputError
 from ema_model.measurement import Measurement
 from ema_model.simulation import steps_per_sample
@@ -116,10 +117,10 @@ def cut(
 
 
 def _inputs(measurement: Measurement, actuator: Actuator, run: slice, steps: int, step_s: float) -> tuple[Array, ...]:
-    """Command, load and supply at every step; linear between samples, but for the drive's switch."""
+    """Command, load and supply at every step; linear between samples, but for jumps and the drive's switch."""
     time = measurement.time_s[run] - measurement.time_s[run.start]
     at = np.arange(steps) * step_s - actuator.sensors.delay_s
-    command = np.interp(at, time, measurement["command_rad"][run])
+    command = between(at, time, measurement["command_rad"][run])
     load = measurement.get("load_torque_Nm")
     loads = np.zeros(steps) if load is None else np.interp(at, time, load[run])
     bus = measurement.get("bus_voltage_V")

@@ -6,7 +6,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from ema_model.comparison.result import Comparison, Region
-from emaviz.figures import quantity, theme
+from emaviz.figures import floor_band, quantity, theme
 from emaviz.figures.binned import Binned, binned, edges_for
 from emaviz.figures.lines import scattered
 
@@ -118,18 +118,7 @@ def _band(chart: go.Figure, bins: Binned, axis: quantity.Quantity, shown: quanti
     # in steps from edge to edge: the floor is known by bin
     x = np.stack([bins.low, bins.high], axis=1).ravel() * axis.factor
     y = np.repeat(bins.floor, 2) * shown.factor * theme.FLOOR_WIDTH
-    chart.add_trace(
-        go.Scatter(
-            x=np.concatenate([x, x[::-1]]),
-            y=np.concatenate([y, -y[::-1]]),
-            fill="toself",
-            fillcolor=theme.FLOOR,
-            line={"width": 0},
-            mode="lines",
-            name=theme.FLOOR_NAME,
-            hoverinfo="skip",
-        )
-    )
+    floor_band.outlined(chart, np.concatenate([x, x[::-1]]), np.concatenate([y, -y[::-1]]))
 
 
 def _points(chart: go.Figure, x: np.ndarray, y: np.ndarray, name: str, marker: dict) -> None:

@@ -6,9 +6,9 @@ import numpy as np
 import plotly.graph_objects as go
 
 from ema_model.measurement import SIGNALS
-from emaviz.figures import quantity, theme
+from emaviz.figures import floor_band, quantity, theme
 from emaviz.figures.discovery_tracks import Track
-from emaviz.figures.lines import band, line
+from emaviz.figures.lines import line
 
 BEFORE, AFTER = theme.MODEL, theme.MEASURED
 
@@ -24,20 +24,7 @@ def figure(track: Track, signal: str, first: int = 0, last: int = -1, *, dark: b
     shown = quantity.Quantity(title, told.unit, symbol=f"Δ{told.symbol}").scaled(before)
     chart = theme.new(f"{title} (measured − model)", "Time [s]", shown.short_label, dark=dark)
     sigma = theme.FLOOR_WIDTH * shown.factor * track.sigma[signal]
-    x, y = band(track.time_s, -sigma, sigma, theme.POINTS)
-    chart.add_trace(
-        go.Scatter(
-            x=x,
-            y=y,
-            fill="toself",
-            fillcolor=theme.FLOOR,
-            line={"width": 0},
-            mode="lines",
-            name=theme.FLOOR_NAME,
-            legendgroup="floor",
-            hoverinfo="skip",
-        )
-    )
+    floor_band.below(chart, track.time_s, sigma)
     changed = len(track.models) > 1
     drawn = [(before, "without the added effects", BEFORE)] if changed else []
     drawn.append((after, "with them" if changed else "residual", AFTER))
@@ -45,12 +32,7 @@ def figure(track: Track, signal: str, first: int = 0, last: int = -1, *, dark: b
         x, y = line(track.time_s, shown.factor * values, theme.POINTS)
         style = {"width": 1, "color": colour}
         chart.add_trace(go.Scatter(x=x, y=y, mode="lines", name=name, line=style, hovertemplate="%{y:.4g}"))
-    for edge in (-sigma, sigma):  # once more, because dense noise hides the band below it
-        x, y = line(track.time_s, edge, theme.POINTS // 2)
-        style = {"width": 1.4, "color": theme.EDGE}
-        chart.add_trace(
-            go.Scatter(x=x, y=y, mode="lines", line=style, hoverinfo="skip", legendgroup="floor", showlegend=False)
-        )
+    floor_band.above(chart, track.time_s, sigma)
     most = float(np.max(np.abs(np.concatenate([before, after])))) * shown.factor
     chart.update_yaxes(range=[-1.05 * most, 1.05 * most])
     return chart

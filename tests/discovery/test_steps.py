@@ -61,7 +61,8 @@ def test_score_is_not_misled_by_the_amplitude_of_another_actuator(toothed):
     """A hinge moment of hundreds of N·m at a small axis: the fingerprint is taken at a strength that fits."""
     data, base = toothed
     prints = fingerprints(data, base, ["position_sensor_bias"], [])
-    strong = replace(base, residual=1e-3 * base.residual)
+    quiet = 1e-3 * base.residual
+    strong = replace(base, calibration=replace(base.calibration, residual=quiet))
     assert max(np.sqrt(np.mean(one.columns**2)) for one in fingerprints(data, strong, ["hinge_moment"], [])) < 40.0
     assert len(prints) == 3
 

@@ -109,6 +109,16 @@ def test_recorded_is_linear_between_samples_and_constant_outside():
     assert recorded.settings() == {"file": "run.csv", "samples": 3}
 
 
+def test_recorded_jump_comes_with_its_sample():
+    time = np.arange(0.0, 0.05, 0.01)
+    stepped = Recorded(time, np.array([0.0, 0.0, 1.0, 1.0, 1.0]))
+    np.testing.assert_allclose(stepped.at(np.array([0.01, 0.0199, 0.02, 0.03])), [0.0, 0.0, 1.0, 1.0])
+    fine = np.arange(50_000) * 1e-6  # sums of rounded steps: none of them moves the jump
+    np.testing.assert_array_equal(stepped.at(fine) > 0.5, np.arange(50_000) >= 20_000)
+    sloping = Recorded(time, np.array([0.0, 0.5, 1.0, 1.5, 2.0]))
+    np.testing.assert_allclose(sloping.at(np.array([0.015])), [0.75])
+
+
 @pytest.mark.parametrize(
     ("name", "settings", "message"),
     [

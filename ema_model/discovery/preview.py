@@ -1,0 +1,74 @@
+"""What one more effect with given settings would change in a fitted model, before any refit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
+
+from ema_model.actuator import Actuator
+from ema_model.discovery.fitting import Data, Fit
+from ema_model.faults import HEALTHY
+from ema_model.plants import Plant
+
+Array = NDArray[np.float64]
+
+_LEAST = 1e-9  # σ, so that a parameter at its bound has some room
+
+
+@dataclass(frozen=True, eq=False)
+class Preview:
+    """A fitted model with room for one effect; the first change with it is compiled."""
+
+    data: Data
+    found: Fit
+    name: str
+    plant: Plant
+    jacobian: Array  # ∂residual/∂x, (values, unknowns), above the prior's, (unknowns, unknowns)
+    basis: Array  # its Q, (values + unknowns, unknowns)
+    triangle: Array  # and R
+
+    def change(self, settings: Mapping[str, float]) -> Array:
+        """What the effect would take from measured − model, over the floor: (values,); NaN where it has no value.
+
+        The calibrated parameters follow, as far as a straight line tells: some may have stood in for it.
+        """
+        calibration = self.found.calibration
+        model = _with(calibration.actuator, self.name, settings)
+        parts = []
+        for i, (window, one, before) in enumerate(zip(self.plant.windows, self.data.floors, calibration.signals)):
+            start = calibration.start_of(i)
+            after = self.plant.signals(window, model, HEALTHY, *start)  # pyright: ignore[reportArgumentType]
+            parts += [
+                (after[signal][0] - before[signal]) * (self.data.signals[signal] / one.fit_sigma(signal))
+                for signal in self.data.signals
+                if signal in window.measured
+            ]
+        whole = np.concatenate(parts)
+        return whole + self._followed(whole) if np.all(np.isfinite(whole)) else whole
+
+    def _followed(self, change: Array) -> Array:
+        """What the parameters change in turn, within their bounds and their prior: (values,)."""
+        calibration = self.found.calibration
+        wanted = -self.basis.T @ np.concatenate([calibration.residual + change, calibration.x])
+        low, high = calibration.room
+        room = np.minimum(low, -_LEAST), np.maximum(high, _LEAST)
+        moved = lsq_linear(self.triangle, wanted, room, method="bvls").x
+        return self.jacobian[: len(change)] @ moved
+
+
+def preview(data: Data, found: Fit, name: str, settings: Mapping[str, float]) -> Preview:
+    """Makes room for an effect beside those of a fit; its settings may change afterwards."""
+    calibration = found.calibration
+    parts = [part[signal] for part in calibration.weighted_sensitivities for signal in part]
+    jacobian = np.concatenate([*parts, np.eye(len(calibration.x))])
+    basis, triangle = np.linalg.qr(jacobian)
+    plant = data.plant(_with(calibration.actuator, name, settings))
+    return Preview(data, found, name, plant, jacobian, basis, triangle)
+
+
+def _with(actuator: Actuator, name: str, settings: Mapping[str, float]) -> Actuator:
+    return replace(actuator, effects={**actuator.effects, name: dict(settings)})

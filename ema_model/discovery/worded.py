@@ -1,0 +1,41 @@
+"""A discovery's warnings in plain words, as the page, the reports and the recordings show them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ema_model.actuator.titles import parameter_title
+from ema_model.axes import Axes
+from ema_model.discovery.result import Added
+from ema_model.effects import find
+
+NOT_REPEATABLE = (
+    "The closed loop is not repeatable (a change of 0.05 % in the inertia moves its signals by more than the noise): "
+    "what the measured motion needs is compared instead."
+)
+
+
+def masked(added: Sequence[Added], axes: Axes) -> list[str]:
+    """One line for each effect that parameters of the model had been standing in for, and where they are now."""
+    lines = []
+    for one in added:
+        moved = [
+            f"{_small(parameter_title(axes.path(part.path)))} ({part.before:+.1f} → {part.after:+.1f} σ)"
+            for part in one.stood_in
+            if part.path != find(one.name).duplicates
+        ]
+        if moved:
+            came = ", ".join(moved).replace("-", "−")
+            lines.append(f"{find(one.name).title} had been masked: back toward the file's value came {came}.")
+    return lines
+
+
+def untold(first: str, second: str) -> str:
+    """That no test is known which would tell two effects apart."""
+    one, other = (_small(find(name).title) for name in (first, second))
+    return f"No command within the range of these recordings tells {one} from {other}."
+
+
+def _small(title: str) -> str:
+    """A title within a sentence."""
+    return title[:1].lower() + title[1:] if not title[1:2].isupper() else title

@@ -1,9 +1,10 @@
 """Challenges: recordings of an actuator in which an effect may be hidden, for practice and for tests.
 
 `python -m ema_model.challenges` makes the recordings from the truths in assets/challenges/truth.  Whoever wants to
-solve a challenge reads `challenge.py` only; `truth.py` tells the answers.
+solve a challenge reads `challenge.py` and `sealed_file.py` only; `truth.py` and `sealing.py` tell the answers.
 """
 
 from ema_model.challenges.challenge import Challenge, challenges, folder
+from ema_model.challenges.sealed_file import opened, sealed_challenge
 
-__all__ = ["Challenge", "challenges", "folder"]
+__all__ = ["Challenge", "challenges", "folder", "opened", "sealed_challenge"]

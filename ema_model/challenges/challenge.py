@@ -22,6 +22,8 @@ class Challenge:
     story: str
     training: tuple[Path, ...]  # to fit
     holdout: tuple[Path, ...]  # not to fit; must improve as well
+    actuator: Path | None = None  # its file; the thesis's without one
+    sealed: Path | None = None  # the file that holds all of these, which then are names in it: see `sealed_file`
 
 
 def folder() -> Path:
@@ -39,8 +41,9 @@ def challenges(where: Path | None = None) -> list[Challenge]:
 def _read(path: Path) -> Challenge:
     try:
         told = tomllib.loads(path.read_text(encoding="utf-8"))
-        files = [tuple(path.with_name(str(name)) for name in told[which]) for which in ("training", "holdout")]
-        found = Challenge(path.parent.name, str(told["title"]), int(told["grade"]), str(told["story"]).strip(), *files)
+        training, holdout = (tuple(path.with_name(str(n)) for n in told[which]) for which in ("training", "holdout"))
+        title, grade, story = str(told["title"]), int(told["grade"]), str(told["story"]).strip()
+        found = Challenge(path.parent.name, title, grade, story, training, holdout)
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, TypeError, ValueError) as error:
         raise InputError(f"{path}: not a challenge: {error}; mend it or remove its folder") from None
     except KeyError as error:

@@ -5,6 +5,8 @@ The same truth gives the same values: all that is drawn comes from its seed.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -36,10 +38,22 @@ _RANGE = (-100.0, 100.0)  # of a hidden torque's parameters
 
 def make(truth: Truth, where: Path) -> None:
     """Writes the challenge's recordings to the folder of its name, which must be there."""
-    plant, effects = plant_of(truth, load_actuator()), _hidden(truth)
+    for name, recording in recorded(truth, load_actuator()):
+        write(recording, where / truth.name / f"{name}.parquet")
+
+
+def recorded(
+    truth: Truth, actuator: Actuator, sensors: Sensors = SENSORS, load_torque_Nm: float = 0.0
+) -> Iterator[tuple[str, Measurement]]:
+    """The names and recordings of `RUNS`, one after another, under a constant load at the user.
+
+    Raises InputError for an actuator that has no three-phase model, FloatingPointError if that one diverges.
+    """
+    plant, effects = plant_of(truth, actuator), _hidden(truth)
     for number, (name, run) in enumerate(RUNS.items()):
-        recording = SENSORS.record(simulate_reference(run, plant, effects=effects), 1000 * truth.seed + number)
-        _write(recording, where / truth.name / f"{name}.parquet")
+        loaded = replace(run, load_torque_Nm=load_torque_Nm)
+        recording = simulate_reference(loaded, plant, truth.k, effects)
+        yield name, sensors.record(recording, 1000 * truth.seed + number)
 
 
 def plant_of(truth: Truth, actuator: Actuator) -> Actuator:
@@ -60,11 +74,14 @@ def _hidden(truth: Truth) -> Effects:
     return {**truth.effects, own.name: truth.torque_parameters}
 
 
-def _write(recording: Measurement, path: Path) -> None:
-    """Small: what a converter would give has few digits, and bytes of a kind stand together."""
+def write(recording: Measurement, path: Path) -> None:
+    """Small: what a converter would give has few digits, and bytes of a kind stand together.
+
+    The load is written where there is one: whoever solves the challenge knows of it.
+    """
     digits = {"current_A": _CONVERTER_STEP_A, "command_rad": _COMMAND_STEP_RAD}
     columns = {}
-    for name in COLUMNS:
+    for name in (*COLUMNS, "load_torque_Nm") if "load_torque_Nm" in recording else COLUMNS:
         step = digits.get(name)
         values = recording[name] if step is None else step * np.round(recording[name] / step)
         columns[name] = pa.array(values)

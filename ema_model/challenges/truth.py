@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ema_model.effects import find
 from ema_model.errors import InputError
+from ema_model.faults import vector
 
-_KEYS = {"schema", "seed", "answer", "torque", "torque_parameters", "effects"}
+_KEYS = {"schema", "seed", "answer", "torque", "torque_parameters", "effects", "faults"}
 
 
 @dataclass(frozen=True)
@@ -22,6 +28,12 @@ class Truth:
     effects: dict[str, dict[str, float]] = field(default_factory=dict)  # of the catalogue, with their settings
     torque: str = ""  # outside the catalogue: an expression of `ema_model.user_effects`, N·m at the motor
     torque_parameters: dict[str, float] = field(default_factory=dict)
+    faults: dict[str, float] = field(default_factory=dict)  # k1 … k8 that are not healthy
+
+    @property
+    def k(self) -> NDArray[np.float64]:
+        """All faults of the plant, (8,)."""
+        return vector(self.faults)
 
 
 def truths(where: Path) -> list[Truth]:
@@ -32,19 +44,29 @@ def truths(where: Path) -> list[Truth]:
 def read_truth(path: Path) -> Truth:
     """One truth; InputError tells a mistake."""
     try:
-        told = tomllib.loads(path.read_text(encoding="utf-8"))
-        if unknown := told.keys() - _KEYS:
-            raise InputError(f"{path}: {min(unknown)} is not known; known are {', '.join(sorted(_KEYS))}")
-        effects = {name: find(name).settings(dict(given)) for name, given in told.get("effects", {}).items()}
+        return truth_of(tomllib.loads(path.read_text(encoding="utf-8")), path.stem, str(path))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise InputError(f"{path}: not a challenge's truth: {error}") from None
+
+
+def truth_of(told: Mapping[str, Any], name: str, where: str) -> Truth:
+    """The truth that a file tells; InputError, which begins with `where`, tells a mistake."""
+    if unknown := told.keys() - _KEYS:
+        raise InputError(f"{where}: {min(unknown)} is not known; known are {', '.join(sorted(_KEYS))}")
+    try:
+        effects = {effect: find(effect).settings(dict(given)) for effect, given in told.get("effects", {}).items()}
+        faults = {fault: float(value) for fault, value in told.get("faults", {}).items()}
+        vector(faults)
         return Truth(
-            path.stem,
+            name,
             int(told["seed"]),
             str(told["answer"]).strip(),
             effects,
             str(told.get("torque", "")),
-            {name: float(value) for name, value in told.get("torque_parameters", {}).items()},
+            {parameter: float(value) for parameter, value in told.get("torque_parameters", {}).items()},
+            faults,
         )
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, TypeError, ValueError) as error:
-        raise InputError(f"{path}: not a challenge's truth: {error}") from None
     except KeyError as error:
-        raise InputError(f"{path}: {error.args[0]} is missing; add it") from None
+        raise InputError(f"{where}: {error.args[0]} is missing; add it") from None
+    except (TypeError, ValueError, AttributeError, OverflowError) as error:
+        raise InputError(f"{where}: not a challenge's truth: {error}") from None

@@ -22,6 +22,7 @@ _ROUNDS = 6  # of twin and refit, at most
 _STEPS = 25  # of a refit
 _CLOSE = 40.0  # χ²: the search's weights are coarse, and basins this close may change their order
 _CANDIDATES = 3
+_RIVAL = 4.0  # χ², within which another basin may be the right one
 _SETTLED = 1e-3  # of x's faults, between two rounds
 _SPREADS = (0.0, 0.05, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0)
 
@@ -57,6 +58,7 @@ class Fitted:
     k: Array  # (8,)
     spread: float  # how far the data want the base parameters from the file's values, 1 being the tolerances
     evaluations: int
+    rivals: tuple[Fitted, ...] = ()  # other basins that fit within the floor as well
 
 
 def setting(objective: ClosedLoop, *, parameters_known: bool) -> Setting:
@@ -80,8 +82,10 @@ def refine_best(given: Setting, k: ArrayLike, seed: int = 0) -> Fitted:
     costs = np.sum(given.coarse().residuals(to_x(candidates)) ** 2, axis=1)
     order = np.argsort(costs, kind="stable")
     close = order[costs[order] < costs[order[0]] + _CLOSE][:_CANDIDATES]
-    fits = [refine(given, candidates[i], seed) for i in close]
-    return min(fits, key=lambda one: one.cost)
+    fits = sorted((refine(given, candidates[i], seed) for i in close), key=lambda one: one.cost)
+    best = fits[0]
+    within = max(best.cost, best.problem.values) + _RIVAL
+    return replace(best, rivals=tuple(one for one in fits[1:] if one.cost < within))
 
 
 def refine(given: Setting, k: ArrayLike, seed: int = 0) -> Fitted:

@@ -8,7 +8,7 @@ tell their own spread roughly: what rests on it is widened as Student's t is bey
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,7 +53,30 @@ class Uncertainty:
 
 
 def uncertainty(found: Fitted, k: Array) -> Uncertainty:
-    """Intervals and tests of a best fit; the intervals contain the answer k (8,) that is shown."""
+    """Intervals and tests of a best fit; the intervals contain the answer k (8,) that is shown.
+
+    Where other basins fit within the floor as well, intervals reach over all of them, and an alarm is one of each.
+    """
+    sure = _of_one(found, k)
+    others = [_of_one(one, one.k) for one in found.rivals]
+    if not others:
+        return sure
+    interval = sure.interval90.copy()
+    for one in others:
+        interval[:, 0] = np.minimum(interval[:, 0], one.interval90[:, 0])
+        interval[:, 1] = np.maximum(interval[:, 1], one.interval90[:, 1])
+    if interval[5, 0] <= 0.0 or np.ptp(interval[6]) >= 1.0:
+        interval[6] = 0.0, 1.0
+    return replace(
+        sure,
+        interval90=interval,
+        healthy=sure.healthy or any(one.healthy for one in others),
+        alarms=tuple(name for name in sure.alarms if all(name in one.alarms for one in others)),
+    )
+
+
+def _of_one(found: Fitted, k: Array) -> Uncertainty:
+    """Of one basin."""
     covariance = _covariance(found)[:FAULTS, :FAULTS]
     fit = adequacy(found)
     if not fit.adequate:  # a misfit says how wrong the model is, and the intervals with it

@@ -40,6 +40,28 @@ def test_noise_free_faults_are_found_from_every_start(fault):
         assert answer.polished and answer.algorithm == "robust" and answer.uncertainty.adequate
 
 
+@pytest.mark.parametrize(
+    ("name", "given"), [("step", {"final_rad": 0.01}), ("step", {"final_rad": 0.03}), ("sine", {}), ("staircase", {})]
+)
+def test_every_command_that_tells_the_faults_gives_them(name, given):
+    """A step's jump, and a standstill that lasts ten times the motion, mislead nobody."""
+    truth = faults.vector({"k1": 0.3, "k2": 0.2, "k4": 0.15, "k6": 0.3, "k7": 0.8, "k8": 0.4})
+    answer = identify(
+        Objective([simulated(Run(command(name, given)), ACTUATOR, truth)], ACTUATOR), truth=truth, parameters_known=True
+    )
+    assert answer.uncertainty.adequate
+    assert answer.error_percent is not None and answer.error_percent <= 0.5, answer.k
+
+
+def test_what_hardly_tells_anything_is_not_sure_of_anything():
+    """A crawl of half a millirad: other basins fit as well, and the intervals reach over them."""
+    truth = faults.vector({"k3": 0.25})
+    answer = identify(Objective([simulated(Run(command("ramp")), ACTUATOR, truth)], ACTUATOR), parameters_known=True)
+    low, high = answer.uncertainty.interval90.T
+    assert low[2] < truth[2] < high[2] and high[2] - low[2] > 0.5
+    assert "k3" not in answer.uncertainty.alarms
+
+
 def test_noise_is_met_with_intervals():
     answer = of({"k1": 0.3, "k2": 0.2, "k3": 0.4, "k8": 0.6}, NOISY)
     assert answer.error_percent is not None and answer.error_percent <= 1.5

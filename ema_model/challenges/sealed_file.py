@@ -1,0 +1,159 @@
+"""A challenge as one file to hand on: NAME.challenge, a zip of its recordings, its story, its actuator, its seal.
+
+The seal is a digest over all other parts and a salt: a part that was changed is noticed, and what is hidden cannot be
+guessed from it.  The part that tells the answer is carried here unread; `sealing.py` writes and reads it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import hmac
+import io
+import json
+import os
+import re
+import secrets
+import tempfile
+import zipfile
+import zlib
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from ema_model.challenges.challenge import Challenge
+from ema_model.errors import InputError
+from ema_model.measurement.refusal import shown
+
+SUFFIX = ".challenge"
+SCHEMA = 1
+HIDDEN = "hidden"
+MOST_CHARACTERS = {"title": 80, "story": 4000}
+_HEAD, _ACTUATOR, _SEAL = "challenge.json", "actuator.toml", "seal.json"
+_RECORDING = re.compile(r"[a-z0-9_]{1,30}\.parquet")
+_MOST_BYTES = 32 * 1024 * 1024  # of the file, and of its parts unpacked
+_MOST_PARTS = 12
+_SALT_BYTES = 16
+_REFUSED = (
+    *(OSError, zipfile.BadZipFile, zlib.error, EOFError, KeyError, TypeError, ValueError, AttributeError),
+    *(NotImplementedError, RuntimeError, OverflowError, MemoryError),
+)
+
+
+def write_sealed(path: Path, head: Mapping[str, Any], parts: Mapping[str, bytes]) -> None:
+    """Writes the file whole or not at all; InputError where it cannot be written.
+
+    head: title, grade, story, training, holdout; parts: the recordings by name, `HIDDEN` and the actuator's file.
+    """
+    parts = {**parts, _HEAD: json.dumps({"schema": SCHEMA, **head}, indent=1).encode()}
+    salt = secrets.token_hex(_SALT_BYTES)
+    seal = {"salt": salt, "sha256": _digest(salt, parts)}
+    draft = path.with_name(f".{secrets.token_hex(8)}.part")
+    try:
+        with zipfile.ZipFile(draft, "w", zipfile.ZIP_DEFLATED) as archive:
+            for name, content in (*parts.items(), (_SEAL, json.dumps(seal).encode())):
+                archive.writestr(name, content)
+        os.replace(draft, path)
+    except OSError as error:
+        raise InputError(f"{path.name}: cannot be written ({error.strerror}); check the disk") from None
+    finally:
+        with suppress(OSError):
+            draft.unlink()
+
+
+def sealed_challenge(path: Path) -> Challenge:
+    """What a sealed file gives away; InputError, one line, for one that is broken, changed or none at all."""
+    return _challenge(path, read_parts(path))
+
+
+@contextmanager
+def opened(one: Challenge) -> Iterator[Challenge]:
+    """The challenge with its recordings and its actuator as files, which for a sealed one are gone afterwards."""
+    if one.sealed is None:
+        yield one
+        return
+    parts = read_parts(one.sealed)
+    known = _challenge(one.sealed, parts)
+    with tempfile.TemporaryDirectory(prefix="emaviz-challenge-") as name:
+        folder = Path(name)
+        for file in (*known.training, *known.holdout, Path(_ACTUATOR)):
+            (folder / file.name).write_bytes(parts[file.name])
+        training, holdout = (tuple(folder / file for file in files) for files in (known.training, known.holdout))
+        try:
+            yield replace(known, training=training, holdout=holdout, actuator=folder / _ACTUATOR)
+        except InputError as error:  # it names a folder that will be gone
+            raise InputError(f"{shown(one.sealed.name)}: {str(error).replace(f'{name}{os.sep}', '')}") from None
+
+
+def read_parts(path: Path) -> dict[str, bytes]:
+    """All parts but the seal, which was found whole, by their names; InputError otherwise."""
+    try:
+        if path.stat().st_size > _MOST_BYTES:
+            raise InputError(f"{shown(path.name)}: is too large to be a challenge ({path.stat().st_size / 1e6:.0f} MB)")
+        parts = _unpacked(path)
+        seal = json.loads(parts.pop(_SEAL))
+        good = hmac.compare_digest(_digest(str(seal["salt"]), parts).encode(), str(seal["sha256"]).encode())
+    except InputError:
+        raise
+    except _REFUSED as error:
+        raise InputError(_none(path, type(error).__name__)) from None
+    if not good:
+        raise InputError(f"{shown(path.name)}: was changed after it was sealed; ask for it anew")
+    return parts
+
+
+def _unpacked(path: Path) -> dict[str, bytes]:
+    """The parts of the zip; only names that a challenge has, and never more bytes than it may have."""
+    parts: dict[str, bytes] = {}
+    room = _MOST_BYTES
+    with zipfile.ZipFile(io.BytesIO(path.read_bytes())) as archive:
+        inside = archive.infolist()
+        for info in inside[: _MOST_PARTS + 1]:
+            known = info.filename in (_HEAD, _ACTUATOR, _SEAL, HIDDEN) or _RECORDING.fullmatch(info.filename)
+            if not known or info.filename in parts:
+                raise InputError(f"{shown(path.name)}: holds {shown(info.filename)!r}, which no challenge has")
+            with archive.open(info) as file:
+                content = file.read(room + 1)
+            room -= len(content)
+            if room < 0 or len(inside) > _MOST_PARTS:
+                raise InputError(f"{shown(path.name)}: unpacks to more than a challenge has; ask for it anew")
+            parts[info.filename] = content
+    return parts
+
+
+def _challenge(path: Path, parts: Mapping[str, bytes]) -> Challenge:
+    try:
+        told = json.loads(parts[_HEAD])
+        if told["schema"] != SCHEMA:
+            raise InputError(f"{shown(path.name)}: was sealed by another version (schema {shown(told['schema'])})")
+        training, holdout = (tuple(Path(str(name)) for name in told[which]) for which in ("training", "holdout"))
+        title, story = (_text(told[which], most) for which, most in MOST_CHARACTERS.items())
+        grade = min(max(int(told["grade"]), 0), 5)
+        found = Challenge(path.stem, title, grade, story, training, holdout, sealed=path)
+    except InputError:
+        raise
+    except _REFUSED as error:
+        raise InputError(_none(path, type(error).__name__)) from None
+    if _ACTUATOR not in parts or HIDDEN not in parts or not found.training:
+        raise InputError(_none(path, "a part is missing"))
+    for file in (*found.training, *found.holdout):
+        if str(file) not in parts or not _RECORDING.fullmatch(str(file)):
+            raise InputError(f"{shown(path.name)}: its recording {shown(file)} is missing; ask for it anew")
+    return found
+
+
+def _digest(salt: str, parts: Mapping[str, bytes]) -> str:
+    whole = hashlib.sha256(salt.encode())
+    for name, content in sorted(parts.items()):
+        whole.update(f"\0{name}\0{len(content)}\0".encode())
+        whole.update(content)
+    return whole.hexdigest()
+
+
+def _text(value: Any, most: int) -> str:
+    return "".join(c for c in str(value)[:most] if c.isprintable() or c == "\n").strip()
+
+
+def _none(path: Path, why: str) -> str:
+    return f"{shown(path.name)}: is no challenge, or damaged ({why}); ask for it anew"

@@ -1,4 +1,4 @@
-"""What all tests share: the browser."""
+"""What all tests share: how many processes they take, and the browser."""
 
 from __future__ import annotations
 
@@ -14,6 +14,14 @@ SOFTWARE_GL = (
     "--disable-sync --use-gl=angle --use-angle=gl-egl --ignore-gpu-blocklist --disable-accelerated-2d-canvas "
     "--disable-gpu-rasterization"
 ).split()
+
+
+def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
+    """The whole suite takes two processes or more; chosen tests, a study, or `-s` run here."""
+    whole = config.args_source == pytest.Config.ArgsSource.TESTPATHS
+    if not whole or config.option.capture == "no" or config.option.markexpr != "not study":
+        return 0
+    return min(4, os.cpu_count() or 1)
 
 
 @pytest.fixture(scope="session")

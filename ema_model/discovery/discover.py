@@ -14,7 +14,7 @@ import numpy as np
 from ema_model.actuator import Actuator, load_actuator
 from ema_model.comparison.result import Explanation
 from ema_model.discovery.experiments import next_experiment
-from ema_model.discovery.harmonics import is_periodic, with_further_orders
+from ema_model.discovery.harmonics import with_further_orders
 from ema_model.discovery.result import Candidate, Discovery, Experiment
 from ema_model.discovery.story import Story, begun, with_drops
 from ema_model.discovery.trial import LEAST_BIC, Trial, fitted_count, pays
@@ -118,7 +118,7 @@ def _chosen(accepted: Sequence[Trial]) -> tuple[Trial, list[Trial]]:
 
 def _further(story: Story, best: Trial, tell: Progress) -> Trial | None:
     """Further orders of a periodic effect, beside it."""
-    if not is_periodic(best.candidate.name):
+    if not find(best.candidate.name).is_periodic:
         return None
     return with_further_orders(story.data, story.held, best.fit, best.candidate.name, tell)
 

@@ -17,6 +17,8 @@ from ema_model.actuator import Actuator
 from ema_model.discovery.fitting import Data, Fit
 from ema_model.effects import CATALOGUE, Effect, find
 from ema_model.faults import HEALTHY
+from ema_model.kernel_rows import stack_for
+from ema_model.stacks import Stack
 
 Array = NDArray[np.float64]
 Lane = tuple[Effect, dict[str, float]]
@@ -43,6 +45,14 @@ def off(effect: Effect) -> float | None:
     if first.low <= 0.0 <= first.high:
         return 0.0
     return first.low if effect.states == () else None
+
+
+def stacks_of_their_own(actuator: Actuator) -> list[Stack]:
+    """Those of the effects that nothing switches off, beside what an actuator has; none without a known controller."""
+    if actuator.controller.kind == "unknown":
+        return []
+    alone = [effect for effect in CATALOGUE.values() if off(effect) is None and effect.name not in actuator.effects]
+    return [stack_for(actuator, [effect.name]) for effect in alone]
 
 
 def variants(effect: Effect, orders: Sequence[int]) -> list[list[dict[str, float]]]:
@@ -143,8 +153,10 @@ def _switched_off(effect: Effect) -> dict[str, float]:
 
 
 def _library_off() -> dict[str, dict[str, float]]:
-    """Every effect that can be switched off, switched off."""
-    return {name: _switched_off(effect) for name, effect in CATALOGUE.items() if off(effect) is not None}
+    """Every effect that can be switched off, switched off, the periodic ones twice: one stack serves all scores."""
+    library = {name: effect for name, effect in CATALOGUE.items() if off(effect) is not None}
+    library |= {f"{name}_2": find(f"{name}_2") for name, effect in library.items() if effect.is_periodic}
+    return {name: _switched_off(effect) for name, effect in library.items()}
 
 
 def _resting(data: Data, found: Fit) -> Array:

@@ -15,11 +15,6 @@ _MOST = 5  # further orders
 _SHARE = 0.05  # of the strongest one's predicted drop
 
 
-def is_periodic(name: str) -> bool:
-    """Whether an effect has an order and a phase."""
-    return {"order", "phase_rad"} <= {parameter.name for parameter in find(name).parameters}
-
-
 def with_further_orders(
     data: Data, held: Data | None, current: Fit, name: str, tell: Callable[[str], None]
 ) -> Trial | None:

@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
+from ema_model.ahead import compile_ahead
 from ema_model.comparison.compare import prepared, weights_of
 from ema_model.comparison.result import Explanation
 from ema_model.comparison.sampling import fit_stretches
-from ema_model.discovery.fingerprints import Fingerprint, fingerprints
+from ema_model.discovery.fingerprints import Fingerprint, fingerprints, stacks_of_their_own
 from ema_model.discovery.fitting import Data, Fit, fit, floor_ratio, gather, holdout_fit, rms_by_signal, without_effect
 from ema_model.discovery.left import Left, left_by
 from ema_model.discovery.repeatability import by_inverse_dynamics, is_lost, with_divergence
@@ -176,6 +177,7 @@ def begun(
     Raises InputError for recordings that cannot be compared.
     """
     check_same_actuator([*measurements, *holdout])
+    compile_ahead(stacks_of_their_own(actuator))
     story = _calibrated(measurements, actuator, holdout, signals, tell)
     inverse = None if story.repeatable else by_inverse_dynamics(story.data, actuator)
     if inverse is None:

@@ -14,7 +14,8 @@ from ema_model.effects import find
 Progress = Callable[[str], None]
 
 LEAST_BIC = 10.0
-_LEAST_FALL = 0.01  # of the error: what is less is immaterial
+_LEAST_FALL = 0.004  # of the error: what is less is immaterial
+_FALL = 0.01  # below which the data must be twice as sure
 _LEAST_T = 2.4  # of the mean gain over blocks of time: 1 % of chance
 _HELD = 0.01  # of the held-out error: at the floor chance may raise it so much, above the floor it must fall so much
 _FLOOR = 1.1  # of the floor, up to which an error counts as at it
@@ -48,9 +49,8 @@ def pays(current: Fit, trial: Trial, data: Data, held: Data | None) -> bool:
     """Whether the data pay for the parameters: most of the time, materially, and where they were not fitted."""
     values = len(current.residual)
     count = sum(fitted_count(name) for name in trial.effects)
-    if trial.drop - count * np.log(values) < LEAST_BIC:
-        return False
-    if trial.fit.error() > (1.0 - _LEAST_FALL) * current.error():
+    fall = 1.0 - trial.fit.error() / current.error()
+    if fall < _LEAST_FALL or trial.drop - count * np.log(values) < (LEAST_BIC if fall > _FALL else 2.0 * LEAST_BIC):
         return False
     gains = np.array_split(current.residual**2 - trial.fit.residual**2, max(8, values // _CORRELATED))
     sums = np.array([gain.sum() for gain in gains])

@@ -45,6 +45,11 @@ class Effect:
     is_load: bool = False  # pulls at the user from outside, so that its torque counts as the load
     name: str = ""  # of the file; the catalogue fills it in
 
+    @property
+    def is_periodic(self) -> bool:
+        """Whether it has an order and a phase, so that a model may hold it several times."""
+        return {"order", "phase_rad"} <= {parameter.name for parameter in self.parameters}
+
     def settings(self, given: dict[str, float]) -> dict[str, float]:
         """All parameters, in order, those not given at their default; InputError for names and values."""
         known = {parameter.name: parameter for parameter in self.parameters}

@@ -1,0 +1,36 @@
+"""What another process compiles ahead is found compiled here."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+HERE = """
+import sys, time
+from ema_model.actuator import load_actuator
+from ema_model import ahead
+from ema_model.simulation import Run, simulate_monitor
+from ema_model.stacks import find_stack
+
+stack = find_stack("reduced", ["dead_time"])
+ahead.compile_ahead([stack])
+[child] = ahead._running
+assert child.wait(120) == 0
+simulate_monitor(Run(duration_s=0.01), load_actuator(), effects={"dead_time": {}}, circuit="reduced")
+statistics = stack.monitor.traces.stats
+assert statistics.cache_hits and not statistics.cache_misses, statistics
+ahead.compile_ahead([stack])
+assert len(ahead._running) == 1, "what the cache holds is not compiled again"
+"""
+
+
+def test_a_kernel_compiled_ahead_is_not_compiled_here(tmp_path):
+    found = subprocess.run(
+        [sys.executable, "-c", HERE],
+        env={**os.environ, "EMAVIZ_CACHE_DIR": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    assert found.returncode == 0, found.stderr

@@ -27,6 +27,7 @@ _running: list[subprocess.Popen[bytes]] = []
 
 def compile_ahead(stacks: Iterable[Stack]) -> None:
     """Begins to compile the `traces` kernels that the cache lacks; returns at once.  Effects are the catalogue's."""
+    _running[:] = [process for process in _running if process.poll() is None]
     missing = ["+".join((one.circuit, one.controller, *one.effects)) for one in stacks if not _is_cached(one)]
     if not missing or (os.cpu_count() or 1) < 2:
         return

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import html
 import sys
 import threading
 import time
@@ -16,9 +17,13 @@ import viser
 
 from ema_model.actuator import load_actuator
 from ema_model.comparison.result import Comparison
+from ema_model.faults import HEALTHY
+from ema_model.measurement import Measurement
+from emaviz import plant
 from emaviz.comparing import Comparing
 from emaviz.data_folder import DataFolder
 from emaviz.discovering import Discovering
+from emaviz.discovery_source import COMPARED
 from emaviz.identifying import measured
 from emaviz.library import Library
 from emaviz.panels.compare import ComparePanel
@@ -33,15 +38,18 @@ from emaviz.panels.discover_result import DiscoveryPanel
 from emaviz.panels.explore import ExplorePanel
 from emaviz.panels.explore_charts import ChartsPanel
 from emaviz.panels.explore_export import ExportControls
+from emaviz.panels.explore_seal import SealControls
 from emaviz.panels.identify import IdentifyPanel
+from emaviz.panels.identify_missing import take_to_discover
 from emaviz.panels.identify_result import IdentifyResult
 from emaviz.panels.library import EffectPage, LibraryPanel
 from emaviz.panels.page import Page
 from emaviz.panels.page_playback import PlaybackStrip
+from emaviz.panels.page_width import LEFT_PX, Widths
 from emaviz.panels.recordings import RecordingsPanel
 from emaviz.panels.recordings_result import RecordingsResult
 from emaviz.panels.sessions import SessionControls, parts
-from emaviz.recorded import Recorded
+from emaviz.recorded import Recorded, recovered
 from emaviz.recording.viewer import ViewerHost
 from emaviz.safe_server import LOOPBACK, open_server
 from emaviz.scene.actuator import ActuatorScene
@@ -49,10 +57,10 @@ from emaviz.scene.playback import Playback
 from emaviz.session import Session, Simulation
 from emaviz.worker import Worker
 
-_FASTEST_REDRAW_S = 0.05
+_FASTEST_REDRAW_S = 0.04
 _SLOW_REDRAW_S = 0.3  # of what nobody watches while dragging
-_LEFT_PX, _RIGHT_PX, _VIEWER_PX = 380, 500, 640
 _SETTLE_S = 0.15
+_NOTE = "padding:6px 12px;font-size:13px;line-height:1.45;border-left:3px solid #e8590c"
 _BRAND = (47, 111, 222)
 
 
@@ -75,6 +83,7 @@ class App:
         self._slow_screen = Worker("emaviz-slow-screen", self._on_screen_error, rest_s=_SLOW_REDRAW_S)
         self._recording_files = Worker("emaviz-recordings", self._on_screen_error)
         self.page = Page(self.server, self.session, self.screen)
+        self._widths = Widths(self.server, self._set_widths)
         self.comparing = Comparing(self.session, data)
         self.session.open_file = partial(measured, self.comparing)
         self.discovering = Discovering(self.session, self.comparing)
@@ -85,6 +94,8 @@ class App:
         self.strip.connect(self.playback)
         self._first = threading.Event()
         self.first_picture_s = 0.0
+        if not plant.can_be_explored(actuator):
+            self._first.set()  # there will be no picture of a run
         events = self.session.events
         events.simulated.append(lambda simulation: self.screen.post("signals", lambda: self._draw(simulation, started)))
         events.status.append(lambda text: self.screen.post("status", lambda: self._status(text)))
@@ -92,7 +103,7 @@ class App:
         self.session.start()
         for path in given:
             self.comparing.add(data.name_of(path))
-        for line in _recovered(recordings):
+        for line in recovered(recordings):
             self.explore.status.content = line
         if no_viewer:
             self.server.on_client_connect(lambda _: self.page.notify("The Rerun viewer cannot be shown", no_viewer))
@@ -102,7 +113,7 @@ class App:
         self._theme(dark=False)
         gui.set_panel_label("emaviz")
         gui.main_panel.dock_left()
-        gui.main_panel.set_width(_LEFT_PX)
+        gui.main_panel.set_width(LEFT_PX)
         # Of the panels on the right one is seen: the one that belongs to what was done last.
         self._signals_panel, self._result_panel = gui.add_panel(), gui.add_panel(visible=False)
         self._discovery_panel, self._library_panel = gui.add_panel(visible=False), gui.add_panel(visible=False)
@@ -128,7 +139,8 @@ class App:
                 self.discovering,
                 lambda: self._bring(self._discovery_panel),
                 lambda: DiscoveryKeep(self.page, self.discovering, self.viewer),
-                lambda one: load_into_explore(self.explore, self.page, one),
+                lambda one: load_into_explore(self.explore, one),
+                self._play,
             )
         library = Library(self.session)
         with self._library_panel.add_tab("Effect", viser.Icon.BOOK):
@@ -140,7 +152,7 @@ class App:
             panel.set_width(self._width(panel))
         builders = [
             lambda tabs: self._build_explore(tabs),
-            lambda tabs: self._build_identify(tabs, search),
+            lambda tabs: self._build_identify(tabs, search, opened),
             lambda tabs: self._build_compare(tabs, result),
             lambda tabs: self._build_discover(tabs, discovery),
             lambda tabs: self._build_library(tabs, library, effect),
@@ -152,17 +164,34 @@ class App:
         tabs = gui.add_tab_group()
         for build in builders:
             build(tabs)
+        self.compare.add_drop()
         self.sessions.connect(
-            parts(self.page, self.comparing, self.strip, self.explore, self.identify, search, self.compare)
+            parts(
+                self.page,
+                self.comparing,
+                self.strip,
+                self.explore,
+                self.identify,
+                search,
+                self.compare,
+                self.discovering,
+            )
         )
         self.compare.session_uploaded = self.sessions.uploaded
+        self.compare.challenge_uploaded = self.discover.source.uploaded
+        self.identify.to_discover = partial(
+            take_to_discover, self.page, self.discovering, lambda: self.discover.source.choose(COMPARED)
+        )
 
     def _theme(self, dark: bool) -> None:
         self.server.gui.configure_theme(show_logo=False, show_share_button=False, brand_color=_BRAND, dark_mode=dark)
 
     def _build_explore(self, tabs: viser.GuiTabGroupHandle) -> None:
         with tabs.add_tab("Explore", viser.Icon.ADJUSTMENTS):
+            if text := plant.note(self.session.actuator):
+                self.server.gui.add_html(f'<div style="{_NOTE}">{html.escape(text)}</div>')
             self.explore = ExplorePanel(self.page)
+            SealControls(self.page, self.discovering.sealing)
 
     def _build_recordings(self, tabs: viser.GuiTabGroupHandle, recorded: Recorded, result: RecordingsResult) -> None:
         with tabs.add_tab("Recordings", viser.Icon.LIST):
@@ -170,9 +199,12 @@ class App:
             self.sessions = SessionControls(self.page, self.comparing, self._recording_files)
         self.comparing.events.kept.append(lambda _: panel.refresh_soon())
 
-    def _build_identify(self, tabs: viser.GuiTabGroupHandle, result: IdentifyResult) -> None:
+    def _build_identify(
+        self, tabs: viser.GuiTabGroupHandle, result: IdentifyResult, recordings: RecordingsResult
+    ) -> None:
         with tabs.add_tab("Identify", viser.Icon.SEARCH):
             self.identify = IdentifyPanel(self.page, self.comparing, self.viewer, result)
+        self.identify.open_viewer = recordings.open
 
     def _build_compare(self, tabs: viser.GuiTabGroupHandle, result: ResultPanel) -> None:
         with tabs.add_tab("Compare", viser.Icon.ARROWS_DIFF):
@@ -180,7 +212,7 @@ class App:
 
     def _build_discover(self, tabs: viser.GuiTabGroupHandle, result: DiscoveryPanel) -> None:
         with tabs.add_tab("Discover", viser.Icon.BULB):
-            self.discover = DiscoverPanel(self.page, self.discovering, result)
+            self.discover = DiscoverPanel(self.page, self.discovering, result, self.compare.uploads)
 
     def _build_library(self, tabs: viser.GuiTabGroupHandle, library: Library, effect: EffectPage) -> None:
         with tabs.add_tab("Library", viser.Icon.BOOK):
@@ -196,7 +228,18 @@ class App:
             threading.Timer(_SETTLE_S, lambda: panel.set_width(self._width(panel))).start()
 
     def _width(self, panel: viser.PanelHandle) -> int:
-        return _VIEWER_PX if panel is self._recordings_panel else _RIGHT_PX
+        return self._widths.of(viewer=panel is self._recordings_panel)
+
+    def _set_widths(self) -> None:
+        for panel in self._right:
+            if panel.visible:
+                panel.set_width(self._width(panel))
+
+    def _play(self, run: Measurement | None) -> None:
+        """A run on the 3D actuator; without one, Explore's."""
+        shown = self.session.simulation if run is None else Simulation(run, run, HEALTHY, 0.0)
+        if shown is not None:
+            self.playback.show(shown)
 
     def _hold(self, comparison: Comparison, recording: int, time_s: float) -> None:
         self.strip.play(False)
@@ -272,13 +315,3 @@ def _viewer(recordings: Path) -> tuple[ViewerHost | None, str]:
         return ViewerHost(recordings), ""
     except OSError as error:
         return None, str(error)
-
-
-def _recovered(recordings: Path) -> list[str]:
-    """What became of recordings of interrupted runs, a line each."""
-    try:
-        from emaviz.recording.recover import recover
-
-        return [f"Recovered a recording of an interrupted run: {found}" for found in recover(recordings)]
-    except (OSError, ImportError) as error:
-        return [f"Interrupted recordings cannot be recovered: {error}"]

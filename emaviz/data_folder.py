@@ -13,6 +13,7 @@ import shutil
 from contextlib import suppress
 from pathlib import Path
 
+from ema_model.challenges.sealed_file import SUFFIX as CHALLENGE_SUFFIX
 from ema_model.errors import InputError
 from ema_model.measurement import side_path
 from ema_model.measurement.formats import FORMATS
@@ -31,10 +32,10 @@ class DataFolder:
     """Recordings, uploads and actuator files below one folder.  Raises InputError, one line, for what is refused."""
 
     def __init__(self, folder: Path) -> None:
-        """Makes the folder with `recordings`, `uploads`, `actuators` and `sessions` in it."""
+        """Makes the folder with `recordings`, `uploads`, `actuators`, `sessions` and `challenges` in it."""
         self.recordings, self.uploads, self.actuators = (folder / n for n in ("recordings", "uploads", "actuators"))
-        self.sessions = folder / "sessions"
-        for made in (self.recordings, self.uploads, self.actuators, self.sessions):
+        self.sessions, self.challenges = folder / "sessions", folder / "challenges"
+        for made in (self.recordings, self.uploads, self.actuators, self.sessions, self.challenges):
             try:
                 made.mkdir(parents=True, exist_ok=True)
             except OSError as error:
@@ -56,6 +57,14 @@ class DataFolder:
     def session(self, name: str) -> Path:
         """The saved session of that name, relative to the folder."""
         return self._existing(name, (SESSION_SUFFIX,))
+
+    def challenge_files(self) -> list[str]:
+        """Names of the sealed challenges, the newest first."""
+        return self._files(self.challenges, (CHALLENGE_SUFFIX,))
+
+    def challenge(self, name: str) -> Path:
+        """The sealed challenge of that name, relative to the folder."""
+        return self._existing(name, (CHALLENGE_SUFFIX,))
 
     def measurement(self, name: str) -> Path:
         """The file of that name, relative to the folder."""
@@ -82,17 +91,21 @@ class DataFolder:
     def place(self, filename: str) -> Path:
         """Where an upload of that name is to be kept: safe, and not yet taken.
 
-        Measurements go to `uploads`, .toml to `actuators`, .emaviz to `sessions`.
+        Measurements go to `uploads`, .toml to `actuators`, .emaviz to `sessions`, .challenge to `challenges`.
         """
         name = sanitised(filename)
         suffix = Path(name).suffix.lower()
-        if suffix not in (*FORMATS, ACTUATOR_SUFFIX, SESSION_SUFFIX):
+        if suffix not in (*FORMATS, ACTUATOR_SUFFIX, SESSION_SUFFIX, CHALLENGE_SUFFIX):
             known = ", ".join(FORMATS)
             raise InputError(
-                f"{shown(name)}: the page takes measurements ({known}), actuator files (.toml) and sessions (.emaviz); "
-                "convert it"
+                f"{shown(name)}: the page takes measurements ({known}), actuator files (.toml), sessions (.emaviz) and "
+                "sealed challenges (.challenge); convert it"
             )
-        folders = {ACTUATOR_SUFFIX: self.actuators, SESSION_SUFFIX: self.sessions}
+        folders = {
+            ACTUATOR_SUFFIX: self.actuators,
+            SESSION_SUFFIX: self.sessions,
+            CHALLENGE_SUFFIX: self.challenges,
+        }
         return self._free(folders.get(suffix, self.uploads), name)
 
     def part(self) -> Path:

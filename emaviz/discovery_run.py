@@ -16,6 +16,8 @@ from emaviz.session import Session
 from emaviz.worker import Steps
 
 _TICK_S = 0.5
+_RESTED = 2  # looks, a quarter of a second apart, at a compute thread that is free
+_MOST_WAIT_S = 20.0  # for what may never be ready
 Tell = Callable[[str], None]
 Job = Callable[[Tell], None]
 
@@ -28,8 +30,11 @@ class DiscoverEvents:
     progressed: list[Callable[[str, float], None]] = field(default_factory=list)  # text, and seconds since it began
     looked: list[Callable[[Look | None], None]] = field(default_factory=list)  # the story has changed
     ended: list[Callable[[str], None]] = field(default_factory=list)  # a job: what came of it
+    waits: list[Callable[[str], None]] = field(default_factory=list)  # a job, for its turn
     unsuggested: list[Callable[[], None]] = field(default_factory=list)  # no test tells the candidates apart
     revealed: list[Callable[[], None]] = field(default_factory=list)
+    previewed: list[Callable[[Any], None]] = field(default_factory=list)  # `discovery_own.Preview`
+    unpreviewed: list[Callable[[str], None]] = field(default_factory=list)  # why a torque has no preview
     kept: list[Callable[[Path], None]] = field(default_factory=list)  # a report, a recording, a model
 
 
@@ -40,18 +45,37 @@ class DiscoveryRun:
         self.running = False
         self._session, self._events, self._stopped = session, events, stopped
         self._stop = threading.Event()
+        self._waits = threading.Event()  # set: whoever waits to begin shall not any more
 
     def begin(self, title: str, job: Job) -> bool:
         """Runs job(tell) soon; False, and nothing is begun, while another long run goes on."""
         stop = threading.Event()
         started = self._session.worker.start(self._steps(title, job, stop))
         if started:
+            self._waits.set()
             self._stop, self.running = stop, True
             _tell(self._events.began, title)
         return started
 
+    def begin_when_free(self, title: str, job: Job, ready: Callable[[], bool]) -> None:
+        """Begins once ready() and no other long run goes on, unless another step begins first or it is stopped."""
+        self._waits.set()
+        self._waits = over = threading.Event()
+        _tell(self._events.waits, f"{title}: waiting until nothing else runs …")
+
+        def wait() -> None:
+            rested, until = 0, time.perf_counter() + _MOST_WAIT_S
+            while not over.wait(_TICK_S / 2.0):
+                ready_now = ready() or time.perf_counter() > until
+                rested = rested + 1 if ready_now and not self._session.worker.busy else 0
+                if rested > _RESTED and self.begin(title, job):
+                    return
+
+        threading.Thread(target=wait, name="emaviz-discovery-waits", daemon=True).start()
+
     def stop(self) -> None:
-        """Ends the step that runs, as soon as its present simulation is done."""
+        """Ends the step that runs, as soon as its present simulation is done, or the wait for one."""
+        self._waits.set()
         self._stop.set()
 
     def _steps(self, title: str, job: Job, stop: threading.Event) -> Steps:

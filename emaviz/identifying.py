@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.faults import performance_coefficient
-from ema_model.identification.objective import Objective, simulated
+from ema_model.identification.objective import Objective
 from ema_model.identification.run import Identification, Progress, steps
 from ema_model.measurement import Measurement
 from ema_model.recordings import read_recording
+from emaviz import plant
 from emaviz.state import SLIDERS, Settings
 from emaviz.worker import Steps
 
@@ -85,6 +86,8 @@ class Race:
     time_s: Array  # (blocks,), of the current that is fitted
     measured_A: Array  # (blocks,)
     truth: Array | None  # (8,), of the sliders' plant
+    measurement: Measurement  # what is identified
+    objective: Objective  # and its cost
     growing: Path | None = None  # of the recording, while it is written
     path: Path | None = None  # and once it is whole
 
@@ -161,8 +164,8 @@ def target(
     """Steps that end with the recording to identify, and the true k if it is the sliders' plant."""
     if settings.source != SLIDERS:
         return (yield from _elsewhere(lambda: open_file(settings.source))), None
-    plant = simulated(settings.run(), actuator, settings.k, settings.fitness, settings.effects)
-    return settings.sensors.record(plant, settings.seed), settings.k
+    run = plant.to_identify(settings.run(), actuator, settings.k, settings.fitness, settings.effects)
+    return settings.sensors.record(run, settings.seed), settings.k
 
 
 def _elsewhere(read: Callable[[], Measurement]) -> Generator[None, None, Measurement]:
@@ -191,7 +194,8 @@ def begin(settings: Settings, objective: Objective, truth: Array | None) -> Race
     window = objective.windows[0]
     time = objective.measurements[0].time_s[0] + window.block_s * (1.0 + np.arange(window.blocks))
     tracks = {name: Track(name, settings.iterations) for name in settings.algorithms}
-    return Race(settings, tracks, time, objective.target[: window.blocks], truth)
+    measured_A = objective.target[: window.blocks]
+    return Race(settings, tracks, time, measured_A, truth, objective.recorded[0], objective)
 
 
 def run(race: Race, objective: Objective, reins: Reins, tell: Callable[[Race, Progress | None], None]) -> Steps:

@@ -131,3 +131,13 @@ def _properties(path: Path) -> dict[str, Any]:
 def as_text(value: Any) -> str:
     """A setting as a person reads it."""
     return value if isinstance(value, str) else json.dumps(value)
+
+
+def recovered(recordings: Path) -> list[str]:
+    """What became of recordings of interrupted runs, a line each."""
+    try:
+        from emaviz.recording.recover import recover
+
+        return [f"Recovered a recording of an interrupted run: {found}" for found in recover(recordings)]
+    except (OSError, ImportError) as error:
+        return [f"Interrupted recordings cannot be recovered: {error}"]

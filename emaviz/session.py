@@ -21,7 +21,8 @@ from ema_model.faults import HEALTHY
 from ema_model.identification.objective import Objective
 from ema_model.identification.run import Identification, Progress, warm_up
 from ema_model.measurement import Measurement
-from ema_model.simulation import simulate_monitor, simulate_reference
+from ema_model.simulation import simulate_monitor
+from emaviz import plant
 from emaviz.identifying import Race, Reins, begin, run, target
 from emaviz.state import Settings
 from emaviz.worker import Steps, Worker
@@ -87,7 +88,7 @@ class Session:
         self.worker.post("simulate", lambda: self._simulate(asked))
 
     def _simulate(self, asked: bool = True) -> None:
-        if not self.ready.is_set():
+        if not self.ready.is_set() or not plant.can_be_explored(self.actuator):
             return  # the warm-up ends with a simulation
         settings = copy.deepcopy(self.settings)
         stack = tuple(sorted(settings.effects))
@@ -98,7 +99,7 @@ class Session:
         fitted = self.identified.k if self.identified is not None else HEALTHY
         shown = {"healthy": HEALTHY, "same faults": settings.k, "identified": fitted}[settings.monitor]
         try:
-            reference = simulate_reference(
+            reference = plant.simulate(
                 run,
                 self.actuator,
                 settings.k,
@@ -121,8 +122,12 @@ class Session:
     def _warm_up(self) -> None:
         started = time.perf_counter()
         _tell(self.events.status, "Compiling the models for this computer (the first time takes some seconds)…")
+        if not plant.can_be_explored(self.actuator):
+            self.ready.set()
+            _tell(self.events.status, "Ready.")
+            return
         run = Settings().run()
-        reference = simulate_reference(run, self.actuator)
+        reference = plant.simulate(run, self.actuator, HEALTHY, {})
         simulate_monitor(run, self.actuator)
         self.ready.set()
         self._simulate()

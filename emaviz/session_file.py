@@ -33,11 +33,12 @@ class Part:
     """One part of the page.
 
     save(): what JSON can hold; restore(saved, names): takes it, names being the files' names now by those of then.
-    InputError from `restore` says what makes no sense.
+    InputError from `restore` says what makes no sense.  files(): names in the data folder of what it needs.
     """
 
     save: Callable[[], Any]
     restore: Callable[[Any, Mapping[str, str]], None]
+    files: Callable[[], Sequence[str]] = list
 
 
 def write(path: Path, parts: Mapping[str, Part], folder: DataFolder, names: Sequence[str]) -> None:

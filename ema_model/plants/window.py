@@ -120,7 +120,7 @@ def _inputs(measurement: Measurement, actuator: Actuator, run: slice, steps: int
     """Command, load and supply at every step; linear between samples, but for jumps and the drive's switch."""
     time = measurement.time_s[run] - measurement.time_s[run.start]
     at = np.arange(steps) * step_s - actuator.sensors.delay_s
-    command = between(at, time, measurement["command_rad"][run])
+    command: Array = between(at, time, measurement["command_rad"][run]).astype(float)
     load = measurement.get("load_torque_Nm")
     loads = np.zeros(steps) if load is None else np.interp(at, time, load[run])
     bus = measurement.get("bus_voltage_V")

@@ -26,7 +26,7 @@ def fault_bars(
         marks = [_box(0.0, k[i], 3, 10, DIFFERENCE if fault.name in alarms else MONITOR, 0.9)]
         if interval90 is not None:
             low, high = np.asarray(interval90)[i]
-            marks.append(_box(low, max(high - low, 0.004), 7, 2, "#495057", 0.9))
+            marks.append(_box(low, max(high - low, 0.004), 7, 2, "currentColor", 0.85))
         if truth is not None:
             marks.append(_box(np.asarray(truth)[i] - 0.004, 0.008, 0, 16, TRUTH, 1.0))
         rows.append(

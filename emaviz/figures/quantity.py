@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ema_model.actuator.titles import parameter_title as parameter_title
 from ema_model.comparison.residuals import Residuals
 from ema_model.comparison.result import Comparison
 from ema_model.measurement import SIGNALS
@@ -119,20 +120,3 @@ def wrapped(comparison: Comparison, variable: str) -> np.ndarray:
     if variable == "motor_angle" and comparison.actuator.axes.variable_unit(variable) == "rad":
         return np.mod(values, 2.0 * np.pi)
     return values
-
-
-def parameter_title(path: str) -> str:
-    """'Motor inertia' of 'motor.inertia_kgm2'; the unit is told apart."""
-    section, _, name = path.rpartition(".")
-    for ending in _ENDINGS:
-        if name.endswith(ending):
-            name = name.removesuffix(ending)
-            break
-    words = f"{section.replace('.', ' ')} {name}".replace("_", " ").strip()
-    return words[:1].upper() + words[1:]
-
-
-_ENDINGS = (
-    *("_Nms2_rad", "_Ns2_m", "_Nms_rad", "_Ns_m", "_Nm_rad", "_N_m", "_Nm_A", "_N_A", "_kgm2", "_kg", "_rad_s"),
-    *("_m_s", "_1_rad", "_1_m", "_1_s", "_rad", "_Nm", "_Ohm", "_m", "_N", "_H", "_V", "_A", "_s"),
-)

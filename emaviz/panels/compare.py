@@ -11,12 +11,13 @@ from ema_model.comparison.result import Comparison
 from ema_model.errors import InputError
 from ema_model.measurement.formats import FORMATS
 from emaviz.comparing import UPLOADED, Comparing, Opened
-from emaviz.data_folder import ACTUATOR_SUFFIX, SESSION_SUFFIX
+from emaviz.data_folder import ACTUATOR_SUFFIX, CHALLENGE_SUFFIX, SESSION_SUFFIX
 from emaviz.panels.compare_asked import AskedControls
 from emaviz.panels.compare_cards import health_card, recordings_list
 from emaviz.panels.compare_mapping import MappingStep
 from emaviz.panels.compare_result import ResultPanel
 from emaviz.panels.page import Page
+from emaviz.panels.page_style import DROP
 from emaviz.uploads import Uploads
 
 _NONE = "–"
@@ -30,6 +31,7 @@ class ComparePanel:
         self._shown: str | None = None
         self._again = False
         self.session_uploaded: Callable[[Path], None] = lambda path: None  # a whole session, not a recording
+        self.challenge_uploaded: Callable[[Path], None] = lambda path: None  # a sealed one, for Discover
         gui = page.server.gui
         self.uploads = Uploads(page.server, comparing.folder, self._uploaded, self._refused)
         gui.add_markdown("Upload a recording of a test bench, or **drop it anywhere** on the page.")
@@ -63,6 +65,11 @@ class ComparePanel:
         events.ended.append(lambda why: page.screen.post("compare ended", lambda: self._ended(why)))
         self.refresh_files()
 
+    def add_drop(self) -> None:
+        """An unseen upload button here, outside all tabs: a tab's own is there only once that tab was opened."""
+        self._page.server.gui.add_html(DROP)
+        self.uploads.add_button("Drop", ",".join((*FORMATS, ACTUATOR_SUFFIX, SESSION_SUFFIX, CHALLENGE_SUFFIX)))
+
     def refresh_files(self) -> None:
         """Reads the data folder's list again."""
         names = self._comparing.folder.measurements() or [_NONE]
@@ -76,6 +83,9 @@ class ComparePanel:
         name = self._comparing.folder.name_of(path)
         if path.suffix.lower() == SESSION_SUFFIX:
             self.session_uploaded(path)
+            return
+        if path.suffix.lower() == CHALLENGE_SUFFIX:
+            self.challenge_uploaded(path)
             return
         if path.suffix.lower() == ACTUATOR_SUFFIX:
             self._page.screen.post("actuator", lambda: self.asked.choose(UPLOADED + name))

@@ -83,11 +83,12 @@ def calibration_table(scores: Sequence[Score]) -> str:
     for score in scores:
         colour = "#e03131" if score.at_bound else "inherit"
         moved = f"{round(score.z, 2) + 0.0:+.2f} σ{' at its bound' if score.at_bound else ''}"
+        moved = moved.replace("-", "−")
         interval = f"{quantity.number(score.low)} … {quantity.number(score.high)}"
         rows.append(
             f"<tr><td>{html.escape(score.title)}</td>"
             f'<td style="text-align:right;white-space:nowrap">{quantity.number(score.value, 4)}</td>'
-            f'<td style="text-align:right;white-space:nowrap">{interval}</td>'
+            f'<td style="text-align:right;white-space:nowrap;padding-left:8px">{interval}</td>'
             f'<td style="padding-left:6px">{html.escape(score.unit)}</td>'
             f'<td style="text-align:right;white-space:nowrap;color:{colour}">{moved}</td></tr>'
         )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import html
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import viser
@@ -13,40 +12,30 @@ from ema_model.discovery import Candidate
 from ema_model.effects import CATALOGUE
 from emaviz.discovering import Discovering
 from emaviz.discovery_look import AT_FLOOR, Look
-from emaviz.discovery_source import COMPARED
 from emaviz.discovery_words import effect_title
 from emaviz.figures.quantity import number
 from emaviz.panels import discover_cards as cards
 from emaviz.panels.discover_guide import Guide
 from emaviz.panels.discover_own import OwnEffect
 from emaviz.panels.discover_result import DiscoveryPanel
+from emaviz.panels.discover_source import SourceControls
 from emaviz.panels.page import Page
+from emaviz.uploads import Uploads
 
 _MOST_ADDED = 6
-_STARS = "●○"
 
 
 class DiscoverPanel:
     """The tab's controls.  `result` is the panel on the right; to_front() brings that one forward."""
 
-    def __init__(self, page: Page, discovering: Discovering, result: DiscoveryPanel) -> None:
+    def __init__(self, page: Page, discovering: Discovering, result: DiscoveryPanel, uploads: Uploads) -> None:
         self._page, self._discovering, self._result = page, discovering, result
         self._look: Look | None = None
         self._opened: str | None = None
         self._title = ""  # of the step that runs
         gui = page.server.gui
-        self._sources = {
-            COMPARED: "",
-            **{
-                f"{_STARS[0] * one.grade}{_STARS[1] * (5 - one.grade)} {one.title}": name
-                for name, one in discovering.source.challenges.items()
-            },
-        }
-        self._guide = Guide(page, discovering, lambda: self._choose(self._first_challenge()))
-        self._source = gui.add_dropdown("Recordings", tuple(self._sources), hint="Of Compare, or of a challenge")
-        self._about = gui.add_html("")
-        self._held = gui.add_folder("Hold out, to judge by", visible=False, expand_by_default=False)
-        self._boxes: list[Any] = []
+        self._guide = Guide(page, discovering, lambda: self.source.choose_first())
+        self.source = SourceControls(page, discovering, uploads, self._chosen, self._source_shown)
         self._start = gui.add_button("Start", icon=viser.Icon.PLAYER_PLAY)
         self._stop = gui.add_button("Stop", icon=viser.Icon.PLAYER_STOP, color="red", visible=False)
         self._bar = gui.add_progress_bar(100.0, animated=True, visible=False)
@@ -72,11 +61,10 @@ class DiscoverPanel:
             self._never = [self._slot() for _ in CATALOGUE]
         self._own = OwnEffect(page, discovering)
         self._listen()
-        self._show_source()
+        self.source.show(None)
 
     def _listen(self) -> None:
         discovering, post = self._discovering, self._page.screen.post
-        self._source.on_update(lambda event: event.client and post("source", self._chosen))
         self._start.on_click(lambda _: self.ask(discovering.start))
         self._stop.on_click(lambda _: post("stop", self._stopping))
         self._undo.on_click(lambda _: self._page.screen.post("undo", self._step_back))
@@ -87,69 +75,22 @@ class DiscoverPanel:
         self._own.connect(self.ask)
         events = discovering.events
         events.began.append(lambda title: post("discover began", lambda: self._began(title)))
+        events.waits.append(lambda text: post("discover progress", lambda: self._say_plain(text)))
         events.progressed.append(lambda text, s: post("discover progress", lambda: self._say(text, s)))
         events.looked.append(lambda look: post("looked", lambda: self._show(look)))
         events.ended.append(lambda text: post("discover ended", lambda: self._ended(text)))
-        compare = discovering.comparing.events
-        compare.opened.append(lambda _: post("discover source", self._show_source))
-        compare.removed.append(lambda: post("discover source", self._show_source))
 
     # --- what is asked ----------------------------------------------------------------------------------------------
 
-    def _first_challenge(self) -> str:
-        return next(title for title, name in self._sources.items() if name)
-
-    def _choose(self, title: str) -> None:
-        """A source by its title; on the screen's thread."""
-        self._source.value = title
-        self._chosen()
-
     def _chosen(self) -> None:
-        name = self._sources.get(str(self._source.value), "")
-        if self._page.checked(lambda: self._discovering.choose(name)):
-            self._opened = None
-            self._say_plain("")
-            self._show_source()
-            self._result.to_front()
-        else:
-            of = self._discovering.source.challenge.name if self._discovering.source.challenge else ""
-            self._source.value = next(title for title, known in self._sources.items() if known == of)
+        """Another source is chosen; on the screen's thread."""
+        self._opened = None
+        self._say_plain("")
+        self._result.to_front()
 
-    def _show_source(self) -> None:
-        """What is known of the recordings; on the screen's thread."""
-        challenge = self._discovering.source.challenge
-        opened = self._discovering.source.compared
-        if challenge is not None:
-            text = f"<b>{html.escape(challenge.title)}.</b> {html.escape(challenge.story)}"
-            files = f"Fitted: {', '.join(p.stem for p in challenge.training)}. "
-            files += f"Held out: {', '.join(p.stem for p in challenge.holdout)}."
-            told = f"{text}<div {cards.DIM}>{html.escape(files)}</div>"
-            if self._look is not None:  # read by now, and the cards want its place
-                summary = f'<summary style="cursor:pointer"><b>{html.escape(challenge.title)}</b>: the story</summary>'
-                told = f"<details>{summary}{told}</details>"
-            self._about.content = f"<div {cards.BOX}>{told}</div>"
-        else:
-            self._about.content = cards.note(
-                "The recordings and the actuator that Compare has."
-                if opened
-                else "Open recordings on Compare first, or choose a challenge."
-            )
-        self._held.visible = challenge is None and len(opened) > 1
-        for box in self._boxes:
-            box.remove()
-        self._boxes = []
-        if self._held.visible:
-            with self._held:
-                for name in opened:
-                    box = self._page.server.gui.add_checkbox(Path(name).name, name in self._discovering.source.held_out)
-                    box.on_update(lambda _, name=name, box=box: self._hold_out(name, bool(box.value)))
-                    self._boxes.append(box)
+    def _source_shown(self) -> None:
         self._start.disabled = self._discovering.running or not self._discovering.source.ready
         self._guide.show(self._look, self._opened)
-
-    def _hold_out(self, name: str, held: bool) -> None:
-        self._discovering.source.hold_out(name, held)
-        self._start.disabled = self._discovering.running or not self._discovering.source.ready
 
     def ask(self, begin: Callable[[], bool]) -> None:
         """Begins a step, or says why not."""
@@ -183,8 +124,9 @@ class DiscoverPanel:
             self._start.visible = not busy
             self._stop.visible = self._bar.visible = busy
             self._stop.disabled = False
-            for control in (self._undo, self._all, self._source, *self._removes):
+            for control in (self._undo, self._all, *self._removes):
                 control.disabled = busy
+            self.source.busy(busy)
             if self._look is not None and not busy:
                 self._undo.disabled = self._look.steps < 2
             self._own.busy(busy)
@@ -227,7 +169,7 @@ class DiscoverPanel:
             else:
                 self._open(self._opened)
         self._start.label, self._start.color = ("Start", None) if look is None else ("Start again", "gray")
-        self._show_source()
+        self.source.show(look)
 
     def _draw_model(self, look: Look | None) -> None:
         added = look.added if look is not None else ()

@@ -1,24 +1,30 @@
-"""Your own effect: an expression checked as it is typed, its parameters, and the curve of what is left."""
+"""Your own effect: an expression checked as it is typed, a slider for each parameter, and the curve of what is left."""
 
 from __future__ import annotations
 
 import html
+import threading
 from collections.abc import Callable
 from typing import Any
 
+import plotly.graph_objects as go
 import viser
 
 from ema_model.errors import InputError
-from ema_model.user_effects import Expression, parse, user_torque
+from ema_model.user_effects import UserEffect, user_torque
 from ema_model.user_effects.expression import FUNCTIONS, VARIABLES
 from emaviz.discovering import Discovering
 from emaviz.discovery_look import Look
+from emaviz.discovery_own import Preview, Typed, typed
+from emaviz.figures import signature
+from emaviz.figures.quantity import number as shown
 from emaviz.panels import discover_cards as cards
+from emaviz.panels.discover_sliders import ParameterSliders
 from emaviz.panels.page import Page
-from emaviz.state import number
 
 _EXAMPLE = "-c*sign(omega)*sqrt(abs(omega))"
-_START = 1e-3  # N·m and the like: a torque at the motor is some thousandths
+_TYPED_S = 0.7  # after the last key, from which a text is taken for whole: its torque is compiled then
+_CONFIG = {"displayModeBar": False, "responsive": False}
 
 
 class OwnEffect:
@@ -26,17 +32,19 @@ class OwnEffect:
 
     def __init__(self, page: Page, discovering: Discovering) -> None:
         self._page, self._discovering = page, discovering
-        self._expression: Expression | None = None
-        self._fields: dict[str, Any] = {}
+        self._typed = Typed(None, "")
         self._running = False
         self._look: Look | None = None
+        self._timer: threading.Timer | None = None
         gui = page.server.gui
         self._folder = gui.add_folder("Your own effect", visible=False, expand_by_default=False)
         with self._folder:
             gui.add_html(_help())
             self._text = gui.add_text("T [N·m] =", "", hint=f"For example {_EXAMPLE}")
             self._checked = gui.add_html("")
-            self._parameters = gui.add_folder("Its parameters start at", visible=False)
+            self._sliders = ParameterSliders(page, self._preview)
+            self._said = gui.add_html("")
+            self._plot: Any = gui.add_plotly(go.Figure(), config=_CONFIG, aspect=0.7, visible=False)
             self._add = gui.add_button("Fit it in the model", icon=viser.Icon.PLUS, disabled=True)
             self._curve = gui.add_button(
                 "From the curve",
@@ -46,6 +54,9 @@ class OwnEffect:
                 hint="What is left, as a table of torque over the variable that explains it best",
             )
         self._text.on_update(lambda event: event.client and page.screen.post("own effect", self._check))
+        events = discovering.events
+        events.previewed.append(lambda found: page.screen.post("own preview", lambda: self._draw(found)))
+        events.unpreviewed.append(lambda why: page.screen.post("own preview", lambda: self._hide(why)))
 
     def connect(self, ask: Callable[[Callable[[], bool]], None]) -> None:
         """ask(begin) starts a step."""
@@ -59,52 +70,77 @@ class OwnEffect:
 
     def show(self, look: Look | None) -> None:
         """A story as it stands."""
+        changed = look is None or self._look is None or look.steps != self._look.steps or self._look.assessment is None
         self._look = look
         self._folder.visible = look is not None
         self._enable()
+        if changed:
+            self._hide("")
+            if look is not None and look.assessment is not None and not self._is_in(look):
+                self._preview()
+
+    def _is_in(self, look: Look) -> bool:
+        found = self._typed.expression
+        return found is not None and any(one.key == user_torque(found.text).name for one in look.added)
 
     def _enable(self) -> None:
         left = self._look.assessment.left.explanation if self._look and self._look.assessment else None
-        self._add.disabled = self._running or self._expression is None
+        self._add.disabled = self._running or self._typed.expression is None
         self._curve.disabled = self._running or left is None
 
     def _check(self) -> None:
         """Reads the text as it stands; on the screen's thread."""
-        text = str(self._text.value)
-        self._expression, line, colour = None, "", "inherit"
-        if text.strip():
-            try:
-                self._expression = parse(text)
-                used = ", ".join(self._expression.variables) or "no variable"
-                free = ", ".join(self._expression.parameters) or "none"
-                line, colour = f"✓ uses {used}; parameters to fit: {free}", "#2b8a3e"
-            except InputError as error:
-                line, colour = f"✗ {error}", "#e03131"
-        self._checked.content = f'<div {cards.BOX}><span style="color:{colour}">{html.escape(line)}</span></div>'
-        self._list(self._expression.parameters if self._expression else ())
+        self._typed = typed(str(self._text.value))
+        colour = "#2b8a3e" if self._typed.expression else "#e03131"
+        line = html.escape(self._typed.line)
+        self._checked.content = f'<div {cards.BOX}><span style="color:{colour}">{line}</span></div>'
+        self._sliders.list(self._typed.expression.parameters if self._typed.expression else ())
+        self._hide("")
         self._enable()
+        if self._timer is not None:
+            self._timer.cancel()
+        if self._typed.expression is not None:
+            self._timer = threading.Timer(_TYPED_S, lambda: self._page.screen.post("own effect typed", self._preview))
+            self._timer.daemon = True
+            self._timer.start()
 
-    def _list(self, names: tuple[str, ...]) -> None:
-        """A field for each parameter; those that stay keep their values."""
-        if tuple(self._fields) == names:
+    def _effect(self) -> UserEffect:
+        if self._typed.expression is None:
+            raise InputError("there is no expression that can be used yet; write one, for example " + _EXAMPLE)
+        return user_torque(self._typed.expression.text, self._sliders.ranges)
+
+    # --- what it would change ---------------------------------------------------------------------------------------
+
+    def _preview(self) -> None:
+        """Asks for what the torque would change with the sliders' values."""
+        if self._typed.expression is None or self._look is None or self._is_in(self._look):
             return
-        values = {name: entry.value for name, entry in self._fields.items()}
-        for entry in self._fields.values():
-            entry.remove()
-        self._parameters.visible = bool(names)
-        with self._parameters:
-            self._fields = {
-                name: self._page.server.gui.add_number(
-                    name, values.get(name, _START), step=1e-4, hint="Where the fit starts; it finds the value"
-                )
-                for name in names
-            }
+        if not self._plot.visible:
+            self._said.content = cards.note("Simulating; a new expression is compiled first, for some seconds …")
+        try:
+            self._discovering.preview_own(self._effect(), self._sliders.values)
+        except InputError as error:
+            self._hide(str(error))
+
+    def _draw(self, found: Preview) -> None:
+        if self._look is None or found.look.steps != self._look.steps or self._typed.expression is None:
+            return
+        if found.candidate.name != self._effect().name:
+            return  # of a text that was typed before
+        with self._page.server.atomic():
+            self._plot.figure = signature.figure(found.look, found.candidate)
+            self._plot.visible = True
+            change = f"{shown(found.look.rmse)} → ≈ {shown(found.rmse)} × floor"
+            self._said.content = f"<div {cards.BOX}>With these values, before any fit: error {change}.</div>"
+
+    def _hide(self, why: str) -> None:
+        self._plot.visible = False
+        self._said.content = (
+            f'<div {cards.BOX}><span style="color:#e8590c">{html.escape(why)}</span></div>' if why else ""
+        )
 
     def _begin(self) -> bool:
-        if self._expression is None:
-            raise InputError("there is no expression that can be used yet; write one, for example " + _EXAMPLE)
-        start = {name: number(entry.value, name) for name, entry in self._fields.items()}
-        return self._discovering.add_own(user_torque(self._expression.text), start)
+        return self._discovering.add_own(self._effect(), self._sliders.values)
 
 
 def _help() -> str:

@@ -9,16 +9,17 @@ from typing import Any
 import plotly.graph_objects as go
 import viser
 
-from ema_model.effects import CATALOGUE, find
-from ema_model.measurement import SIGNALS
+from ema_model.effects import CATALOGUE
+from ema_model.measurement import SIGNALS, Measurement
 from emaviz.discovering import Discovering
 from emaviz.discovery_look import AT_FLOOR, Look
-from emaviz.discovery_words import FLOOR_NOTE, effect_title, headline, parameter, sentences, small
-from emaviz.figures import error_ladder, missing_curve, residual_steps
-from emaviz.figures.discovery_tracks import tracks
+from emaviz.discovery_words import FLOOR_NOTE, headline, sentences
+from emaviz.figures import error_ladder, explained_steps, missing_curve, residual_steps
+from emaviz.figures.discovery_tracks import Track, tracks
 from emaviz.figures.model_equation import equation
 from emaviz.figures.quantity import number
 from emaviz.panels import discover_cards as cards
+from emaviz.panels.discover_actuator import ActuatorSwitch
 from emaviz.panels.discover_effect import CONFIG, EffectView
 from emaviz.panels.discover_next import NextTest
 from emaviz.panels.discover_reveal import reveal
@@ -30,11 +31,11 @@ _RESTING = (
 )
 
 
-_MASKED = "had been standing in for"  # told shorter here
-
-
 class DiscoveryPanel:
-    """Everything here is built and changed on the screen's thread.  keep() adds what saves a discovery."""
+    """Everything here is built and changed on the screen's thread.
+
+    keep() adds what saves a discovery, load(test) puts a test into Explore, play(run) shows a run on the 3D actuator.
+    """
 
     def __init__(
         self,
@@ -43,6 +44,7 @@ class DiscoveryPanel:
         to_front: Callable[[], None],
         keep: Callable[[], object],
         load: Callable[[Any], None],
+        play: Callable[[Measurement | None], None],
     ) -> None:
         self._page, self._discovering, self.to_front = page, discovering, to_front
         self._look: Look | None = None
@@ -62,7 +64,9 @@ class DiscoveryPanel:
         with self._before_folder:
             self._recording = gui.add_dropdown("Recording", ["–"])
             self._signal = gui.add_dropdown("Signal", ["–"])
+            self._actuator = ActuatorSwitch(page, self._track, play)
             self._residual: Any = gui.add_plotly(go.Figure(), config=CONFIG, aspect=0.5, visible=False)
+            self._explained: Any = gui.add_plotly(go.Figure(), config=CONFIG, aspect=0.6, visible=False)
         self._left_folder = gui.add_folder("What is left", visible=False, expand_by_default=False)
         with self._left_folder:
             self._left: Any = gui.add_plotly(go.Figure(), config=CONFIG, aspect=0.5, visible=False)
@@ -119,6 +123,7 @@ class DiscoveryPanel:
             if list(dropdown.options) != options:
                 dropdown.options = options
         self._draw_residual()
+        self._draw_explained(look)
         if self._discovering.source.revealed:
             self._show_truth()
         self.to_front()
@@ -126,12 +131,26 @@ class DiscoveryPanel:
     def _draw_residual(self) -> None:
         if self._look is None:
             return
-        options = list(self._recording.options)
-        at = options.index(self._recording.value) if self._recording.value in options else 0
         signal = self._titles.get(str(self._signal.value)) or self._look.primary
-        runs = tracks(self._look.found)
-        self._residual.figure = residual_steps.figure(runs[min(at, len(runs) - 1)], signal)
-        self._residual.visible = True
+        track = self._track()
+        if track is not None:
+            self._residual.figure = residual_steps.figure(track, signal)
+            self._residual.visible = True
+        if self._actuator.active:
+            self._actuator.refresh()
+
+    def _track(self) -> Track | None:
+        """The recording that is looked at."""
+        if self._look is None:
+            return None
+        options, runs = list(self._recording.options), tracks(self._look.found)
+        at = options.index(self._recording.value) if self._recording.value in options else 0
+        return runs[min(at, len(runs) - 1)]
+
+    def _draw_explained(self, look: Look) -> None:
+        self._explained.visible = look.assessment is not None and bool(look.explained_before)
+        if look.assessment is not None and self._explained.visible:
+            self._explained.figure = explained_steps.figure(look.explained_before, look.assessment.explained)
 
     def _revealed(self) -> None:
         self._page.checked(self._show_truth)
@@ -156,8 +175,7 @@ def answer(look: Look) -> str:
     else:
         first, others = headline(found), sentences(found)
     colour = "#2b8a3e" if done else "#e03131"
-    warned = [text for text in found.warnings if _MASKED not in text]
-    warnings = "".join(f'<div style="color:#e8590c">▲ {html.escape(text)}</div>' for text in warned) + masked(look)
+    warnings = "".join(f'<div style="color:#e8590c">▲ {html.escape(text)}</div>' for text in found.warnings)
     note = html.escape(FLOOR_NOTE, quote=True)
     return (
         f'<div {cards.BOX}><div style="font-size:16px;font-weight:600;color:{colour};padding:2px 0">'
@@ -165,17 +183,3 @@ def answer(look: Look) -> str:
         f'<div style="opacity:.65;font-size:12px" title="{note}">The floor is what noise and the model\'s own limits '
         f"leave: 1 on the ladder.</div></div>"
     )
-
-
-def masked(look: Look) -> str:
-    """Parameters that had been standing in for an added effect, and where they are now."""
-    lines = []
-    axes = look.found.actuator.axes
-    for one in look.added:
-        moved = [part for part in one.stood_in if part.path != find(one.name).duplicates]
-        if moved:
-            names = ", ".join(
-                f"{small(parameter(axes, part.path))} ({part.before:+.1f} → {part.after:+.1f} σ)" for part in moved
-            )
-            lines.append(f"▲ {effect_title(one.name)} had been masked: back toward the file's value came {names}.")
-    return "".join(f'<div style="color:#e8590c;font-size:12.5px">{html.escape(text)}</div>' for text in lines)

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import html
 
+from numpy.typing import ArrayLike
+
 from ema_model.challenges.truth import Truth
 from ema_model.discovery import Discovery
 from ema_model.discovery.result import Added
 from ema_model.effects import CATALOGUE, find
+from ema_model.faults import FAULTS, NAMES, sentences
 from emaviz.discovery_words import effect_title, fitted_of, small
 from emaviz.figures import quantity
 from emaviz.panels.discover_cards import BOX
@@ -17,11 +20,32 @@ _GOOD, _BAD = "#2b8a3e", "#e03131"
 _NEAR = 0.25  # of the true value, within which a strength counts as found where its interval misses it
 
 
+# What of the model's parameters tells a fault; the others, of windings and rotor, are Identify's to find.
+_OF_FAULT = {"k1": "friction", "k2": "backlash", "k8": "position_gain"}
+
+
 def agrees(truth: Truth, found: Discovery, added: tuple[Added, ...]) -> bool:
-    """Whether the answer names exactly what is hidden: the effects, or a torque of its own for an unknown one."""
+    """Whether the answer names exactly what is hidden: the effects, or a torque of its own for an unknown one.
+
+    Of the faults those count that a parameter of the model tells.
+    """
     named = {one.name for one in added if one.name in CATALOGUE and not find(one.name).duplicates}
     own = any(one.name not in CATALOGUE for one in added)
-    return named == set(truth.effects) and own == bool(truth.torque)
+    seen = all(_sees(found, fault) for fault in truth.faults if fault in _OF_FAULT)
+    return named == set(truth.effects) and own == bool(truth.torque) and seen
+
+
+def _sees(found: Discovery, fault: str) -> bool:
+    return any(_OF_FAULT[fault] in path for path in found.parameters_outside_tolerance)
+
+
+def _fault(fault: str, k: ArrayLike, found: Discovery) -> str:
+    index = NAMES.index(fault)
+    what = f"{FAULTS[index].title.lower()} fault: {sentences(k, found.plant.actuator)[index]}"
+    if fault not in _OF_FAULT:
+        return _row(None, what, "a fault that Identify finds, not Discover")
+    good = _sees(found, fault)
+    return _row(good, what, "its parameter is outside its tolerance" if good else "no parameter tells it")
 
 
 def reveal(truth: Truth, found: Discovery, added: tuple[Added, ...]) -> str:
@@ -29,6 +53,7 @@ def reveal(truth: Truth, found: Discovery, added: tuple[Added, ...]) -> str:
     good = agrees(truth, found, added)
     verdict = "Your answer agrees." if good else "Your answer differs."
     rows = [_effect(name, given, found, added) for name, given in truth.effects.items()]
+    rows += [_fault(fault, truth.k, found) for fault in truth.faults]
     if truth.torque:
         own = next((one for one in added if one.name not in CATALOGUE), None)
         what = f"an effect outside the library: T = {truth.torque}"
@@ -44,7 +69,7 @@ def reveal(truth: Truth, found: Discovery, added: tuple[Added, ...]) -> str:
             else:
                 why = "is not hidden here"
             rows.append(_row(False, small(effect_title(one.name)), why))
-    if not truth.effects and not truth.torque and not added:
+    if not truth.effects and not truth.torque and not truth.faults and not added:
         rows.append(_row(True, "nothing is hidden", "and you added nothing"))
     head = f'<div style="font-size:16px;font-weight:600;color:{_GOOD if good else _BAD}">{verdict}</div>'
     return f"<div {BOX}>{head}<div>{html.escape(truth.answer)}</div>{''.join(rows)}</div>"
@@ -74,8 +99,8 @@ def _effect(name: str, given: dict[str, float], found: Discovery, added: tuple[A
     return _row(near and (order is None or one.chosen.get("order") == order), title, told)
 
 
-def _row(good: bool, what: str, how: str) -> str:
-    mark, colour = ("✓", _GOOD) if good else ("✗", _BAD)
+def _row(good: bool | None, what: str, how: str) -> str:
+    mark, colour = ("•", "inherit") if good is None else ("✓", _GOOD) if good else ("✗", _BAD)
     return (
         f'<div style="padding-top:3px"><span style="color:{colour}"><b>{mark}</b></span> '
         f"<b>{html.escape(what[:1].upper() + what[1:])}</b>: {html.escape(how)}</div>"

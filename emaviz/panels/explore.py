@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import copy
+from collections.abc import Callable, Mapping
 from dataclasses import fields
 from functools import partial
 from typing import Any
@@ -18,6 +19,8 @@ from emaviz.panels.explore_start import StartHere
 from emaviz.panels.page import Page
 from emaviz.panels.page_style import LONG_LABELS
 from emaviz.state import MONITORS
+
+_DECIMALS = 6  # that a command's settings may have
 
 
 class ExplorePanel:
@@ -81,13 +84,39 @@ class ExplorePanel:
                 slider.label = self._label(i)
         self._page.session.refresh()
 
+    def take(
+        self,
+        *,
+        command: str | None = None,
+        settings: Mapping[str, Any] | None = None,
+        duration_s: float | None = None,
+        load_torque_Nm: float | None = None,
+    ) -> None:
+        """Sets what is given as if a person had, and simulates once; on the screen's thread.
+
+        settings: of the command (the present one without it).  InputError, and nothing is changed, for a value that
+        makes no sense.
+        """
+        tried = copy.deepcopy(self._page.session.settings)
+        if command is not None:
+            tried.set_command(command)
+        for name, value in (settings or {}).items():
+            tried.set_command_setting(tried.command, name, value)
+        if duration_s is not None:
+            tried.set_duration(duration_s)
+        if load_torque_Nm is not None:
+            tried.set_load(load_torque_Nm)
+        self._page.session.settings.restore(tried.saved())
+        self.show_settings()
+
     def show_settings(self) -> None:
         """Sets every control to what the session holds, and simulates; on the screen's thread."""
         settings = self._page.session.settings
-        self._command.value = COMMANDS[settings.command].title
-        self._show_group()
-        for entry, read in self._reads:
-            entry.value = str(read()) if isinstance(entry.value, str) else read()
+        with self._page.server.atomic():
+            self._command.value = COMMANDS[settings.command].title
+            self._show_group()
+            for entry, read in self._reads:
+                entry.value = _written(read()) if isinstance(entry.value, str) else read()
         self._plant.show_settings()
         self.show_monitor(settings.monitor)
         self.set_faults(settings.k)
@@ -125,6 +154,7 @@ class ExplorePanel:
                 entry = self._page.server.gui.add_text(label, "+".join(f"{value:g}" for value in default))
             else:
                 entry = self._page.server.gui.add_number(label, float(default), step=_step(float(default)))
+                entry.precision = _DECIMALS  # the step's own would show 0.448 Hz as 0
             setter = partial(self._page.session.settings.set_command_setting, name, f.name)
             self._listen(entry, setter, partial(self._command_setting, name, f.name, entry.value))
             inputs.append(entry)
@@ -158,6 +188,11 @@ class ExplorePanel:
         if good:
             self._page.session.refresh()
         return good
+
+
+def _written(value: Any) -> str:
+    """As it is typed: the numbers of a list are joined by plus signs."""
+    return "+".join(f"{one:g}" for one in value) if isinstance(value, (list, tuple)) else str(value)
 
 
 def _step(default: float) -> float:

@@ -9,7 +9,7 @@ import viser
 
 from emaviz.figures.colours import GHOST, MONITOR, REFERENCE
 from emaviz.figures.run_metrics import differences, metrics, table
-from emaviz.figures.signals import LivePhases, LiveSignals
+from emaviz.figures.signals import PHASE_SIGNALS, LivePhases, LiveSignals
 from emaviz.panels.page import Page
 from emaviz.panels.page_style import TIME_CHARTS
 from emaviz.session import Simulation
@@ -27,14 +27,15 @@ class ChartsPanel:
         gui = page.server.gui
         with panel.add_tab("Signals", viser.Icon.CHART_LINE):
             gui.add_html(TIME_CHARTS)
-            self.signals = LiveSignals(gui)
-            self._range = gui.add_multi_slider(
-                "Shown [%]", 0, 100, 1, (0, 100), min_range=1, hint="Of the run; zooms all charts, in full resolution"
-            )
+            # Above the charts, which fill the panel.
             self._freeze = gui.add_button(
                 "Freeze this run", icon=viser.Icon.SNOWFLAKE, color="gray", hint="Keeps it as a dashed line"
             )
             self._melt = gui.add_button("Drop the frozen run", icon=viser.Icon.X, color="gray", visible=False)
+            self.signals = LiveSignals(gui)
+            self._range = gui.add_multi_slider(
+                "Shown [%]", 0, 100, 1, (0, 100), min_range=1, hint="Of the run; zooms all charts, in full resolution"
+            )
         with panel.add_tab("Phases", viser.Icon.WAVE_SINE):
             gui.add_html(TIME_CHARTS)
             self._phases = LivePhases(gui)
@@ -80,7 +81,8 @@ class ChartsPanel:
             runs["frozen plant"] = metrics(ghost.reference, ghost.command)
             errors["frozen run's"] = differences(ghost.reference, ghost.monitor)
         with self._page.server.atomic():
-            self._phases.show(simulation.reference, simulation.monitor, frozen, self.window_s)
+            if all(name in simulation.reference for name in PHASE_SIGNALS):
+                self._phases.show(simulation.reference, simulation.monitor, frozen, self.window_s)
             self._table.content = table(runs, errors, [REFERENCE, MONITOR, GHOST])
 
     def _zoom(self) -> None:

@@ -15,6 +15,7 @@ from emaviz.comparing import Comparing
 from emaviz.figures.convergence import colour
 from emaviz.identifying import Race
 from emaviz.panels.identify_result import IdentifyResult
+from emaviz.panels.identify_words import verdict
 from emaviz.panels.page import Page
 from emaviz.recording.viewer import ViewerHost
 from emaviz.state import SLIDERS
@@ -27,6 +28,9 @@ class IdentifyPanel:
 
     def __init__(self, page: Page, comparing: Comparing, viewer: ViewerHost | None, result: IdentifyResult) -> None:
         self._page, self._comparing, self._viewer, self._result = page, comparing, viewer, result
+        self._race: Race | None = None
+        self.open_viewer: Callable[[str, str], None] = lambda url, name: None  # on the right
+        self.to_discover: Callable[[Race], None] = lambda race: None  # takes its recording there
         gui, settings = page.server.gui, page.session.settings
         self._source: Any = gui.add_dropdown(
             "Identify", (PLANT,), hint="The sliders' plant, whose faults are known, or a recording of the data folder"
@@ -52,6 +56,20 @@ class IdentifyPanel:
         self._progress = gui.add_progress_bar(0.0)
         self._text = gui.add_html(_line("Finds the faults from the current alone."))
         self._link = gui.add_html("")
+        self._watch = gui.add_button(
+            "Watch it in Rerun, here",
+            icon=viser.Icon.EYE,
+            color="gray",
+            visible=False,
+            hint="The recording while it is written, on the right",
+        )
+        self._missing = gui.add_button(
+            "Look for the missing physics",
+            icon=viser.Icon.BULB,
+            color="orange",
+            visible=False,
+            hint="The model does not fit: takes the same recording to Discover",
+        )
         self._again = gui.add_button("Show the search", icon=viser.Icon.CHART_DOTS, color="gray")
         self._source.on_update(lambda event: event.client and page.screen.post("identify source", self._take_source))
         for tick in self._ticks.values():
@@ -60,6 +78,8 @@ class IdentifyPanel:
         self._pause.on_click(lambda _: page.screen.post("pause", self._toggle))
         self._stop.on_click(lambda _: page.session.stop())
         self._again.on_click(lambda _: page.screen.post("bring", result.to_front))
+        self._watch.on_click(lambda _: page.screen.post("watch", self._watch_growing))
+        self._missing.on_click(lambda _: page.screen.post("to discover", self._look_for_missing))
         events = page.session.events
         events.progressed.append(self._progressed)
         events.identified.append(lambda race: page.screen.post("identification", lambda: self._draw_answer(race)))
@@ -117,8 +137,19 @@ class IdentifyPanel:
         self._start.disabled, self._pause.disabled, self._stop.disabled = True, False, False
         self._show_paused(False)
         self._link.content = ""
+        self._missing.visible = False
         self._text.content = _line("Starting…")
         self._page.screen.post("bring", self._result.to_front)
+
+    def _watch_growing(self) -> None:
+        race = self._race
+        if self._viewer is not None and race is not None and race.growing is not None:
+            self.open_viewer(self._viewer.url_of(race.growing.name), race.growing.name)
+
+    def _look_for_missing(self) -> None:
+        race = self._race
+        if race is not None:
+            self._page.checked(lambda: self.to_discover(race))
 
     def _toggle(self) -> None:
         session = self._page.session
@@ -134,6 +165,7 @@ class IdentifyPanel:
         """Gives the button back when no identification runs any more."""
         self._start.disabled, self._pause.disabled, self._stop.disabled = False, True, True
         self._show_paused(False)
+        self._watch.visible = False
         if "Starting" in self._text.content:
             self._text.content = _line("Ended without an answer.")
 
@@ -150,8 +182,10 @@ class IdentifyPanel:
                 continue
             at = "done" if track.answer else f"iteration {len(track.rmse) - 1} of {track.iterations}"
             lines.append(_line(f"{_title(name)} · {at} · rmse {track.rmse[-1]:.4f} A"))
-        if race.growing is not None and not self._link.content:
+        if race.growing is not None and race is not self._race:
             self._link.content = recording_link(self._viewer, race.growing, "Watch it live ↗")
+            self._watch.visible = self._viewer is not None
+        self._race = race
         self._text.content = "".join(lines)
 
     def _draw_answer(self, race: Race) -> None:
@@ -159,22 +193,19 @@ class IdentifyPanel:
         best = race.best
         lines = []
         for answer in race.answers:
-            sure = answer.uncertainty
-            verdict = (
-                "healthy" if sure.healthy else f"not healthy: {', '.join(sure.alarms) or 'no single k stands out'}"
-            )
-            if not sure.adequate:
-                verdict = "the model does not fit: no fault can be told"
             stopped = "stopped · " if answer.stopped else ""
             error = "" if answer.error_percent is None else f"Err {answer.error_percent:.2f} % · "
             star = "★ " if best is not None and len(race.tracks) > 1 and answer is best.answer else ""
             lines.append(
                 _line(
                     f"{star}{_title(answer.algorithm)} · {stopped}{error}rmse {answer.rmse:.4f} A · "
-                    f"{answer.evaluations} simulations in {answer.elapsed_s:.2f} s · <b>{html.escape(verdict)}</b>"
+                    f"{answer.evaluations} simulations in {answer.elapsed_s:.2f} s · "
+                    f"<b>{html.escape(verdict(answer))}</b>"
                 )
             )
         self._text.content = "".join(lines)
+        self._race = race
+        self._missing.visible = best is not None and best.answer is not None and not best.answer.uncertainty.adequate
         self._result.finished(race)
         if race.path is not None:
             self._link.content = recording_link(self._viewer, race.path)

@@ -15,7 +15,9 @@ from emaviz.figures.fault_bars import fault_bars
 from emaviz.figures.fitted_current import LiveFit
 from emaviz.figures.identified_table import Row, table
 from emaviz.identifying import Race
+from emaviz.panels.identify_landscape import LandscapeView
 from emaviz.panels.identify_swarm import SwarmView
+from emaviz.panels.identify_words import sure_words
 from emaviz.panels.page import Page
 from emaviz.worker import Worker
 
@@ -31,8 +33,9 @@ class IdentifyResult:
     """
 
     def __init__(self, page: Page, slow: Worker, panel: viser.PanelHandle, to_front: Callable[[], None]) -> None:
-        self._page, self._slow, self.to_front = page, slow, to_front
+        self._page, self._slow, self._panel, self._bring = page, slow, panel, to_front
         self._race: Race | None = None
+        self._begun: Race | None = None  # of which something was drawn
         self._drawn_at = 0.0
         self.rows: list[Row] = []
         gui = page.server.gui
@@ -42,7 +45,10 @@ class IdentifyResult:
         with panel.add_tab("Answer", viser.Icon.TARGET_ARROW):
             self._whose = gui.add_dropdown("Whose", (_BEST, *ALGORITHMS.values()))
             self._bars = gui.add_html(fault_bars(HEALTHY, page.session.actuator))
+            self._sure = gui.add_html("")
             self._fit = LiveFit(gui)
+        with panel.add_tab("Landscape", viser.Icon.MAP_2):
+            self._landscape = LandscapeView(page, slow)
         with panel.add_tab("Runs", viser.Icon.TABLE):
             self._table = gui.add_html(table([]))
             clear = gui.add_button("Clear the table", icon=viser.Icon.ERASER, color="gray")
@@ -53,10 +59,17 @@ class IdentifyResult:
 
     def progressed(self, race: Race) -> None:
         """A race has gone on; on any thread."""
-        self._page.screen.post("swarm", lambda: self._draw(race, soon=False))
-        self._slow.post("answer", self._draw_answer)
+        self._race = race
+        if self._panel.visible:  # what nobody sees is not drawn
+            self._page.screen.post("swarm", lambda: self._draw(race, soon=False))
+            self._slow.post("answer", self._draw_answer)
 
     # --- on the screen's thread -------------------------------------------------------------------------------------
+
+    def to_front(self) -> None:
+        """Makes this panel the one that is seen, and draws what has happened meanwhile."""
+        self._bring()
+        self.draw()
 
     def draw(self) -> None:
         """Everything as it stands now."""
@@ -68,6 +81,7 @@ class IdentifyResult:
         """The race is over: its last picture, and its rows in the table."""
         self._draw(race, soon=True)
         self._slow.post("answer", self._draw_answer)
+        self._landscape.answered(race)
         performance = race.performance()
         number = 1 + max((row.race for row in self.rows), default=0)
         settings = race.settings
@@ -104,11 +118,11 @@ class IdentifyResult:
         self.show_rows([])
 
     def _draw(self, race: Race, soon: bool) -> None:
-        begun = race is not self._race
+        begun = race is not self._begun
         if not (begun or soon or time.monotonic() - self._drawn_at > _LEAST_S):
             return
         self._drawn_at = time.monotonic()
-        self._race = race
+        self._race = self._begun = race
         longest = max(track.iterations for track in race.tracks.values())
         with self._page.server.atomic():
             self._convergence.begin(tuple(race.tracks), longest)
@@ -128,4 +142,5 @@ class IdentifyResult:
         fitted = {name: one.current_A for name, one in race.tracks.items() if one.current_A is not None}
         with self._page.server.atomic():
             self._bars.content = fault_bars(track.k, self._page.session.actuator, race.truth, **bars)
+            self._sure.content = sure_words(track.answer)
             self._fit.show(race.time_s, race.measured_A, fitted)

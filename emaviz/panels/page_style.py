@@ -13,6 +13,8 @@ from emaviz.figures.theme import DARK, MARK
 STRIP = '<div class="emaviz-strip"></div>'  # stands in the panel that becomes the strip
 TIME_CHARTS = '<div class="emaviz-time"></div>'  # stands beside charts over time
 LONG_LABELS = '<div class="emaviz-long"></div>'  # stands beside controls with long labels
+# stands before the upload button that takes dropped files, which is not to be seen
+DROP = '<div class="emaviz-drop"></div><style>div:has(> .emaviz-drop),div:has(> .emaviz-drop)+div{display:none}</style>'
 WIDE_MODAL = "<style>.mantine-Modal-root{--modal-size:min(960px,92vw)!important}</style>"
 STRIP_HEIGHT_PX = 68
 _ROW_PX = 48
@@ -74,4 +76,7 @@ def figures(dark: bool) -> str:
     """Text of figures that were drawn for a light page, legible on a dark one."""
     if not dark:
         return ""
-    return f"<style>.js-plotly-plot .main-svg text{{fill:{DARK.ink}!important}}.u-title{{color:{DARK.ink}}}</style>"
+    return (
+        f"<style>.js-plotly-plot .main-svg text{{fill:{DARK.ink}!important}}.u-title{{color:{DARK.ink}}}"
+        ".mantine-Paper-root>.mantine-ActionIcon-root{background:rgba(0,0,0,.4)!important}</style>"
+    )

@@ -15,6 +15,7 @@ from ema_model.errors import InputError
 from emaviz import session_file
 from emaviz.comparing import UPLOADED, Comparing
 from emaviz.data_folder import SESSION_SUFFIX
+from emaviz.discovering import Discovering
 from emaviz.figures.identified_table import Row
 from emaviz.panels.compare import ComparePanel
 from emaviz.panels.explore import ExplorePanel
@@ -36,6 +37,7 @@ def parts(
     identify: IdentifyPanel,
     runs: IdentifyResult,
     compare: ComparePanel,
+    discovering: Discovering,
 ) -> dict[str, Part]:
     """What a session's file holds, by name.  `restore` is called on the screen's thread."""
 
@@ -91,6 +93,7 @@ def parts(
         "settings": Part(page.session.settings.saved, restore_settings),
         "runs": Part(lambda: [asdict(row) for row in runs.rows], restore_runs),
         "compare": Part(save_compare, restore_compare),
+        "discovery": Part(discovering.saved, discovering.restore, discovering.files),
         "look": Part(strip.saved, lambda saved, _: strip.restore(saved)),
     }
 
@@ -150,6 +153,7 @@ class SessionControls:
         names = [*self._comparing.opened, self._page.session.settings.source]
         if self._comparing.actuator_name.startswith(UPLOADED):
             names.append(self._comparing.actuator_name.removeprefix(UPLOADED))
+        names += [name for part in self._parts.values() for name in part.files()]
         return [name for name in names if name]
 
     def _read(self, path: Path) -> None:

@@ -15,6 +15,10 @@ from emaviz.scene.motion import Motion, enlargement, motion
 from emaviz.session import Simulation
 
 _POSES_PER_S = 30.0
+# While a slider is dragged one watches the charts, and in software one picture takes the time of all of them; each
+# pose lets the browser draw pictures for a quarter of a second.
+_POSES_WHILE_CHANGING_PER_S = 2.0
+_CHANGING_S = 1.0  # a run that comes so soon after another one is one of many
 _TOLD_PER_S = 8.0  # play-heads are redrawn at this pace
 SPEEDS = {"1 : 1": 1.0, "1 : 5": 0.2, "1 : 10": 0.1, "1 : 20": 0.05, "1 : 50": 0.02, "1 : 200": 0.005}
 
@@ -32,6 +36,8 @@ class Playback:
         self.motion: Motion | None = None
         self._clock_s = 0.0
         self._stale = False  # what the scene shows is not the run at the clock
+        self._damaged: Motion | None = None  # whose faults the scene shows
+        self._came_s = (-np.inf, -np.inf)  # when the last two runs came
         self._posing = threading.Lock()
         self._wake = threading.Event()
         self._closing = False
@@ -43,8 +49,8 @@ class Playback:
         shown = motion(simulation.reference, simulation.k, self._actuator)
         with self._posing:
             self.motion = shown
-            shown.damage(self._scene)
             self._stale = True
+            self._came_s = self._came_s[1], time.monotonic()
         self._wake.set()
 
     def play(self, playing: bool) -> None:
@@ -96,6 +102,7 @@ class Playback:
                         self._clock_s = self._clock_s % shown.duration_s if self.playing else shown.duration_s
                     moves = self.playing or self._stale
                     if moves:
+                        self._show_damage(shown)
                         shown.pose(self._scene, self._clock_s)
                 else:
                     moves = False
@@ -103,9 +110,25 @@ class Playback:
             if shown is not None and moves and (stale or now - told >= 1.0 / _TOLD_PER_S):
                 told = now
                 self._moved(self._clock_s, shown.duration_s)
-            if self.playing:
-                time.sleep(max(0.0, 1.0 / _POSES_PER_S - (time.monotonic() - now)))
+            if self.playing or self._changing:
+                time.sleep(max(0.0, 1.0 / self._pace - (time.monotonic() - now)))
             elif not self._stale:
                 self._wake.wait()
                 last = time.monotonic()
             self._wake.clear()
+
+    @property
+    def _changing(self) -> bool:
+        """Whether one run follows the other, as while a slider is dragged."""
+        before, last = self._came_s
+        return last - before < _CHANGING_S and time.monotonic() - last < _CHANGING_S
+
+    @property
+    def _pace(self) -> float:
+        """Poses per second."""
+        return _POSES_WHILE_CHANGING_PER_S if self._changing else _POSES_PER_S
+
+    def _show_damage(self, shown: Motion) -> None:
+        if shown is not self._damaged:
+            self._damaged = shown
+            shown.damage(self._scene)

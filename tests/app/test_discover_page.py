@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 
+import numpy as np
 import pytest
 
 pytestmark = pytest.mark.browser
@@ -76,6 +77,16 @@ def drawn(page, words):
     return max([one["points"] for one in page.evaluate(FIGURES) if words in one["title"]], default=0)
 
 
+def box(page, label):
+    """The number box of a slider or a text field."""
+    row = page.locator(f'label:text-is("{label}")').last
+    return (
+        row.locator("xpath=ancestor::div[contains(@class,'mantine-Flex-root')][1]")
+        .locator("input:not([type=hidden]), textarea")
+        .first
+    )
+
+
 def errors(app):
     ladder = app.discovering.look.found.ladder
     return [rung.rmse for rung in ladder], [rung.holdout_rmse for rung in ladder]
@@ -107,6 +118,7 @@ def test_one_effect_with_the_guide(discover, app):
     fitted, held = errors(app)
     assert fitted[0] > 1.3 and fitted[-1] < 1.1 and held[-1] < 1.1
     wait_until(lambda: drawn(page, "Error after each step") == 2, 20.0)
+    wait_until(lambda: drawn(page, "What the residual depends on") > 2, 20.0)
     page.get_by_text("T = A sin(h θ + φ)").first.wait_for()
     assert revealed(page) == "Your answer agrees."
     page.get_by_text("Step 6 of 6").wait_for()
@@ -129,6 +141,13 @@ def test_two_effects_undo_and_a_wrong_answer(discover, app):
     fitted, held = errors(app)
     assert fitted[0] > fitted[1] > fitted[2] and fitted[2] < 1.1 and held[2] < 1.1
     page.get_by_text("Your answer agrees.").wait_for()
+    explored = app.playback.motion
+    page.get_by_label("3D actuator", exact=True).click()
+    page.get_by_role("option", name="model with them").click()
+    wait_until(lambda: app.playback.motion is not explored, 20.0)
+    page.get_by_label("3D actuator", exact=True).click()
+    page.get_by_role("option", name="Explore's plant").click()
+    wait_until(lambda: np.array_equal(app.playback.motion.motor_rad, explored.motor_rad), 20.0)
     page.get_by_text("Load-dependent friction had been masked").wait_for()
     page.get_by_text("Nothing of the library would take away more than chance does.").wait_for()
 
@@ -162,7 +181,17 @@ def test_an_expression_is_checked_as_it_is_typed_and_fitted(discover, app):
     assert folder.is_disabled()
     entry.fill("-c*sign(omega)*sqrt(abs(omega))")
     page.get_by_text("✓ uses omega; parameters to fit: c").wait_for()
-    page.get_by_label("c", exact=True).wait_for()
+    page.get_by_text("With these values, before any fit").wait_for()
+    value = box(page, "c")
+    shown, errors_told = page.get_by_text("With these values, before any fit"), []
+    for text in ("0.0025", "0.02"):  # about right, and far too much
+        before = shown.inner_text()
+        value.fill(text)
+        value.press("Enter")
+        wait_until(lambda before=before: shown.inner_text() != before, 20.0)
+        errors_told.append(float(shown.inner_text().split("≈")[1].split()[0]))
+    assert errors_told[0] < 1.1 < errors_told[1], "a slider shows at once what its value would do"
+    wait_until(lambda: drawn(page, "User's torque beside what is left") > 10, 20.0)
     folder.click()
     done(page, app)
     (effect,) = app.discovering.look.added
@@ -204,6 +233,76 @@ def test_the_next_test_goes_to_explore_and_to_a_file(discover, app):
     page.get_by_role("tab", name="Explore", exact=True).click()
     shown = page.get_by_label("Duration [s]", exact=True)
     assert float(shown.input_value()) == pytest.approx(wanted.duration_s)
+
+
+def test_a_challenge_of_ones_own_is_sealed_sent_opened_and_revealed(discover, app, tmp_path):
+    page = discover
+    settings = app.session.settings
+    page.get_by_role("tab", name="Explore", exact=True).click()
+    for name, value in {"amplitude_Nm": 0.02, "order": 12.0, "phase_rad": 0.5}.items():
+        settings.set_effect("cogging_torque", name, value)
+    app.screen.post("test", app.explore.show_settings)
+    page.get_by_role("button", name="Seal as a challenge").click()
+    seal = page.get_by_role("button", name="Seal it")
+    seal.click()
+    page.get_by_text("the challenge has no title yet").wait_for()
+    box(page, "Challenge title").fill("For <b>you</b>")
+    box(page, "Its story").fill("It hums when it turns.")
+    page.wait_for_timeout(500)
+    with page.expect_download(timeout=60_000) as sent:
+        seal.click()
+    assert sent.value.suggested_filename.endswith(".challenge")
+    mine = tmp_path / "from a colleague.challenge"
+    sent.value.save_as(mine)
+    (kept,) = app.comparing.folder.challenges.glob("*.challenge")
+    assert kept.read_bytes() == mine.read_bytes()
+    settings.remove_effect("cogging_torque")
+    app.screen.post("test", app.explore.show_settings)
+
+    page.get_by_role("tab", name="Discover", exact=True).click()
+    button = page.get_by_role("button", name="Open a sealed challenge")
+    upload = button.locator("xpath=..").locator("input[type=file]")
+    broken = tmp_path / "broken.challenge"
+    broken.write_bytes(mine.read_bytes()[:-40])
+    upload.set_input_files(broken)
+    page.get_by_text("broken.challenge: is no challenge, or damaged").wait_for()
+    upload.set_input_files(mine)
+    wait_until(lambda: "colleague" in app.discovering.source.chosen, 20.0)
+    page.get_by_text("It hums when it turns.").wait_for()
+    page.get_by_text("For <b>you</b>").first.wait_for()
+    page.get_by_role("button", name="Start", exact=True).click()
+    done(page, app)
+    add(page, app, "Cogging torque")
+    fitted, held = errors(app)
+    assert fitted[0] > 1.1 > fitted[-1] and held[-1] < 1.1
+    assert revealed(page) == "Your answer agrees."
+    page.get_by_text("Hidden: cogging torque of order 12.").wait_for()
+
+
+def test_a_session_brings_the_ladder_back(discover, app):
+    page = discover
+    begin(page, app, "First bench run")
+    add(page, app, "Cogging torque")
+    fitted, held = errors(app)
+    page.get_by_role("tab", name="Recordings", exact=True).click()
+    box(page, "Session name").fill("ladder")
+    page.wait_for_timeout(300)
+    with page.expect_download():
+        page.get_by_role("button", name="Save session").click()
+    page.get_by_role("tab", name="Discover", exact=True).click()
+    begin(page, app, "Two suspects")
+    assert not app.discovering.look.added
+    page.get_by_role("tab", name="Recordings", exact=True).click()
+    page.get_by_role("button", name="Load session").click()
+    page.get_by_role("tab", name="Discover", exact=True).click()
+    page.get_by_text("Taking the session's steps again").first.wait_for(timeout=60_000)
+    wait_until(lambda: not app.discovering.running)
+    page.get_by_role("button", name="Remove Cogging torque").wait_for()
+    assert page.get_by_label("Recordings", exact=True).input_value().endswith("First bench run")
+    again = errors(app)
+    assert again[0] == pytest.approx(fitted, rel=0.01) and again[1] == pytest.approx(held, rel=0.01)
+    wait_until(lambda: drawn(page, "Error after each step") == 2, 20.0)
+    page.get_by_text("T = A sin(h θ + φ)").first.wait_for()
 
 
 def test_the_library_is_searched_and_felt(page, app):

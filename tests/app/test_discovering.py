@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from ema_model.actuator import load_actuator
 from ema_model.errors import InputError
+from ema_model.faults import HEALTHY
 from ema_model.user_effects import user_torque
 from emaviz.comparing import Comparing
 from emaviz.data_folder import DataFolder
 from emaviz.discovering import Discovering
+from emaviz.figures.discovery_tracks import tracks
 from emaviz.panels import discover_cards
+from emaviz.panels.discover_actuator import _SHOWN, run_of
 from emaviz.panels.discover_guide import STEPS, step
 from emaviz.panels.discover_next import as_csv
 from emaviz.panels.discover_reveal import agrees, reveal
 from emaviz.recording.read import read
+from emaviz.scene.motion import motion
 from emaviz.session import Session
 
 EASY = "first_bench_run"
@@ -145,6 +150,77 @@ def test_an_expression_of_the_user_is_fitted(fresh):
         fresh.add_own(effect, {})
 
 
+def test_a_recording_is_played_as_measured_and_as_each_model_has_it(fresh):
+    fresh.add("cogging_torque")
+    wait_until(lambda: not fresh.running)
+    track = tracks(fresh.look.found)[2]
+    runs = [run_of(track, shown) for shown in _SHOWN[1:]]
+    off = [np.sqrt(np.mean((run["current_A"] - runs[0]["current_A"]) ** 2)) for run in runs[1:]]
+    assert 0.0 < off[1] < off[0], "with the effect, the actuator moves more like the measured one"
+    for run in runs:
+        shown = motion(run, HEALTHY, fresh.look.found.actuator)
+        assert shown.duration_s == pytest.approx(1.0, abs=0.02) and np.ptp(shown.surface_rad) > 0.1
+    with pytest.raises(InputError, match="current_A was not fitted"):
+        run_of(replace(track, measured={}, models=[{}]), _SHOWN[1])
+
+
+def previewed(discovering, text, values):
+    """What the page is told with an expression's sliders at these values: a preview, or why there is none."""
+    told = []
+    events = discovering.events
+    events.previewed.append(told.append)
+    events.unpreviewed.append(told.append)
+    try:
+        discovering.preview_own(user_torque(text), values)
+        wait_until(lambda: told)
+    finally:
+        events.previewed.remove(told.append)
+        events.unpreviewed.remove(told.append)
+    return told[0]
+
+
+def test_a_torque_shows_what_its_values_would_change_before_it_is_fitted(fresh):
+    look, text = fresh.look, "A*sin(14*theta) + B*cos(14*theta)"
+    previewed(fresh, text, {"A": 0.0, "B": 0.0})  # compiled
+    given = fresh.source.reveal().effects["cogging_torque"]
+    size, phase = given["amplitude_Nm"], given["phase_rad"]
+    took = []
+    errors = {}
+    for name, share in (("none", 0.0), ("half", 0.5), ("right", 1.0), ("wrong", -1.0)):
+        began = time.perf_counter()
+        values = {"A": share * size * np.cos(phase), "B": share * size * np.sin(phase)}
+        found = previewed(fresh, text, values)
+        took.append(time.perf_counter() - began)
+        errors[name] = found.rmse
+    assert errors["none"] == pytest.approx(look.rmse, rel=0.03)
+    assert errors["right"] < 1.1 and errors["right"] < errors["half"] < errors["none"] < errors["wrong"]
+    assert np.median(took) < 0.5, "0.2 s on a machine that does nothing else"
+    fresh.add_own(user_torque(text), {"A": size * np.cos(phase), "B": size * np.sin(phase)})
+    wait_until(lambda: not fresh.running)
+    assert errors["right"] == pytest.approx(fresh.look.rmse, rel=0.1), "a preview is what a refit gives"
+
+
+WITHOUT_VALUE = [
+    "c/(theta - theta)",  # division by zero
+    "exp(c*1e6)*1e308",  # overflow
+    "sqrt(-1 - c**2)",  # NaN
+]
+
+
+@pytest.mark.parametrize("text", WITHOUT_VALUE)
+def test_a_torque_without_value_fails_as_a_candidate_and_nothing_else(fresh, text):
+    before, said = fresh.look, []
+    fresh.session.events.told.append(lambda title, line: said.append(line))
+    line = previewed(fresh, text, {"c": 0.01})
+    assert isinstance(line, str) and "has no value" in line and "\n" not in line
+    assert fresh.add_own(user_torque(text), {"c": 0.01})
+    wait_until(lambda: not fresh.running)
+    fresh.session.events.told.pop()
+    assert fresh.look.steps == before.steps and fresh.look.rmse == before.rmse
+    assert len(said) == 1 and "has no value" in said[0] and len(said[0]) < 200 and "\n" not in said[0]
+    assert previewed(fresh, "c*omega", {"c": 0.0}).rmse == pytest.approx(before.rmse, rel=0.03), "the thread lives"
+
+
 def test_what_is_kept_opens_again(fresh):
     fresh.add("cogging_torque")
     wait_until(lambda: not fresh.running)
@@ -195,12 +271,12 @@ def test_recordings_of_compare_can_be_held_out(discovering):
     source.choose("")
     names = list(source.compared)
     source.hold_out(names[0], True)
-    given = source.read()
+    given = source.read(source.recipe())
     assert [one.name for one in given.held] == [source.compared[names[0]].name] and len(given.fitted) == 1
     source.hold_out(names[1], True)
     assert not source.ready
     with pytest.raises(InputError, match="no recording to fit"):
-        source.read()
+        source.recipe()
     for name in names:
         source.hold_out(name, False)
         comparing.remove(name)

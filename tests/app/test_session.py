@@ -103,7 +103,7 @@ def test_a_diverging_model_is_told_and_the_session_goes_on(session, monkeypatch)
         raise FloatingPointError("the reference model diverged")
 
     with monkeypatch.context() as patch:
-        patch.setattr("emaviz.session.simulate_reference", diverge)
+        patch.setattr("emaviz.plant.simulate_reference", diverge)
         session.refresh()
         assert told.wait(10.0)
     session.events.simulated.append(lambda _: drawn.set())

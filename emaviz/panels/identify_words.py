@@ -1,0 +1,73 @@
+"""How sure an identification is, in words: health, what cannot be told apart, and what would tell it."""
+
+from __future__ import annotations
+
+import html
+import shlex
+
+from ema_model.commands import COMMANDS
+from ema_model.faults import FAULTS
+from ema_model.identification.run import Identification
+from emaviz.panels.explore_labels import readable
+
+_BOX = 'style="padding:4px 12px;font-size:13px;line-height:1.45"'
+_GOOD, _BAD, _WARNING = "#2b8a3e", "#e03131", "#e8590c"
+
+
+def verdict(answer: Identification) -> str:
+    """The short one: healthy, which k are not, or that nothing can be told."""
+    sure = answer.uncertainty
+    if not sure.adequate:
+        return "the model does not fit: no fault can be told; see Discover"
+    return "healthy" if sure.healthy else f"not healthy: {', '.join(sure.alarms) or 'no single k stands out'}"
+
+
+def sure_words(answer: Identification | None) -> str:
+    """HTML below the bars; empty while a search runs."""
+    if answer is None:
+        return ""
+    sure = answer.uncertainty
+    lines = []
+    if not sure.adequate:
+        lines.append(_line(_BAD, "The model does not fit", " ".join(sure.warnings)))
+    elif sure.healthy:
+        lines.append(_line(_GOOD, "Healthy", "no k is surely off (joint test at 1 %)"))
+    else:
+        named = ", ".join(f"{fault.name} {fault.title.lower()}" for fault in FAULTS if fault.name in sure.alarms)
+        lines.append(_line(_BAD, "Not healthy", named or "all k together, though no single one stands out"))
+    for group in sure.ambiguous:
+        names = " and ".join(_named(name) for name in group)
+        lines.append(_line(_WARNING, "Cannot be told apart", f"{names} do the same to this recording"))
+    if sure.ambiguous and sure.separated_by:
+        lines.append(_line(_WARNING, "What would tell them apart", f"{in_words(sure.separated_by)}"))
+    if not answer.polished:
+        lines.append(f"<div {_BOX}><span style='opacity:.7'>The intervals are those of a fit from here; the answer of "
+                     "the search alone may lie at their edge.</span></div>")  # fmt: skip
+    return "".join(lines)
+
+
+def in_words(options: str) -> str:
+    """A run that is written as options of `emaviz simulate`, as a sentence's part; as it is if it is no such run."""
+    words = shlex.split(options)
+    given = list(zip(words[::2], words[1::2]))
+    named = dict(given)
+    command = COMMANDS.get(named.get("--command", ""))
+    if command is None:
+        return options
+    parts = []
+    for option, value in given:
+        if option == "--set":
+            name, _, number = value.partition("=")
+            label, _, unit = readable(name).partition(" [")
+            parts.append(f"{label.lower()} {number} {unit.rstrip(']')}".rstrip())
+    lasting = f", for {named['--duration']} s" if "--duration" in named else ""
+    article = "an" if command.title[:1] in "AEIOU" else "a"
+    return f"{article} {command.title.lower()} with {', '.join(parts) or 'its usual settings'}{lasting}"
+
+
+def _named(name: str) -> str:
+    return next(f"{fault.name} ({fault.title.lower()})" for fault in FAULTS if fault.name == name)
+
+
+def _line(colour: str, head: str, text: str) -> str:
+    return f'<div {_BOX}><b style="color:{colour}">{html.escape(head)}</b>: {html.escape(text)}</div>'

@@ -1,0 +1,240 @@
+"""A discovery that comes back: sealed in Explore and solved, and taken again from a session's file."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import time
+
+import numpy as np
+import pytest
+
+from ema_model.actuator import load_actuator
+from ema_model.discovery.result import Experiment
+from ema_model.errors import InputError
+from ema_model.user_effects import user_torque
+from emaviz import session_file
+from emaviz.comparing import Comparing
+from emaviz.data_folder import DataFolder
+from emaviz.discovering import Discovering
+from emaviz.discovery_sealing import sensors_of, truth_of
+from emaviz.panels.discover_reveal import agrees, reveal
+from emaviz.session import Session
+from emaviz.session_file import Part
+from emaviz.state import Settings
+
+EASY = "first_bench_run"
+HIDDEN = {"amplitude_Nm": 0.02, "order": 12.0, "phase_rad": 0.5}
+
+
+class Rig:
+    """An app without a screen."""
+
+    def __init__(self, folder):
+        self.folder = DataFolder(folder)
+        self.session = Session(load_actuator(), self.folder.recordings)
+        self.comparing = Comparing(self.session, self.folder)
+        self.discovering = Discovering(self.session, self.comparing)
+        self.part = Part(self.discovering.saved, self.discovering.restore, self.discovering.files)
+        self.told, self.ended = [], []
+        self.session.events.told.append(lambda *line: self.told.append(line))
+        self.discovering.events.ended.append(self.ended.append)
+
+    def close(self):
+        self.discovering.close()
+        self.comparing.close()
+        self.session.close()
+
+    def done(self, seconds=240.0):
+        wait_until(lambda: self.ended, seconds)
+        self.ended.clear()
+        wait_until(lambda: not self.discovering.running)
+
+    def save(self):
+        path = session_file.free_path(self.folder, "kept")
+        session_file.write(path, {"discovery": self.part}, self.folder, self.part.files())
+        return path
+
+    def load(self, path):
+        session_file.read(path, {"discovery": self.part}, self.folder)
+
+
+def wait_until(condition, seconds=240.0):
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+@pytest.fixture(scope="module")
+def rigs(tmp_path_factory):
+    """One where something is discovered, and one to which it is taken."""
+    made = [Rig(tmp_path_factory.mktemp(name)) for name in ("here", "there")]
+    yield made
+    for one in made:
+        one.close()
+
+
+@pytest.fixture(scope="module")
+def solved(rigs):
+    """A plant with cogging, sealed by the first rig, with what is found in it: cogging, and a torque of one's own."""
+    here = rigs[0]
+    settings = here.session.settings
+    for name, value in HIDDEN.items():
+        settings.set_effect("cogging_torque", name, value)
+    settings.set_fault(0, 0.0)
+    sealed = []
+    here.discovering.sealing.events.sealed.append(sealed.append)
+    with pytest.raises(InputError, match="no story yet"):
+        here.discovering.sealing.seal("Mine", "  ")
+    assert here.discovering.sealing.seal("../Mine & yours", "It hums.")
+    wait_until(lambda: sealed)
+    assert sealed[0].parent == here.folder.challenges and sealed[0].suffix == ".challenge"
+    (name,) = here.discovering.source.sealed
+    here.discovering.choose(name)
+    assert here.discovering.start()
+    here.done()
+    assert here.discovering.look.promising[0].name == "cogging_torque"
+    here.discovering.add("cogging_torque")
+    here.done()
+    here.discovering.add_own(user_torque("c*omega"), {"c": 1e-5})
+    here.done()
+    return here
+
+
+def ladder(rig):
+    return [(one.label, one.rmse, one.holdout_rmse) for one in rig.discovering.look.found.ladder]
+
+
+def test_what_was_sealed_in_explore_is_found_and_revealed(solved):
+    found, added = solved.discovering.look.found, solved.discovering.look.added
+    truth = solved.discovering.source.reveal()
+    assert truth.effects == {"cogging_torque": HIDDEN} and not truth.faults
+    assert "cogging torque of order 12" in truth.answer
+    assert agrees(truth, found, added[:1])
+    assert "Your answer agrees" in reveal(truth, found, added[:1])
+    assert found.ladder[1].rmse < 1.1 < found.ladder[0].rmse
+    amplitude = added[0].parameters["amplitude_Nm"].value
+    assert amplitude == pytest.approx(0.02, rel=0.1)
+
+
+def test_a_session_keeps_the_ladder(rigs, solved):
+    there = rigs[1]
+    solved.discovering._told.experiment = Experiment(
+        "sine", {"frequency_Hz": 2.0}, 1.0, 5.0, None, ("cogging_torque", "torque_ripple"), 80.0
+    )
+    solved.discovering.source.reveal()
+    path = solved.save()
+    before = solved.discovering.look
+    looks = []
+    there.discovering.events.looked.append(looks.append)
+    there.load(path)
+    there.done()
+    assert not there.told
+    after = there.discovering.look
+    for (label, rmse, held), (again, same, same_held) in zip(ladder(solved), ladder(there), strict=True):
+        assert again == label
+        assert same == pytest.approx(rmse, rel=0.01) and same_held == pytest.approx(held, rel=0.01)
+    assert [one.key for one in after.added] == [one.key for one in before.added]
+    for one, again in zip(before.added, after.added):
+        assert again.same_as == one.same_as
+        for name, value in one.parameters.items():
+            half = 0.5 * (value.interval90[1] - value.interval90[0])
+            assert abs(again.parameters[name].value - value.value) < max(0.2 * half, 1e-12)
+    assert [one.name for one in after.assessment.candidates][:3] == [one.name for one in before.assessment.candidates][
+        :3
+    ]
+    assert {one.steps for one in looks if one} >= {1, 2, 3}, "the ladder grows as the steps are taken"
+    assert there.discovering.source.revealed
+    assert there.discovering.experiment == solved.discovering.experiment
+    assert (there.folder.folder / there.discovering.source.chosen).is_file(), "the sealed file came with it"
+    there.discovering.undo()
+    assert there.discovering.look.rmse == pytest.approx(ladder(solved)[1][1], rel=0.01)
+    there.done()  # the cards of that step are new here
+
+
+def test_recordings_of_compare_are_taken_again_with_what_was_asked(rigs, tmp_path):
+    here, there = rigs
+    files = here.discovering.source.challenges[EASY]
+    for path in (*files.training[:1], *files.holdout):
+        shutil.copy(path, here.folder.uploads / path.name)
+        here.comparing.add(f"uploads/{path.name}")
+    wait_until(lambda: len(here.discovering.source.compared) == 2)
+    here.discovering.choose("")
+    here.discovering.source.hold_out("uploads/unseen.parquet", True)
+    here.comparing.set_window(0.0, 0.3)
+    here.comparing.set_free("motor.inertia_kgm2", False)
+    assert here.discovering.start()
+    here.done()
+    here.discovering.add("cogging_torque")
+    here.done()
+    here.discovering.remove("cogging_torque")
+    here.done()
+    here.comparing.window_s = None  # what is asked now is not what was asked then
+    path = here.save()
+    (there.folder.uploads / "chirp.parquet").write_bytes(b"another file of this name")
+    there.load(path)
+    for name in ("uploads/chirp-2.parquet", "uploads/unseen.parquet"):
+        there.comparing.add(name)  # as Compare's own part of the session does
+    there.done()
+    assert not there.told
+    for (label, rmse, held), (again, same, same_held) in zip(ladder(here), ladder(there), strict=True):
+        assert again == label
+        assert same == pytest.approx(rmse, rel=0.01) and same_held == pytest.approx(held, rel=0.01)
+    assert ladder(there)[2][0].startswith("−")
+    look = there.discovering.look
+    assert look.reach == ("chirp-2",) and look.held == ("unseen",)
+    assert "motor.inertia_kgm2" not in look.found.calibration.parameters
+    assert max(window.time_s[-1] for window in look.found.plant.windows) < 0.31
+
+
+def test_damaged_parts_are_told_in_one_line_and_change_nothing(rigs, solved):
+    there = rigs[1]
+    good = json.loads(json.dumps(solved.discovering.saved()))
+    names = {name: name for name in solved.discovering.files()}
+    before = there.discovering.look
+    step = good["steps"][0] if good["steps"] else {"model": "", "starts": {}}
+    damages = [
+        7,
+        {},
+        {**good, "recipe": 7},
+        {**good, "recipe": {"challenge": "../../etc/passwd"}},
+        {**good, "recipe": {"challenge": "no_such"}},
+        {**good, "recipe": {"challenge": "", "fitted": 7, "held": []}},
+        {**good, "steps": 7},
+        {**good, "steps": [7]},
+        {**good, "steps": [{"model": 7, "starts": {}}]},
+        {**good, "steps": [{"model": "", "starts": {"x": "evil"}}]},
+        {**good, "steps": [{**step, "starts": {"x": 1e99}}]},
+        {**good, "steps": [step] * 999},
+        {**good, "experiment": {"command": "evil"}},
+        {**good, "experiment": 7},
+    ]
+    for saved in damages:
+        with pytest.raises(InputError) as told:
+            there.discovering.restore(saved, names)
+        assert "\n" not in str(told.value)
+    assert there.discovering.look is before and not there.discovering.running
+
+
+def test_a_step_whose_model_is_damaged_leaves_the_steps_before_it(rigs):
+    there = rigs[1]
+    saved = {"recipe": {"challenge": EASY}, "steps": [{"model": "evil", "starts": {}}], "experiment": None}
+    there.discovering.restore(saved, {})
+    there.done()
+    assert len(there.told) == 1 and "\n" not in there.told[0][1] and "/tmp" not in there.told[0][1]
+    there.told.clear()
+    assert there.discovering.look.steps == 1
+
+
+def test_faults_are_part_of_what_is_hidden():
+    settings = Settings()
+    settings.set_fault(1, 0.25)
+    settings.set_fault(2, 0.1)
+    truth = truth_of(settings, load_actuator(), 3)
+    assert truth.faults == {"k2": 0.25, "k3": 0.1} and np.allclose(truth.k, settings.k)
+    assert "backlash" in truth.answer and "phase A" in truth.answer
+    assert sensors_of(settings).current_noise_A == 0.45, "no rig is perfect"
+    settings.set_noise(0.1)
+    assert sensors_of(settings).current_noise_A == 0.1 and sensors_of(settings).encoder_bits == 12
+    assert "Nothing is hidden" in truth_of(Settings(), load_actuator(), 3).answer

@@ -1,0 +1,40 @@
+"""Warnings are plain words: no path of a parameter and no name of a file of effects stands in them."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+from discovered import with_cogging
+
+from ema_model.discovery.result import StoodIn
+from ema_model.discovery.summary import as_dict
+from ema_model.discovery.worded import NOT_REPEATABLE, masked, untold
+from emaviz.report import write_discovery_report
+
+RAW = re.compile(r"[a-z]+\.[a-z_]+_|cogging_torque|torque_ripple|_Nm|_A\b")
+
+
+def test_parameters_that_masked_an_effect_are_named_as_on_the_page(tmp_path):
+    found = with_cogging()
+    (one,) = found.effects
+    moved = StoodIn("motor.torque_constant_Nm_A", -2.5, -0.4), StoodIn("friction.dynamic_Nm", 2.0, 0.1)
+    lines = masked([replace(one, stood_in=moved)], found.actuator.axes)
+    assert lines == [
+        "Cogging torque had been masked: back toward the file's value came motor torque constant (−2.5 → −0.4 σ), "
+        "friction dynamic (+2.0 → +0.1 σ)."
+    ]
+    told = replace(found, warnings=[*lines, untold("cogging_torque", "torque_ripple"), NOT_REPEATABLE])
+    assert not any(RAW.search(line) for line in as_dict(told)["warnings"])
+    write_discovery_report(told, tmp_path / "report.html")
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "Cogging torque had been masked" in page and "tells cogging torque from torque ripple" in page
+    shown = re.sub(r"<(script|style).*?</\1>", "", page, flags=re.S)
+    assert "motor.torque_constant" not in shown and "friction.dynamic" not in shown
+
+
+def test_an_effect_that_is_a_parameter_does_not_mask_itself():
+    found = with_cogging()
+    (one,) = found.effects
+    itself = replace(one, name="viscous_friction", stood_in=(StoodIn("motor.viscous_friction_Nms_rad", 2.0, 0.0),))
+    assert masked([itself], found.actuator.axes) == []

@@ -35,6 +35,7 @@ from emaviz.panels.discover_cards import TABS
 from emaviz.panels.discover_keep import DiscoveryKeep
 from emaviz.panels.discover_load import load_into_explore
 from emaviz.panels.discover_result import DiscoveryPanel
+from emaviz.panels.docked import LEFT_PX, Docked
 from emaviz.panels.explore import ExplorePanel
 from emaviz.panels.explore_charts import ChartsPanel
 from emaviz.panels.explore_export import ExportControls
@@ -45,7 +46,6 @@ from emaviz.panels.identify_result import IdentifyResult
 from emaviz.panels.library import EffectPage, LibraryPanel
 from emaviz.panels.page import Page
 from emaviz.panels.page_playback import PlaybackStrip
-from emaviz.panels.page_width import LEFT_PX, Widths
 from emaviz.panels.recordings import RecordingsPanel
 from emaviz.panels.recordings_result import RecordingsResult
 from emaviz.panels.sessions import SessionControls, parts
@@ -59,7 +59,6 @@ from emaviz.worker import Worker
 
 _FASTEST_REDRAW_S = 0.04
 _SLOW_REDRAW_S = 0.3  # of what nobody watches while dragging
-_SETTLE_S = 0.15
 _NOTE = "padding:6px 12px;font-size:13px;line-height:1.45;border-left:3px solid #e8590c"
 _BRAND = (47, 111, 222)
 
@@ -83,7 +82,7 @@ class App:
         self._slow_screen = Worker("emaviz-slow-screen", self._on_screen_error, rest_s=_SLOW_REDRAW_S)
         self._recording_files = Worker("emaviz-recordings", self._on_screen_error)
         self.page = Page(self.server, self.session, self.screen)
-        self._widths = Widths(self.server, self._set_widths)
+        self._docked = Docked(self.server)
         self.comparing = Comparing(self.session, data)
         self.session.open_file = partial(measured, self.comparing)
         self.discovering = Discovering(self.session, self.comparing)
@@ -114,22 +113,21 @@ class App:
         gui.set_panel_label("emaviz")
         gui.main_panel.dock_left()
         gui.main_panel.set_width(LEFT_PX)
-        # Of the panels on the right one is seen: the one that belongs to what was done last.
-        self._signals_panel, self._result_panel = gui.add_panel(), gui.add_panel(visible=False)
-        self._discovery_panel, self._library_panel = gui.add_panel(visible=False), gui.add_panel(visible=False)
-        self._search_panel = gui.add_panel(visible=False)
+        docked = self._docked
+        self.signals_panel, self._result_panel, self._discovery_panel = docked.add(), docked.add(), docked.add()
+        self._library_panel, self._search_panel = docked.add(), docked.add()
+        self._recordings_panel = docked.add(viewer=True)
         search = IdentifyResult(
-            self.page, self._slow_screen, self._search_panel, lambda: self._bring(self._search_panel)
+            self.page, self._slow_screen, self._search_panel, lambda: docked.bring(self._search_panel)
         )
-        self._recordings_panel = gui.add_panel(visible=False)
-        opened = RecordingsResult(self.page, self._recordings_panel, lambda: self._bring(self._recordings_panel))
+        opened = RecordingsResult(self.page, self._recordings_panel, lambda: docked.bring(self._recordings_panel))
         export = ExportControls(self.page, self.scene, self.playback)
-        self.charts = ChartsPanel(self.page, self._slow_screen, self._signals_panel, export.build)
+        self.charts = ChartsPanel(self.page, self._slow_screen, self.signals_panel, export.build)
         export.connect(lambda: self.charts.ghost, lambda: self.charts.window_s)
         with self._result_panel.add_tab("Comparison", viser.Icon.ARROWS_DIFF):
             result = ResultPanel(
                 self.page,
-                lambda: self._bring(self._result_panel),
+                lambda: docked.bring(self._result_panel),
                 self._hold,
                 lambda: KeepControls(self.page, self.comparing, self.viewer),
             )
@@ -137,19 +135,15 @@ class App:
             discovery = DiscoveryPanel(
                 self.page,
                 self.discovering,
-                lambda: self._bring(self._discovery_panel),
+                lambda: docked.bring(self._discovery_panel),
                 lambda: DiscoveryKeep(self.page, self.discovering, self.viewer),
                 lambda one: load_into_explore(self.explore, one),
                 self._play,
             )
         library = Library(self.session)
         with self._library_panel.add_tab("Effect", viser.Icon.BOOK):
-            effect = EffectPage(self.page, library, lambda: self._bring(self._library_panel))
-        self._right = [self._signals_panel, self._result_panel, self._discovery_panel, self._library_panel]
-        self._right += [self._search_panel, self._recordings_panel]
-        for panel in self._right:
-            panel.dock_right()
-            panel.set_width(self._width(panel))
+            effect = EffectPage(self.page, library, lambda: docked.bring(self._library_panel))
+        docked.dock()
         builders = [
             lambda tabs: self._build_explore(tabs),
             lambda tabs: self._build_identify(tabs, search, opened),
@@ -218,23 +212,6 @@ class App:
         with tabs.add_tab("Library", viser.Icon.BOOK):
             LibraryPanel(self.page, library, effect)
 
-    def _bring(self, panel: viser.PanelHandle) -> None:
-        """To the front, on the right; the others give way."""
-        changed = not panel.visible
-        for one in self._right:
-            if one.visible != (one is panel):
-                one.visible = one is panel
-        if changed:  # a panel that was hidden comes back narrow, and takes a width once it is there
-            threading.Timer(_SETTLE_S, lambda: panel.set_width(self._width(panel))).start()
-
-    def _width(self, panel: viser.PanelHandle) -> int:
-        return self._widths.of(viewer=panel is self._recordings_panel)
-
-    def _set_widths(self) -> None:
-        for panel in self._right:
-            if panel.visible:
-                panel.set_width(self._width(panel))
-
     def _play(self, run: Measurement | None) -> None:
         """A run on the 3D actuator; without one, Explore's."""
         shown = self.session.simulation if run is None else Simulation(run, run, HEALTHY, 0.0)
@@ -279,7 +256,7 @@ class App:
             self.first_picture_s = time.perf_counter() - started
             self._first.set()
         elif simulation.asked:
-            self._bring(self._signals_panel)
+            self._docked.bring(self.signals_panel)
 
     def _status(self, text: str) -> None:
         self.explore.status.content = text

@@ -61,7 +61,7 @@ def signals_in_front(app):
     def in_front():
         app.session.refresh()
         time.sleep(0.2)
-        return app._signals_panel.visible
+        return app.signals_panel.visible
 
     wait_until(in_front)
 

@@ -52,7 +52,7 @@ def page(tab, app):
     before = app.session.simulation
     app.explore.show_settings()
     app.identify.show_settings()
-    wait_until(lambda: app.session.simulation is not before and app._signals_panel.visible)
+    wait_until(lambda: app.session.simulation is not before and app.signals_panel.visible)
     yield tab
     app.session.stop()
     wait_until(lambda: not app.session.worker.busy)
@@ -155,7 +155,7 @@ def test_each_command_has_its_settings(page, app, title, name, label, value, set
 
 def test_the_charts_show_a_part_of_the_run_and_the_phases(page, app):
     app.explore.set_faults(HEALTHY)
-    wait_until(lambda: app._signals_panel.visible)
+    wait_until(lambda: app.signals_panel.visible)
     show(page, "Signals")
     wait_until(lambda: chart(page, "Motor speed").ndim == 2)
     thumb = page.locator(".multi-slider-thumb").first

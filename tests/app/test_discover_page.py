@@ -30,7 +30,7 @@ def in_front(app, panel):
 def signals_in_front(app):
     """As a new page is known by its charts."""
     wait_until(lambda: not app.discovering.running)
-    wait_until(lambda: in_front(app, app._signals_panel))
+    wait_until(lambda: in_front(app, app.signals_panel))
 
 
 @pytest.fixture

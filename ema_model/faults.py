@@ -87,7 +87,7 @@ def sentences(k: ArrayLike, actuator: Actuator) -> tuple[str, ...]:
         f"phase B: {r['turns_b']:.0%} of turns",
         f"phase C: {r['turns_c']:.0%} of turns",
         f"eccentricity ζ = {r['eccentricity']:.2f}",
-        f"thinnest gap at {np.degrees(r['eccentricity_phase_rad']):+.0f}°",
+        f"thinnest gap at {round(np.degrees(r['eccentricity_phase_rad'])):+d}°",
         f"gain × {physical(k).gain_factor:.2f}",
     )
 

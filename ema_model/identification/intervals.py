@@ -32,7 +32,7 @@ _ALARM_LENGTH = float(np.sqrt(-2.0 * np.log(_ALARM)))  # of a vector
 _INSEPARABLE = 0.9
 _WIDE = 0.03  # σ of a k below which it counts as known
 _LEAST_SPREAD = 0.02  # of a fit that left the base parameters where they were
-_SLIGHT = 3e-5  # least σ: as well as the models' steps in time let any k be told
+_SLIGHT = 2e-5  # least σ: as well as the models' steps in time let any k be told
 
 
 @dataclass(frozen=True)

@@ -7,4 +7,4 @@ COMMAND = "#868e96"
 TRUTH = "#2b8a3e"
 GHOST = "#9c6ade"  # a frozen run
 PHASES = ("#ec403a", "#28be5a", "#3878ff")  # A, B, C, in the charts and in the windings
-ALGORITHMS = {"robust": "#4c6ef5", "ssa": "#9c36b5", "hba": "#f08c00", "do": "#1098ad"}
+ALGORITHMS = {"robust": "#d6336c", "ssa": "#9c36b5", "hba": "#f08c00", "do": "#1098ad"}

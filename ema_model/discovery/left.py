@@ -16,15 +16,13 @@ from ema_model.comparison.result import Explanation
 from ema_model.comparison.verdict import ORDER_OF_PRIMARY
 from ema_model.discovery.fitting import Data, Fit
 
-_ORDERS = 4  # of the residual's strongest, tried for periodic effects
-
 
 @dataclass(frozen=True)
 class Left:
     """Of the residual that `comparison` would explain: the current's, where it is measured."""
 
     explanation: Explanation | None  # the most significant
-    orders: list[int]  # that a periodic effect may have, the strongest first
+    orders: list[int]  # that the recordings can show, the strongest first
 
 
 @lru_cache(maxsize=4)  # a walk asks before and after it has looked for the next effect
@@ -36,7 +34,7 @@ def left_by(data: Data, found: Fit) -> Left:
     orders = sorted(_orders(residuals, primary), key=lambda one: -one.significance)
     return Left(
         significant[0] if significant else None,
-        [one.order for one in orders[:_ORDERS]],
+        [one.order for one in orders],
     )
 
 

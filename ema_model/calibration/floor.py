@@ -4,6 +4,7 @@ Two parts, for each signal and block: the sensors' noise, estimated from the rec
 floor, how far the Monitor Model is from its three-phase twin under the same command (MODEL §2).  The twin
 differs most in transients, so its floor is local: the rms within 12.5 ms on either side.  Where the motor stands,
 friction holds it at any place in a band, and the model's error there is one error, however long it stands.
+When a command jumped is known to within a sample, which moves the transient that follows.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter1d
 
 from ema_model.actuator import Actuator
 from ema_model.commands import Recorded
+from ema_model.commands.recorded import jumps
 from ema_model.faults import HEALTHY
 from ema_model.measurement import Measurement
 from ema_model.plants import ClosedLoop, Plant, Stretch, Window
@@ -85,6 +87,9 @@ def floor(
         }
         assert isinstance(plant, ClosedLoop)
         model = _twins(plant, window, k, names)
+        if np.any(jumps(window.command)):
+            moved = _a_sample_late(plant, window, k)
+            model = {name: np.hypot(model[name], moved[name] / np.sqrt(12.0)) for name in names}
     slow = {name: np.hypot(model[name], known[name].get("accuracy", 0.0)) for name in names}
     return Floor(noise, slow, repeats_of(window, noise), window.block_s)
 
@@ -122,6 +127,14 @@ def _twins(plant: ClosedLoop, window: Window, k: ArrayLike, names: list[str]) ->
     width = max(3, round(CORRELATED_S / window.block_s) | 1)
     error = twin_error(plant, window, plant.actuator, k)
     return {name: np.sqrt(np.maximum(uniform_filter1d(error[name] ** 2, width, mode="nearest"), 0.0)) for name in names}
+
+
+def _a_sample_late(plant: ClosedLoop, window: Window, k: ArrayLike) -> dict[str, Array]:
+    """What the Monitor Model's signals change by if the command comes a sample later, (blocks,) each."""
+    steps = window.steps_per_sample
+    later = np.concatenate([np.full(steps, window.command[0]), window.command[:-steps]])
+    now, then = (plant.signals(one, k=k) for one in (window, replace(window, command=later)))
+    return {name: then[name][0] - now[name][0] for name in now}
 
 
 def repeats_of(window: Window | Stretch, noise: Mapping[str, float]) -> Array:

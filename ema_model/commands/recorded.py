@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ema_model.commands.command import Array, Command
 
@@ -21,13 +22,18 @@ def between(at_s: Array, time_s: Array, command: Array) -> Array:
     to a sample early, which is 3 A in the first half millisecond of a step sampled at 10 kHz.
     """
     values = np.interp(at_s, time_s, command)
-    change = np.abs(np.diff(command))
-    if len(change) > 1:
-        beside = np.maximum(np.append(0.0, change[:-1]), np.append(change[1:], 0.0))
-        jumps = np.append((change > _JUMP * beside) & (np.diff(time_s) <= _LONGEST_SAMPLE_S), False)
+    if len(command) > 2:
+        held = np.append(jumps(command) & (np.diff(time_s) <= _LONGEST_SAMPLE_S), False)
         last = np.clip(np.searchsorted(time_s, at_s + _ROUNDING_S, side="right") - 1, 0, len(time_s) - 1)
-        values = np.where(jumps[last], command[last], values)
+        values = np.where(held[last], command[last], values)
     return values
+
+
+def jumps(command: Array) -> NDArray[np.bool_]:
+    """Between which samples of a command (n,) it jumps, (n − 1,)."""
+    change = np.abs(np.diff(command))
+    beside = np.maximum(np.append(0.0, change[:-1]), np.append(change[1:], 0.0))
+    return change > _JUMP * beside
 
 
 @dataclass(frozen=True)

@@ -35,6 +35,7 @@ from ema_model.measurement.refusal import shown
 from ema_model.measurement.side_file import SideFile, find_side_file
 from ema_model.recordings import read_recording, usual_mapping
 from emaviz.data_folder import DataFolder
+from emaviz.listeners import notify
 from emaviz.session import Session
 from emaviz.state import number
 from emaviz.worker import Steps, Worker
@@ -112,7 +113,7 @@ class Comparing:
     def remove(self, name: str) -> None:
         """Takes a recording off the list; its file stays."""
         self.opened.pop(name, None)
-        _tell(self.events.removed)
+        notify(self.events.removed)
 
     def use_mapping(self, name: str, mapping: ColumnMapping) -> None:
         """Reads the file with this mapping soon, and remembers it in the side file."""
@@ -165,7 +166,7 @@ class Comparing:
 
     def _opened(self, opened: Opened) -> None:
         self.opened[opened.name] = opened
-        _tell(self.events.opened, opened)
+        notify(self.events.opened, opened)
 
     def _take_actuator(self, side: SideFile) -> InputError | None:
         """Takes the actuator that a side file names, if the data folder holds it; else why not."""
@@ -286,7 +287,7 @@ class Comparing:
         def progress(text: str) -> None:
             if stop.is_set():
                 raise Stopped
-            _tell(self.events.progressed, text)
+            notify(self.events.progressed, text)
             self.session.worker.breathe()  # the sliders of the other tabs
 
         yield
@@ -295,16 +296,16 @@ class Comparing:
 
             comparison = compare(measurements, **asked, on_progress=progress)
         except Stopped:
-            self._end(lambda: _tell(self.events.ended, "Stopped."))
+            self._end(lambda: notify(self.events.ended, "Stopped."))
             return
         except Exception as error:
-            self._end(lambda: _tell(self.events.ended, ""))
+            self._end(lambda: notify(self.events.ended, ""))
             if isinstance(error, FloatingPointError):
                 raise InputError(f"{error}; check the actuator's file and the recording's units") from None
             raise
         elapsed_s = time.perf_counter() - started
         self.comparison = comparison
-        self._end(lambda: _tell(self.events.compared, comparison, elapsed_s))
+        self._end(lambda: notify(self.events.compared, comparison, elapsed_s))
 
     # --- what stays -------------------------------------------------------------------------------------------------
 
@@ -333,7 +334,7 @@ class Comparing:
             write_report(comparison, path)
         else:
             write_comparison(comparison, path)
-        _tell(self.events.kept, path)
+        notify(self.events.kept, path)
 
     def _end(self, tell: Callable[[], None]) -> None:
         """Tells the end once the compute thread is free, so that a listener may start the next run."""
@@ -347,10 +348,10 @@ class Comparing:
     def _on_error(self, error: BaseException) -> None:
         if isinstance(error, InputError):
             line = str(error).replace(f"{self.folder.folder}/", "")  # the page knows its files by their names there
-            _tell(self.session.events.told, "That does not work", line)
+            notify(self.session.events.told, "That does not work", line)
             return
         traceback.print_exception(error)
-        _tell(self.session.events.told, "Something failed; the app goes on", f"{type(error).__name__}: {error}")
+        notify(self.session.events.told, "Something failed; the app goes on", f"{type(error).__name__}: {error}")
 
 
 def _freed(actuator: Actuator) -> set[str]:
@@ -362,8 +363,3 @@ def shipped_actuators() -> dict[str, Path]:
     inside = resources.files("ema_model") / "assets" / "actuators"
     folder = Path(str(inside)) if inside.is_dir() else Path(__file__).parents[1] / "assets" / "actuators"
     return {load_actuator(path).name: path for path in sorted(folder.glob("*.toml"))}
-
-
-def _tell(listeners: list[Callable[..., None]], *values: Any) -> None:
-    for listener in listeners:
-        listener(*values)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ema_model.discovery import Candidate, begun, walk
@@ -23,6 +23,7 @@ from emaviz.discovery_sealing import Sealing
 from emaviz.discovery_source import NOTHING, DiscoverySource
 from emaviz.discovery_telling import Telling
 from emaviz.discovery_trials import check_value, undecided
+from emaviz.listeners import notify
 from emaviz.session import Session
 from emaviz.worker import Worker
 
@@ -61,7 +62,7 @@ class Discovering:
         self.run.stop()  # one that waits to begin
         self.source.choose(name)
         self._told = self.look = None
-        _tell(self.events.looked, None)
+        notify(self.events.looked, None)
 
     # --- steps ------------------------------------------------------------------------------------------------------
 
@@ -110,9 +111,9 @@ class Discovering:
             if told is None or look is None or look.steps != len(told.story.steps) or look.assessment is None:
                 return
             try:
-                _tell(self.events.previewed, self._own.of(told.story, look, effect, settings))
+                notify(self.events.previewed, self._own.of(told.story, look, effect, settings))
             except (InputError, FloatingPointError) as error:
-                _tell(self.events.unpreviewed, str(error))
+                notify(self.events.unpreviewed, str(error))
 
         self.session.worker.post("own torque", job)
 
@@ -192,7 +193,7 @@ class Discovering:
             told.experiment = next_experiment(base.data, trials[0].fit, trials[1].fit)
             self._show(told)
             if told.experiment is None:
-                _tell(self.events.unsuggested)
+                notify(self.events.unsuggested)
 
         return self.run.begin("Looking for the best next test", job)
 
@@ -231,7 +232,7 @@ class Discovering:
 
     def _show(self, told: Telling) -> None:
         self.look = told.look()
-        _tell(self.events.looked, self.look)
+        notify(self.events.looked, self.look)
 
     def _seen(self) -> tuple[Telling, Look]:
         if self.running:
@@ -264,7 +265,7 @@ class Discovering:
         steps, experiment = checked(saved.get("steps")), experiment_of(saved.get("experiment"))
         recipe = self.source.take(saved["recipe"], names)
         self._told = self.look = None
-        _tell(self.events.looked, None)
+        notify(self.events.looked, None)
 
         def job(tell: Tell) -> None:
             told = self._begin(recipe, tell)
@@ -287,9 +288,4 @@ class Discovering:
     def _keep(self, suffix: str) -> None:
         if self.look is None:
             raise InputError("nothing is discovered yet; press Start first")
-        _tell(self.events.kept, keep(self.look, self.folder, suffix))
-
-
-def _tell(listeners: list[Callable[..., None]], *values: Any) -> None:
-    for listener in listeners:
-        listener(*values)
+        notify(self.events.kept, keep(self.look, self.folder, suffix))

@@ -10,12 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.comparison.assemble import residuals_of
-from ema_model.comparison.explain import explain
 from ema_model.comparison.residuals import Residuals
 from ema_model.comparison.result import Explanation
-from ema_model.comparison.verdict import ORDER_OF_PRIMARY
 from ema_model.discovery import Candidate, Discovery, Story
-from ema_model.discovery.left import Left, residuals_left
+from ema_model.discovery.left import Left
 from ema_model.discovery.result import Added
 from ema_model.discovery.story import alike
 from ema_model.discovery.trial import LEAST_BIC
@@ -37,7 +35,6 @@ class Assessment:
     candidates: Sequence[Candidate]
     signatures: Mapping[str, Array]  # (values,) over the floor
     alike: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    explained: Sequence[Explanation] = ()  # all that was tried to explain the primary signal's residual
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,10 +131,7 @@ def assessed(story: Story) -> Assessment:
     worth = [one for one in ranked if not one.untestable_reason]
     signatures = story.signatures(worth)
     rivals = {one.name: signatures[one.name] for one in worth if one.predicted_drop > _RIVAL and one.name in signatures}
-    residuals = residuals_left(story.data, story.current)
-    first = next(name for name in ORDER_OF_PRIMARY if name in residuals.values)
-    explained = explain(residuals, first, story.current.actuator.axes)
-    return Assessment(left, ranked, signatures, alike(rivals), explained)
+    return Assessment(left, ranked, signatures, alike(rivals))
 
 
 def look_at(story: Story, found: Discovery, assessment: Assessment | None, first: Assessment | None = None) -> Look:
@@ -160,5 +154,5 @@ def look_at(story: Story, found: Discovery, assessment: Assessment | None, first
         assessment=assessment,
         reach=tuple(one.name for one in data.measurements),
         held=() if story.held is None else tuple(one.name for one in story.held.measurements),
-        explained_before=first.explained if first is not None else (),
+        explained_before=first.left.explained if first is not None else (),
     )

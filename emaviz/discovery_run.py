@@ -12,6 +12,7 @@ from typing import Any
 from ema_model.errors import InputError
 from emaviz.comparing import Stopped
 from emaviz.discovery_look import Look
+from emaviz.listeners import notify
 from emaviz.session import Session
 from emaviz.worker import Steps
 
@@ -54,14 +55,14 @@ class DiscoveryRun:
         if started:
             self._waits.set()
             self._stop, self.running = stop, True
-            _tell(self._events.began, title)
+            notify(self._events.began, title)
         return started
 
     def begin_when_free(self, title: str, job: Job, ready: Callable[[], bool]) -> None:
         """Begins once ready() and no other long run goes on, unless another step begins first or it is stopped."""
         self._waits.set()
         self._waits = over = threading.Event()
-        _tell(self._events.waits, f"{title}: waiting until nothing else runs …")
+        notify(self._events.waits, f"{title}: waiting until nothing else runs …")
 
         def wait() -> None:
             rested, until = 0, time.perf_counter() + _MOST_WAIT_S
@@ -85,13 +86,13 @@ class DiscoveryRun:
 
         def tick() -> None:
             while not over.wait(_TICK_S):  # a compilation says nothing for seconds
-                _tell(self._events.progressed, said[0], time.perf_counter() - began)
+                notify(self._events.progressed, said[0], time.perf_counter() - began)
 
         def tell(text: str) -> None:
             if stop.is_set():
                 raise Stopped
             said[0] = text.replace("_", " ")
-            _tell(self._events.progressed, said[0], time.perf_counter() - began)
+            notify(self._events.progressed, said[0], time.perf_counter() - began)
             self._session.worker.breathe()  # the sliders of the other tabs
 
         yield
@@ -116,11 +117,6 @@ class DiscoveryRun:
 
         def ended() -> None:
             self.running = False
-            _tell(self._events.ended, text)
+            notify(self._events.ended, text)
 
         self._session.worker.post("discovery's end", ended)
-
-
-def _tell(listeners: list[Callable[..., None]], *values: Any) -> None:
-    for listener in listeners:
-        listener(*values)

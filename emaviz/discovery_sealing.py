@@ -6,7 +6,6 @@ import secrets
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -20,6 +19,7 @@ from ema_model.errors import InputError
 from ema_model.faults import HEALTHY, NAMES, sentences
 from ema_model.sensors import Sensors
 from emaviz.data_folder import DataFolder, sanitised
+from emaviz.listeners import notify
 from emaviz.session import Session
 from emaviz.state import Settings
 from emaviz.worker import Steps
@@ -57,7 +57,7 @@ class Sealing:
 
         def steps() -> Steps:
             def tell(text: str) -> None:
-                _tell(self.events.said, f"Sealing: {text} …")
+                notify(self.events.said, f"Sealing: {text} …")
                 self.session.worker.breathe()
 
             yield
@@ -65,8 +65,8 @@ class Sealing:
                 tell("simulating; a combination of effects is compiled on its first use")
                 seal(truth, path, title, story, actuator, sensors=sensors, load_torque_Nm=load, on_progress=tell)
             finally:
-                _tell(self.events.said, "")
-            _tell(self.events.sealed, path)
+                notify(self.events.said, "")
+            notify(self.events.sealed, path)
 
         return self.session.worker.start(steps())
 
@@ -92,8 +92,3 @@ def sensors_of(settings: Settings) -> Sensors:
     """Those that are set; where they are perfect, those of the shipped challenges, since no rig has such."""
     given = settings.sensors
     return Sensors(given.current_noise_A or SENSORS.current_noise_A, given.encoder_bits or SENSORS.encoder_bits)
-
-
-def _tell(listeners: list[Callable[..., None]], *values: Any) -> None:
-    for listener in listeners:
-        listener(*values)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from ema_model.actuator.titles import in_sentence
 from ema_model.axes import Axes
 from ema_model.calibration import Calibrated
 from ema_model.discovery import Discovery
@@ -30,7 +31,7 @@ def headline(found: Discovery) -> str:
     """The verdict in one sentence."""
     if found.verdict == "effects_found":
         # Once, where two orders of one effect were added.
-        names = _listed(list(dict.fromkeys(small(effect_title(one.name)) for one in found.effects)))
+        names = _listed(list(dict.fromkeys(in_sentence(effect_title(one.name)) for one in found.effects)))
         return f"The model lacks {names}."
     if found.verdict == "adequate" and found.parameters_outside_tolerance:
         return "No physics is missing, but not all parameters are within their tolerance."
@@ -49,8 +50,8 @@ def sentences(found: Discovery) -> list[str]:
         told.append(f"The calibrated model's error is {number(last.rmse)} times the floor{held}.")
     for one in found.effects:
         if one.same_as:
-            rivals = _listed([small(effect_title(name)) for name in one.same_as])
-            told.append(f"These recordings cannot tell {small(effect_title(one.name))} from {rivals}.")
+            rivals = _listed([in_sentence(effect_title(name)) for name in one.same_as])
+            told.append(f"These recordings cannot tell {in_sentence(effect_title(one.name))} from {rivals}.")
     if found.parameters_outside_tolerance:
         outside = _listed([parameter(found.actuator.axes, path) for path in found.parameters_outside_tolerance])
         whose = "its" if len(found.parameters_outside_tolerance) == 1 else "their"
@@ -74,7 +75,7 @@ def next_experiment(found: Discovery) -> list[str]:
     if best.add_signal:
         names = [SIGNALS[name].title.lower() if name in SIGNALS else name for name in best.add_signal.split(", ")]
         asked += f", and measure the {_listed(names)} as well"
-    rivals = _listed([small(effect_title(name)) for name in best.separates])
+    rivals = _listed([in_sentence(effect_title(name)) for name in best.separates])
     return [f"{asked}.", f"It would tell {rivals} apart: χ² of {best.expected_chi2:.0f} is expected between them."]
 
 
@@ -103,7 +104,7 @@ def parameter(axes: Axes, path: str) -> str:
     if section != "effects":
         return parameter_title(axes.path(path))
     effect, _, name = rest.partition(".")
-    return f"{effect_title(effect)}: {small(parameter_title('.' + name))}"
+    return f"{effect_title(effect)}: {in_sentence(parameter_title('.' + name))}"
 
 
 def value(one: Calibrated) -> str:
@@ -121,11 +122,6 @@ def settings(found: Discovery, one: Added) -> dict[str, str]:
 def fitted_of(found: Discovery, one: Added, name: str) -> Calibrated:
     """A fitted parameter of an added effect as the last model has it: later effects may have moved it."""
     return found.calibration.parameters.get(f"effects.{one.key}.{name}", one.parameters[name])
-
-
-def small(title: str) -> str:
-    """A title within a sentence."""
-    return title[:1].lower() + title[1:] if not title[1:2].isupper() else title
 
 
 def _times(first: Rung, last: Rung) -> str:

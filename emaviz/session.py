@@ -24,6 +24,7 @@ from ema_model.measurement import Measurement
 from ema_model.simulation import simulate_monitor
 from emaviz import plant
 from emaviz.identifying import Race, Reins, begin, run, target
+from emaviz.listeners import notify
 from emaviz.state import Settings
 from emaviz.worker import Steps, Worker
 
@@ -93,7 +94,7 @@ class Session:
         settings = copy.deepcopy(self.settings)
         stack = tuple(sorted(settings.effects))
         if stack not in self._compiled:
-            _tell(self.events.status, f"Compiling the plant with {', '.join(stack).replace('_', ' ')}…")
+            notify(self.events.status, f"Compiling the plant with {', '.join(stack).replace('_', ' ')}…")
         started = time.perf_counter()
         run, start = settings.run(), settings.start_rad()
         fitted = self.identified.k if self.identified is not None else HEALTHY
@@ -114,26 +115,26 @@ class Session:
         elapsed = time.perf_counter() - started
         if stack not in self._compiled:
             self._compiled.add(stack)
-            _tell(self.events.status, f"Ready ({elapsed:.1f} s).")
+            notify(self.events.status, f"Ready ({elapsed:.1f} s).")
         reference = settings.sensors.record(reference, settings.seed)
         self.simulation = Simulation(reference, monitor, settings.k, elapsed, settings.command, settings.monitor, asked)
-        _tell(self.events.simulated, self.simulation)
+        notify(self.events.simulated, self.simulation)
 
     def _warm_up(self) -> None:
         started = time.perf_counter()
-        _tell(self.events.status, "Compiling the models for this computer (the first time takes some seconds)…")
+        notify(self.events.status, "Compiling the models for this computer (the first time takes some seconds)…")
         if not plant.can_be_explored(self.actuator):
             self.ready.set()
-            _tell(self.events.status, "Ready.")
+            notify(self.events.status, "Ready.")
             return
         run = Settings().run()
         reference = plant.simulate(run, self.actuator, HEALTHY, {})
         simulate_monitor(run, self.actuator)
         self.ready.set()
         self._simulate()
-        _tell(self.events.status, "Compiling the identification…")
+        notify(self.events.status, "Compiling the identification…")
         warm_up(Objective([reference], self.actuator))
-        _tell(self.events.status, f"Ready ({time.perf_counter() - started:.1f} s).")
+        notify(self.events.status, f"Ready ({time.perf_counter() - started:.1f} s).")
 
     # --- identification ---------------------------------------------------------------------------------------------
 
@@ -165,7 +166,7 @@ class Session:
             def tell(race: Race, progress: Progress | None) -> None:
                 if story is not None and progress is not None:
                     story.iteration(progress)
-                _tell(self.events.progressed, race)
+                notify(self.events.progressed, race)
 
             yield from run(race, objective, reins, tell)
             self._keep(race, story)
@@ -174,7 +175,7 @@ class Session:
         finally:
             if story is not None:
                 story.close()
-            _tell(self.events.ended)
+            notify(self.events.ended)
 
     def _keep(self, race: Race, story: IdentificationStory | None) -> None:
         best = race.best
@@ -187,8 +188,8 @@ class Session:
             story.finish(best.answer, *others)
             race.path = None if story.failed else story.path
             if story.failed:
-                _tell(self.events.told, "The recording could not be written", story.failed)
-        _tell(self.events.identified, race)
+                notify(self.events.told, "The recording could not be written", story.failed)
+        notify(self.events.identified, race)
         if race.truth is not None:
             self.refresh(asked=False)
 
@@ -205,15 +206,15 @@ class Session:
                 path, objective, measurement, source, race.truth, readable(settings), settings.algorithms
             )
         except (OSError, ImportError) as error:  # a run without its recording is still a run
-            _tell(self.events.told, "The recording cannot be written", " ".join(str(error).split()))
+            notify(self.events.told, "The recording cannot be written", " ".join(str(error).split()))
             return None
 
     def _on_error(self, error: BaseException) -> None:
         if isinstance(error, InputError):
-            _tell(self.events.told, "That does not work", str(error))
+            notify(self.events.told, "That does not work", str(error))
             return
         traceback.print_exception(error)
-        _tell(self.events.told, "Something failed; the app goes on", f"{type(error).__name__}: {error}")
+        notify(self.events.told, "Something failed; the app goes on", f"{type(error).__name__}: {error}")
 
 
 def readable(settings: Settings) -> dict[str, Any]:
@@ -250,8 +251,3 @@ def _search(settings: Settings) -> dict[str, Any]:
 
 def _no_files(name: str) -> Measurement:
     raise InputError(f"{name[:100]}: there is no data folder to read it from")
-
-
-def _tell(listeners: list[Callable[..., None]], *values: Any) -> None:
-    for listener in listeners:
-        listener(*values)

@@ -6,11 +6,8 @@ NAME.emaviz is a zip of `session.json` and the files under `files/`, so that it 
 from __future__ import annotations
 
 import json
-import os
-import secrets
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,6 +15,7 @@ from typing import Any
 from ema_model.errors import InputError
 from ema_model.measurement import side_path
 from ema_model.measurement.refusal import shown
+from ema_model.whole_file import whole_file
 from emaviz import __version__
 from emaviz.data_folder import SESSION_SUFFIX, DataFolder, sanitised
 
@@ -47,9 +45,8 @@ def write(path: Path, parts: Mapping[str, Part], folder: DataFolder, names: Sequ
     Raises InputError, and leaves nothing behind, if it cannot be written.
     """
     document = {"schema": SCHEMA, "emaviz": __version__, "files": [], **{n: p.save() for n, p in parts.items()}}
-    part = path.with_name(f".{secrets.token_hex(8)}.part")
     try:
-        with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+        with whole_file(path) as part, zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
             for name in dict.fromkeys(names):
                 file = folder.folder / name
                 if not (folder.holds(file) and file.is_file()):
@@ -60,12 +57,8 @@ def write(path: Path, parts: Mapping[str, Part], folder: DataFolder, names: Sequ
                 if side != file and side.is_file() and folder.holds(side):
                     archive.write(side, _FILES + folder.name_of(side))
             archive.writestr(_DOCUMENT, json.dumps(document, indent=1))
-        os.replace(part, path)
     except OSError as error:
         raise InputError(f"{path.name}: cannot be written ({error.strerror}); check the disk") from None
-    finally:
-        with suppress(OSError):
-            part.unlink()
 
 
 def read(path: Path, parts: Mapping[str, Part], folder: DataFolder) -> None:

@@ -17,3 +17,8 @@ def parameter_title(path: str) -> str:
             break
     words = f"{section.replace('.', ' ')} {name}".replace("_", " ").strip()
     return words[:1].upper() + words[1:]
+
+
+def in_sentence(title: str) -> str:
+    """A title within a sentence: 'motor inertia', but 'RMS current' as it is."""
+    return title if title[1:2].isupper() else title[:1].lower() + title[1:]

@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 import math
 import os
-import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ema_model.actuator.layout import KINDS, layout
 from ema_model.actuator.parameters import SECTIONS, Actuator
 from ema_model.errors import InputError
+from ema_model.whole_file import whole_file
 
 if TYPE_CHECKING:
     from ema_model.user_effects import UserEffect
@@ -23,11 +23,8 @@ def save_actuator(actuator: Actuator, path: str | os.PathLike[str]) -> None:
     if target.suffix != ".toml":
         raise InputError(f"{target}: the name of an actuator file must end in .toml")
     try:
-        handle, draft = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}-")
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(as_toml(actuator))
-        os.chmod(draft, 0o644)
-        os.replace(draft, target)
+        with whole_file(target) as draft:
+            draft.write_text(as_toml(actuator), encoding="utf-8")
     except OSError as error:
         raise InputError(f"{target}: cannot be written ({error.strerror}); check the folder") from None
 

@@ -90,6 +90,11 @@ class Calibration:
         return 0.0 if turned is None else turned.value, 0.0 if play is None else play.value
 
     @property
+    def weighted_jacobian(self) -> Array:
+        """`weighted_sensitivities` below each other, beside `residual`: (values, unknowns)."""
+        return np.concatenate([part[name] for part in self.weighted_sensitivities for name in part])
+
+    @property
     def outside_tolerance(self) -> tuple[str, ...]:
         """Parameters that stand at 3 σ of their tolerance, or would go beyond."""
         return tuple(name for name, one in self.parameters.items() if abs(one.z) > _OUTSIDE_Z)

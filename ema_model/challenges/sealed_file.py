@@ -17,7 +17,7 @@ import tempfile
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -25,6 +25,7 @@ from typing import Any
 from ema_model.challenges.challenge import Challenge
 from ema_model.errors import InputError
 from ema_model.measurement.refusal import shown
+from ema_model.whole_file import whole_file
 
 SUFFIX = ".challenge"
 SCHEMA = 1
@@ -49,17 +50,12 @@ def write_sealed(path: Path, head: Mapping[str, Any], parts: Mapping[str, bytes]
     parts = {**parts, _HEAD: json.dumps({"schema": SCHEMA, **head}, indent=1).encode()}
     salt = secrets.token_hex(_SALT_BYTES)
     seal = {"salt": salt, "sha256": _digest(salt, parts)}
-    draft = path.with_name(f".{secrets.token_hex(8)}.part")
     try:
-        with zipfile.ZipFile(draft, "w", zipfile.ZIP_DEFLATED) as archive:
+        with whole_file(path) as draft, zipfile.ZipFile(draft, "w", zipfile.ZIP_DEFLATED) as archive:
             for name, content in (*parts.items(), (_SEAL, json.dumps(seal).encode())):
                 archive.writestr(name, content)
-        os.replace(draft, path)
     except OSError as error:
         raise InputError(f"{path.name}: cannot be written ({error.strerror}); check the disk") from None
-    finally:
-        with suppress(OSError):
-            draft.unlink()
 
 
 def sealed_challenge(path: Path) -> Challenge:

@@ -136,8 +136,7 @@ def _fitted(found: Fit, problem: Problem) -> Array:
 
 def _information(found: Fit, names: Sequence[str]) -> Array:
     """What the recordings say of these parameters, inverse covariance; starts of runs are only what they were."""
-    parts = [part[name] for part in found.calibration.weighted_sensitivities for name in part]
-    columns = np.concatenate(parts)
+    columns = found.calibration.weighted_jacobian
     all_names = list(found.starts)
     covariance = np.linalg.inv(columns.T @ columns + np.eye(columns.shape[1]))
     known = [i for i, name in enumerate(names) if "." in name]

@@ -127,14 +127,12 @@ def _changes(data: Data, found: Fit, lanes: list[Lane], switchable: bool) -> Arr
     plant = data.plant(replace(actuator, effects=resting))
     model = replace(actuator, effects=varied)
     k = np.tile(np.asarray(HEALTHY, float), (len(lanes) + 1, 1))
-    parts = []
-    for i, (window, one) in enumerate(zip(plant.windows, data.floors)):
-        shown = plant.signals(window, model, k, *found.calibration.start_of(i))  # pyright: ignore[reportArgumentType]
-        parts += [
-            shown[name] * (data.signals[name] / one.fit_sigma(name)) for name in data.signals if name in window.measured
-        ]
-    signals = np.concatenate(parts, axis=1)
-    return signals[1:] - (signals[0] if switchable else _resting(data, found))
+    shown = [
+        plant.signals(window, model, k, *found.calibration.start_of(i))  # pyright: ignore[reportArgumentType]
+        for i, window in enumerate(plant.windows)
+    ]
+    signals = data.over_floor(plant, shown)
+    return signals[1:] - (signals[0] if switchable else data.over_floor(found.plant, found.calibration.signals))
 
 
 def _gentler(effect: Effect, settings: dict[str, float], size: float, error: float) -> dict[str, float] | None:
@@ -157,15 +155,3 @@ def _library_off() -> dict[str, dict[str, float]]:
     library = {name: effect for name, effect in CATALOGUE.items() if off(effect) is not None}
     library |= {f"{name}_2": find(f"{name}_2") for name, effect in library.items() if effect.is_periodic}
     return {name: _switched_off(effect) for name, effect in library.items()}
-
-
-def _resting(data: Data, found: Fit) -> Array:
-    """The fitted model's own signals, over the floor."""
-    return np.concatenate(
-        [
-            signals[name] * (data.signals[name] / one.fit_sigma(name))
-            for window, one, signals in zip(found.plant.windows, data.floors, found.calibration.signals)
-            for name in data.signals
-            if name in window.measured
-        ]
-    )

@@ -35,6 +35,16 @@ class Data:
         """The recordings beside this actuator's model."""
         return plant_for(self.measurements, actuator, stretches=self.stretches)
 
+    def over_floor(self, plant: Plant, shown: Sequence[Mapping[str, Array]]) -> Array:
+        """Signals of each window of the plant, (…, blocks), over the floor, in a residual's order: (…, values)."""
+        parts = [
+            signals[name] * (weight / one.fit_sigma(name))
+            for window, one, signals in zip(plant.windows, self.floors, shown)
+            for name, weight in self.signals.items()
+            if name in window.measured
+        ]
+        return np.concatenate(parts, axis=-1)
+
     def beside(self, found: Fit) -> Data:
         """The data with the model's floor at a calibrated model as well, where that is greater."""
         plant = self.plant(found.calibration.actuator)

@@ -21,8 +21,13 @@ from ema_model.discovery.fitting import Data, Fit
 class Left:
     """Of the residual that `comparison` would explain: the current's, where it is measured."""
 
-    explanation: Explanation | None  # the most significant
+    explained: list[Explanation]  # all that was tried
     orders: list[int]  # that the recordings can show, the strongest first
+
+    @property
+    def explanation(self) -> Explanation | None:
+        """The most significant."""
+        return next((one for one in self.explained if one.significant), None)
 
 
 @lru_cache(maxsize=4)  # a walk asks before and after it has looked for the next effect
@@ -30,12 +35,8 @@ def left_by(data: Data, found: Fit) -> Left:
     """What a fit leaves."""
     residuals = residuals_left(data, found)
     primary = next(name for name in ORDER_OF_PRIMARY if name in residuals.values)
-    significant = [one for one in explain(residuals, primary, found.actuator.axes) if one.significant]
     orders = sorted(_orders(residuals, primary), key=lambda one: -one.significance)
-    return Left(
-        significant[0] if significant else None,
-        [one.order for one in orders],
-    )
+    return Left(explain(residuals, primary, found.actuator.axes), [one.order for one in orders])
 
 
 def residuals_left(data: Data, found: Fit) -> Residuals:

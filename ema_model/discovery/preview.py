@@ -38,16 +38,11 @@ class Preview:
         """
         calibration = self.found.calibration
         model = _with(calibration.actuator, self.name, settings)
-        parts = []
-        for i, (window, one, before) in enumerate(zip(self.plant.windows, self.data.floors, calibration.signals)):
-            start = calibration.start_of(i)
-            after = self.plant.signals(window, model, HEALTHY, *start)  # pyright: ignore[reportArgumentType]
-            parts += [
-                (after[signal][0] - before[signal]) * (self.data.signals[signal] / one.fit_sigma(signal))
-                for signal in self.data.signals
-                if signal in window.measured
-            ]
-        whole = np.concatenate(parts)
+        after = [
+            self.plant.signals(window, model, HEALTHY, *calibration.start_of(i))  # pyright: ignore[reportArgumentType]
+            for i, window in enumerate(self.plant.windows)
+        ]
+        whole = self.data.over_floor(self.plant, after)[0] - self.data.over_floor(self.found.plant, calibration.signals)
         return whole + self._followed(whole) if np.all(np.isfinite(whole)) else whole
 
     def _followed(self, change: Array) -> Array:
@@ -63,8 +58,7 @@ class Preview:
 def preview(data: Data, found: Fit, name: str, settings: Mapping[str, float]) -> Preview:
     """Makes room for an effect beside those of a fit; its settings may change afterwards."""
     calibration = found.calibration
-    parts = [part[signal] for part in calibration.weighted_sensitivities for signal in part]
-    jacobian = np.concatenate([*parts, np.eye(len(calibration.x))])
+    jacobian = np.concatenate([calibration.weighted_jacobian, np.eye(len(calibration.x))])
     basis, triangle = np.linalg.qr(jacobian)
     plant = data.plant(_with(calibration.actuator, name, settings))
     return Preview(data, found, name, plant, jacobian, basis, triangle)

@@ -34,8 +34,7 @@ def scored(found: Fit, prints: Sequence[Fingerprint]) -> list[Candidate]:
 
 def scored_all(found: Fit, prints: Sequence[Fingerprint]) -> list[Candidate]:
     """A candidate for each fingerprint, in their order."""
-    jacobian = _movable(found)
-    gram = jacobian.T @ jacobian + np.eye(jacobian.shape[1])
+    jacobian, gram = _movable(found)
     return [_scored(found, one, jacobian, gram) for one in prints]
 
 
@@ -44,8 +43,7 @@ def signatures(found: Fit, prints: Mapping[str, Sequence[Fingerprint]]) -> dict[
 
     At the strength that suits best, and only what the parameters cannot do as well.
     """
-    jacobian = _movable(found)
-    gram = jacobian.T @ jacobian + np.eye(jacobian.shape[1])
+    jacobian, gram = _movable(found)
     told = {}
     for name, its in prints.items():
         own = [_beyond(jacobian, gram, one.columns) for one in its]
@@ -56,7 +54,7 @@ def signatures(found: Fit, prints: Mapping[str, Sequence[Fingerprint]]) -> dict[
 
 def scored_together(found: Fit, prints: Sequence[Fingerprint], most: int) -> list[Candidate]:
     """Up to `most` fingerprints that tell most beside each other, each scored beside those before it."""
-    jacobian = _movable(found)
+    jacobian, _ = _movable(found)
     prior = np.ones(jacobian.shape[1])
     left = list(prints)
     chosen: list[Candidate] = []
@@ -71,12 +69,12 @@ def scored_together(found: Fit, prints: Sequence[Fingerprint], most: int) -> lis
     return chosen
 
 
-def _movable(found: Fit) -> Array:
-    """∂residual/∂x of the parameters that do not stand at a bound, (values, unknowns)."""
+def _movable(found: Fit) -> tuple[Array, Array]:
+    """J = ∂residual/∂x of the parameters that do not stand at a bound, (values, unknowns), and JᵀJ with the prior."""
     low, high = found.calibration.room
     free = np.minimum(-low, high) > _AT_BOUND
-    parts = [part[name] for part in found.calibration.weighted_sensitivities for name in part]
-    return np.concatenate(parts)[:, free] if parts else np.zeros((len(found.residual), 0))
+    jacobian = found.calibration.weighted_jacobian[:, free]
+    return jacobian, jacobian.T @ jacobian + np.eye(jacobian.shape[1])
 
 
 def _beyond(jacobian: Array, gram: Array, columns: Array) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ema_model.actuator.titles import parameter_title
+from ema_model.actuator.titles import in_sentence, parameter_title
 from ema_model.axes import Axes
 from ema_model.discovery.result import Added
 from ema_model.effects import find
@@ -20,7 +20,7 @@ def masked(added: Sequence[Added], axes: Axes) -> list[str]:
     lines = []
     for one in added:
         moved = [
-            f"{_small(parameter_title(axes.path(part.path)))} ({part.before:+.1f} → {part.after:+.1f} σ)"
+            f"{in_sentence(parameter_title(axes.path(part.path)))} ({part.before:+.1f} → {part.after:+.1f} σ)"
             for part in one.stood_in
             if part.path != find(one.name).duplicates
         ]
@@ -32,10 +32,5 @@ def masked(added: Sequence[Added], axes: Axes) -> list[str]:
 
 def untold(first: str, second: str) -> str:
     """That no test is known which would tell two effects apart."""
-    one, other = (_small(find(name).title) for name in (first, second))
+    one, other = (in_sentence(find(name).title) for name in (first, second))
     return f"No command within the range of these recordings tells {one} from {other}."
-
-
-def _small(title: str) -> str:
-    """A title within a sentence."""
-    return title[:1].lower() + title[1:] if not title[1:2].isupper() else title

@@ -132,13 +132,14 @@ def _with_twins(
         found = twins(problem, x, seed + number, found)
         _reweight(problem, given, found)
         if found is None:
-            return _descend(problem, x)[0], None, evaluations
+            x, _, more = _descend(problem, x)
+            return x, None, evaluations + more
         residual = problem.residuals(x[None, :])[0]
         cost = float(residual @ residual)
         moved = float(np.max(np.abs(x - best)[:FAULTS]))
         if cost < least:
             least, best, kept = cost, x, found
-            if number and moved < _SETTLED:
+            if (number and moved < _SETTLED) or number == _ROUNDS - 1:
                 break
             x, _, more = _descend(problem, x)
             evaluations += more

@@ -8,7 +8,7 @@ tell their own spread roughly: what rests on it is widened as Student's t is bey
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,46 +57,51 @@ def uncertainty(found: Fitted, k: Array) -> Uncertainty:
 
     Where other basins fit within the floor as well, intervals reach over all of them, and an alarm is one of each.
     """
-    sure = _of_one(found, k)
-    others = [_of_one(one, one.k) for one in found.rivals]
-    if not others:
-        return sure
-    interval = sure.interval90.copy()
+    best, *others = [_basin(found, k), *(_basin(one, one.k) for one in found.rivals)]
+    interval = best.interval90
     for one in others:
-        interval[:, 0] = np.minimum(interval[:, 0], one.interval90[:, 0])
-        interval[:, 1] = np.maximum(interval[:, 1], one.interval90[:, 1])
+        low, high = np.minimum(interval[:, 0], one.interval90[:, 0]), np.maximum(interval[:, 1], one.interval90[:, 1])
+        interval = np.stack([low, high], axis=1)
     if interval[5, 0] <= 0.0 or np.ptp(interval[6]) >= 1.0:
         interval[6] = 0.0, 1.0
-    return replace(
-        sure,
+    groups = _groups(best.covariance)
+    suggestion = separating(found, best.covariance, [name for group in groups for name in group]) if groups else None
+    return Uncertainty(
         interval90=interval,
-        healthy=sure.healthy or any(one.healthy for one in others),
-        alarms=tuple(name for name in sure.alarms if all(name in one.alarms for one in others)),
+        healthy=best.healthy or any(one.healthy for one in others),
+        alarms=tuple(name for name in best.alarms if all(name in one.alarms for one in others)),
+        ambiguous=groups,
+        adequate=best.fit.adequate,
+        warnings=_warnings(best.fit),
+        separated_by=suggestion.text if suggestion else "",
+        covariance=best.covariance,
     )
 
 
-def _of_one(found: Fitted, k: Array) -> Uncertainty:
-    """Of one basin."""
+@dataclass(frozen=True, eq=False)
+class _Basin:
+    """What one best fit alone says."""
+
+    covariance: Array  # of the faults' part of x
+    fit: Adequacy
+    interval90: Array  # (8, 2)
+    healthy: bool
+    alarms: tuple[str, ...]
+
+
+def _basin(found: Fitted, k: Array) -> _Basin:
     covariance = _covariance(found)[:FAULTS, :FAULTS]
     fit = adequacy(found)
     if not fit.adequate:  # a misfit says how wrong the model is, and the intervals with it
         covariance = covariance * max(1.0, fit.ratio) ** 2
     free = _unbounded(found)[:FAULTS]
-    sigma = np.sqrt(np.diag(covariance))
-    interval = _intervals(free, covariance, k)
-    deviation = _from_healthy(free, covariance)
-    healthy = deviation < float(chdtri(FAULTS, 0.01))
-    groups = _groups(covariance, sigma)
-    suggestion = separating(found, covariance, [name for group in groups for name in group]) if groups else None
-    return Uncertainty(
-        interval90=interval,
-        healthy=bool(healthy and fit.adequate),
-        alarms=() if healthy or not fit.adequate else _alarms(free, sigma, covariance),
-        ambiguous=groups,
-        adequate=fit.adequate,
-        warnings=_warnings(fit),
-        separated_by=suggestion.text if suggestion else "",
-        covariance=covariance,
+    healthy = _from_healthy(free, covariance) < float(chdtri(FAULTS, 0.01))
+    return _Basin(
+        covariance,
+        fit,
+        _intervals(free, covariance, k),
+        bool(healthy and fit.adequate),
+        () if healthy or not fit.adequate else _alarms(free, covariance),
     )
 
 
@@ -209,7 +214,8 @@ def _from_healthy(free: Array, covariance: Array) -> float:
     return float(healthy @ healthy - 2.0 * best.cost)
 
 
-def _alarms(free: Array, sigma: Array, covariance: Array) -> tuple[str, ...]:
+def _alarms(free: Array, covariance: Array) -> tuple[str, ...]:
+    sigma = np.sqrt(np.diag(covariance))
     outside = [faults.NAMES[i] for i in range(5) if free[i] > _ALARM_Z * sigma[i]]
     along, _, length = _polar(free, covariance)
     if length > _ALARM_LENGTH * along:
@@ -219,9 +225,10 @@ def _alarms(free: Array, sigma: Array, covariance: Array) -> tuple[str, ...]:
     return tuple(outside)
 
 
-def _groups(covariance: Array, sigma: Array) -> tuple[tuple[str, ...], ...]:
+def _groups(covariance: Array) -> tuple[tuple[str, ...], ...]:
     """k that trade against each other: strongly correlated and, each, poorly known."""
     names = [*faults.NAMES[:5], "k6", "k6", "k8"]
+    sigma = np.sqrt(np.diag(covariance))
     correlation = np.abs(covariance / np.outer(sigma, sigma))
     groups: list[set[str]] = []
     for i in range(FAULTS):

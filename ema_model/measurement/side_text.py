@@ -5,27 +5,21 @@ from __future__ import annotations
 import json
 import math
 import os
-import secrets
-from contextlib import suppress
 
 from ema_model.measurement.mapping import MappedColumn
 from ema_model.measurement.refusal import reason, refusal
 from ema_model.measurement.side_file import SideFile
+from ema_model.whole_file import whole_file
 
 
 def write_side_file(side: SideFile, path: str | os.PathLike[str]) -> None:
     """Writes the side file, whole or not at all; an older one is replaced.  Raises InputError if it cannot."""
     path = os.fspath(path)
-    part = os.path.join(os.path.dirname(os.path.realpath(path)), f".{secrets.token_hex(8)}.part")
     try:
-        with open(part, "w", encoding="utf-8", newline="\n") as file:
-            file.write(side_text(side))
-        os.replace(part, os.path.realpath(path))
+        with whole_file(path) as draft:
+            draft.write_text(side_text(side), encoding="utf-8", newline="\n")
     except OSError as error:
         raise refusal(path, f"cannot be written ({reason(error)}); check the disk and the permissions") from None
-    finally:
-        with suppress(OSError):
-            os.remove(part)  # left over by a failure only
 
 
 def side_text(side: SideFile) -> str:

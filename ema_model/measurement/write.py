@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import os
-import secrets
-from contextlib import suppress
 
 from ema_model.measurement.checks import check_finite
 from ema_model.measurement.formats import format_of
 from ema_model.measurement.measurement import Measurement
 from ema_model.measurement.refusal import reason, refusal, shown
+from ema_model.whole_file import whole_file
 
 
 def write_measurement(measurement: Measurement, path: str | os.PathLike[str]) -> None:
@@ -21,16 +20,11 @@ def write_measurement(measurement: Measurement, path: str | os.PathLike[str]) ->
     path = os.fspath(path)
     check_target(path)
     check_finite(path, measurement.signals, lambda row: f"sample {row + 1}")
-    target = os.path.realpath(path)
-    part = os.path.join(os.path.dirname(target), f".{secrets.token_hex(8)}.part")
     try:
-        format_of(path).write(measurement.signals, part)
-        os.replace(part, target)
+        with whole_file(path) as draft:
+            format_of(path).write(measurement.signals, os.fspath(draft))
     except OSError as error:
         raise refusal(path, f"cannot be written ({reason(error)}); check the disk and the permissions") from None
-    finally:
-        with suppress(OSError):
-            os.remove(part)  # left over by a failure only
 
 
 def check_target(path: str | os.PathLike[str]) -> None:

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import importlib.util
-import os
 import sys
-import tempfile
 import threading
 from collections.abc import Sequence
 from functools import cache
@@ -15,6 +13,7 @@ from types import ModuleType
 
 from ema_model.errors import InputError
 from ema_model.stacks import cache_folder
+from ema_model.whole_file import whole_file
 
 _FUNCTIONS = Path(__file__).with_name("functions.py").read_text(encoding="utf-8")
 _HEAD = """\"\"\"Generated: a user's effect; `ema_model.user_effects.module` has written it.\"\"\"
@@ -70,7 +69,5 @@ def _module(name: str, source: str) -> ModuleType:
 
 def _write(path: Path, source: str) -> None:
     """Whole or not at all, as several processes may want it at once."""
-    handle, draft = tempfile.mkstemp(prefix=".draft", suffix=".py", dir=path.parent)
-    with os.fdopen(handle, "w", encoding="utf-8") as file:
-        file.write(source)
-    os.replace(draft, path)
+    with whole_file(path) as draft:
+        draft.write_text(source, encoding="utf-8")

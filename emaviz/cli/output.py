@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import sys
-import tempfile
 import time
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ import numba
 import numpy as np
 
 from ema_model.errors import InputError
+from ema_model.whole_file import whole_file
 from emaviz import __version__
 
 
@@ -30,12 +30,9 @@ def write_json(path: str | None, result: dict[str, Any], seed: int, configuratio
     }
     target = Path(path)
     check_target(target, "--json")
-    handle, draft = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}-")
-    with os.fdopen(handle, "w", encoding="utf-8") as file:
+    with whole_file(target) as draft, open(draft, "w", encoding="utf-8") as file:
         json.dump(document, file, indent=1, default=_plain, ensure_ascii=False, allow_nan=False)
         file.write("\n")
-    os.chmod(draft, 0o644)
-    os.replace(draft, target)
 
 
 def check_target(path: Path, option: str) -> None:

@@ -6,11 +6,12 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
+from ema_model.actuator.titles import in_sentence
 from ema_model.comparison.residuals import Residuals
 from ema_model.discovery import Candidate
 from ema_model.measurement import SIGNALS
 from emaviz.discovery_look import Look
-from emaviz.discovery_words import effect_title, small
+from emaviz.discovery_words import effect_title
 from emaviz.figures import theme
 from emaviz.figures.binned import Binned, binned, edges_for
 from emaviz.figures.quantity import Quantity, variable_title
@@ -47,7 +48,7 @@ def figure(look: Look, one: Candidate, *, dark: bool = False) -> go.Figure:
             x=axis.factor * own.centre,
             y=shown.factor * own.mean,
             mode="lines",
-            name=f"what {small(effect_title(one.name))} would change",
+            name=f"what {in_sentence(effect_title(one.name))} would change",
             line={"color": SIGNATURE, "width": 2.5},
             hovertemplate="%{y:.3g}",
         )
@@ -65,12 +66,14 @@ def _over_time(look: Look, one: Candidate, title: str, signal: str, change: Arra
     part = np.flatnonzero(residuals.run == residuals.run[middle])
     part = part[np.abs(part - middle) <= _SHOWN // 2]
     values = residuals.values[signal][part]
-    quantity = Quantity("Residual " + small(SIGNALS[signal].title.removeprefix("Equivalent ")), SIGNALS[signal].unit)
+    quantity = Quantity(
+        "Residual " + in_sentence(SIGNALS[signal].title.removeprefix("Equivalent ")), SIGNALS[signal].unit
+    )
     shown = quantity.scaled(values)
     chart = theme.new(title, "Time [s], where it would show most", shown.label, dark=dark)
     for name, line, style in (
         ("measured − model", values, {"color": theme.MEASURED, "width": 1}),
-        (f"what {small(effect_title(one.name))} would change", change[part], {"color": SIGNATURE, "width": 2.5}),
+        (f"what {in_sentence(effect_title(one.name))} would change", change[part], {"color": SIGNATURE, "width": 2.5}),
     ):
         chart.add_trace(
             go.Scatter(x=residuals.time_s[part], y=shown.factor * line, mode="lines", name=name, line=style)
@@ -135,7 +138,7 @@ def _shown(look: Look, signal: str, *lines: Binned) -> Quantity:
         linear = look.found.actuator.axes.motor == "linear"
         told = Quantity("Missing force" if linear else "Missing torque", "N" if linear else "N·m", constant)
     else:
-        told = Quantity(f"Residual {small(SIGNALS[signal].title)}", SIGNALS[signal].unit)
+        told = Quantity(f"Residual {in_sentence(SIGNALS[signal].title)}", SIGNALS[signal].unit)
     return told.scaled(values)
 
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import html
 from collections.abc import Sequence
 
+from ema_model.actuator.titles import in_sentence
 from ema_model.discovery import Candidate
 from ema_model.effects import find
 from emaviz.discovery_look import Look
-from emaviz.discovery_words import effect_title, small
+from emaviz.discovery_words import effect_title
 from emaviz.figures import quantity
 from emaviz.figures.quantity import number
 from emaviz.panels.explore_labels import readable
@@ -47,7 +48,7 @@ def label(look: Look, one: Candidate) -> str:
         lines.append(f"{strength(look, one)} · {confidence(one)}")
         same = look.assessment.alike.get(one.name, ()) if look.assessment else ()
         if same:
-            lines.append("≈ same as " + ", ".join(small(effect_title(name)) for name in same))
+            lines.append("≈ same as " + ", ".join(in_sentence(effect_title(name)) for name in same))
     return "\n".join(lines)
 
 

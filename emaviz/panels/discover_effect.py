@@ -9,11 +9,12 @@ from typing import Any
 import plotly.graph_objects as go
 import viser
 
+from ema_model.actuator.titles import in_sentence
 from ema_model.discovery import Candidate
 from ema_model.effects import Effect, find
 from emaviz.discovering import Discovering
 from emaviz.discovery_look import Look
-from emaviz.discovery_words import effect_title, small
+from emaviz.discovery_words import effect_title
 from emaviz.figures import quantity, signature
 from emaviz.figures.quantity import number
 from emaviz.panels import discover_cards as cards
@@ -91,7 +92,7 @@ def head(look: Look, one: Candidate) -> str:
     ]
     same = look.assessment.alike.get(one.name, ()) if look.assessment else ()
     if same:
-        names = ", ".join(small(effect_title(name)) for name in same)
+        names = ", ".join(in_sentence(effect_title(name)) for name in same)
         lines.append(f'<span style="color:#e8590c">▲ These recordings cannot tell it from {html.escape(names)}.</span>')
     return f"<div {cards.BOX}>{'<br>'.join(lines)}</div>"
 

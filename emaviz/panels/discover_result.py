@@ -150,7 +150,7 @@ class DiscoveryPanel:
     def _draw_explained(self, look: Look) -> None:
         self._explained.visible = look.assessment is not None and bool(look.explained_before)
         if look.assessment is not None and self._explained.visible:
-            self._explained.figure = explained_steps.figure(look.explained_before, look.assessment.explained)
+            self._explained.figure = explained_steps.figure(look.explained_before, look.assessment.left.explained)
 
     def _revealed(self) -> None:
         self._page.checked(self._show_truth)

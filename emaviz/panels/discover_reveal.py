@@ -6,12 +6,13 @@ import html
 
 from numpy.typing import ArrayLike
 
+from ema_model.actuator.titles import in_sentence
 from ema_model.challenges.truth import Truth
 from ema_model.discovery import Discovery
 from ema_model.discovery.result import Added
 from ema_model.effects import CATALOGUE, find
 from ema_model.faults import FAULTS, NAMES, sentences
-from emaviz.discovery_words import effect_title, fitted_of, small
+from emaviz.discovery_words import effect_title, fitted_of
 from emaviz.figures import quantity
 from emaviz.panels.discover_cards import BOX
 from emaviz.panels.explore_labels import readable
@@ -57,7 +58,7 @@ def reveal(truth: Truth, found: Discovery, added: tuple[Added, ...]) -> str:
     if truth.torque:
         own = next((one for one in added if one.name not in CATALOGUE), None)
         what = f"an effect outside the library: T = {truth.torque}"
-        how = f"found as {small(effect_title(own.name))}" if own else "not found: add the curve of what is left"
+        how = f"found as {in_sentence(effect_title(own.name))}" if own else "not found: add the curve of what is left"
         rows.append(_row(own is not None, what, how))
     for one in added:
         if one.name in CATALOGUE and one.name not in truth.effects:
@@ -65,10 +66,10 @@ def reveal(truth: Truth, found: Discovery, added: tuple[Added, ...]) -> str:
             if find(one.name).duplicates:
                 why = "a parameter outside its tolerance; nothing of the kind is hidden"
             elif tied:
-                why = f"cannot be told from {small(effect_title(tied[0]))} by these recordings"
+                why = f"cannot be told from {in_sentence(effect_title(tied[0]))} by these recordings"
             else:
                 why = "is not hidden here"
-            rows.append(_row(False, small(effect_title(one.name)), why))
+            rows.append(_row(False, in_sentence(effect_title(one.name)), why))
     if not truth.effects and not truth.torque and not truth.faults and not added:
         rows.append(_row(True, "nothing is hidden", "and you added nothing"))
     head = f'<div style="font-size:16px;font-weight:600;color:{_GOOD if good else _BAD}">{verdict}</div>'
@@ -76,7 +77,7 @@ def reveal(truth: Truth, found: Discovery, added: tuple[Added, ...]) -> str:
 
 
 def _effect(name: str, given: dict[str, float], found: Discovery, added: tuple[Added, ...]) -> str:
-    title = small(effect_title(name))
+    title = in_sentence(effect_title(name))
     order = given.get("order")
     own = [one for one in added if one.name == name]
     one = next((one for one in own if order is None or one.chosen.get("order") == order), own[0] if own else None)

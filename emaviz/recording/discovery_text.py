@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ema_model.actuator.titles import in_sentence
 from ema_model.discovery import Discovery
 from ema_model.effects import find
 from emaviz import discovery_words as words
@@ -31,7 +32,7 @@ def verdict(found: Discovery) -> str:
         for name, told in words.settings(found, one).items():
             lines.append(f"| {escaped(name)} | {escaped(told)} |")
         if one.same_as:
-            same = ", ".join(words.small(words.effect_title(name)) for name in one.same_as)
+            same = ", ".join(in_sentence(words.effect_title(name)) for name in one.same_as)
             lines += ["", f"Not to be told from {escaped(same)} by these recordings."]
     if experiment := words.next_experiment(found):
         lines += ["", "## Next experiment", "", *(escaped(sentence) for sentence in experiment)]

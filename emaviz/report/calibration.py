@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ema_model.actuator.titles import in_sentence
 from ema_model.comparison.result import Comparison
 from emaviz.figures import calibration_scores, quantity
 from emaviz.report.markup import bullets, paragraph, table
@@ -45,14 +46,10 @@ class CalibrationTable(Section[Comparison]):
         assert comparison.calibration is not None
         titles = {score.path: score.title for score in found}
         return warnings + [
-            f"{titles.get(a, a)} and {_small(titles.get(b, b))} trade against each other here: "
+            f"{titles.get(a, a)} and {in_sentence(titles.get(b, b))} trade against each other here: "
             "only both together are known."
             for a, b in comparison.calibration.confounded
         ]
-
-
-def _small(title: str) -> str:
-    return title[0].lower() + title[1:]
 
 
 def _table(found: list[calibration_scores.Score]) -> str:

@@ -5,8 +5,6 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
-import os
-import tempfile
 from collections.abc import Sequence
 from datetime import datetime
 from importlib import resources
@@ -15,6 +13,7 @@ from pathlib import Path
 from plotly.offline import get_plotlyjs
 
 from ema_model.errors import InputError
+from ema_model.whole_file import whole_file
 from emaviz import __version__
 from emaviz.figures.theme import DARK, LIGHT
 from emaviz.report.markup import escape
@@ -50,20 +49,14 @@ def page(title: str, lead: str, sections: Sequence[Section[Subject]], subject: S
 def write(path: str | Path, text: str) -> None:
     """Writes a page, whole or not at all; InputError in one line where that cannot be done."""
     target = Path(path)
-    draft = None
     try:
         if target.is_dir():
             raise InputError(f"{target}: is a folder; name a file in it")
         if not target.parent.is_dir():
             raise InputError(f"{target}: the folder {target.parent} does not exist; make it first")
-        handle, draft = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name[:100]}-")
-        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
-            file.write(text)
-        os.chmod(draft, 0o644)
-        os.replace(draft, target)
+        with whole_file(target) as draft:
+            draft.write_text(text, encoding="utf-8", newline="\n")
     except OSError as error:
-        if draft is not None:
-            Path(draft).unlink(missing_ok=True)
         why = error.strerror or type(error).__name__
         raise InputError(f"{target}: the report cannot be written: {why}; write it elsewhere") from None
 

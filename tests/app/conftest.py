@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
+from on_page import wait_until
 
 from emaviz.app import App
 
@@ -24,7 +25,9 @@ def page(browser: Any, app: App) -> Iterator[Any]:
     """A browser tab on the app, its controls and charts drawn, that failed on no request to elsewhere."""
     tab = browser.new_page(viewport={"width": 1400, "height": 900})
     asked: list[str] = []
-    app.session.refresh()  # brings the signals to the front, where an earlier test may have left another panel
+    # An earlier test may have left work that brings another panel to the front when it ends.
+    wait_until(lambda: not (app.comparing.running or app.discovering.running or app.session.worker.busy))
+    app.session.refresh()  # brings the signals there
     tab.on("request", lambda request: asked.append(request.url))
     tab.goto(app.address)
     tab.get_by_role("tab", name="Explore").wait_for(timeout=60_000)

@@ -6,6 +6,7 @@ import time
 
 import numpy as np
 import pytest
+from on_page import choose, field, fill, wait_until
 
 from ema_model.actuator import load_actuator, save_actuator
 from ema_model.commands import command
@@ -37,30 +38,6 @@ def page(browser, app):
     page.set_default_timeout(15_000)
     yield page
     page.close()
-
-
-def wait_until(condition, seconds=30.0):
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.02)
-
-
-def field(page, label):
-    row = page.locator(f'xpath=//label[normalize-space(.)="{label}"]').locator(
-        "xpath=ancestor::div[contains(@class,'mantine-Flex-root')][1]"
-    )
-    return row.locator("input:not([type=hidden])").first
-
-
-def fill(page, label, value):
-    field(page, label).fill(str(value))
-    field(page, label).press("Enter")
-
-
-def choose(page, label, option):
-    page.get_by_label(label, exact=True).click()
-    page.get_by_role("option", name=option, exact=True).click()
 
 
 def resting(app):
@@ -96,7 +73,7 @@ def test_what_is_asked_is_set(page, app):
     fill(page, "User position", 0)
     wait_until(lambda: "user_position_rad" not in comparing.weights)
     fill(page, "User position", 1)
-    wait_until(lambda: comparing.weights["user_position_rad"] == 1.0)
+    wait_until(lambda: comparing.weights.get("user_position_rad") == 1.0)
     page.get_by_label("Only a window of time", exact=True).click()
     field(page, "From [s]").wait_for()
     fill(page, "To [s]", 0.4)

@@ -6,6 +6,7 @@ import time
 
 import numpy as np
 import pytest
+from on_page import wait_until
 
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
@@ -76,13 +77,6 @@ def compare(page, app):
     wait_until(lambda: not app.comparing.running)
     page.set_default_timeout(15_000)
     return page
-
-
-def wait_until(condition, seconds=30.0):
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.02)
 
 
 def upload(page, path):

@@ -8,6 +8,7 @@ import time
 
 import numpy as np
 import pytest
+from on_page import choose, field, fill, wait_until
 
 from ema_model.faults import HEALTHY
 from emaviz.recording import read
@@ -58,13 +59,6 @@ def page(tab, app):
     wait_until(lambda: not app.session.worker.busy)
 
 
-def wait_until(condition, seconds=20.0):
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.02)
-
-
 def show(page, tab):
     page.get_by_role("tab", name=tab, exact=True).click()
 
@@ -73,23 +67,6 @@ def unfold(page, folder, label):
     """Opens a folder that is closed at first."""
     if not field(page, label).is_visible():
         page.get_by_text(folder, exact=True).click()
-
-
-def field(page, label):
-    row = page.locator(f'xpath=//label[normalize-space(.)="{label}"]').locator(
-        "xpath=ancestor::div[contains(@class,'mantine-Flex-root')][1]"
-    )
-    return row.locator("input:not([type=hidden])").first
-
-
-def fill(page, label, value):
-    field(page, label).fill(str(value))
-    field(page, label).press("Enter")
-
-
-def choose(page, label, option):
-    page.get_by_label(label, exact=True).click()
-    page.get_by_role("option", name=option, exact=True).click()
 
 
 def chart(page, title):

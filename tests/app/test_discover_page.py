@@ -6,18 +6,12 @@ import time
 
 import numpy as np
 import pytest
+from on_page import wait_until
 
 pytestmark = pytest.mark.browser
 
 FIGURES = """() => Array.from(document.querySelectorAll('.js-plotly-plot'), plot => ({
   title: plot.layout?.title?.text ?? '', points: plot.calcdata?.[0]?.length ?? 0 }))"""
-
-
-def wait_until(condition, seconds=240.0):
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.02)
 
 
 def in_front(app, panel):

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from on_page import wait_until
 
 from ema_model.actuator import load_actuator
 from ema_model.errors import InputError
@@ -26,13 +27,6 @@ from emaviz.scene.motion import motion
 from emaviz.session import Session
 
 EASY = "first_bench_run"
-
-
-def wait_until(condition, seconds=240.0):
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.02)
 
 
 @pytest.fixture(scope="module")

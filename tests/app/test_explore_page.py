@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import json
 import math
-import time
 
 import numpy as np
 import pytest
+from on_page import wait_until
 
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
@@ -32,13 +32,6 @@ CHART = """(title) => {
 
 def chart(page, title):
     return np.array(page.evaluate(CHART, title))
-
-
-def wait_until(condition, seconds=30.0):
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.02)
 
 
 @pytest.fixture(scope="module")

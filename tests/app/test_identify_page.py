@@ -7,6 +7,7 @@ import time
 
 import numpy as np
 import pytest
+from on_page import wait_until
 
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
@@ -28,13 +29,6 @@ CHART = """(title) => {
   const chart = charts.find(c => c.root.querySelector('.u-title')?.textContent === title);
   return chart ? Array.from(chart.data, a => Array.from(a)) : null;
 }"""
-
-
-def wait_until(condition, seconds=30.0):
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.02)
 
 
 @pytest.fixture(scope="module")

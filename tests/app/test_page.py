@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 import pytest
+from on_page import wait_until
 
 from emaviz.recording import read
 
@@ -28,13 +27,6 @@ def set_slider(page, label, value):
     box = row(page, label).locator("input:not([type=hidden])").first
     box.fill(str(value))
     box.press("Enter")
-
-
-def wait_until(condition, seconds=20.0):
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.02)
 
 
 def chart(page, title):

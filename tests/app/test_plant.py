@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import threading
-import time
 
 import numpy as np
 import pytest
+from on_page import wait_until
 
 from ema_model.actuator import load_actuator
 from ema_model.errors import InputError
@@ -18,13 +18,6 @@ from emaviz.comparing import shipped_actuators
 from emaviz.session import Session
 
 SERVO, DRIVE = "XL330 on a pendulum", "ODrive motor"
-
-
-def wait_until(condition, seconds=30.0):
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.02)
 
 
 def actuator(name):

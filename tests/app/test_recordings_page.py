@@ -5,11 +5,11 @@ from __future__ import annotations
 import http.client
 import os
 import threading
-import time
 from urllib.parse import quote
 
 import numpy as np
 import pytest
+from on_page import field, wait_until
 
 from ema_model.actuator import load_actuator
 from ema_model.errors import InputError
@@ -18,13 +18,6 @@ from emaviz.recorded import Recorded
 from emaviz.recording import RecordingWriter, read
 from emaviz.recording.viewer import ViewerHost
 from emaviz.session import Session
-
-
-def wait_until(condition, seconds=30.0):
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.02)
 
 
 def identify(session, seconds=60.0):
@@ -195,12 +188,6 @@ def test_closing_the_host_ends_what_follows_a_recording(tmp_path):
 
 
 # --- in the browser ---------------------------------------------------------------------------------------------------
-
-
-def field(page, label):
-    found = page.locator(f'label:text-is("{label}")')
-    row = found.locator("xpath=ancestor::div[contains(@class,'mantine-Flex-root')][1]")
-    return row.locator("input:not([type=hidden])").first
 
 
 @pytest.fixture

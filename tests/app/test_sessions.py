@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import json
 import math
-import time
 import zipfile
 
 import numpy as np
 import pytest
+from on_page import wait_until
 
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
@@ -157,13 +157,6 @@ def test_files_of_a_session_stay_inside_the_data_folder(folder, tmp_path):
 
 
 # --- in the browser ---------------------------------------------------------------------------------------------------
-
-
-def wait_until(condition, seconds=30.0):
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.02)
 
 
 def slider(page, label):

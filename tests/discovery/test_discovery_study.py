@@ -114,8 +114,7 @@ def showable(name: str, severity: int, seed: int, signals: str) -> float:
     with_it = data.plant(replace(ACTUATOR, effects=effects))
     problem = Problem(with_it, data.floors, default_free(ACTUATOR), HEALTHY, data.signals)
     change = problem.residual(x)[: problem.values] - base.residual
-    parts = [part[signal] for part in base.calibration.weighted_sensitivities for signal in part]
-    columns = np.concatenate(parts)
+    columns = base.calibration.weighted_jacobian
     own = change - columns @ np.linalg.solve(columns.T @ columns + np.eye(len(x)), columns.T @ change)
     return float(change @ own)
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from ema_model.actuator.titles import in_sentence
 from ema_model.discovery.result import Added
 from ema_model.effects import Effect, find
-from emaviz.discovery_words import effect_title, fitted_of, small
+from emaviz.discovery_words import effect_title, fitted_of
 from emaviz.figures import quantity
 from emaviz.report.discovery.subject import Told
 from emaviz.report.markup import escape, paragraph, table
@@ -24,7 +25,9 @@ class AddedEffects(Section[Told]):
 
 def _card(told: Told, index: int, one: Added) -> str:
     effect = find(one.name)
-    same = "" if not one.same_as else f"Could as well be: {', '.join(small(effect_title(n)) for n in one.same_as)}."
+    same = (
+        "" if not one.same_as else f"Could as well be: {', '.join(in_sentence(effect_title(n)) for n in one.same_as)}."
+    )
     return (
         f'<div class="region" id="effect-{index}"><h3>{index}. {escape(effect.title)}</h3>'
         + f'<p class="equation">{escape(effect.equation)}</p>'

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from ema_model.actuator.titles import in_sentence
 from ema_model.faults import NAMES
-from emaviz.discovery_words import parameter, small
+from emaviz.discovery_words import parameter
 from emaviz.figures import quantity
 from emaviz.report.discovery.subject import Told
 from emaviz.report.markup import bullets, paragraph, table
@@ -40,7 +41,7 @@ class Calibrated(Section[Told]):
         ]
         heads = ["Parameter", "unit", "started at", "calibrated", "90 % interval", "z [σ]"]
         pairs = [
-            f"{named(a)} and {small(named(b))} trade against each other: only both together are known."
+            f"{named(a)} and {in_sentence(named(b))} trade against each other: only both together are known."
             for a, b in fit.confounded
         ]
         return (

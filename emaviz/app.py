@@ -33,13 +33,13 @@ from emaviz.panels.compare_result import ResultPanel
 from emaviz.panels.discover import DiscoverPanel
 from emaviz.panels.discover_cards import TABS
 from emaviz.panels.discover_keep import DiscoveryKeep
-from emaviz.panels.discover_load import load_into_explore
 from emaviz.panels.discover_result import DiscoveryPanel
 from emaviz.panels.docked import LEFT_PX, Docked
 from emaviz.panels.explore import ExplorePanel
 from emaviz.panels.explore_charts import ChartsPanel
 from emaviz.panels.explore_export import ExportControls
 from emaviz.panels.explore_seal import SealControls
+from emaviz.panels.explore_take import take_experiment, take_separating
 from emaviz.panels.identify import IdentifyPanel
 from emaviz.panels.identify_missing import take_to_discover
 from emaviz.panels.identify_result import IdentifyResult
@@ -137,7 +137,7 @@ class App:
                 self.discovering,
                 lambda: docked.bring(self._discovery_panel),
                 lambda: DiscoveryKeep(self.page, self.discovering, self.viewer),
-                lambda one: load_into_explore(self.explore, one),
+                lambda one: take_experiment(self.explore, one),
                 self._play,
             )
         library = Library(self.session)
@@ -171,6 +171,7 @@ class App:
                 self.discovering,
             )
         )
+        search.to_explore = partial(take_separating, self.explore)
         self.compare.session_uploaded = self.sessions.uploaded
         self.compare.challenge_uploaded = self.discover.source.uploaded
         self.identify.to_discover = partial(

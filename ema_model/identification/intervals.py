@@ -18,7 +18,7 @@ from ema_model import faults
 from ema_model.identification.adequacy import Adequacy, adequacy
 from ema_model.identification.belts import above_zero, length_of_vector
 from ema_model.identification.fit import Fitted
-from ema_model.identification.separation import separating
+from ema_model.identification.separation import Suggestion, separating
 from ema_model.identification.twin import TWINS
 from ema_model.identification.unknowns import ECCENTRICITY, FAULTS, GAIN, to_x
 
@@ -48,7 +48,7 @@ class Uncertainty:
     ambiguous: tuple[tuple[str, ...], ...]  # groups that these recordings cannot separate
     adequate: bool = True  # the model with this k leaves no more than the floor
     warnings: tuple[str, ...] = ()
-    separated_by: str = ""  # the run, as options of `emaviz simulate`, that would tell the groups apart
+    separated_by: Suggestion | None = None  # the run that would tell the groups apart
     covariance: Array = field(default_factory=lambda: np.zeros((FAULTS, FAULTS)))  # of the faults' part of x
 
 
@@ -65,7 +65,7 @@ def uncertainty(found: Fitted, k: Array) -> Uncertainty:
     if interval[5, 0] <= 0.0 or np.ptp(interval[6]) >= 1.0:
         interval[6] = 0.0, 1.0
     groups = _groups(best.covariance)
-    suggestion = separating(found, best.covariance, [name for group in groups for name in group]) if groups else None
+    unclear = [name for group in groups for name in group]
     return Uncertainty(
         interval90=interval,
         healthy=best.healthy or any(one.healthy for one in others),
@@ -73,7 +73,7 @@ def uncertainty(found: Fitted, k: Array) -> Uncertainty:
         ambiguous=groups,
         adequate=best.fit.adequate,
         warnings=_warnings(best.fit),
-        separated_by=suggestion.text if suggestion else "",
+        separated_by=separating(found, best.covariance, unclear) if unclear else None,
         covariance=best.covariance,
     )
 

@@ -19,23 +19,31 @@ from ema_model.simulation import Run, simulate_monitor
 
 Array = NDArray[np.floating]
 
-_COMMANDS: tuple[tuple[str, dict[str, str], float], ...] = (
-    ("chirp", {"amplitude_rad": "0.005"}, 0.5),
-    ("chirp", {"amplitude_rad": "0.02"}, 0.5),
-    ("sine", {"amplitude_rad": "0.005", "frequency_Hz": "6"}, 0.5),
-    ("sine", {"amplitude_rad": "0.05", "frequency_Hz": "2"}, 0.5),
-    ("step", {"final_rad": "0.005"}, 0.5),
-    ("staircase", {"step_rad": "0.002"}, 0.5),
+_COMMANDS: tuple[tuple[str, dict[str, float], float], ...] = (
+    ("chirp", {"amplitude_rad": 0.005}, 0.5),
+    ("chirp", {"amplitude_rad": 0.02}, 0.5),
+    ("sine", {"amplitude_rad": 0.005, "frequency_Hz": 6.0}, 0.5),
+    ("sine", {"amplitude_rad": 0.05, "frequency_Hz": 2.0}, 0.5),
+    ("step", {"final_rad": 0.005}, 0.5),
+    ("staircase", {"step_rad": 0.002}, 0.5),
 )
 _CURRENT_A = 0.2  # noise of a block, where the recording does not tell
 
 
 @dataclass(frozen=True)
 class Suggestion:
-    """A run, as the options of `emaviz simulate` write it, and how much less k would be spread."""
+    """A run, and how much less k would be spread after it."""
 
-    text: str
+    command: str
+    settings: dict[str, float]  # of the command; the others are its usual ones
+    duration_s: float
     gain: float  # of the σ of the k in question, before over after
+
+    @property
+    def options(self) -> str:
+        """The run as `emaviz simulate` takes it."""
+        chosen = "".join(f" --set {name}={value:g}" for name, value in self.settings.items())
+        return f"--command {self.command}{chosen} --duration {self.duration_s:g}"
 
 
 def separating(found: Fitted, covariance: Array, names: Sequence[str]) -> Suggestion | None:
@@ -44,14 +52,13 @@ def separating(found: Fitted, covariance: Array, names: Sequence[str]) -> Sugges
     best: Suggestion | None = None
     before = np.sqrt(np.diag(covariance)[columns])
     for name, settings, duration in _COMMANDS:
-        information = _information(found, Run(command(name, dict(settings)), duration))
+        information = _information(found, Run(command(name, settings), duration))
         if information is None:
             continue
         after = np.linalg.inv(np.linalg.inv(covariance) + information)
         gain = float(np.max(before / np.sqrt(np.diag(after)[columns])))
         if gain > 1.3 and (best is None or gain > best.gain):
-            chosen = " ".join(f"--set {key}={value}" for key, value in settings.items())
-            best = Suggestion(f"--command {name} {chosen} --duration {duration:g}", gain)
+            best = Suggestion(name, settings, duration, gain)
     return best
 
 

@@ -93,7 +93,7 @@ def result(answer: Identification, actuator: Actuator) -> dict[str, Any]:
         "healthy": bool(sure.healthy),
         "alarms": sure.alarms,
         "ambiguous": sure.ambiguous,
-        "separated_by": sure.separated_by,
+        "separated_by": sure.separated_by.options if sure.separated_by else "",
         "adequate": bool(sure.adequate),
         "warnings": sure.warnings,
         "physical": faults.readings(answer.k, actuator),
@@ -137,7 +137,7 @@ def _table(answer: Identification, actuator: Actuator) -> str:
     if sure.ambiguous:
         lines.append("cannot be told apart here: " + "; ".join(" / ".join(group) for group in sure.ambiguous))
     if sure.separated_by:
-        lines.append(f"would tell them apart: {sure.separated_by}")
+        lines.append(f"would tell them apart: {sure.separated_by.options}")
     lines += sure.warnings
     error = "" if answer.truth is None else f", Err {answer.error_percent:.2f} %"
     lines.append(

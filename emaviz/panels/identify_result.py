@@ -10,6 +10,7 @@ import viser
 
 from ema_model.faults import HEALTHY
 from ema_model.identification.run import ALGORITHMS
+from ema_model.identification.separation import Suggestion
 from emaviz.figures.convergence import LiveConvergence
 from emaviz.figures.fault_bars import fault_bars
 from emaviz.figures.fitted_current import LiveFit
@@ -36,6 +37,8 @@ class IdentifyResult:
         self._page, self._slow, self._panel, self._bring = page, slow, panel, to_front
         self._race: Race | None = None
         self._begun: Race | None = None  # of which something was drawn
+        self._separating: Suggestion | None = None
+        self.to_explore: Callable[[Suggestion], None] = lambda run: None  # sets a run there
         self._drawn_at = 0.0
         self.rows: list[Row] = []
         gui = page.server.gui
@@ -46,12 +49,20 @@ class IdentifyResult:
             self._whose = gui.add_dropdown("Whose", (_BEST, *ALGORITHMS.values()))
             self._bars = gui.add_html(fault_bars(HEALTHY, page.session.actuator))
             self._sure = gui.add_html("")
+            self._try = gui.add_button(
+                "Set that command in Explore",
+                icon=viser.Icon.ADJUSTMENTS,
+                color="gray",
+                visible=False,
+                hint="The run that would tell them apart; then identify again",
+            )
             self._fit = LiveFit(gui)
         with panel.add_tab("Landscape", viser.Icon.MAP_2):
             self._landscape = LandscapeView(page, slow)
         with panel.add_tab("Runs", viser.Icon.TABLE):
             self._table = gui.add_html(table([]))
             clear = gui.add_button("Clear the table", icon=viser.Icon.ERASER, color="gray")
+        self._try.on_click(lambda _: page.screen.post("separating", self._try_separating))
         self._whose.on_update(lambda _: slow.post("answer", self._draw_answer))
         clear.on_click(lambda _: page.screen.post("runs", self._clear))
 
@@ -117,6 +128,11 @@ class IdentifyResult:
     def _clear(self) -> None:
         self.show_rows([])
 
+    def _try_separating(self) -> None:
+        run = self._separating
+        if run is not None and self._page.checked(lambda: self.to_explore(run)):
+            self._page.notify("Explore has the command", "On Identify, press Identify again.", "green")
+
     def _draw(self, race: Race, soon: bool) -> None:
         begun = race is not self._begun
         if not (begun or soon or time.monotonic() - self._drawn_at > _LEAST_S):
@@ -143,4 +159,6 @@ class IdentifyResult:
         with self._page.server.atomic():
             self._bars.content = fault_bars(track.k, self._page.session.actuator, race.truth, **bars)
             self._sure.content = sure_words(track.answer)
+            self._separating = sure.separated_by if sure is not None else None
+            self._try.visible = self._separating is not None
             self._fit.show(race.time_s, race.measured_A, fitted)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import html
-import shlex
 
 from ema_model.commands import COMMANDS
 from ema_model.faults import FAULTS
 from ema_model.identification.run import Identification
+from ema_model.identification.separation import Suggestion
 from emaviz.panels.explore_labels import readable
 
 _BOX = 'style="padding:4px 12px;font-size:13px;line-height:1.45"'
@@ -38,31 +38,24 @@ def sure_words(answer: Identification | None) -> str:
     for group in sure.ambiguous:
         names = " and ".join(_named(name) for name in group)
         lines.append(_line(_WARNING, "Cannot be told apart", f"{names} do the same to this recording"))
-    if sure.ambiguous and sure.separated_by:
-        lines.append(_line(_WARNING, "What would tell them apart", f"{in_words(sure.separated_by)}"))
+    if sure.separated_by:
+        lines.append(_line(_WARNING, "What would tell them apart", in_words(sure.separated_by)))
     if not answer.polished:
         lines.append(f"<div {_BOX}><span style='opacity:.7'>The intervals are those of a fit from here; the answer of "
                      "the search alone may lie at their edge.</span></div>")  # fmt: skip
     return "".join(lines)
 
 
-def in_words(options: str) -> str:
-    """A run that is written as options of `emaviz simulate`, as a sentence's part; as it is if it is no such run."""
-    words = shlex.split(options)
-    given = list(zip(words[::2], words[1::2]))
-    named = dict(given)
-    command = COMMANDS.get(named.get("--command", ""))
-    if command is None:
-        return options
+def in_words(run: Suggestion) -> str:
+    """A run as a sentence's part."""
+    told = COMMANDS[run.command]
     parts = []
-    for option, value in given:
-        if option == "--set":
-            name, _, number = value.partition("=")
-            label, _, unit = readable(name).partition(" [")
-            parts.append(f"{label.lower()} {number} {unit.rstrip(']')}".rstrip())
-    lasting = f", for {named['--duration']} s" if "--duration" in named else ""
-    article = "an" if command.title[:1] in "AEIOU" else "a"
-    return f"{article} {command.title.lower()} with {', '.join(parts) or 'its usual settings'}{lasting}"
+    for name, value in run.settings.items():
+        label, _, unit = readable(name).partition(" [")
+        parts.append(f"{label.lower()} {value:g} {unit.rstrip(']')}".rstrip())
+    article = "an" if told.title[:1] in "AEIOU" else "a"
+    chosen = ", ".join(parts) or "its usual settings"
+    return f"{article} {told.title.lower()} with {chosen}, for {run.duration_s:g} s"
 
 
 def _named(name: str) -> str:

@@ -35,22 +35,10 @@ class Motor:
     def __init__(self, scene: viser.SceneApi, root: str, pole_pairs: int) -> None:
         self._housing = _add(scene, f"{root}/housing", _housing(), (96, 130, 176), opacity=0.35)
         _add(scene, f"{root}/stator", _stator(), _IRON)
-        self._phase_of, self._layer_of, places = _coil_places()
-        loop = _loop()
-        self._live = np.ones(len(self._phase_of), dtype=bool)
-        self._coils = scene.add_batched_meshes_simple(
-            f"{root}/coils",
-            loop.vertices,
-            loop.faces,
-            batched_wxyzs=np.array([about_x(azimuth) for _, azimuth, _ in places]),
-            batched_positions=np.array([(0.0, r * np.cos(azimuth), r * np.sin(azimuth)) for r, azimuth, _ in places]),
-            batched_scales=np.array([(1.0, 1.0, width) for _, _, width in places]),
-            batched_colors=np.zeros((len(places), 3), np.uint8),
-            lod="off",
-            flat_shading=True,
-            cast_shadow=False,
-            receive_shadow=False,
-        )
+        self._scene, self._root = scene, root
+        self._coils: list[Any] = [None] * 3
+        self._burnt: Any = None
+        self._layers: list[int] = [0] * 3
         self._axis = scene.add_frame(f"{root}/axis", show_axes=False)
         self.rotor = scene.add_frame(f"{root}/axis/rotor", show_axes=False)
         _add(scene, f"{root}/axis/rotor/core", _rotor_core(), _STEEL)
@@ -72,9 +60,8 @@ class Motor:
             cast_shadow=False,
             receive_shadow=False,
         )
-        self._drawn = np.zeros((len(places), 3), np.uint8)
         self._eccentricity, self._phase_rad = 0.0, 0.0
-        self.glow((0.0, 0.0, 0.0))
+        self._wind([_LAYERS] * 3)
 
     def set_opacity(self, opacity: float) -> None:
         """Of the housing, 0 … 1."""
@@ -86,7 +73,7 @@ class Motor:
         healthy = np.round(_LAYERS * np.asarray(turns, dtype=float))
         # A short, however small, shows as one turn.
         healthy = np.where((healthy == _LAYERS) & (np.asarray(turns) < 0.995), _LAYERS - 1, healthy)
-        self._live = self._layer_of < healthy[self._phase_of]
+        self._wind([int(layers) for layers in healthy])
         self._eccentricity, self._phase_rad = eccentricity, phase_rad
 
     def turn(self, motor_rad: float) -> None:
@@ -99,11 +86,28 @@ class Motor:
 
     def glow(self, currents: Sequence[float]) -> None:
         """Brightness of the phases by their currents, each as a share −1 … 1 of the brightest."""
-        colours = np.array([_lit(_PHASES[i], abs(currents[i])) for i in range(3)], dtype=np.uint8)
-        drawn = np.where(self._live[:, None], colours[self._phase_of], np.array(_BURNT, np.uint8))
-        if not np.array_equal(drawn, self._drawn):
-            self._drawn = drawn
-            self._coils.batched_colors = drawn
+        for coil, own, current in zip(self._coils, _PHASES, currents):
+            colour = tuple(int(part) for part in _lit(own, abs(current)))
+            if coil is not None and coil.color != colour:
+                coil.color = colour
+
+    def _wind(self, layers: list[int]) -> None:
+        """So many healthy layers of each phase's coils, the others burnt; a mesh for each, cheap to recolour."""
+        if layers == self._layers:
+            return
+        for phase, healthy in enumerate(layers):
+            if healthy != self._layers[phase]:
+                loops = _loops(phase, range(healthy))
+                self._coils[phase] = self._mesh(self._coils[phase], f"coil_{'abc'[phase]}", loops, _PHASES[phase])
+        burnt = [loop for phase, healthy in enumerate(layers) for loop in _loops(phase, range(healthy, _LAYERS))]
+        self._burnt = self._mesh(self._burnt, "burnt", burnt, _BURNT)
+        self._layers = layers
+
+    def _mesh(self, old: Any, name: str, loops: list[Solid], colour: Colour) -> Any:
+        """Of these loops instead of the old ones; None without any."""
+        if old is not None:
+            old.remove()
+        return _add(self._scene, f"{self._root}/{name}", joined(*loops), colour) if loops else None
 
 
 def _lit(colour: Colour, share: float) -> NDArray[np.float64]:
@@ -150,24 +154,22 @@ def _azimuth(slot: int) -> float:
     return _FIRST_AZIMUTH - TURN * phase / 3.0 + np.radians(30.0 if second else -30.0)
 
 
-def _coil_places() -> tuple[NDArray[np.intp], NDArray[np.intp], list[tuple[float, float, float]]]:
-    """Phase and layer of each drawn turn; its radius, azimuth and relative width."""
-    phases, layers, places = [], [], []
-    for slot in range(6):
-        for layer in range(_LAYERS):
-            phases.append(slot // 2)
-            layers.append(_LAYERS - 1 - layer)  # the innermost turns, which the eye meets first, burn first
-            radius = 0.169 + 0.0088 * layer
-            places.append((radius, _azimuth(slot), radius / 0.169))
-    return np.array(phases), np.array(layers), places
+def _loops(phase: int, layers: range) -> list[Solid]:
+    """Turns of these layers of a phase's two coils; the innermost, which the eye meets first, burn first."""
+    loops = []
+    for layer in layers:
+        radius = 0.169 + 0.0088 * (_LAYERS - 1 - layer)
+        loops += [_loop(radius / 0.169).moved(y=radius).turned(_azimuth(slot)) for slot in (2 * phase, 2 * phase + 1)]
+    return loops
 
 
-def _loop() -> Solid:
+def _loop(width: float) -> Solid:
     """One turn about a tooth, at azimuth 0: long along x, narrow along z, thin along y."""
-    thick, wire, half_length, half_width = 0.0066, 0.034, 0.225, 0.044
-    legs = [block(2.0 * half_length, thick, wire).moved(z=side * half_width) for side in (-1.0, 1.0)]
+    thick, wire, half_length, half_width = 0.0066, 0.034, 0.225, 0.044 * width
+    legs = [block(2.0 * half_length, thick, wire * width).moved(z=side * half_width) for side in (-1.0, 1.0)]
     ends = [
-        block(wire, thick, 2.0 * half_width + wire).moved(x=side * (half_length + 0.5 * wire)) for side in (-1.0, 1.0)
+        block(wire, thick, 2.0 * half_width + wire * width).moved(x=side * (half_length + 0.5 * wire))
+        for side in (-1.0, 1.0)
     ]
     return joined(*legs, *ends)
 

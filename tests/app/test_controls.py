@@ -5,12 +5,14 @@ from __future__ import annotations
 import re
 import threading
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from on_page import choose, field, fill, wait_until
 
 from ema_model.faults import HEALTHY
+from ema_model.identification.separation import Suggestion
 from emaviz.recording import read
 from emaviz.state import Settings
 
@@ -293,6 +295,25 @@ def test_what_does_not_fit_is_taken_to_discover(page, app):
     wait_until(lambda: settings.source == "uploads/identified plant.csv")
     choose(page, "Identify", "The plant of Explore's sliders")
     wait_until(lambda: settings.source == "")
+
+
+def test_a_separating_command_is_set_in_explore(page, app):
+    race = app.identify._race
+    sine = Suggestion("sine", {"amplitude_rad": 0.05, "frequency_Hz": 2.0}, 0.4, 3.0)
+    answer = race.best.answer
+    race.best.answer = replace(answer, uncertainty=replace(answer.uncertainty, separated_by=sine))
+    show(page, "Identify")
+    page.get_by_role("button", name="Show the search").click()
+    show(page, "Answer")
+    app.identify._result.draw()
+    page.get_by_text("a sine with amplitude 0.05 rad, frequency 2 Hz, for 0.4 s").wait_for()
+    page.get_by_role("button", name="Set that command in Explore").click()
+    settings = app.session.settings
+    wait_until(lambda: settings.command == "sine" and settings.duration_s == 0.4)
+    page.get_by_text("Explore has the command").wait_for()
+    show(page, "Explore")
+    wait_until(lambda: float(field(page, "Frequency [Hz]").input_value()) == 2.0)
+    wait_until(lambda: app.session.simulation.reference.duration_s == pytest.approx(0.4, rel=0.01))
 
 
 # --- Recordings and sessions ------------------------------------------------------------------------------------------

@@ -10,6 +10,7 @@ import pytest
 
 from ema_model.errors import InputError
 from ema_model.faults import HEALTHY, vector
+from ema_model.identification.separation import Suggestion
 from emaviz.figures import landscape as figures
 from emaviz.landscape import Landscape, Way, extent, slices, ways
 from emaviz.panels.identify_words import in_words, sure_words
@@ -112,19 +113,21 @@ def test_a_scale_of_logarithms_has_a_few_round_values(low, high):
 
 
 def answer(**known):
-    usual = {"healthy": False, "alarms": (), "ambiguous": (), "adequate": True, "warnings": (), "separated_by": ""}
+    usual = {"healthy": False, "alarms": (), "ambiguous": (), "adequate": True, "warnings": (), "separated_by": None}
     return SimpleNamespace(uncertainty=SimpleNamespace(**{**usual, **known}), polished=True)
 
 
 def test_a_run_is_told_in_words():
-    text = in_words("--command chirp --set amplitude_rad=0.02 --set end_Hz=12 --duration 0.5")
-    assert text == "a chirp with amplitude 0.02 rad, end 12 Hz, for 0.5 s"
-    assert in_words("--command none") == "--command none"
+    chirp = Suggestion("chirp", {"amplitude_rad": 0.02, "end_Hz": 12.0}, 0.5, 2.0)
+    assert in_words(chirp) == "a chirp with amplitude 0.02 rad, end 12 Hz, for 0.5 s"
+    assert chirp.options == "--command chirp --set amplitude_rad=0.02 --set end_Hz=12 --duration 0.5"
 
 
 def test_what_cannot_be_told_apart_is_named_with_what_would():
     said = sure_words(
-        answer(alarms=("k1",), ambiguous=(("k1", "k8"),), separated_by="--command step --set final_rad=0.005")
+        answer(
+            alarms=("k1",), ambiguous=(("k1", "k8"),), separated_by=Suggestion("step", {"final_rad": 0.005}, 0.5, 2.0)
+        )
     )
     assert "k1 friction" in said and "k1 (friction) and k8 (proportional gain)" in said
     assert "a step with final 0.005 rad" in said

@@ -177,16 +177,33 @@ def test_a_shorter_run_is_played_from_within(actuator):
         playback.close()
 
 
+class Meshes:
+    """A scene that keeps the meshes that are in it."""
+
+    def __init__(self):
+        self.there = {}
+
+    def add_mesh_simple(self, name, vertices, faces, **given):
+        mesh = self.there[name] = SimpleNamespace(faces=len(faces), remove=lambda: self.there.pop(name), **given)
+        return mesh
+
+    def __getattr__(self, name):
+        return lambda *_, **given: SimpleNamespace(**given)
+
+
 def test_coils_burn_from_the_first_shorted_turn_on():
-    drawn = SimpleNamespace(batched_colors=None)
-    one = object.__new__(motor.Motor)
-    one._phase_of, one._layer_of, _ = motor._coil_places()
-    one._coils, one._drawn = drawn, np.zeros((len(one._phase_of), 3), np.uint8)
+    scene = Meshes()
+    one = motor.Motor(scene, "/m", 2)
+    loop = len(motor._loop(1.0).faces)
     for turns, burnt in (((1.0, 1.0, 1.0), 0), ((0.97, 1.0, 1.0), 2), ((0.5, 1.0, 0.25), 8 + 12), ((0.02, 1, 1), 16)):
         one.damage(turns, 0.0, 0.0)
         one.glow((0.0, 1.0, 0.5))
-        black = np.all(drawn.batched_colors == motor._BURNT, axis=1)
-        assert black.sum() == burnt and not np.any(black[one._phase_of == 1])
+        black = scene.there.get("/m/burnt")
+        assert (black.faces if black else 0) == burnt * loop
+        coils = [scene.there.get(f"/m/coil_{phase}") for phase in "abc"]
+        assert sum(coil.faces for coil in coils if coil) == (48 - burnt) * loop
+        assert coils[1].faces == 16 * loop and min(coils[1].color) > 120, "full current in all turns of phase B"
+    assert coils[0] is None, "all of phase A is burnt"
 
 
 @pytest.mark.browser

@@ -20,7 +20,7 @@ from emaviz.discovery_own import OwnPreview
 from emaviz.discovery_record import checked, experiment_of, take_again
 from emaviz.discovery_run import DiscoverEvents, DiscoveryRun, Tell
 from emaviz.discovery_sealing import Sealing
-from emaviz.discovery_source import NOTHING, DiscoverySource
+from emaviz.discovery_source import NOTHING, DiscoverySource, files_of
 from emaviz.discovery_telling import Telling
 from emaviz.discovery_trials import check_value, undecided
 from emaviz.listeners import notify
@@ -40,6 +40,7 @@ class Discovering:
         self.look: Look | None = None
         self.run = DiscoveryRun(session, self.events, self._stopped)
         self._told: Telling | None = None
+        self._restoring: dict[str, Any] | None = None  # what a session brought, until its steps are taken again
         self._own = OwnPreview()
         self._files = Worker("emaviz-discovery-files", comparing._on_error)
 
@@ -61,7 +62,7 @@ class Discovering:
             raise InputError("a step is running; stop it first")
         self.run.stop()  # one that waits to begin
         self.source.choose(name)
-        self._told = self.look = None
+        self._told = self.look = self._restoring = None
         notify(self.events.looked, None)
 
     # --- steps ------------------------------------------------------------------------------------------------------
@@ -214,6 +215,7 @@ class Discovering:
         given = self.source.read(recipe)
         told = Telling(begun(given.fitted, given.actuator, given.held, given.signals, tell), recipe)
         self._told, self.look, self.source.revealed = told, None, False
+        self._restoring = None
         return told
 
     def _take(self, told: Telling, trial: Trial, alike: Sequence[str], tell: Tell) -> None:
@@ -244,12 +246,18 @@ class Discovering:
     # --- a session --------------------------------------------------------------------------------------------------
 
     def saved(self) -> dict[str, Any] | None:
-        """The story as it stands, in what JSON can hold; None without one."""
+        """The story as it stands, or the session's whose steps are still to be taken again; None without one.
+
+        In what JSON can hold.
+        """
+        if self._restoring is not None:
+            return self._restoring
         return None if self._told is None else {**self._told.saved(), "revealed": self.source.revealed}
 
     def files(self) -> list[str]:
-        """Names in the data folder of what the story is of."""
-        return [] if self._told is None else self._told.files()
+        """Names in the data folder of what the saved story is of."""
+        saved = self.saved()
+        return [] if saved is None else files_of(saved["recipe"])
 
     def restore(self, saved: Any, names: Mapping[str, str]) -> None:
         """Takes the steps of a session's story again, once no other long run goes on; InputError if it is none.
@@ -265,13 +273,18 @@ class Discovering:
         steps, experiment = checked(saved.get("steps")), experiment_of(saved.get("experiment"))
         recipe = self.source.take(saved["recipe"], names)
         self._told = self.look = None
+        self._restoring = restoring = {**saved, "recipe": dict(recipe)}
         notify(self.events.looked, None)
 
         def job(tell: Tell) -> None:
-            told = self._begin(recipe, tell)
-            self._assess(told, tell)  # the first step's cards are what the report ranks
-            take_again(told.story, steps, tell, lambda: self._show(told))
-            told.experiment, self.source.revealed = experiment, bool(saved.get("revealed"))
+            try:
+                told = self._begin(recipe, tell)
+                self._restoring = restoring  # until all its steps are taken
+                self._assess(told, tell)  # the first step's cards are what the report ranks
+                take_again(told.story, steps, tell, lambda: self._show(told))
+                told.experiment, self.source.revealed = experiment, bool(saved.get("revealed"))
+            finally:
+                self._restoring = None
             self._assess(told, tell)
 
         wanted = {*recipe.get("fitted", ()), *recipe.get("held", ())}

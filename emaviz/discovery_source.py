@@ -147,6 +147,11 @@ class DiscoverySource:
         return truth
 
 
+def files_of(recipe: Mapping[str, Any]) -> list[str]:
+    """Names in the data folder of what a recipe is made from."""
+    return [name for name in (recipe.get("challenge"), *recipe.get("fitted", ()), *recipe.get("held", ())) if name]
+
+
 def actuator_of(text: Any) -> Actuator:
     """The actuator of a file's text; InputError tells what is wrong in it."""
     if not isinstance(text, str):

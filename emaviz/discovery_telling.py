@@ -61,8 +61,3 @@ class Telling:
         """The steps, and what they were made from, in what JSON can hold."""
         experiment = experiment_saved(self.experiment)
         return {"recipe": dict(self.recipe), "steps": steps_of(self.story), "experiment": experiment}
-
-    def files(self) -> list[str]:
-        """Names in the data folder of the recordings."""
-        given = self.recipe
-        return [name for name in (given.get("challenge"), *given.get("fitted", ()), *given.get("held", ())) if name]

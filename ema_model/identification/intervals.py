@@ -31,6 +31,7 @@ _ALARM_Z_BOTH = 3.19  # two-sided
 _ALARM_LENGTH = float(np.sqrt(-2.0 * np.log(_ALARM)))  # of a vector
 _INSEPARABLE = 0.9
 _WIDE = 0.03  # σ of a k below which it counts as known
+_ANY = 0.4  # width of an interval from which on a k is hardly known
 _LEAST_SPREAD = 0.02  # of a fit that left the base parameters where they were
 _SLIGHT = 2e-5  # least σ: as well as the models' steps in time let any k be told
 
@@ -46,9 +47,10 @@ class Uncertainty:
     healthy: bool  # joint test at 1 %, of a model that fits
     alarms: tuple[str, ...]  # the k that are surely not healthy; none where the model does not fit
     ambiguous: tuple[tuple[str, ...], ...]  # groups that these recordings cannot separate
+    hardly_known: tuple[str, ...] = ()  # k, without the angle k7, that could be nearly anything
     adequate: bool = True  # the model with this k leaves no more than the floor
     warnings: tuple[str, ...] = ()
-    separated_by: Suggestion | None = None  # the run that would tell the groups apart
+    separated_by: Suggestion | None = None  # the run that would tell the groups apart, and the hardly known
     covariance: Array = field(default_factory=lambda: np.zeros((FAULTS, FAULTS)))  # of the faults' part of x
 
 
@@ -65,12 +67,14 @@ def uncertainty(found: Fitted, k: Array) -> Uncertainty:
     if interval[5, 0] <= 0.0 or np.ptp(interval[6]) >= 1.0:
         interval[6] = 0.0, 1.0
     groups = _groups(best.covariance)
-    unclear = [name for group in groups for name in group]
+    hardly = tuple(name for name, width in zip(faults.NAMES, np.ptp(interval, axis=1)) if width > _ANY and name != "k7")
+    unclear = [*hardly, *(name for group in groups for name in group)]
     return Uncertainty(
         interval90=interval,
         healthy=best.healthy or any(one.healthy for one in others),
         alarms=tuple(name for name in best.alarms if all(name in one.alarms for one in others)),
         ambiguous=groups,
+        hardly_known=hardly,
         adequate=best.fit.adequate,
         warnings=_warnings(best.fit),
         separated_by=separating(found, best.covariance, unclear) if unclear else None,

@@ -93,6 +93,7 @@ def result(answer: Identification, actuator: Actuator) -> dict[str, Any]:
         "healthy": bool(sure.healthy),
         "alarms": sure.alarms,
         "ambiguous": sure.ambiguous,
+        "hardly_known": sure.hardly_known,
         "separated_by": sure.separated_by.options if sure.separated_by else "",
         "adequate": bool(sure.adequate),
         "warnings": sure.warnings,
@@ -136,8 +137,10 @@ def _table(answer: Identification, actuator: Actuator) -> str:
     lines.append(_verdict(answer))
     if sure.ambiguous:
         lines.append("cannot be told apart here: " + "; ".join(" / ".join(group) for group in sure.ambiguous))
+    if sure.hardly_known:
+        lines.append(f"hardly known: {', '.join(sure.hardly_known)}; the other intervals rest on them")
     if sure.separated_by:
-        lines.append(f"would tell them apart: {sure.separated_by.options}")
+        lines.append(f"would tell more: {sure.separated_by.options}")
     lines += sure.warnings
     error = "" if answer.truth is None else f", Err {answer.error_percent:.2f} %"
     lines.append(

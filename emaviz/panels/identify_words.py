@@ -38,8 +38,12 @@ def sure_words(answer: Identification | None) -> str:
     for group in sure.ambiguous:
         names = " and ".join(_named(name) for name in group)
         lines.append(_line(_WARNING, "Cannot be told apart", f"{names} do the same to this recording"))
+    if sure.hardly_known:
+        names = ", ".join(_named(name) for name in sure.hardly_known)
+        told = f"this recording says hardly anything of {names}, and the other intervals rest on them"
+        lines.append(_line(_WARNING, "Hardly known", told))
     if sure.separated_by:
-        lines.append(_line(_WARNING, "What would tell them apart", in_words(sure.separated_by)))
+        lines.append(_line(_WARNING, "What would tell more", in_words(sure.separated_by)))
     if not answer.polished:
         lines.append(f"<div {_BOX}><span style='opacity:.7'>The intervals are those of a fit from here; the answer of "
                      "the search alone may lie at their edge.</span></div>")  # fmt: skip

@@ -122,8 +122,12 @@ def test_a_session_keeps_the_ladder(rigs, solved):
     looks = []
     there.discovering.events.looked.append(looks.append)
     there.load(path)
+    kept = there.discovering.saved()
     there.done()
     assert not there.told
+    then = solved.discovering.saved()
+    assert kept["steps"] == then["steps"] and kept["revealed"]
+    assert there.discovering.saved()["revealed"] and there.discovering._restoring is None
     after = there.discovering.look
     for (label, rmse, held), (again, same, same_held) in zip(ladder(solved), ladder(there), strict=True):
         assert again == label

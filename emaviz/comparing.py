@@ -7,16 +7,13 @@ import time
 import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from datetime import datetime
-from importlib import resources
-from itertools import count
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ema_model.actuator import Actuator, load_actuator
+from ema_model.actuator import Actuator
 from ema_model.comparison.result import Comparison
 from ema_model.errors import InputError
 from ema_model.measurement import (
@@ -34,6 +31,8 @@ from ema_model.measurement.health import Health, health
 from ema_model.measurement.refusal import shown
 from ema_model.measurement.side_file import SideFile, find_side_file
 from ema_model.recordings import read_recording, usual_mapping
+from emaviz import actuator_files
+from emaviz.comparing_keep import keep
 from emaviz.data_folder import DataFolder
 from emaviz.listeners import notify
 from emaviz.session import Session
@@ -47,7 +46,6 @@ MOST_RECORDINGS = 20
 COMPARABLE = ("current_A", "motor_position_rad", "user_position_rad", "motor_speed_rad_s")
 USUAL = {name: 1.0 for name in COMPARABLE[:3]}
 _MOST_WEIGHT = 1e3
-UPLOADED = "uploaded: "  # before the names of actuator files that the data folder holds
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,7 +174,7 @@ class Comparing:
             if not self.folder.holds(Path(side.actuator_path)):
                 named = shown(side.actuator, 100)
                 raise InputError(f"{named}: the side file names an actuator outside the data folder; upload it")
-            self.choose_actuator(f"{UPLOADED}{self.folder.name_of(Path(side.actuator_path))}")
+            self.choose_actuator(f"{actuator_files.UPLOADED}{self.folder.name_of(Path(side.actuator_path))}")
         except InputError as error:
             return error
         return None
@@ -185,17 +183,12 @@ class Comparing:
 
     def actuators(self) -> list[str]:
         """The actuator that the app was started with, those that come with it, and the uploaded ones."""
-        uploaded = (UPLOADED + name for name in self.folder.actuator_files())
-        return list(dict.fromkeys([self.session.actuator.name, *shipped_actuators(), *uploaded]))
+        return list(dict.fromkeys([self.session.actuator.name, *actuator_files.names(self.folder)]))
 
     def choose_actuator(self, name: Any) -> None:
         """One of `actuators`; InputError for another, or a file that is no actuator."""
-        if name == self.session.actuator.name:
-            chosen = self.session.actuator
-        elif (path := shipped_actuators().get(name)) is not None:
-            chosen = load_actuator(path)
-        else:
-            chosen = load_actuator(self.folder.actuator(str(name).removeprefix(UPLOADED)))
+        own = self.session.actuator
+        chosen = own if name == own.name else actuator_files.named(str(name), self.folder)
         self._use(chosen)
         self.actuator_name = str(name)
         for opened in list(self.opened.values()):
@@ -321,20 +314,7 @@ class Comparing:
         comparison = self.comparison
         if comparison is None:
             raise InputError("nothing is compared yet; press Compare first")
-        if not self.folder.holds(self.folder.recordings):
-            raise InputError("the data folder's recordings leads out of it; replace the link by a folder")
-        stamp = datetime.now().strftime("%Y%m%d-%H%M%S")
-        names = (f"{stamp}-compare{'' if again == 1 else f'-{again}'}{suffix}" for again in count(1))
-        path = next(path for name in names if not (path := self.folder.recordings / name).exists())
-        # Imported when wanted: rerun and the report's figures take half a second of the app's start.
-        from emaviz.recording.comparison import write_comparison
-        from emaviz.report import write_report
-
-        if suffix == ".html":
-            write_report(comparison, path)
-        else:
-            write_comparison(comparison, path)
-        notify(self.events.kept, path)
+        notify(self.events.kept, keep(comparison, self.folder, suffix))
 
     def _end(self, tell: Callable[[], None]) -> None:
         """Tells the end once the compute thread is free, so that a listener may start the next run."""
@@ -356,10 +336,3 @@ class Comparing:
 
 def _freed(actuator: Actuator) -> set[str]:
     return {path for path, tolerance in actuator.tolerances.items() if tolerance.free}
-
-
-def shipped_actuators() -> dict[str, Path]:
-    """The actuator files that come with the package, by the names in them."""
-    inside = resources.files("ema_model") / "assets" / "actuators"
-    folder = Path(str(inside)) if inside.is_dir() else Path(__file__).parents[1] / "assets" / "actuators"
-    return {load_actuator(path).name: path for path in sorted(folder.glob("*.toml"))}

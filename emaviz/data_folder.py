@@ -11,6 +11,7 @@ import re
 import secrets
 import shutil
 from contextlib import suppress
+from datetime import datetime
 from pathlib import Path
 
 from ema_model.challenges.sealed_file import SUFFIX as CHALLENGE_SUFFIX
@@ -107,6 +108,10 @@ class DataFolder:
             CHALLENGE_SUFFIX: self.challenges,
         }
         return self._free(folders.get(suffix, self.uploads), name)
+
+    def fresh(self, where: Path, what: str, suffix: str) -> Path:
+        """A name for what the app writes there itself: the time, and what it is; not yet taken."""
+        return self._free(where, f"{datetime.now():%Y%m%d-%H%M%S}-{what}{suffix}")
 
     def part(self) -> Path:
         """A new file in `uploads` for a transfer on its way; `measurements` leaves it out."""

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from datetime import datetime
-from itertools import count
 from pathlib import Path
 
 from ema_model.actuator import save_actuator
-from ema_model.errors import InputError
 from emaviz.data_folder import DataFolder
 from emaviz.discovery_look import Look
 
@@ -16,11 +13,7 @@ def keep(look: Look, folder: DataFolder, suffix: str) -> Path:
     """Writes a report (.html), a recording (.rrd) or an actuator (.toml) under a new name; returns where it is."""
     found = look.found
     where = folder.actuators if suffix == ".toml" else folder.recordings
-    if not folder.holds(where):
-        raise InputError(f"the data folder's {where.name} leads out of it; replace the link by a folder")
-    stamp = datetime.now().strftime("%Y%m%d-%H%M%S")
-    names = (f"{stamp}-discover{'' if again == 1 else f'-{again}'}{suffix}" for again in count(1))
-    path = next(path for name in names if not (path := where / name).exists())
+    path = folder.fresh(where, "discover", suffix)
     configuration = {
         "fitted": ", ".join(look.reach),
         "held out": ", ".join(look.held) or "–",

@@ -13,6 +13,7 @@ from ema_model.effects import find
 from ema_model.errors import InputError
 from ema_model.measurement import SIGNALS
 from emaviz.figures.quantity import number, parameter_title
+from emaviz.setting_words import run_in_words
 
 VERDICTS = {
     "effects_found": "effects are missing, and have been added",
@@ -68,10 +69,9 @@ def next_experiment(found: Discovery) -> list[str]:
     best = found.next_experiment
     if best is None:
         return []
-    given = ", ".join(f"{name} = {setting:g}" for name, setting in best.settings.items())
-    asked = f"Record a {best.command}" + (f" ({given})" if given else "") + f" for {number(best.duration_s)} s"
+    asked = f"Record {run_in_words(best.command, best.settings, best.duration_s)}"
     if best.load_torque_Nm:
-        asked += f" under a load of {number(best.load_torque_Nm)} N·m at the user"
+        asked += f", under a load of {number(best.load_torque_Nm)} N·m at the user"
     if best.add_signal:
         names = [SIGNALS[name].title.lower() if name in SIGNALS else name for name in best.add_signal.split(", ")]
         asked += f", and measure the {_listed(names)} as well"

@@ -4,7 +4,7 @@ The difference changes slowly with k, so that MM(k) + [RM(k̂) − MM(k̂)] pred
 fit of it does not carry the low-fidelity model's bias into k.  The position's lag changes faster (with shorted
 phases, the winding's inductance, the bus voltage), so that half of its difference counts as not known.
 Hysteresis chopping makes the Reference Model's ripple depend on the smallest change of k: the mean of several
-twins, each with k changed by a hair, is what is known of the difference, and their spread is what is not.
+twins, each with a slightly different k, is what is known of the difference, and their spread is what is not.
 """
 
 from __future__ import annotations
@@ -25,7 +25,9 @@ from ema_model.simulation import Run, simulate_reference
 Array = NDArray[np.float64]
 
 TWINS = 4
-_HAIR = 1e-4
+# σ of the twins' k about the answer.  In saturation the ripple repeats for the same k, but not for one that a fit may
+# still move to: twins that are too close together would call it known.
+_HAIR = 3e-3
 _SLACK = 0.5  # share of a lasting difference that is not trusted to stay when the fit moves
 WHITE = frozenset({"current_A"})  # the ripple's spread: alternating in the current, lasting in the positions
 
@@ -73,7 +75,7 @@ def _spread(deviations: Array, mean: Array, name: str, block_s: float) -> Array:
     if name not in WHITE:
         square = square + (_SLACK * mean) ** 2
     width = max(3, round(CORRELATED_S / block_s) | 1)
-    return np.sqrt(uniform_filter1d(square, width, mode="nearest"))
+    return np.sqrt(np.maximum(uniform_filter1d(square, width, mode="nearest"), 0.0))  # its running sum rounds
 
 
 def _errors(problem: Problem, x: Array, place: int) -> dict[str, Array]:

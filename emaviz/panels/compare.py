@@ -10,7 +10,8 @@ import viser
 from ema_model.comparison.result import Comparison
 from ema_model.errors import InputError
 from ema_model.measurement.formats import FORMATS
-from emaviz.comparing import UPLOADED, Comparing, Opened
+from emaviz.actuator_files import UPLOADED
+from emaviz.comparing import Comparing, Opened
 from emaviz.data_folder import ACTUATOR_SUFFIX, CHALLENGE_SUFFIX, SESSION_SUFFIX
 from emaviz.panels.compare_asked import AskedControls
 from emaviz.panels.compare_cards import health_card, recordings_list

@@ -12,7 +12,7 @@ from emaviz.discovery_look import Look
 from emaviz.discovery_words import effect_title
 from emaviz.figures import quantity
 from emaviz.figures.quantity import number
-from emaviz.panels.explore_labels import readable
+from emaviz.setting_words import readable
 
 BOX = 'style="padding:2px 12px 6px;font-size:13px;line-height:1.45"'
 DIM = 'style="opacity:.65"'

@@ -18,8 +18,8 @@ from emaviz.discovery_words import effect_title
 from emaviz.figures import quantity, signature
 from emaviz.figures.quantity import number
 from emaviz.panels import discover_cards as cards
-from emaviz.panels.explore_labels import readable
 from emaviz.panels.page import Page
+from emaviz.setting_words import readable
 
 CONFIG = {"displayModeBar": False, "responsive": False}
 

@@ -15,7 +15,7 @@ from ema_model.faults import FAULTS, NAMES, sentences
 from emaviz.discovery_words import effect_title, fitted_of
 from emaviz.figures import quantity
 from emaviz.panels.discover_cards import BOX
-from emaviz.panels.explore_labels import readable
+from emaviz.setting_words import readable
 
 _GOOD, _BAD = "#2b8a3e", "#e03131"
 _NEAR = 0.25  # of the true value, within which a strength counts as found where its interval misses it

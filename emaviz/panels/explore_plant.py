@@ -8,8 +8,8 @@ from typing import Any
 import viser
 
 from ema_model.effects import CATALOGUE, find
-from emaviz.panels.explore_labels import readable
 from emaviz.panels.page import Page
+from emaviz.setting_words import readable
 
 _NONE = "–"
 

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import html
 
-from ema_model.commands import COMMANDS
 from ema_model.faults import FAULTS
 from ema_model.identification.run import Identification
-from ema_model.identification.separation import Suggestion
-from emaviz.panels.explore_labels import readable
+from emaviz.setting_words import run_in_words
 
 _BOX = 'style="padding:4px 12px;font-size:13px;line-height:1.45"'
 _GOOD, _BAD, _WARNING = "#2b8a3e", "#e03131", "#e8590c"
@@ -42,24 +40,12 @@ def sure_words(answer: Identification | None) -> str:
         names = ", ".join(_named(name) for name in sure.hardly_known)
         told = f"this recording says hardly anything of {names}, and the other intervals rest on them"
         lines.append(_line(_WARNING, "Hardly known", told))
-    if sure.separated_by:
-        lines.append(_line(_WARNING, "What would tell more", in_words(sure.separated_by)))
+    if run := sure.separated_by:
+        lines.append(_line(_WARNING, "What would tell more", run_in_words(run.command, run.settings, run.duration_s)))
     if not answer.polished:
         lines.append(f"<div {_BOX}><span style='opacity:.7'>The intervals are those of a fit from here; the answer of "
                      "the search alone may lie at their edge.</span></div>")  # fmt: skip
     return "".join(lines)
-
-
-def in_words(run: Suggestion) -> str:
-    """A run as a sentence's part."""
-    told = COMMANDS[run.command]
-    parts = []
-    for name, value in run.settings.items():
-        label, _, unit = readable(name).partition(" [")
-        parts.append(f"{label.lower()} {value:g} {unit.rstrip(']')}".rstrip())
-    article = "an" if told.title[:1] in "AEIOU" else "a"
-    chosen = ", ".join(parts) or "its usual settings"
-    return f"{article} {told.title.lower()} with {chosen}, for {run.duration_s:g} s"
 
 
 def _named(name: str) -> str:

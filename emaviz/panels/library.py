@@ -13,8 +13,8 @@ from emaviz.figures.effect_signature import EffectCharts, small_picture
 from emaviz.library import RUNS, Felt, Library
 from emaviz.panels import discover_cards as cards
 from emaviz.panels.discover_effect import about
-from emaviz.panels.explore_labels import readable
 from emaviz.panels.page import Page
+from emaviz.setting_words import readable
 
 _CARD = (
     "height:auto!important;min-height:52px;padding:4px 130px 4px 9px;font-weight:400;font-size:12px;"

@@ -13,7 +13,8 @@ import viser
 
 from ema_model.errors import InputError
 from emaviz import session_file
-from emaviz.comparing import UPLOADED, Comparing
+from emaviz.actuator_files import UPLOADED
+from emaviz.comparing import Comparing
 from emaviz.data_folder import SESSION_SUFFIX
 from emaviz.discovering import Discovering
 from emaviz.figures.identified_table import Row

@@ -15,7 +15,8 @@ from ema_model.errors import InputError
 from ema_model.measurement import ColumnMapping, MappedColumn, read_side_file, side_path, write_measurement
 from ema_model.sensors import Sensors
 from ema_model.simulation import Run, simulate_reference
-from emaviz.comparing import UPLOADED, Comparing, shipped_actuators
+from emaviz.actuator_files import UPLOADED, shipped_actuators
+from emaviz.comparing import Comparing
 from emaviz.data_folder import DataFolder
 from emaviz.recording import read
 from emaviz.session import Session

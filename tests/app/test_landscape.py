@@ -13,7 +13,8 @@ from ema_model.faults import HEALTHY, vector
 from ema_model.identification.separation import Suggestion
 from emaviz.figures import landscape as figures
 from emaviz.landscape import Landscape, Way, extent, slices, ways
-from emaviz.panels.identify_words import in_words, sure_words
+from emaviz.panels.identify_words import sure_words
+from emaviz.setting_words import run_in_words
 
 TRUTH = vector({"k1": 0.3, "k6": 0.4})
 
@@ -113,13 +114,24 @@ def test_a_scale_of_logarithms_has_a_few_round_values(low, high):
 
 
 def answer(**known):
-    usual = {"healthy": False, "alarms": (), "ambiguous": (), "adequate": True, "warnings": (), "separated_by": None}
+    usual = {
+        "healthy": False,
+        "alarms": (),
+        "ambiguous": (),
+        "adequate": True,
+        "warnings": (),
+        "separated_by": None,
+        "hardly_known": (),
+    }
     return SimpleNamespace(uncertainty=SimpleNamespace(**{**usual, **known}), polished=True)
 
 
 def test_a_run_is_told_in_words():
     chirp = Suggestion("chirp", {"amplitude_rad": 0.02, "end_Hz": 12.0}, 0.5, 2.0)
-    assert in_words(chirp) == "a chirp with amplitude 0.02 rad, end 12 Hz, for 0.5 s"
+    assert (
+        run_in_words(chirp.command, chirp.settings, chirp.duration_s)
+        == "a chirp with amplitude 0.02 rad, end 12 Hz, for 0.5 s"
+    )
     assert chirp.options == "--command chirp --set amplitude_rad=0.02 --set end_Hz=12 --duration 0.5"
 
 

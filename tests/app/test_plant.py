@@ -13,8 +13,8 @@ from ema_model.errors import InputError
 from ema_model.faults import HEALTHY, vector
 from ema_model.simulation import Run, simulate_monitor, simulate_reference
 from emaviz import plant
+from emaviz.actuator_files import shipped_actuators
 from emaviz.app import App
-from emaviz.comparing import shipped_actuators
 from emaviz.session import Session
 
 SERVO, DRIVE = "XL330 on a pendulum", "ODrive motor"

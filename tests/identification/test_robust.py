@@ -16,6 +16,7 @@ from ema_model.identification.descent import Descent
 from ema_model.identification.fit import refine, setting
 from ema_model.identification.objective import Objective, simulated
 from ema_model.identification.run import identify
+from ema_model.identification.twin import TWINS, _spread
 from ema_model.identification.unknowns import to_k, to_x
 from ema_model.sensors import Sensors
 from ema_model.simulation import Run, simulate_reference
@@ -60,6 +61,19 @@ def test_what_hardly_tells_anything_is_not_sure_of_anything():
     low, high = answer.uncertainty.interval90.T
     assert low[2] < truth[2] < high[2] and high[2] - low[2] > 0.5
     assert "k3" not in answer.uncertainty.alarms
+
+
+@pytest.mark.parametrize("sensors", [None, NOISY])
+def test_a_step_that_saturates_tells_what_it_can(sensors):
+    """One radian in half a second: all at full speed, where the gain does nothing, and that is said."""
+    recording = simulated(Run(command("step")), ACTUATOR, faults.vector({"k1": 0.3, "k8": 0.3}))
+    seen = sensors.record(recording, 1) if sensors else recording
+    answer = identify(Objective([seen], ACTUATOR), parameters_known=True)
+    sure = answer.uncertainty
+    assert sure.adequate and sure.alarms == ("k1",)
+    assert sure.interval90[0, 0] <= 0.3 <= sure.interval90[0, 1] and abs(answer.k[0] - 0.3) < 0.02
+    assert sure.hardly_known == ("k8",) and sure.interval90[7].tolist() == [0.0, 1.0]
+    assert sure.separated_by is not None and sure.separated_by.gain > 10.0
 
 
 def test_noise_is_met_with_intervals():
@@ -157,6 +171,14 @@ def test_twin_takes_the_low_fidelity_bias_out(monkeypatch):
     with_twin = faults.error_percent(refine(given, truth).k, truth)
     monkeypatch.setattr("ema_model.identification.fit.twins", lambda *_: None)
     assert with_twin < 0.5 * faults.error_percent(refine(given, truth).k, truth)
+
+
+def test_a_spread_beside_a_far_larger_one_is_a_number():
+    rng = np.random.default_rng(0)
+    size = np.where(np.arange(1000) < 300, 1e3, 0.0)
+    for _ in range(20):
+        spread = _spread(size * rng.standard_normal((TWINS, 1000)), np.zeros(1000), "current_A", 5e-4)
+        assert np.all(spread >= 0.0) and np.all(spread[:250] > 100.0) and np.all(spread[350:] < 1e-3)
 
 
 @pytest.mark.parametrize("options", [{"population": 1}, {"iterations": 0}, {"colour": 1.0}, {"population": 2.5}])

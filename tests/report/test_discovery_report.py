@@ -91,7 +91,7 @@ def test_next_experiment_and_warnings_are_in_plain_words(found, tmp_path):
     best = Experiment("step", {"final_rad": 0.01}, 0.5, 12.0, "motor_position_rad", rivals, 140.0)
     write_discovery_report(replace(found, next_experiment=best, warnings=("Look here.",)), tmp_path / "r.html")
     text = _section(tmp_path / "r.html", "next")
-    assert "Record a step (final_rad = 0.01)" in text and "12.0 N·m" in text and "motor position as well" in text
+    assert "Record a step with final 0.01 rad, for " in text and "12.0 N·m" in text and "motor position as well" in text
     assert "asymmetric friction and current sensor bias apart" in text and "140" in text
     assert "Look here." in _section(tmp_path / "r.html", "verdict")
 

@@ -1,6 +1,10 @@
-"""Names of settings and parameters as labels of controls."""
+"""Names of settings and parameters as labels of controls, and runs as parts of sentences."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
+
+from ema_model.commands import COMMANDS
 
 _UNITS = {
     "Nm_rad": "N·m/rad",
@@ -27,6 +31,17 @@ def readable(name: str) -> str:
         if name.endswith(f"_{ending}"):
             return f"{_sentence(name.removesuffix(f'_{ending}'))} [{unit}]"
     return _sentence(name)
+
+
+def run_in_words(command: str, settings: Mapping[str, float], duration_s: float) -> str:
+    """'a sine with amplitude 0.03 rad, frequency 2 Hz, for 0.5 s'."""
+    title = COMMANDS[command].title
+    parts = []
+    for name, value in settings.items():
+        label, _, unit = readable(name).partition(" [")
+        parts.append(f"{label.lower()} {value:.4g} {unit.rstrip(']')}".rstrip())
+    article = "an" if title[:1] in "AEIOU" else "a"
+    return f"{article} {title.lower()} with {', '.join(parts) or 'its usual settings'}, for {duration_s:g} s"
 
 
 def _sentence(name: str) -> str:

@@ -10,7 +10,7 @@ import viser
 
 from ema_model.identification.run import ALGORITHMS as TITLES
 from emaviz.figures.colours import ALGORITHMS, MONITOR
-from emaviz.figures.signals import AXIS, legend
+from emaviz.figures.signals import AXIS, PADDING, legend
 
 _LEAST_A = 1e-9  # a logarithmic axis has no zero
 
@@ -30,6 +30,7 @@ class LiveConvergence:
             scales=_scales(150),
             axes=axes,
             legend={"show": False},
+            padding=PADDING,
             height=height,
         )
 

@@ -13,7 +13,7 @@ from ema_model.identification.run import ALGORITHMS as TITLES
 from emaviz.figures.colours import REFERENCE
 from emaviz.figures.convergence import colour
 from emaviz.figures.decimate import envelope
-from emaviz.figures.signals import CURSOR, POINTS, legend, time_axis, value_axis
+from emaviz.figures.signals import CURSOR, PADDING, POINTS, legend, time_axis, value_axis
 
 Array = NDArray[np.float64]
 
@@ -29,6 +29,7 @@ class LiveFit:
             "scales": {"x": {"time": False}, "y": {"auto": True}},
             "legend": {"show": False},
             "cursor": CURSOR,
+            "padding": PADDING,
         }
         self._currents: Any = gui.add_uplot(
             data=(empty, empty),

@@ -15,6 +15,7 @@ from emaviz.figures.decimate import envelope
 
 Array = NDArray[np.float64]
 POINTS = 800  # of a line, at most
+PADDING = (10, 4, 0, 0)  # top, right, bottom, left, px: the uppermost tick needs half a line
 _GREY = "#868e96"
 
 
@@ -78,7 +79,7 @@ class LiveSignals:
                 axes=(time_axis(last), value_axis(chart.unit), _difference_axis(chart.difference_unit)),
                 cursor=CURSOR,
                 legend={"show": False},
-                padding=(0, 4, 0, 0),
+                padding=PADDING,
                 height=height + (16 if last else 0),
             )
             self._charts.append((chart, handle))
@@ -110,7 +111,12 @@ class LivePhases:
     def __init__(self, gui: viser.GuiApi, height: int = 250) -> None:
         empty = np.array([0.0, 1.0])
         gui.add_html(legend(*((colour, f"phase {name}, plant") for colour, name in zip(PHASES, "ABC"))))
-        common = {"scales": {"x": {"time": False}, "y": {"auto": True}}, "legend": {"show": False}, "cursor": CURSOR}
+        common = {
+            "scales": {"x": {"time": False}, "y": {"auto": True}},
+            "legend": {"show": False},
+            "cursor": CURSOR,
+            "padding": PADDING,
+        }
         self._phases: Any = gui.add_uplot(
             data=(empty,) * 4,
             series=({"label": "t [s]"}, *(_line(f"phase {name}", colour) for name, colour in zip("ABC", PHASES))),

@@ -42,7 +42,7 @@ def _sees(found: Discovery, fault: str) -> bool:
 
 def _fault(fault: str, k: ArrayLike, found: Discovery) -> str:
     index = NAMES.index(fault)
-    what = f"{FAULTS[index].title.lower()} fault: {sentences(k, found.plant.actuator)[index]}"
+    what = f"{in_sentence(FAULTS[index].title)} fault: {sentences(k, found.plant.actuator)[index]}"
     if fault not in _OF_FAULT:
         return _row(None, what, "a fault that Identify finds, not Discover")
     good = _sees(found, fault)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 
+from ema_model.actuator.titles import in_sentence
 from ema_model.faults import FAULTS
 from ema_model.identification.run import Identification
 from emaviz.setting_words import run_in_words
@@ -31,7 +32,7 @@ def sure_words(answer: Identification | None) -> str:
     elif sure.healthy:
         lines.append(_line(_GOOD, "Healthy", "no k is surely off (joint test at 1 %)"))
     else:
-        named = ", ".join(f"{fault.name} {fault.title.lower()}" for fault in FAULTS if fault.name in sure.alarms)
+        named = ", ".join(f"{fault.name} {in_sentence(fault.title)}" for fault in FAULTS if fault.name in sure.alarms)
         lines.append(_line(_BAD, "Not healthy", named or "all k together, though no single one stands out"))
     for group in sure.ambiguous:
         names = " and ".join(_named(name) for name in group)
@@ -49,7 +50,7 @@ def sure_words(answer: Identification | None) -> str:
 
 
 def _named(name: str) -> str:
-    return next(f"{fault.name} ({fault.title.lower()})" for fault in FAULTS if fault.name == name)
+    return next(f"{fault.name} ({in_sentence(fault.title)})" for fault in FAULTS if fault.name == name)
 
 
 def _line(colour: str, head: str, text: str) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
+from ema_model.actuator.titles import in_sentence, parameter_title
 from ema_model.calibration import Calibration
 from ema_model.calibration.floor import CORRELATED_S
 from ema_model.comparison.explain import explain, used_blocks
@@ -114,11 +115,11 @@ def _warnings(residuals: Residuals, primary: str, calibration: Calibration | Non
     if calibration is not None:
         if not calibration.converged:
             found.append("The calibration has not converged: what looks like missing physics may be an unfinished fit.")
-        outside = [actuator.axes.path(name) for name in calibration.outside_tolerance]
+        outside = [in_sentence(parameter_title(actuator.axes.path(name))) for name in calibration.outside_tolerance]
         if outside:
             found.append(
                 f"At the edge of {'its' if len(outside) == 1 else 'their'} tolerance (3 σ): {', '.join(outside)}. "
-                "Either the value is wrong, or it stands in for what is missing."
+                "Either a value is wrong, or it stands in for what is missing."
             )
     share = float(np.mean(residuals.saturated))
     if share > 0.005:

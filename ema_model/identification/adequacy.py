@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ema_model.actuator.titles import in_sentence, parameter_title
 from ema_model.calibration.floor import CORRELATED_S
 from ema_model.identification.fit import Fitted
 from ema_model.measurement import SIGNALS as SIGNAL_NAMES
@@ -43,12 +44,12 @@ def adequacy(found: Fitted) -> Adequacy:
             ratio = max(size, slow)
             title = SIGNAL_NAMES[name].title.lower()
             return Adequacy(False, ratio, f"the {title} is left {ratio:.1f} × its floor")
-    edge = [
-        name for name, x in zip(found.problem.names, found.x) if "." in name and not name.startswith("effects.")
-        and abs(x) > _EDGE
-    ]  # fmt: skip
+    own = [one for one in zip(found.problem.names, found.x) if "." in one[0] and not one[0].startswith("effects.")]
+    axes = found.problem.plant.actuator.axes
+    edge = [in_sentence(parameter_title(axes.path(name))) for name, x in own if abs(x) > _EDGE]
     if edge:
-        return Adequacy(False, 1.0, f"{', '.join(edge)} would have to be outside its tolerance")
+        whose = "its" if len(edge) == 1 else "their"
+        return Adequacy(False, 1.0, f"{', '.join(edge)} would have to be outside {whose} tolerance")
     shape, ratio = _worst_shape(found)
     if shape:
         return Adequacy(False, ratio, f"what is left of the current {shape}")

@@ -92,7 +92,7 @@ def new(title: str, x: str, y: str, *, dark: bool = False) -> go.Figure:
         title={"text": f"<b>{plain(title)}</b>", "y": 1.0, "yanchor": "top", "pad": {"t": 6, "l": 8}},
         xaxis={"title": {"text": plain(x)}},
         yaxis={"title": {"text": plain(y)}},
-        margin={"l": 48, "r": 14, "t": 30, "b": 36},
+        margin={"l": 48, "r": 14, "t": 30, "b": 0},  # below, as axis and legend need: a narrow panel has no more
         # Below the axes: above, its second row would run into the title on a narrow panel.
         legend={
             "orientation": "h",

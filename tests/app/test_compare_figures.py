@@ -9,6 +9,7 @@ import pytest
 from comparison_by_hand import comparison as by_hand
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from plotly.offline import get_plotlyjs
 
 from emaviz.figures import (
     calibration_scores,
@@ -220,3 +221,18 @@ def test_units_suit_the_size():
 def test_regions_in_time_end_with_their_run(comparison):
     everything = replace(comparison.worst_regions[0], blocks=np.ones(comparison.residuals.blocks, dtype=bool))
     assert len(time_ranges(comparison, everything, 0)) == 1
+
+
+@pytest.mark.browser
+def test_a_figure_with_its_legend_fits_a_panel_that_is_narrow_for_a_moment(browser):
+    """Plotly fails where margins leave nothing, and takes the whole page with it."""
+    figure = theme.new("Equivalent current", "Time [s]", "I [A]")
+    for name in ("floor ±2σ", "initial", "measured", "calibrated"):
+        figure.add_scatter(x=[0.0, 1.0], y=[0.0, 1.0], name=name)
+    page = browser.new_page()
+    page.set_content("<div id=a></div>")
+    page.add_script_tag(content=get_plotlyjs())
+    draw = "([f, w, h]) => { const g = JSON.parse(f); Plotly.react('a', g.data, {...g.layout, width: w, height: h}); }"
+    for width, aspect in ((261, 0.42), (261, 0.3), (500, 0.42)):
+        page.evaluate(draw, [figure.to_json(), width, aspect * width])
+    page.close()

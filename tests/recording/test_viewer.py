@@ -136,7 +136,7 @@ def test_view_prints_the_address_and_ends_with_an_interrupt(tmp_path):
     process = subprocess.Popen([sys.executable, "-c", code, str(tmp_path / "a.rrd")], stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None and "a.rrd: http://127.0.0.1:" in process.stdout.readline()
     process.send_signal(signal.SIGINT)
-    assert process.wait(10) == 0
+    assert process.wait(60) == 0  # on a loaded machine, too
     process.stdout.close()
 
 

@@ -38,6 +38,10 @@ class StartHere:
                     self._folder.visible = True
 
     def _read(self, event: viser.GuiEvent[Any]) -> None:
-        self._folder.visible = False
         if event.client is not None:
-            event.client.local_storage.set_item(_KEY, "1")
+            kept = event.client.local_storage
+            kept.set_item(_KEY, "1")
+            # Gone only when the browser has kept it: a reload at once must not bring it back.
+            with contextlib.suppress(RuntimeError, TimeoutError):
+                kept.get_item(_KEY, timeout=2.0)
+        self._folder.visible = False

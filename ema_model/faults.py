@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.errors import InputError
+from ema_model.titles import in_sentence
 
 _LEAST_TURNS = 0.02  # less, and the three-phase model diverges when two phases are shorted
 
@@ -21,6 +22,11 @@ class Fault:
     name: str
     title: str
     healthy: float
+
+    @property
+    def label(self) -> str:
+        """'k1 friction'."""
+        return f"{self.name} {in_sentence(self.title)}"
 
 
 FAULTS = (

@@ -31,6 +31,7 @@ from ema_model.measurement.health import Health, health
 from ema_model.measurement.refusal import shown
 from ema_model.measurement.side_file import SideFile, find_side_file
 from ema_model.recordings import read_recording, usual_mapping
+from ema_model.titles import in_sentence
 from emaviz import actuator_files
 from emaviz.comparing_keep import keep
 from emaviz.data_folder import DataFolder
@@ -210,7 +211,7 @@ class Comparing:
         """How much a signal counts in the calibration, 1 as its floor says; 0 leaves it out."""
         if name not in COMPARABLE:
             raise InputError(f"{name[:60]} is not compared; choose of {', '.join(COMPARABLE)}")
-        value = number(weight, f"the weight of the {SIGNALS[name].title.lower()}")
+        value = number(weight, f"the weight of the {in_sentence(SIGNALS[name].title)}")
         if not 0.0 <= value <= _MOST_WEIGHT:
             raise InputError(f"the weight of a signal must lie between 0 and {_MOST_WEIGHT:g}, not {value:g}")
         others = {other: w for other, w in self.weights.items() if other != name}
@@ -248,7 +249,7 @@ class Comparing:
         if not measurements:
             raise InputError("no recording is chosen; upload one, or choose one of the data folder")
         if not self.weights:
-            wanted = ", ".join(SIGNALS[name].title.lower() for name in COMPARABLE)
+            wanted = ", ".join(in_sentence(SIGNALS[name].title) for name in COMPARABLE)
             raise InputError(f"no signal to fit is chosen; choose one or more of {wanted}")
         if self.calibrate and not self.free:
             raise InputError("calibration is on, but no parameter may move; free one, or turn it off")

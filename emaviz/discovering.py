@@ -12,6 +12,7 @@ from ema_model.discovery.trial import Trial
 from ema_model.discovery.unknown import curve_for
 from ema_model.effects import CATALOGUE, find
 from ema_model.errors import InputError
+from ema_model.titles import in_sentence
 from ema_model.user_effects import UserEffect
 from emaviz.comparing import Comparing
 from emaviz.discovery_keep import keep
@@ -73,7 +74,9 @@ class Discovering:
             raise InputError(NOTHING)
 
         def job(tell: Tell) -> None:
-            self._assess(self._begin(self.source.recipe(), tell), tell)
+            told = self._begin(self.source.recipe(), tell)
+            self._restoring = None  # what a session brought is put away
+            self._assess(told, tell)
 
         return self.run.begin("Calibrating the model", job)
 
@@ -102,7 +105,7 @@ class Discovering:
                 trial = told.trials.followed(told.story, trial, tell)
             self._take(told, trial, alike, tell)
 
-        return self.run.begin(f"Adding {find(candidate.name).title.lower()}", job)
+        return self.run.begin(f"Adding {in_sentence(find(candidate.name).title)}", job)
 
     def preview_own(self, effect: UserEffect, settings: Mapping[str, float]) -> None:
         """Tells soon what a user's torque with these values would change; of several requests the last one counts."""
@@ -146,7 +149,7 @@ class Discovering:
             told.story.remove(key, smaller)
             self._assess(told, tell)
 
-        return self.run.begin(f"Removing {find(key).title.lower()}", job)
+        return self.run.begin(f"Removing {in_sentence(find(key).title)}", job)
 
     def find_all(self) -> bool:
         """Adds what pays, a step after another, as `emaviz discover` does."""
@@ -188,7 +191,7 @@ class Discovering:
         def job(tell: Tell) -> None:
             trials: list[Trial] = []
             for one in pair:
-                tell(f"fitting {find(one.name).title.lower()}")
+                tell(f"fitting {in_sentence(find(one.name).title)}")
                 trials.append(told.trials.of(base, one, tell))
             tell("simulating the tests that the actuator allows")
             told.experiment = next_experiment(base.data, trials[0].fit, trials[1].fit)
@@ -215,7 +218,6 @@ class Discovering:
         given = self.source.read(recipe)
         told = Telling(begun(given.fitted, given.actuator, given.held, given.signals, tell), recipe)
         self._told, self.look, self.source.revealed = told, None, False
-        self._restoring = None
         return told
 
     def _take(self, told: Telling, trial: Trial, alike: Sequence[str], tell: Tell) -> None:
@@ -273,13 +275,12 @@ class Discovering:
         steps, experiment = checked(saved.get("steps")), experiment_of(saved.get("experiment"))
         recipe = self.source.take(saved["recipe"], names)
         self._told = self.look = None
-        self._restoring = restoring = {**saved, "recipe": dict(recipe)}
+        self._restoring = {**saved, "recipe": dict(recipe)}
         notify(self.events.looked, None)
 
         def job(tell: Tell) -> None:
             try:
                 told = self._begin(recipe, tell)
-                self._restoring = restoring  # until all its steps are taken
                 self._assess(told, tell)  # the first step's cards are what the report ranks
                 take_again(told.story, steps, tell, lambda: self._show(told))
                 told.experiment, self.source.revealed = experiment, bool(saved.get("revealed"))

@@ -18,6 +18,7 @@ from ema_model.effects import find
 from ema_model.errors import InputError
 from ema_model.faults import HEALTHY, NAMES, sentences
 from ema_model.sensors import Sensors
+from ema_model.titles import in_sentence
 from emaviz.data_folder import DataFolder, sanitised
 from emaviz.listeners import notify
 from emaviz.session import Session
@@ -79,7 +80,7 @@ def truth_of(settings: Settings, actuator: Actuator, seed: int) -> Truth:
         faults.pop("k7", None)  # where the gap would be thinnest
     for name, given in settings.effects.items():
         order = f" of order {given['order']:g}" if "order" in given else ""
-        told.append(f"{find(name).title.lower()}{order}")
+        told.append(f"{in_sentence(find(name).title)}{order}")
     told += [sentences(k, actuator)[NAMES.index(name)] for name in faults]
     answer = (
         f"Hidden: {'; '.join(told)}." if told else "Nothing is hidden: the plant is the model's, within tolerances."

@@ -12,6 +12,7 @@ from ema_model.discovery.story import Step
 from ema_model.discovery.trial import Trial
 from ema_model.effects import find
 from ema_model.errors import InputError
+from ema_model.titles import in_sentence
 from emaviz.discovery_look import Assessment, Look
 from emaviz.discovery_run import Tell
 
@@ -51,7 +52,7 @@ class Trials:
 def check_value(trial: Trial) -> None:
     """Raises InputError for a refitted model that has no value somewhere: whatever failed stays out of the story."""
     if not all(np.all(np.isfinite(values)) for one in trial.fit.calibration.signals for values in one.values()):
-        title = find(trial.candidate.name).title.lower()
+        title = in_sentence(find(trial.candidate.name).title)
         raise InputError(
             f"with {title} the model has no value somewhere in these recordings, as in a division by zero; it was not "
             "added"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ema_model.actuator.titles import in_sentence
 from ema_model.axes import Axes
 from ema_model.calibration import Calibrated
 from ema_model.discovery import Discovery
@@ -12,8 +11,9 @@ from ema_model.discovery.result import Added, Rung
 from ema_model.effects import find
 from ema_model.errors import InputError
 from ema_model.measurement import SIGNALS
+from ema_model.titles import in_sentence
 from emaviz.figures.quantity import number, parameter_title
-from emaviz.setting_words import run_in_words
+from emaviz.run_words import run_in_words
 
 VERDICTS = {
     "effects_found": "effects are missing, and have been added",
@@ -73,7 +73,7 @@ def next_experiment(found: Discovery) -> list[str]:
     if best.load_torque_Nm:
         asked += f", under a load of {number(best.load_torque_Nm)} N·m at the user"
     if best.add_signal:
-        names = [SIGNALS[name].title.lower() if name in SIGNALS else name for name in best.add_signal.split(", ")]
+        names = [in_sentence(SIGNALS[name].title) if name in SIGNALS else name for name in best.add_signal.split(", ")]
         asked += f", and measure the {_listed(names)} as well"
     rivals = _listed([in_sentence(effect_title(name)) for name in best.separates])
     return [f"{asked}.", f"It would tell {rivals} apart: χ² of {best.expected_chi2:.0f} is expected between them."]

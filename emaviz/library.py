@@ -15,6 +15,7 @@ from ema_model.effects import CATALOGUE, find
 from ema_model.errors import InputError
 from ema_model.measurement import Measurement
 from ema_model.simulation import Run, simulate_monitor
+from ema_model.titles import in_sentence
 from emaviz.session import Session
 from emaviz.worker import Steps
 
@@ -95,7 +96,7 @@ class Library:
 
     def _steps(self) -> Steps:
         for i, effect in enumerate(CATALOGUE.values()):
-            self._say(f"Running {effect.title.lower()} … {i + 1} of {len(CATALOGUE)}")
+            self._say(f"Running {in_sentence(effect.title)} … {i + 1} of {len(CATALOGUE)}")
             settings = effect.settings({effect.parameters[0].name: effect.severities[1]})
             found: list[Felt] = []
             for run in RUNS:

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from ema_model.actuator import Actuator, load_actuator
-from ema_model.calibration.fit import Calibrated, Calibration, unit_of
+from ema_model.calibration.fit import Calibrated, Calibration
 from ema_model.commands import command
 from ema_model.comparison.orders import Order
 from ema_model.comparison.residuals import Residuals, join
@@ -18,6 +18,7 @@ from ema_model.comparison.result import Compared, Comparison, Explanation, Regio
 from ema_model.measurement.health import health
 from ema_model.sensors import Sensors
 from ema_model.simulation import Run, simulate_monitor, simulate_reference
+from ema_model.titles import unit_of
 
 SIGNALS = ("current_A", "motor_position_rad", "user_position_rad")
 PER_BLOCK = 5

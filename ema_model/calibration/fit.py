@@ -14,6 +14,7 @@ from ema_model.calibration.floor import CORRELATED_S, Floor
 from ema_model.calibration.problem import BOUND, Problem, Unknown
 from ema_model.faults import HEALTHY
 from ema_model.plants import Plant
+from ema_model.titles import unit_of
 
 Array = NDArray[np.float64]
 
@@ -24,31 +25,6 @@ _DRAWN = 192  # of the prior, from which further starts are taken
 _STARTS = 5
 _MISFIT = 25.0  # χ² per value, from which on the model misses by far
 _LONGEST = 40  # evaluations of a start
-_UNITS = (
-    ("_Nms2_rad", "N·m·s²/rad"),
-    ("_Nms_rad", "N·m·s/rad"),
-    ("_Nm_rad", "N·m/rad"),
-    ("_Nm_A", "N·m/A"),
-    ("_Ns_m", "N·s/m"),
-    ("_N_m", "N/m"),
-    ("_N_A", "N/A"),
-    ("_Nm", "N·m"),
-    ("_kgm2", "kg·m²"),
-    ("_kg", "kg"),
-    ("_rad_s", "rad/s"),
-    ("_m_s", "m/s"),
-    ("_1_rad", "1/rad"),
-    ("_1_m", "1/m"),
-    ("_1_s", "1/s"),
-    ("_rad", "rad"),
-    ("_Ohm", "Ω"),
-    ("_N", "N"),
-    ("_m", "m"),
-    ("_H", "H"),
-    ("_V", "V"),
-    ("_A", "A"),
-    ("_s", "s"),
-)
 
 
 @dataclass(frozen=True)
@@ -261,12 +237,4 @@ def _confounded(unknowns: Sequence[Unknown], covariance: NDArray[np.floating]) -
     return tuple((unknowns[j].name, unknowns[i].name) for i, j in pairs)
 
 
-def unit_of(path: str) -> str:
-    """The unit that a parameter's name ends with, as it is written."""
-    name = path.split(".")[-1]
-    if " " in path:
-        return "rad"
-    return next((shown for ending, shown in _UNITS if name.endswith(ending)), "")
-
-
-__all__ = ["BOUND", "SIGNALS", "Calibrated", "Calibration", "calibrate", "default_free", "unit_of"]
+__all__ = ["BOUND", "SIGNALS", "Calibrated", "Calibration", "calibrate", "default_free"]

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
-from ema_model.actuator.titles import in_sentence, parameter_title
 from ema_model.calibration import Calibration
 from ema_model.calibration.floor import CORRELATED_S
 from ema_model.comparison.explain import explain, used_blocks
@@ -19,6 +18,7 @@ from ema_model.comparison.residuals import Residuals
 from ema_model.comparison.result import Explanation, Region, SignalError
 from ema_model.comparison.words import order_sentence
 from ema_model.measurement import SIGNALS
+from ema_model.titles import in_sentence, parameter_title
 
 Array = NDArray[np.float64]
 
@@ -102,15 +102,15 @@ def _summary(name: str, error: SignalError, adequate: bool) -> str:
     size = f"{error.rmse:.3g} {signal.unit} rms"
     floor = f"{error.noise_floor:.3g} {signal.unit}"
     if adequate:
-        left = f"what is left of the {signal.title.lower()}, {size}, is noise and the model's own floor ({floor})"
+        left = f"what is left of the {in_sentence(signal.title)}, {size}, is noise and the model's own floor ({floor})"
         return f"The model explains the recordings: {left}."
-    return f"The {signal.title.lower()} is off by {size}, where noise and the model's own floor are {floor}."
+    return f"The {in_sentence(signal.title)} is off by {size}, where noise and the model's own floor are {floor}."
 
 
 def _warnings(residuals: Residuals, primary: str, calibration: Calibration | None, actuator: Actuator) -> list[str]:
     found = []
     if used_blocks(residuals, primary) is None:
-        title = SIGNALS[primary].title.lower()
+        title = in_sentence(SIGNALS[primary].title)
         found.append(f"Of the {title} too little can be judged: the motor stands, or the drive is at its limits.")
     if calibration is not None:
         if not calibration.converged:

@@ -6,6 +6,7 @@ import math
 
 from ema_model.axes import Axes
 from ema_model.measurement import SIGNALS
+from ema_model.titles import in_sentence
 
 _PREFIXES = ((1e-6, "µ"), (1e-3, "m"), (1.0, ""), (1e3, "k"))
 _SCALED = ("N·m", "rad", "A", "m", "N", "V", "rad/s", "m/s")
@@ -41,7 +42,7 @@ def amount(value: float, unit: str, digits: int = 2) -> str:
 
 def explanation_sentence(signal: str, variable: str, modulator: str, r2: float) -> str:
     """One line on what explains a residual, and how much of it."""
-    title = SIGNALS[signal].title.lower()
+    title = in_sentence(SIGNALS[signal].title)
     share = f"{100.0 * max(0.0, r2):.0f} % of what is left"
     return f"The {title}'s error {_EXPLAINED[variable]}{_MODULATED[modulator]} ({share})."
 
@@ -85,7 +86,7 @@ def region_sentence(
         way = "forward" if mean > 0.0 else "backward"
         what = {"N": "force", "A": "current"}.get(unit, "torque")
         return f"The motor needs {amount(size, unit)} more {what} {way} {where} than the model."
-    title, unit = SIGNALS[signal].title.lower(), SIGNALS[signal].unit
+    title, unit = in_sentence(SIGNALS[signal].title), SIGNALS[signal].unit
     if SIGNALS[signal].kind == "position":
         behind = direction and mean * direction < 0.0
         side = ("behind" if behind else "ahead of") if direction else ("above" if mean > 0.0 else "below")

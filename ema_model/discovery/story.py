@@ -29,6 +29,7 @@ from ema_model.discovery.worded import NOT_REPEATABLE
 from ema_model.effects import CATALOGUE, catalogue_name, find
 from ema_model.measurement import Measurement
 from ema_model.recordings import check_same_actuator
+from ema_model.titles import in_sentence
 
 Progress = Callable[[str], None]
 Array = NDArray[np.float64]
@@ -154,7 +155,7 @@ class Story:
         path = find(name).duplicates
         if path:
             return f"{self.current.actuator.axes.path(path)} outside its tolerance"
-        return f"+ {find(name).title.lower()}" if name not in CATALOGUE else f"+ {name}"
+        return f"+ {in_sentence(find(name).title)}" if name not in CATALOGUE else f"+ {name}"
 
     def _append(self, found: Fit, rung: Rung, added: Sequence[Added]) -> None:
         # All with the last model's values: what is added later moves what was there.

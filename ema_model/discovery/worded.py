@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ema_model.actuator.titles import in_sentence, parameter_title
 from ema_model.axes import Axes
 from ema_model.discovery.result import Added
 from ema_model.effects import find
+from ema_model.titles import in_sentence, parameter_title
 
 NOT_REPEATABLE = (
     "The closed loop is not repeatable (a change of 0.05 % in the inertia moves its signals by more than the noise): "

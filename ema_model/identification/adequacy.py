@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ema_model.actuator.titles import in_sentence, parameter_title
 from ema_model.calibration.floor import CORRELATED_S
 from ema_model.identification.fit import Fitted
 from ema_model.measurement import SIGNALS as SIGNAL_NAMES
+from ema_model.titles import in_sentence, parameter_title
 
 Array = NDArray[np.floating]
 
@@ -42,11 +42,14 @@ def adequacy(found: Fitted) -> Adequacy:
     for name, (size, slow) in sizes.items():
         if size > _SIZE or slow > _SLOW:
             ratio = max(size, slow)
-            title = SIGNAL_NAMES[name].title.lower()
+            title = in_sentence(SIGNAL_NAMES[name].title)
             return Adequacy(False, ratio, f"the {title} is left {ratio:.1f} × its floor")
-    own = [one for one in zip(found.problem.names, found.x) if "." in one[0] and not one[0].startswith("effects.")]
     axes = found.problem.plant.actuator.axes
-    edge = [in_sentence(parameter_title(axes.path(name))) for name, x in own if abs(x) > _EDGE]
+    edge = [
+        in_sentence(parameter_title(axes.path(name)))
+        for name, x in zip(found.problem.names, found.x)
+        if abs(x) > _EDGE and "." in name and not name.startswith("effects.")
+    ]
     if edge:
         whose = "its" if len(edge) == 1 else "their"
         return Adequacy(False, 1.0, f"{', '.join(edge)} would have to be outside {whose} tolerance")

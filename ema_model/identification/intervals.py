@@ -62,8 +62,8 @@ def uncertainty(found: Fitted, k: Array) -> Uncertainty:
     best, *others = [_basin(found, k), *(_basin(one, one.k) for one in found.rivals)]
     interval = best.interval90
     for one in others:
-        low, high = np.minimum(interval[:, 0], one.interval90[:, 0]), np.maximum(interval[:, 1], one.interval90[:, 1])
-        interval = np.stack([low, high], axis=1)
+        lower, upper = zip(interval.T, one.interval90.T)
+        interval = np.stack([np.minimum(*lower), np.maximum(*upper)], axis=1)
     if interval[5, 0] <= 0.0 or np.ptp(interval[6]) >= 1.0:
         interval[6] = 0.0, 1.0
     groups = _groups(best.covariance)

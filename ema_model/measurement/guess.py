@@ -14,6 +14,7 @@ from ema_model.measurement.refusal import shown
 from ema_model.measurement.signals import SIGNALS
 from ema_model.measurement.units import find_unit
 from ema_model.measurement.words import BUS, COMMAND, LOAD, MEASURED, MOTOR, OTHER, QUANTITIES, USER, Name, readings
+from ema_model.titles import in_sentence
 
 _LEAST = 0.3  # confidence below which a column is left aside
 _CURRENT_WORDS = frozenset("i im iph phase ph cur curr current".split())
@@ -234,7 +235,7 @@ def _others(name: Name, quantity: str, said: str, context: _Context) -> list[_Gu
     table = {"duty": "duty", "temperature": "temperature_C", "segment": "segment"}
     table["enabled"] = "drive_enabled"
     if quantity in table:
-        return [_Guess(table[quantity], "", sure, f"{said!r} is {SIGNALS[table[quantity]].title.lower()}")]
+        return [_Guess(table[quantity], "", sure, f"{said!r} is {in_sentence(SIGNALS[table[quantity]].title)}")]
     if name.words[-1:] == ("load",):
         sure = 0.6 if name.unit else 0.35
         return [_Guess(load, "", sure, f"{said!r} is a load") for load in ("load_torque_Nm", "load_force_N")]

@@ -12,6 +12,7 @@ from ema_model.measurement.equivalent_current import PHASES
 from ema_model.measurement.finding import Finding
 from ema_model.measurement.measurement import Measurement
 from ema_model.measurement.signals import SIGNALS
+from ema_model.titles import in_sentence
 
 Array = NDArray[np.float64]
 
@@ -119,7 +120,7 @@ def delay(measurement: Measurement) -> Iterator[Finding]:
         found, likeness = estimates.delay_s(
             measurement[command][run], measurement[response][run], measurement.time_s[run]
         )
-        title = SIGNALS[response].title.lower()
+        title = in_sentence(SIGNALS[response].title)
         values = {"delay_s": found, "correlation": likeness}
         if not abs(likeness) > 0.2:
             sentence = f"The delay from command to {title} cannot be told; their movements hardly agree."
@@ -152,7 +153,7 @@ def _speed_sign(
     expected = np.concatenate([estimates.changes_over(travelled, cut) for cut in edges])
     # The speed over the position's derivative, so that a speed in rpm reads 9.55.
     slope = estimates.slope(expected, moved)
-    title = SIGNALS[position].title.lower()
+    title = in_sentence(SIGNALS[position].title)
     values = {"ratio": slope.ratio, "correlation": slope.correlation}
     if not abs(slope.correlation) > 0.5:
         sentence = f"Motor speed and the derivative of the {title} hardly agree (correlation {slope.correlation:.2f})."

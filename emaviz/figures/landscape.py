@@ -9,7 +9,6 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
-from ema_model.actuator.titles import in_sentence
 from ema_model.faults import FAULTS
 from ema_model.identification.run import ALGORITHMS as TITLES
 from emaviz.figures import theme
@@ -89,7 +88,7 @@ def sentences(found: Mapping[str, Way]) -> Sequence[str]:
 
 def axis_title(k: int) -> str:
     """k has no unit; its name and what it means."""
-    return f"{FAULTS[k].name}  {in_sentence(FAULTS[k].title)} [–]"
+    return f"{FAULTS[k].label} [–]"
 
 
 def round_values(low: float, high: float) -> list[float]:

@@ -6,10 +6,10 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
-from ema_model.actuator.titles import in_sentence
 from ema_model.comparison.residuals import Residuals
 from ema_model.discovery import Candidate
 from ema_model.measurement import SIGNALS
+from ema_model.titles import in_sentence
 from emaviz.discovery_look import Look
 from emaviz.discovery_words import effect_title
 from emaviz.figures import theme

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ema_model.actuator.titles import in_sentence
 from ema_model.faults import FAULTS, NAMES
 from emaviz.figures.colours import TRUTH
 
@@ -43,9 +42,9 @@ def plane(swarms: Sequence[Swarm], x: int, y: int, truth: Array | None = None, t
         return _LEFT + (right - _LEFT) * k[:, x], low - (low - _TOP) * k[:, y]
 
     parts = [_grid(right, low)]
-    parts.append(_text((_LEFT + right) / 2, _PLANE_HEIGHT - 4, f"{NAMES[x]}  {in_sentence(FAULTS[x].title)}", "middle"))
+    parts.append(_text((_LEFT + right) / 2, _PLANE_HEIGHT - 4, FAULTS[x].label, "middle"))
     turned = f'transform="rotate(-90 12 {(_TOP + low) / 2:.0f})"'
-    parts.append(_text(12, (_TOP + low) / 2, f"{NAMES[y]}  {in_sentence(FAULTS[y].title)}", "middle", turned))
+    parts.append(_text(12, (_TOP + low) / 2, FAULTS[y].label, "middle", turned))
     for swarm, trail in zip(swarms, trails):
         if len(trail) > 1:
             points = " ".join(f"{px:.1f},{py:.1f}" for px, py in zip(*at(trail)))

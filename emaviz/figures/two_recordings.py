@@ -9,7 +9,6 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
-from ema_model.actuator.titles import in_sentence
 from ema_model.faults import FAULTS
 from ema_model.measurement import SIGNALS
 from emaviz.figures.colours import DIFFERENCE, MONITOR, REFERENCE
@@ -86,7 +85,7 @@ def table(first: Entry, second: Entry) -> str:
         known = [value for value in values if value is not None]
         apart = len(known) == 2 and abs(known[0] - known[1]) > 0.02
         mark = f' style="color:{DIFFERENCE};font-weight:600"' if apart else ""
-        rows.append(_row(f"{fault.name} {in_sentence(fault.title)}", *(f"<span{mark}>{cell}</span>" for cell in cells)))
+        rows.append(_row(fault.label, *(f"<span{mark}>{cell}</span>" for cell in cells)))
     return (
         '<div style="padding:4px 10px;font-size:12.5px;font-variant-numeric:tabular-nums">'
         f'<table style="width:100%;border-collapse:collapse">{"".join(rows)}</table></div>'

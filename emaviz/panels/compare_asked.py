@@ -6,8 +6,8 @@ from typing import Any
 
 import viser
 
-from ema_model.calibration.fit import unit_of
 from ema_model.measurement import SIGNALS
+from ema_model.titles import unit_of
 from emaviz.comparing import COMPARABLE, Comparing
 from emaviz.data_folder import ACTUATOR_SUFFIX
 from emaviz.figures import quantity

@@ -5,14 +5,13 @@ from __future__ import annotations
 import html
 from collections.abc import Sequence
 
-from ema_model.actuator.titles import in_sentence
 from ema_model.discovery import Candidate
 from ema_model.effects import find
+from ema_model.titles import in_sentence, parameter_title, unit_of
 from emaviz.discovery_look import Look
 from emaviz.discovery_words import effect_title
 from emaviz.figures import quantity
 from emaviz.figures.quantity import number
-from emaviz.setting_words import readable
 
 BOX = 'style="padding:2px 12px 6px;font-size:13px;line-height:1.45"'
 DIM = 'style="opacity:.65"'
@@ -57,9 +56,8 @@ def strength(look: Look, one: Candidate) -> str:
     effect = find(one.name)
     first = effect.parameters[0]
     value, half = one.settings[first.name], look.uncertainty(one)
-    name, _, unit = readable(first.name).rstrip("]").partition(" [")
-    shown = quantity.Quantity("", unit).scaled([value])
-    told = f"{name.lower()} {number(shown.factor * value)}"
+    shown = quantity.Quantity("", unit_of(first.name)).scaled([value])
+    told = f"{in_sentence(parameter_title(first.name))} {number(shown.factor * value)}"
     if half is not None:
         told += f" ± {number(shown.factor * half, 2)}"
     told = f"{told} {shown.unit}".rstrip()

@@ -9,9 +9,9 @@ from typing import Any
 import plotly.graph_objects as go
 import viser
 
-from ema_model.actuator.titles import in_sentence
 from ema_model.discovery import Candidate
 from ema_model.effects import Effect, find
+from ema_model.titles import in_sentence, parameter_title, unit_of
 from emaviz.discovering import Discovering
 from emaviz.discovery_look import Look
 from emaviz.discovery_words import effect_title
@@ -19,7 +19,6 @@ from emaviz.figures import quantity, signature
 from emaviz.figures.quantity import number
 from emaviz.panels import discover_cards as cards
 from emaviz.panels.page import Page
-from emaviz.setting_words import readable
 
 CONFIG = {"displayModeBar": False, "responsive": False}
 
@@ -115,7 +114,6 @@ def about(effect: Effect, equation: bool = True) -> str:
 def typical(effect: Effect) -> str:
     """'Amplitude 6, 12, 24 mN·m: slight, clear, strong.'"""
     first = effect.parameters[0]
-    name, _, unit = readable(first.name).rstrip("]").partition(" [")
-    shown = quantity.Quantity("", unit).scaled(effect.severities)
+    shown = quantity.Quantity("", unit_of(first.name)).scaled(effect.severities)
     values = ", ".join(number(shown.factor * one, 2) for one in effect.severities)
-    return f"{name} {values} {shown.unit}".rstrip() + ": slight, clear, strong"
+    return f"{parameter_title(first.name)} {values} {shown.unit}".rstrip() + ": slight, clear, strong"

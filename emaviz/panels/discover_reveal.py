@@ -6,16 +6,15 @@ import html
 
 from numpy.typing import ArrayLike
 
-from ema_model.actuator.titles import in_sentence
 from ema_model.challenges.truth import Truth
 from ema_model.discovery import Discovery
 from ema_model.discovery.result import Added
 from ema_model.effects import CATALOGUE, find
 from ema_model.faults import FAULTS, NAMES, sentences
+from ema_model.titles import in_sentence, parameter_title, unit_of
 from emaviz.discovery_words import effect_title, fitted_of
 from emaviz.figures import quantity
 from emaviz.panels.discover_cards import BOX
-from emaviz.setting_words import readable
 
 _GOOD, _BAD = "#2b8a3e", "#e03131"
 _NEAR = 0.25  # of the true value, within which a strength counts as found where its interval misses it
@@ -88,11 +87,10 @@ def _effect(name: str, given: dict[str, float], found: Discovery, added: tuple[A
     low, high = fitted.interval90
     inside = low <= given[first.name] <= high
     near = inside or abs(fitted.value - given[first.name]) <= _NEAR * abs(given[first.name])
-    label, _, unit = readable(first.name).rstrip("]").partition(" [")
-    shown = quantity.Quantity("", unit).scaled([given[first.name]])
+    shown = quantity.Quantity("", unit_of(first.name)).scaled([given[first.name]])
     half = quantity.number(shown.factor * 0.5 * (high - low), 2)
     told = (
-        f"{label.lower()} {shown.text(given[first.name])} in truth, "
+        f"{in_sentence(parameter_title(first.name))} {shown.text(given[first.name])} in truth, "
         f"{quantity.number(shown.factor * fitted.value)} ± {half} {shown.unit} found".rstrip()
     )
     if order is not None:

@@ -12,12 +12,12 @@ import viser
 
 from ema_model.commands import COMMANDS
 from ema_model.faults import FAULTS, HEALTHY, sentences
+from ema_model.titles import labelled
 from emaviz.panels.explore_plant import PlantControls
 from emaviz.panels.explore_presets import CUSTOM, PRESETS, name_of
 from emaviz.panels.explore_start import StartHere
 from emaviz.panels.page import Page
 from emaviz.panels.page_style import LONG_LABELS
-from emaviz.setting_words import readable
 from emaviz.state import MONITORS
 
 _DECIMALS = 6  # that a command's settings may have
@@ -149,7 +149,7 @@ class ExplorePanel:
         inputs = []
         for f in fields(COMMANDS[name]):
             default: Any = f.default
-            label = readable(f.name)
+            label = labelled(f.name)
             if isinstance(default, tuple):
                 entry = self._page.server.gui.add_text(label, "+".join(f"{value:g}" for value in default))
             else:

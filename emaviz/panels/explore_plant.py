@@ -8,8 +8,8 @@ from typing import Any
 import viser
 
 from ema_model.effects import CATALOGUE, find
+from ema_model.titles import labelled
 from emaviz.panels.page import Page
-from emaviz.setting_words import readable
 
 _NONE = "–"
 
@@ -97,7 +97,7 @@ class PlantControls:
                 value = session.settings.effects[name][parameter.name]
                 span = parameter.high - parameter.low
                 entry = gui.add_number(
-                    readable(parameter.name),
+                    labelled(parameter.name),
                     int(value) if parameter.integer else value,
                     min=parameter.low,
                     max=parameter.high,

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import viser
 
-from ema_model.actuator.titles import in_sentence
 from ema_model.errors import InputError
 from ema_model.faults import FAULTS
 from ema_model.identification.run import ALGORITHMS
@@ -22,7 +21,7 @@ from emaviz.worker import Steps, Worker
 
 _BEST = "the answer"
 _WHOLE, _CLOSE = "all of 0 … 1", "close to it"
-_NAMES = tuple(f"{fault.name} {in_sentence(fault.title)}" for fault in FAULTS)
+_NAMES = tuple(fault.label for fault in FAULTS)
 _CONFIG = {"displayModeBar": False, "responsive": False}
 _BOX = 'style="padding:2px 12px;font-size:12.5px;line-height:1.45"'
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from ema_model.actuator.titles import in_sentence
 from ema_model.faults import FAULTS, HEALTHY
 from emaviz.figures import swarm
 from emaviz.figures.convergence import colour
@@ -12,7 +11,7 @@ from emaviz.identifying import Frame, Race, Track
 from emaviz.panels.page import Page
 
 _PLANE, _LINES = "points over two k", "lines across all k"
-_NAMES = tuple(f"{fault.name} {in_sentence(fault.title)}" for fault in FAULTS)
+_NAMES = tuple(fault.label for fault in FAULTS)
 
 
 class SwarmView:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import html
 
-from ema_model.actuator.titles import in_sentence
 from ema_model.faults import FAULTS
 from ema_model.identification.run import Identification
-from emaviz.setting_words import run_in_words
+from ema_model.titles import in_sentence
+from emaviz.run_words import run_in_words
 
 _BOX = 'style="padding:4px 12px;font-size:13px;line-height:1.45"'
 _GOOD, _BAD, _WARNING = "#2b8a3e", "#e03131", "#e8590c"
@@ -32,7 +32,7 @@ def sure_words(answer: Identification | None) -> str:
     elif sure.healthy:
         lines.append(_line(_GOOD, "Healthy", "no k is surely off (joint test at 1 %)"))
     else:
-        named = ", ".join(f"{fault.name} {in_sentence(fault.title)}" for fault in FAULTS if fault.name in sure.alarms)
+        named = ", ".join(fault.label for fault in FAULTS if fault.name in sure.alarms)
         lines.append(_line(_BAD, "Not healthy", named or "all k together, though no single one stands out"))
     for group in sure.ambiguous:
         names = " and ".join(_named(name) for name in group)

@@ -9,12 +9,12 @@ from typing import Any
 import viser
 
 from ema_model.effects import CATALOGUE, Effect, find
+from ema_model.titles import labelled
 from emaviz.figures.effect_signature import EffectCharts, small_picture
 from emaviz.library import RUNS, Felt, Library
 from emaviz.panels import discover_cards as cards
 from emaviz.panels.discover_effect import about
 from emaviz.panels.page import Page
-from emaviz.setting_words import readable
 
 _CARD = (
     "height:auto!important;min-height:52px;padding:4px 130px 4px 9px;font-weight:400;font-size:12px;"
@@ -151,10 +151,10 @@ class EffectPage:
             low, high = max(one.low, -most), min(one.high, most)
         low, high = min(low, middle), max(high, middle)
         if one.integer:
-            slider = gui.add_slider(readable(one.name), int(one.low), int(min(one.high, 48)), 1, int(middle))
+            slider = gui.add_slider(labelled(one.name), int(one.low), int(min(one.high, 48)), 1, int(middle))
         else:
             step = float(f"{(high - low) / 400.0:.0e}")
-            slider = gui.add_slider(readable(one.name), low, high, step, middle, hint=one.meaning)
+            slider = gui.add_slider(labelled(one.name), low, high, step, middle, hint=one.meaning)
         slider.on_update(lambda event: event.client and self._ask())
         return slider
 

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ema_model.actuator.titles import in_sentence
 from ema_model.discovery import Discovery
 from ema_model.effects import find
+from ema_model.titles import in_sentence
 from emaviz import discovery_words as words
 from emaviz.figures.candidates import ranked
 from emaviz.figures.discovery_tracks import Track

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ema_model.actuator.titles import in_sentence
 from ema_model.comparison.result import Comparison
+from ema_model.titles import in_sentence
 from emaviz.figures import calibration_scores, quantity
 from emaviz.report.markup import bullets, paragraph, table
 from emaviz.report.section import Figures, Section

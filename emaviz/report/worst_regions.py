@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ema_model.comparison.result import Comparison, Region
+from ema_model.titles import in_sentence
 from emaviz.figures import quantity, residual_against, residual_time
 from emaviz.figures.region_blocks import time_ranges
 from emaviz.report.markup import escape, link, paragraph
@@ -54,7 +55,7 @@ def _details(comparison: Comparison, region: Region) -> str:
     shown = quantity.of_residual(comparison, region.signal).scaled(region.rmse)
     low, high = (quantity.number(axis.factor * value) for value in (region.low, region.high))
     return (
-        f"{axis.title} {low} … {high} {axis.unit}: {shown.title.lower()} {shown.text(region.rmse)} rms, "
+        f"{axis.title} {low} … {high} {axis.unit}: {in_sentence(shown.title)} {shown.text(region.rmse)} rms, "
         f"{shown.text(region.mean)} on average; {quantity.number(region.excess)} times the floor, "
         f"in {np.count_nonzero(region.blocks)} of {len(region.blocks)} blocks."
     )

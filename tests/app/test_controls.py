@@ -224,7 +224,7 @@ def test_the_search_is_looked_at_from_all_sides_and_its_landscape_drawn(page, ap
     choose(page, "Swarm as", "points over two k")
     choose(page, "Across", "k2 backlash")
     choose(page, "Upwards", "k8 proportional gain")
-    page.locator("svg text", has_text="k8  proportional gain").first.wait_for()
+    page.locator("svg text", has_text="k8 proportional gain").first.wait_for()
 
     show(page, "Answer")
     choose(page, "Whose", "Dandelion")

@@ -14,7 +14,7 @@ from ema_model.identification.separation import Suggestion
 from emaviz.figures import landscape as figures
 from emaviz.landscape import Landscape, Way, extent, slices, ways
 from emaviz.panels.identify_words import sure_words
-from emaviz.setting_words import run_in_words
+from emaviz.run_words import run_in_words
 
 TRUTH = vector({"k1": 0.3, "k6": 0.4})
 

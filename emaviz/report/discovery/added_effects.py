@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from ema_model.actuator.titles import in_sentence
 from ema_model.discovery.result import Added
 from ema_model.effects import Effect, find
+from ema_model.titles import in_sentence
 from emaviz.discovery_words import effect_title, fitted_of
 from emaviz.figures import quantity
 from emaviz.report.discovery.subject import Told
@@ -25,16 +25,14 @@ class AddedEffects(Section[Told]):
 
 def _card(told: Told, index: int, one: Added) -> str:
     effect = find(one.name)
-    same = (
-        "" if not one.same_as else f"Could as well be: {', '.join(in_sentence(effect_title(n)) for n in one.same_as)}."
-    )
+    rivals = ", ".join(in_sentence(effect_title(name)) for name in one.same_as)
     return (
         f'<div class="region" id="effect-{index}"><h3>{index}. {escape(effect.title)}</h3>'
         + f'<p class="equation">{escape(effect.equation)}</p>'
         + paragraph(effect.explanation)
         + _parameters(told, one)
         + paragraph(_fall(one))
-        + (paragraph(same, "warning") if same else "")
+        + (paragraph(f"Could as well be: {rivals}.", "warning") if rivals else "")
         + paragraph(_known(effect), "small")
         + "</div>"
     )

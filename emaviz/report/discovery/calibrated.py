@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ema_model.actuator.titles import in_sentence
 from ema_model.faults import NAMES
+from ema_model.titles import in_sentence
 from emaviz.discovery_words import parameter
 from emaviz.figures import quantity
 from emaviz.report.discovery.subject import Told

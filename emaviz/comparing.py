@@ -10,9 +10,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ema_model.actuator import Actuator
 from ema_model.comparison.result import Comparison
 from ema_model.errors import InputError
@@ -23,42 +20,26 @@ from ema_model.measurement import (
     can_have_current,
     guess_mapping,
     read_columns,
-    read_measurement,
-    read_side_file,
     write_side_file,
 )
-from ema_model.measurement.health import Health, health
 from ema_model.measurement.refusal import shown
-from ema_model.measurement.side_file import SideFile, find_side_file
-from ema_model.recordings import read_recording, usual_mapping
+from ema_model.measurement.side_file import SideFile
+from ema_model.recordings import usual_mapping
 from ema_model.titles import in_sentence
 from emaviz import actuator_files
 from emaviz.comparing_keep import keep
 from emaviz.data_folder import DataFolder
 from emaviz.listeners import notify
+from emaviz.opened import Opened, measured, side_file_of
 from emaviz.session import Session
 from emaviz.state import number
 from emaviz.worker import Steps, Worker
-
-Array = NDArray[np.float64]
 
 MOST_RECORDINGS = 20
 # By their names on a rotary axis.  The speed is mostly the position's difference, so it is not fitted unless asked for.
 COMPARABLE = ("current_A", "motor_position_rad", "user_position_rad", "motor_speed_rad_s")
 USUAL = {name: 1.0 for name in COMPARABLE[:3]}
 _MOST_WEIGHT = 1e3
-
-
-@dataclass(frozen=True, eq=False)
-class Opened:
-    """A chosen file: as a table until its columns are mapped, then also as a measurement."""
-
-    name: str  # relative to the data folder
-    path: Path
-    columns: dict[str, Array]  # as they stand in the file
-    mapping: ColumnMapping  # in use, or guessed
-    measurement: Measurement | None = None
-    health: Health | None = None
 
 
 @dataclass
@@ -123,45 +104,26 @@ class Comparing:
         if name not in self.opened and len(self.opened) >= MOST_RECORDINGS:
             raise InputError(f"{MOST_RECORDINGS} recordings are the most to compare at once; remove one first")
         columns = read_columns(path)
-        side = self._side(path)
+        side = side_file_of(path, self.folder)
         refused = self._take_actuator(side) if side is not None else None
         of_actuator = usual_mapping(self.actuator, columns)
         if side is not None or set(columns) <= set(SIGNALS) or of_actuator.entries:
             mapping = (side.mapping if side else None) or of_actuator
-            self._read(Opened(name, path, columns, mapping if mapping.entries else guess_mapping(columns)))
+            table = Opened(name, path, columns, mapping if mapping.entries else guess_mapping(columns))
+            self._opened(measured(table, self.actuator))
         else:
             self._opened(Opened(name, path, columns, guess_mapping(columns)))
         if refused is not None:
             raise refused  # told once the recording is there all the same
-
-    def _side(self, path: Path) -> SideFile | None:
-        """The side file of a recording, or of its folder."""
-        beside = self.folder.beside(path)
-        found = find_side_file(path)
-        if found is None:
-            return None
-        if found != beside and not self.folder.holds(found):
-            raise InputError(f"{found.name} leads out of the data folder; replace the link by the file")
-        return read_side_file(found)
 
     def _map(self, name: str, mapping: ColumnMapping) -> None:
         opened = self.opened.get(name)
         if opened is None:
             return
         beside = self.folder.beside(opened.path)
-        side = replace(self._side(opened.path) or SideFile(), mapping=mapping, path=str(beside))
-        self._read(replace(opened, mapping=mapping), side)  # first, so that nothing wrong is remembered
-        write_side_file(side, beside)
-
-    def _read(self, opened: Opened, side: SideFile | None = None) -> None:
-        measurement = (
-            read_recording(opened.path, self.actuator) if side is None else read_measurement(opened.path, side=side)
-        )
-        limit: float | None = self.actuator.controller.current_limit_A
-        if not np.isfinite(limit):  # a drive whose limit is not known
-            limit = None
-        card = health(measurement, current_limit_A=limit, pole_pairs=self.actuator.motor.pole_pairs)
-        self._opened(replace(opened, measurement=measurement, health=card))
+        side = replace(side_file_of(opened.path, self.folder) or SideFile(), mapping=mapping, path=str(beside))
+        self._opened(measured(replace(opened, mapping=mapping), self.actuator, side))
+        write_side_file(side, beside)  # last, so that nothing wrong is remembered
 
     def _opened(self, opened: Opened) -> None:
         self.opened[opened.name] = opened

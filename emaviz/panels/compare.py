@@ -11,8 +11,9 @@ from ema_model.comparison.result import Comparison
 from ema_model.errors import InputError
 from ema_model.measurement.formats import FORMATS
 from emaviz.actuator_files import UPLOADED
-from emaviz.comparing import Comparing, Opened
+from emaviz.comparing import Comparing
 from emaviz.data_folder import ACTUATOR_SUFFIX, CHALLENGE_SUFFIX, SESSION_SUFFIX
+from emaviz.opened import Opened
 from emaviz.panels.compare_asked import AskedControls
 from emaviz.panels.compare_cards import health_card, recordings_list
 from emaviz.panels.compare_mapping import MappingStep

@@ -7,9 +7,9 @@ from collections.abc import Iterable, Sequence
 
 from ema_model.measurement import SIGNALS, ColumnMapping
 from ema_model.measurement.health import Finding, Health
-from emaviz.comparing import Opened
 from emaviz.figures import quantity
 from emaviz.figures.calibration_scores import Score
+from emaviz.opened import Opened
 
 _MARKS = {"good": ("✓", "#2b8a3e"), "note": ("●", "#1c7ed6"), "warning": ("▲", "#e8590c")}
 _BOX = 'style="padding:0 10px 6px;font-size:12.5px;line-height:1.4"'

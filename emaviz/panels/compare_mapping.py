@@ -11,7 +11,8 @@ import viser
 from ema_model.errors import InputError
 from ema_model.measurement import SIGNALS, ColumnMapping, MappedColumn
 from ema_model.measurement.units import known_units
-from emaviz.comparing import Comparing, Opened
+from emaviz.comparing import Comparing
+from emaviz.opened import Opened
 from emaviz.panels.compare_cards import mapping_table
 from emaviz.panels.page import Page
 

@@ -11,8 +11,8 @@ import viser
 
 from ema_model.comparison.result import Comparison, Region
 from ema_model.measurement import SIGNALS
-from emaviz.comparing import Opened
 from emaviz.figures import mapped_columns
+from emaviz.opened import Opened
 from emaviz.panels.compare_plots import ComparePlots, View
 from emaviz.panels.page import Page
 

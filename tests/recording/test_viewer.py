@@ -132,7 +132,11 @@ def test_view_prints_the_address_and_ends_with_an_interrupt(tmp_path):
 
     with RecordingWriter(tmp_path / "a.rrd"):
         pass
-    code = "import sys; from emaviz.recording.viewer import view; view(sys.argv[1], open_browser=False)"
+    # Whoever runs the tests in the background has the interrupt ignored, and so would the viewer.
+    code = (
+        "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler); "
+        "from emaviz.recording.viewer import view; view(sys.argv[1], open_browser=False)"
+    )
     process = subprocess.Popen([sys.executable, "-c", code, str(tmp_path / "a.rrd")], stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None and "a.rrd: http://127.0.0.1:" in process.stdout.readline()
     process.send_signal(signal.SIGINT)

@@ -16,10 +16,15 @@ from collections.abc import Callable, Generator
 Job = Callable[[], None]
 Steps = Generator[None, None, None]
 
+_ATTENDED_S = 0.3  # after a quick job, in which another one is likely: somebody drags a slider
+_STEP_TO_REST = 2.0  # meanwhile, the rest after a long job's step over the time that the step took
+_LONGEST_REST_S = 0.05
+
 
 class Worker:
     """Runs quick jobs by kind, latest wins, and one long job in steps, all on one thread.
 
+    While quick jobs keep coming, the long one takes a third of the thread's time.
     rest_s: the least time between two quick jobs of one kind; the screen's thread takes it so that the
     browser, which has no back-pressure, is not sent more than it can draw.
     """
@@ -28,6 +33,7 @@ class Worker:
         self._on_error = on_error
         self._rest_s = rest_s
         self._last: dict[str, float] = {}
+        self._attended = -math.inf  # when the last quick job ended
         self._wake = threading.Condition()
         self._quick: dict[str, Job] = {}
         self._long: Steps | None = None
@@ -84,10 +90,20 @@ class Worker:
                     break
             if job is not None:
                 self._guarded(job)
+                self._attended = time.monotonic()
             elif self._long is not None:
+                started = time.monotonic()
                 self._guarded(self._step)
+                self._yield_to_quick_jobs(time.monotonic() - started)
         if self._long is not None:
             self._guarded(self._long.close)
+
+    def _yield_to_quick_jobs(self, step_s: float) -> None:
+        """Rests after a step while quick jobs keep coming, so that they, and who draws them, find the machine free."""
+        if time.monotonic() - self._attended < _ATTENDED_S:
+            with self._wake:
+                if not (self._quick or self._closing or self._long is None):
+                    self._wake.wait(min(_STEP_TO_REST * step_s, _LONGEST_REST_S))
 
     def _next_job(self) -> Job | None:
         """The oldest quick job whose kind has rested, taken off the list."""

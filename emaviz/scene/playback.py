@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterator
 
 import numpy as np
@@ -15,10 +16,13 @@ from emaviz.scene.motion import Motion, enlargement, motion
 from emaviz.session import Simulation
 
 _POSES_PER_S = 30.0
-# While a slider is dragged one watches the charts, and in software one picture takes the time of all of them; each
-# pose lets the browser draw pictures for a quarter of a second.
-_POSES_WHILE_CHANGING_PER_S = 2.0
-_CHANGING_S = 1.0  # a run that comes so soon after another one is one of many
+# While a slider is dragged one watches the charts, and without a GPU one picture of the scene takes the time of all of
+# them; each pose lets the browser draw pictures for a quarter of a second.  It sends a slider's value every 50 ms when
+# it has the time: then there is time for poses, too.
+_POSES_WHILE_CHANGING_PER_S = 15.0
+_POSES_WHILE_BEHIND_PER_S = 0.5
+_IN_TIME_S = 0.057  # between two runs of a browser that is not behind
+_CHANGING_S = 0.6  # a run that comes so soon after another one is one of many
 _TOLD_PER_S = 8.0  # play-heads are redrawn at this pace
 SPEEDS = {"1 : 1": 1.0, "1 : 5": 0.2, "1 : 10": 0.1, "1 : 20": 0.05, "1 : 50": 0.02, "1 : 200": 0.005}
 
@@ -37,7 +41,7 @@ class Playback:
         self._clock_s = 0.0
         self._stale = False  # what the scene shows is not the run at the clock
         self._damaged: Motion | None = None  # whose faults the scene shows
-        self._came_s = (-np.inf, -np.inf)  # when the last two runs came
+        self._came_s: deque[float] = deque([-1e9] * 6, maxlen=6)  # when the last runs came
         self._posing = threading.Lock()
         self._wake = threading.Event()
         self._closing = False
@@ -50,7 +54,7 @@ class Playback:
         with self._posing:
             self.motion = shown
             self._stale = True
-            self._came_s = self._came_s[1], time.monotonic()
+            self._came_s.append(time.monotonic())
         self._wake.set()
 
     def play(self, playing: bool) -> None:
@@ -111,7 +115,8 @@ class Playback:
                 told = now
                 self._moved(self._clock_s, shown.duration_s)
             if self.playing or self._changing:
-                time.sleep(max(0.0, 1.0 / self._pace - (time.monotonic() - now)))
+                while not self._closing and (left := 1.0 / self._pace - (time.monotonic() - now)) > 0.0:
+                    time.sleep(min(left, 1.0 / _POSES_PER_S))  # the pace may change meanwhile
             elif not self._stale:
                 self._wake.wait()
                 last = time.monotonic()
@@ -120,13 +125,16 @@ class Playback:
     @property
     def _changing(self) -> bool:
         """Whether one run follows the other, as while a slider is dragged."""
-        before, last = self._came_s
+        before, last = self._came_s[-2], self._came_s[-1]
         return last - before < _CHANGING_S and time.monotonic() - last < _CHANGING_S
 
     @property
     def _pace(self) -> float:
         """Poses per second."""
-        return _POSES_WHILE_CHANGING_PER_S if self._changing else _POSES_PER_S
+        if not self._changing:
+            return _POSES_PER_S
+        in_time = np.median(np.diff(self._came_s)) <= _IN_TIME_S
+        return _POSES_WHILE_CHANGING_PER_S if in_time else _POSES_WHILE_BEHIND_PER_S
 
     def _show_damage(self, shown: Motion) -> None:
         if shown is not self._damaged:

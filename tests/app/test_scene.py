@@ -177,6 +177,22 @@ def test_a_shorter_run_is_played_from_within(actuator):
         playback.close()
 
 
+def test_the_picture_gives_way_to_the_charts_of_a_browser_that_is_behind(actuator):
+    playback = Playback(Recorder(), actuator, lambda *_: None)
+    try:
+
+        def pace(between_runs_s, runs=6):
+            playback._came_s.extend([-1e9] * 6)
+            playback._came_s.extend(time.monotonic() - between_runs_s * np.arange(runs)[::-1])
+            return playback._pace
+
+        assert pace(0.05, runs=1) == pace(2.0) == 30.0, "a single change"
+        assert pace(0.05) == 15.0, "a slider sends its value every 50 ms"
+        assert pace(0.08) == 0.5
+    finally:
+        playback.close()
+
+
 class Meshes:
     """A scene that keeps the meshes that are in it."""
 

@@ -165,3 +165,28 @@ def test_quick_jobs_run_while_a_long_step_breathes():
         time.sleep(0.01)
     worker.close()
     assert done == ["quick", "long"]
+
+
+def test_a_long_job_makes_room_while_quick_ones_keep_coming(worker):
+    """A slider is dragged for a second during an identification, which goes on meanwhile, but slower."""
+    steps = 0
+
+    def long():
+        nonlocal steps
+        while True:
+            time.sleep(0.004)
+            steps += 1
+            yield
+
+    def steps_in_half_a_second(drag):
+        before, end = steps, time.monotonic() + 0.5
+        while time.monotonic() < end:
+            if drag:
+                worker.post("slider", lambda: None)
+            time.sleep(0.05)
+        return steps - before
+
+    worker.start(long())
+    alone = steps_in_half_a_second(drag=False)
+    beside = steps_in_half_a_second(drag=True)
+    assert 0 < beside < 0.7 * alone

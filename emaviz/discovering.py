@@ -77,6 +77,8 @@ class Discovering:
             told = self._begin(self.source.recipe(), tell)
             self._restoring = None  # what a session brought is put away
             self._assess(told, tell)
+            while told.take_faults(tell):
+                self._assess(told, tell)
 
         return self.run.begin("Calibrating the model", job)
 

@@ -17,6 +17,7 @@ from ema_model.discovery.story import Step
 from ema_model.discovery.trial import Trial
 from ema_model.effects import CATALOGUE, catalogue_name, find
 from ema_model.errors import InputError
+from ema_model.faults import NAMES
 from emaviz.discovery_source import actuator_of
 from emaviz.discovery_trials import check_value
 from emaviz.state import number
@@ -34,6 +35,7 @@ def steps_of(story: Story) -> list[dict[str, Any]]:
         {
             "model": as_toml(step.fit.actuator),
             "starts": step.fit.starts,
+            "faults": list(step.fit.faults),
             "same_as": sorted({name for one in step.added if one.key not in _keys(before) for name in one.same_as}),
         }
         for before, step in pairwise(story.steps)
@@ -58,7 +60,7 @@ def checked(steps: Any) -> list[dict[str, Any]]:
     for one in steps:
         if not isinstance(one.get("model"), str) or not isinstance(one.get("starts"), dict):
             raise InputError(_DAMAGED)
-        if not all(_is_near(value) for value in one["starts"].values()):
+        if not all(_is_near(value) for value in one["starts"].values()) or not _are_faults(one.get("faults", [])):
             raise InputError(_DAMAGED)
     return steps
 
@@ -100,10 +102,14 @@ def _take(story: Story, saved: Mapping[str, Any], tell: Tell) -> None:
         replace(before, effects=model.effects, tolerances={**others, **own}),
         {str(name): float(x) for name, x in saved["starts"].items()},
         tell,
+        tuple(saved.get("faults", ())),
     )
+    more = found.faults[len(story.current.faults) :]
     new = [key for key in model.effects if key not in before.effects]
     gone = [key for key in before.effects if key not in model.effects]
-    if len(gone) == 1 and not new:
+    if more and not (new or gone):
+        story.add(Trial(Candidate(more[0], 0.0, {}), {}, found, story.current.chi2 - found.chi2, more))
+    elif len(gone) == 1 and not new:
         story.remove(gone[0], found)
     elif new and not gone:
         effects = {key: dict(model.effects[key]) for key in new}
@@ -119,6 +125,10 @@ def _take(story: Story, saved: Mapping[str, Any], tell: Tell) -> None:
 
 def _keys(step: Step) -> set[str]:
     return {one.key for one in step.added}
+
+
+def _are_faults(names: Any) -> bool:
+    return isinstance(names, list) and all(name in NAMES for name in names) and len(set(names)) == len(names)
 
 
 def _is_near(value: Any) -> bool:

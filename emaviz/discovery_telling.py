@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -15,6 +15,8 @@ from ema_model.effects import CATALOGUE
 from emaviz.discovery_look import Assessment, Look, assessed, look_at
 from emaviz.discovery_record import experiment_saved, steps_of
 from emaviz.discovery_trials import Trials
+
+_SHARE, _MOST = 0.25, 3  # of the best effect's score, and how many effects are refitted to compare a fault with
 
 
 @dataclass(eq=False)
@@ -37,6 +39,15 @@ class Telling:
         """Looks at what the last model leaves; takes a second, and the first time a compilation."""
         found = self.known[self.story.steps[-1]] = assessed(self.story)
         self.first = self.first or found.candidates
+
+    def take_faults(self, tell: Callable[[str], None]) -> bool:
+        """Takes the actuator's fault into the model that tells more than any effect would; False if there is none."""
+        story, ranked = self.story, self.known[self.story.steps[-1]].candidates
+        fault = story.fault(ranked, lambda: story.tried(ranked, _SHARE, _MOST, tell), tell)
+        if fault:
+            story.add(fault)
+            self.first = ()  # what was ranked was ranked without it
+        return fault is not None
 
     def add(self, trial: Trial, alike: Sequence[str]) -> None:
         """Takes a trial for the next model; alike: effects that cannot be told from it."""

@@ -10,6 +10,8 @@ from ema_model.discovery import Discovery
 from ema_model.discovery.result import Added, Rung
 from ema_model.effects import find
 from ema_model.errors import InputError
+from ema_model.faults import FAULTS, NAMES
+from ema_model.faults import sentences as phrases_of
 from ema_model.measurement import SIGNALS
 from ema_model.titles import in_sentence
 from emaviz.figures.quantity import number, parameter_title
@@ -30,10 +32,13 @@ FLOOR_NOTE = (
 
 def headline(found: Discovery) -> str:
     """The verdict in one sentence."""
+    faulty = f"the fault{'s' if len(_faults(found)) > 1 else ''} {_listed(_faults(found))}"
     if found.verdict == "effects_found":
         # Once, where two orders of one effect were added.
         names = _listed(list(dict.fromkeys(in_sentence(effect_title(one.name)) for one in found.effects)))
-        return f"The model lacks {names}."
+        return f"The model lacks {names}{f', and the actuator has {faulty}' if found.faults else ''}."
+    if found.verdict == "adequate" and found.faults:
+        return f"No physics is missing: the actuator has {faulty}."
     if found.verdict == "adequate" and found.parameters_outside_tolerance:
         return "No physics is missing, but not all parameters are within their tolerance."
     text = VERDICTS.get(found.verdict, found.verdict.replace("_", " "))
@@ -49,6 +54,8 @@ def sentences(found: Discovery) -> list[str]:
     else:
         held = "" if last.holdout_rmse is None else f" ({number(last.holdout_rmse)} times on what was not fitted)"
         told.append(f"The calibrated model's error is {number(last.rmse)} times the floor{held}.")
+    if found.faults:
+        told.append(f"{'; '.join(faults(found).values())}. What is told of effects is told beside this.")
     for one in found.effects:
         if one.same_as:
             rivals = _listed([in_sentence(effect_title(name)) for name in one.same_as])
@@ -77,6 +84,18 @@ def next_experiment(found: Discovery) -> list[str]:
         asked += f", and measure the {_listed(names)} as well"
     rivals = _listed([in_sentence(effect_title(name)) for name in best.separates])
     return [f"{asked}.", f"It would tell {rivals} apart: χ² of {best.expected_chi2:.0f} is expected between them."]
+
+
+def faults(found: Discovery) -> dict[str, str]:
+    """Each fault that was found, by name: 'k2 backlash 0.201 ± 0.012 (backlash 209 µrad)'."""
+    phrases = dict(zip(NAMES, phrases_of(found.calibration.k, found.actuator)))
+    labels = {fault.name: fault.label for fault in FAULTS}
+    return {name: f"{labels[name]} {value(one)} ({phrases[name]})" for name, one in found.faults.items()}
+
+
+def _faults(found: Discovery) -> list[str]:
+    """Their titles; a phase belongs to its modulus."""
+    return [fault.label for fault in FAULTS if fault.name in found.faults and fault.name != "k7"]
 
 
 def effect_title(name: str) -> str:

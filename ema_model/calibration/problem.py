@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 
 BOUND = 3.0  # σ
 _STEP = 0.1  # σ, of the differences: beyond the roughness that stick and slip give
+_STEP_OF_K = 0.03  # of a k's: it spans far more
 _K_SIGMA = 0.29  # a k may be anywhere in [0, 1]
 _TURNED_SIGMA_RAD = 2e-3  # how well an encoder tells where the motor starts
 
@@ -89,7 +90,8 @@ class Problem:
         n = len(x)
         points = np.repeat(x[None, :], 2 * n + 1, axis=0)
         least, greatest = self.bounds
-        low, high = np.clip(x - _STEP, least, greatest), np.clip(x + _STEP, least, greatest)
+        step = np.array([_STEP_OF_K if unknown.name in NAMES else _STEP for unknown in self.unknowns])
+        low, high = np.clip(x - step, least, greatest), np.clip(x + step, least, greatest)
         points[np.arange(n), np.arange(n)] = low
         points[n + np.arange(n), np.arange(n)] = high
         residuals = self._residuals(points)

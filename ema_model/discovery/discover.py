@@ -19,7 +19,7 @@ from ema_model.discovery.result import Candidate, Discovery, Experiment
 from ema_model.discovery.story import Story, begun, with_drops
 from ema_model.discovery.trial import LEAST_BIC, Trial, fitted_count, pays
 from ema_model.discovery.unknown import curve_instead, is_a_shape
-from ema_model.discovery.worded import masked, untold
+from ema_model.discovery.worded import as_well, masked, untold
 from ema_model.effects import CATALOGUE, find
 from ema_model.measurement import Measurement
 
@@ -84,6 +84,10 @@ def walk(
         left = story.left()
         ranked = story.ranked(candidates, left)
         trials = story.tried(ranked, _REFITTED_SHARE, _MOST_REFITTED, tell)
+        fault = story.fault(ranked, lambda trials=trials: trials, tell)
+        if fault:
+            story.add(fault)
+            continue
         first = first or with_drops(ranked, trials)
         accepted = [trial for trial in trials if pays(story.current, trial, story.data, story.held)]
         if not accepted:
@@ -137,7 +141,7 @@ def _with_curve(story: Story, curve: Trial | None, unknown: Explanation, tell: P
 
     Parameters that only bent toward it go back: the curve is drawn beside the calibrated model, if one can be.
     """
-    bent = story.steps[1:]
+    bent = story.steps[story.bare :]
     whole = None
     if bent:
         try:
@@ -169,7 +173,8 @@ def result_of(
     """What a story comes to; unknown: what its last model leaves."""
     calibration = story.current.calibration
     named = _named(story)
-    outside = [name for name in calibration.outside_tolerance if not name.startswith("effects.")]
+    faults = {name: calibration.parameters[name] for name in story.current.faults}
+    outside = [name for name in calibration.outside_tolerance if "." in name and not name.startswith("effects.")]
     stand_ins = [path for one in story.added if (path := find(one.name).duplicates)]
     return Discovery(
         verdict=_verdict(story, unknown),
@@ -177,6 +182,7 @@ def result_of(
         effects=[one for one in story.added if one.name in named],
         ladder=story.ladder,
         candidates=candidates,
+        faults=faults,
         parameters_outside_tolerance=list(dict.fromkeys([*stand_ins, *outside])),
         actuator=calibration.actuator,
         plant=story.current.plant,
@@ -184,7 +190,11 @@ def result_of(
         unknown=unknown,
         curve=next((one for one in story.added if one.name not in CATALOGUE), None),
         next_experiment=experiment,
-        warnings=[*story.warnings, *masked(story.added, calibration.actuator.axes)],
+        warnings=[
+            *story.warnings,
+            *masked(story.added, calibration.actuator.axes),
+            *as_well(story.ties, story.added, story.current.faults),
+        ],
     )
 
 

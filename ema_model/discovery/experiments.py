@@ -21,7 +21,6 @@ from ema_model.calibration.problem import Problem
 from ema_model.commands import command
 from ema_model.discovery.fitting import Data, Fit
 from ema_model.discovery.result import Experiment
-from ema_model.faults import HEALTHY
 from ema_model.plants import ClosedLoop, Window
 from ema_model.simulation import Run, simulate_monitor
 
@@ -112,10 +111,13 @@ def expected_chi2(
     rate = float(np.clip(_SAMPLES / seconds, 1000.0, 10_000.0))
     run = Run(command(name, settings), seconds, rate, load)
     try:
-        recording = simulate_monitor(run, first.calibration.actuator)
+        recording = simulate_monitor(run, first.calibration.actuator, first.calibration.k)
         plants = [ClosedLoop([recording], rival.actuator) for rival in (first, second)]
         floors = [_floor(data, plants[0], window) for window in plants[0].windows]
-        played, problem = (Problem(plant, floors, default_free(plant.actuator), HEALTHY, signals) for plant in plants)
+        played, problem = (
+            Problem(plant, floors, default_free(plant.actuator), rival.calibration.k, signals)
+            for plant, rival in zip(plants, (first, second))
+        )
         # Both models go the same way from the command to the blocks, so that the rivals alone make the difference.
         as_played = played.residual(_fitted(first, played))
         residual, jacobian = problem.linearised(_fitted(second, problem))

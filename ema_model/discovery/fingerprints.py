@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from ema_model.actuator import Actuator
 from ema_model.discovery.fitting import Data, Fit
 from ema_model.effects import CATALOGUE, Effect, find
-from ema_model.faults import HEALTHY
 from ema_model.kernel_rows import stack_for
 from ema_model.stacks import Stack
 
@@ -126,7 +125,7 @@ def _changes(data: Data, found: Fit, lanes: list[Lane], switchable: bool) -> Arr
             varied[effect.name][parameter][lane] = value
     plant = data.plant(replace(actuator, effects=resting))
     model = replace(actuator, effects=varied)
-    k = np.tile(np.asarray(HEALTHY, float), (len(lanes) + 1, 1))
+    k = np.tile(found.calibration.k, (len(lanes) + 1, 1))
     shown = [
         plant.signals(window, model, k, *found.calibration.start_of(i))  # pyright: ignore[reportArgumentType]
         for i, window in enumerate(plant.windows)

@@ -60,6 +60,7 @@ class Fit:
     plant: Plant
     calibration: Calibration
     starts: dict[str, float]  # x by name
+    faults: tuple[str, ...] = ()  # k1 … k8 that move beside the parameters
 
     @property
     def residual(self) -> Array:
@@ -115,21 +116,25 @@ def without_effect(actuator: Actuator, name: str) -> Actuator:
 
 
 def fit(
-    data: Data, actuator: Actuator, start: Mapping[str, float] | None = None, tell: Callable[[str], None] | None = None
+    data: Data,
+    actuator: Actuator,
+    start: Mapping[str, float] | None = None,
+    tell: Callable[[str], None] | None = None,
+    faults: tuple[str, ...] = (),
 ) -> Fit:
-    """Calibrates the base parameters and those of the actuator's effects together."""
+    """Calibrates the base parameters, those of the actuator's effects, and these faults (k1 … k8) together."""
     plant = data.plant(actuator)
     calibration = calibrate(
         plant,
         data.floors,
-        free=default_free(actuator),
+        free=(*default_free(actuator), *faults),
         signals=data.signals,
         start=start,
         on_progress=None if tell is None else lambda evaluations: tell(f"fitting: {evaluations} simulations"),
     )
     names = [*calibration.parameters, *calibration.starts]
     starts = {name: float(x) for name, x in zip(names, calibration.x)}
-    return Fit(actuator, plant, calibration, starts)
+    return Fit(actuator, plant, calibration, starts, faults)
 
 
 def holdout_error(data: Data, found: Fit) -> float:
@@ -141,7 +146,7 @@ def holdout_error(data: Data, found: Fit) -> float:
 def holdout_fit(data: Data, found: Fit) -> tuple[float, dict[str, float]]:
     """`floor_ratio` of recordings that were not fitted, and `rms_by_signal`; only their starts are fitted."""
     plant = data.plant(found.calibration.actuator)
-    calibration = calibrate(plant, data.floors, free=(), signals=data.signals)
+    calibration = calibrate(plant, data.floors, free=(), k=found.calibration.k, signals=data.signals)
     ratio = floor_ratio(data, plant, calibration.signals)
     return ratio if math.isfinite(ratio) else math.inf, rms_by_signal(data, plant, calibration.signals)
 

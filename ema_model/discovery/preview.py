@@ -11,7 +11,6 @@ from scipy.optimize import lsq_linear
 
 from ema_model.actuator import Actuator
 from ema_model.discovery.fitting import Data, Fit
-from ema_model.faults import HEALTHY
 from ema_model.plants import Plant
 
 Array = NDArray[np.float64]
@@ -39,7 +38,7 @@ class Preview:
         calibration = self.found.calibration
         model = _with(calibration.actuator, self.name, settings)
         after = [
-            self.plant.signals(window, model, HEALTHY, *calibration.start_of(i))  # pyright: ignore[reportArgumentType]
+            self.plant.signals(window, model, calibration.k, *calibration.start_of(i))  # pyright: ignore[reportArgumentType]
             for i, window in enumerate(self.plant.windows)
         ]
         whole = self.data.over_floor(self.plant, after)[0] - self.data.over_floor(self.found.plant, calibration.signals)

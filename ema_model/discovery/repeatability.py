@@ -15,7 +15,6 @@ from scipy.ndimage import uniform_filter1d
 from ema_model.actuator import Actuator
 from ema_model.calibration.floor import CORRELATED_S
 from ema_model.discovery.fitting import Data, Fit
-from ema_model.faults import HEALTHY
 from ema_model.plants import ClosedLoop
 
 Array = NDArray[np.float64]
@@ -35,7 +34,7 @@ def with_divergence(data: Data, found: Fit) -> tuple[Data, float]:
     fitted = found.calibration.actuator
     inertia = fitted.value("motor.inertia_kgm2")
     neighbour = fitted.varied({"motor.inertia_kgm2": inertia * np.array([1.0, 1.0 + _APART])})
-    k = np.tile(np.asarray(HEALTHY, float), (2, 1))
+    k = np.tile(found.calibration.k, (2, 1))
     floors, lost = [], []
     for i, (window, one) in enumerate(zip(plant.windows, data.floors)):
         shown = plant.signals(window, neighbour, k, *found.calibration.start_of(i))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -92,6 +92,7 @@ class Discovery:
     actuator: Actuator  # with the effects, as calibrated
     plant: Plant  # the recordings as they were fitted: windows with their blocks
     floors: Sequence[Floor]  # of its windows
+    faults: Mapping[str, Calibrated] = field(default_factory=dict)  # k1 … k8 in the last model
     unknown: Explanation | None = None
     curve: Added | None = None  # the torque curve that was added for what is unknown
     next_experiment: Experiment | None = None

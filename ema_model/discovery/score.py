@@ -34,7 +34,7 @@ def scored(found: Fit, prints: Sequence[Fingerprint]) -> list[Candidate]:
 
 def scored_all(found: Fit, prints: Sequence[Fingerprint]) -> list[Candidate]:
     """A candidate for each fingerprint, in their order."""
-    jacobian, gram = _movable(found)
+    jacobian, gram = movable(found)
     return [_scored(found, one, jacobian, gram) for one in prints]
 
 
@@ -43,10 +43,10 @@ def signatures(found: Fit, prints: Mapping[str, Sequence[Fingerprint]]) -> dict[
 
     At the strength that suits best, and only what the parameters cannot do as well.
     """
-    jacobian, gram = _movable(found)
+    jacobian, gram = movable(found)
     told = {}
     for name, its in prints.items():
-        own = [_beyond(jacobian, gram, one.columns) for one in its]
+        own = [beyond(jacobian, gram, one.columns) for one in its]
         parts = [columns @ np.linalg.lstsq(columns, -found.residual, rcond=None)[0] for columns in own]
         told[name] = min(parts, key=lambda part: float(np.sum((found.residual + part) ** 2)))
     return told
@@ -54,7 +54,7 @@ def signatures(found: Fit, prints: Mapping[str, Sequence[Fingerprint]]) -> dict[
 
 def scored_together(found: Fit, prints: Sequence[Fingerprint], most: int) -> list[Candidate]:
     """Up to `most` fingerprints that tell most beside each other, each scored beside those before it."""
-    jacobian, _ = _movable(found)
+    jacobian, _ = movable(found)
     prior = np.ones(jacobian.shape[1])
     left = list(prints)
     chosen: list[Candidate] = []
@@ -69,7 +69,7 @@ def scored_together(found: Fit, prints: Sequence[Fingerprint], most: int) -> lis
     return chosen
 
 
-def _movable(found: Fit) -> tuple[Array, Array]:
+def movable(found: Fit) -> tuple[Array, Array]:
     """J = ∂residual/∂x of the parameters that do not stand at a bound, (values, unknowns), and JᵀJ with the prior."""
     low, high = found.calibration.room
     free = np.minimum(-low, high) > _AT_BOUND
@@ -77,14 +77,14 @@ def _movable(found: Fit) -> tuple[Array, Array]:
     return jacobian, jacobian.T @ jacobian + np.eye(jacobian.shape[1])
 
 
-def _beyond(jacobian: Array, gram: Array, columns: Array) -> Array:
+def beyond(jacobian: Array, gram: Array, columns: Array) -> Array:
     """What of some columns the parameters cannot do; gram: JᵀJ with the prior's weights."""
     return columns - jacobian @ np.linalg.solve(gram, jacobian.T @ columns)
 
 
 def _scored(found: Fit, one: Fingerprint, jacobian: Array, gram: Array) -> Candidate:
     columns = one.columns
-    own = _beyond(jacobian, gram, columns)
+    own = beyond(jacobian, gram, columns)
     energy = columns.T @ own
     toward = -(own.T @ found.residual)  # the residual is model − measurement
     effect = find(one.name)

@@ -17,6 +17,7 @@ from ema_model.ahead import compile_ahead
 from ema_model.comparison.compare import prepared, weights_of
 from ema_model.comparison.result import Explanation
 from ema_model.comparison.sampling import fit_stretches
+from ema_model.discovery.faulty import fault_for
 from ema_model.discovery.fingerprints import Fingerprint, fingerprints, stacks_of_their_own
 from ema_model.discovery.fitting import Data, Fit, fit, floor_ratio, gather, holdout_fit, rms_by_signal, without_effect
 from ema_model.discovery.left import Left, left_by
@@ -27,6 +28,7 @@ from ema_model.discovery.trial import Trial, promising, tried
 from ema_model.discovery.unknown import curve_for
 from ema_model.discovery.worded import NOT_REPEATABLE
 from ema_model.effects import CATALOGUE, catalogue_name, find
+from ema_model.faults import FAULTS, NAMES
 from ema_model.measurement import Measurement
 from ema_model.recordings import check_same_actuator
 from ema_model.titles import in_sentence
@@ -58,6 +60,7 @@ class Story:
     steps: list[Step]
     repeatable: bool = True
     warnings: list[str] = field(default_factory=list)
+    ties: dict[str, str] = field(default_factory=dict)  # effects by the fault that would explain as much
     _prints: list[Fingerprint] = field(default_factory=list)
 
     @property
@@ -116,6 +119,16 @@ class Story:
         """One candidate in the model, refitted."""
         return tried(self.data, self.current, candidate, {candidate.name: candidate.settings}, tell)
 
+    def fault(
+        self, ranked: Sequence[Candidate], effects: Callable[[], Sequence[Trial]], tell: Progress = lambda text: None
+    ) -> Trial | None:
+        """A fault of the actuator in the model, refitted, where it tells more than any of the effects() refitted."""
+        found = fault_for(self.data, self.held, self.current, ranked, effects, tell)
+        if found and found.same_as:
+            self.ties[found.candidate.name] = found.same_as
+            return None
+        return found
+
     def curve(self, explanation: Explanation | None, tell: Progress = lambda text: None) -> Trial | None:
         """The residual's own curve as a torque, refitted, if the data pay for it."""
         return curve_for(self.data, self.held, self.current, explanation, tell)
@@ -136,7 +149,9 @@ class Story:
 
     def without(self, key: str, tell: Progress = lambda text: None) -> Fit:
         """The last model without one of its effects, refitted."""
-        return fit(self.data, without_effect(self.current.actuator, key), self.current.starts, tell)
+        return fit(
+            self.data, without_effect(self.current.actuator, key), self.current.starts, tell, self.current.faults
+        )
 
     def undo(self) -> bool:
         """Takes the last step back; False where there is none."""
@@ -145,13 +160,20 @@ class Story:
         self.steps.pop()
         return True
 
+    @property
+    def bare(self) -> int:
+        """The number of steps before the first effect: the calibrated model, and its faults."""
+        return next((i for i, step in enumerate(self.steps) if step.added), len(self.steps))
+
     def restart(self) -> None:
-        """Takes all steps back."""
-        del self.steps[1:]
+        """Takes all effects back."""
+        del self.steps[self.bare :]
 
     def label(self, trial: Trial) -> str:
         """What a step that adds this is called."""
         name = trial.candidate.name
+        if trial.faults:
+            return f"fault {FAULTS[NAMES.index(name)].label}"
         path = find(name).duplicates
         if path:
             return f"{self.current.actuator.axes.path(path)} outside its tolerance"

@@ -31,6 +31,7 @@ def as_dict(found: Discovery) -> dict[str, Any]:
                 }
                 for one in found.candidates
             ],
+            "faults": {name: parameter_dict(one) for name, one in found.faults.items()},
             "parameters_outside_tolerance": [axes.path(name) for name in found.parameters_outside_tolerance],
             "unknown": None
             if unknown is None

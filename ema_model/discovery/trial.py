@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -18,6 +19,7 @@ _LEAST_FALL = 0.004  # of the error: what is less is immaterial
 _FALL = 0.01  # below which the data must be twice as sure
 _LEAST_T = 2.4  # of the mean gain over blocks of time: 1 % of chance
 _HELD = 0.01  # of the held-out error: at the floor chance may raise it so much, above the floor it must fall so much
+_AGREES = 0.8  # of the held-out error: so great a fall there needs no test over time
 _FLOOR = 1.1  # of the floor, up to which an error counts as at it
 _CORRELATED = 50  # values of a signal that may share their error
 _SCORE = 0.4  # of what a refit gives, that a score may have fallen short of predicting
@@ -32,6 +34,8 @@ class Trial:
     effects: Mapping[str, Mapping[str, float]]
     fit: Fit
     drop: float  # of χ²
+    faults: tuple[str, ...] = ()  # k1 … k8 that it frees, in place of effects
+    same_as: str = ""  # of a fault: the effect that tells as much
 
 
 def tried(
@@ -45,18 +49,27 @@ def tried(
     return Trial(candidate, effects, best, current.chi2 - best.chi2)
 
 
+def worth(current: Fit, trial: Trial) -> float:
+    """How much of χ² a trial takes beyond what its parameters must (BIC)."""
+    count = sum(fitted_count(name) for name in trial.effects) + len(trial.faults)
+    return trial.drop - count * math.log(len(current.residual))
+
+
 def pays(current: Fit, trial: Trial, data: Data, held: Data | None) -> bool:
     """Whether the data pay for the parameters: most of the time, materially, and where they were not fitted."""
     values = len(current.residual)
-    count = sum(fitted_count(name) for name in trial.effects)
     fall = 1.0 - trial.fit.error() / current.error()
-    if fall < _LEAST_FALL or trial.drop - count * np.log(values) < (LEAST_BIC if fall > _FALL else 2.0 * LEAST_BIC):
+    if fall < _LEAST_FALL or worth(current, trial) < (LEAST_BIC if fall > _FALL else 2.0 * LEAST_BIC):
         return False
+    if held is not None:
+        before, after = holdout_error(held, current), holdout_error(held, trial.fit)
+        if after < _AGREES * before:
+            return True  # no chance repeats itself where it was not fitted
+        if not _holds(before, after):
+            return False
     gains = np.array_split(current.residual**2 - trial.fit.residual**2, max(8, values // _CORRELATED))
     sums = np.array([gain.sum() for gain in gains])
-    if sums.sum() < _LEAST_T * np.std(sums, ddof=1) * np.sqrt(len(sums)):
-        return False
-    return held is None or _holds(holdout_error(held, current), holdout_error(held, trial.fit))
+    return bool(sums.sum() >= _LEAST_T * np.std(sums, ddof=1) * np.sqrt(len(sums)))
 
 
 def _holds(before: float, after: float) -> bool:
@@ -68,7 +81,7 @@ def _refitted(data: Data, current: Fit, effects: Mapping[str, Mapping[str, float
     actuator = current.actuator
     for name, settings in effects.items():
         actuator = with_effect(actuator, name, settings)
-    return fit(data, actuator, current.starts, tell)
+    return fit(data, actuator, current.starts, tell, current.faults)
 
 
 def _weakened(name: str, settings: Mapping[str, float]) -> dict[str, float]:

@@ -24,7 +24,7 @@ def curve_for(
         return None
     tell(f"trying a curve over the {explanation.variable.replace('_', ' ')}")
     actuator, name = with_curve(data, current, explanation)
-    found = fit(data, actuator, current.starts, tell)
+    found = fit(data, actuator, current.starts, tell, current.faults)
     settings = dict(actuator.effects[name])
     trial = Trial(Candidate(name, 0.0, settings), {name: settings}, found, current.chi2 - found.chi2)
     return trial if pays(current, trial, data, held) else None

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from ema_model.axes import Axes
 from ema_model.discovery.result import Added
 from ema_model.effects import find
+from ema_model.faults import FAULTS, NAMES
 from ema_model.titles import in_sentence, parameter_title
 
 NOT_REPEATABLE = (
@@ -28,6 +29,16 @@ def masked(added: Sequence[Added], axes: Axes) -> list[str]:
             came = ", ".join(moved).replace("-", "−")
             lines.append(f"{find(one.name).title} had been masked: back toward the file's value came {came}.")
     return lines
+
+
+def as_well(ties: Mapping[str, str], added: Sequence[Added], faults: Sequence[str]) -> list[str]:
+    """One line for each fault that would explain as much as an effect which was added; ties: effects by fault."""
+    names = {one.name for one in added}
+    return [
+        f"The fault {FAULTS[NAMES.index(fault)].label} would explain as much as {in_sentence(find(effect).title)}."
+        for fault, effect in ties.items()
+        if effect in names and fault not in faults
+    ]
 
 
 def untold(first: str, second: str) -> str:

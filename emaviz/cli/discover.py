@@ -11,7 +11,7 @@ from ema_model.effects import find
 from ema_model.errors import InputError
 from ema_model.recordings import read_recording
 from emaviz.cli import options, output
-from emaviz.discovery_words import VERDICTS, next_experiment, settings
+from emaviz.discovery_words import VERDICTS, faults, next_experiment, settings
 
 HELP = "find the physical effects that the model lacks, and add them"
 _CURRENT_ONLY = ("current_A",)
@@ -95,6 +95,8 @@ def text(found: Discovery) -> str:
         lines += [f"  {name:24}  {told}" for name, told in settings(found, one).items()]
         if one.same_as:
             lines.append(f"  these recordings cannot tell it from {', '.join(one.same_as)}")
+    if found.faults:
+        lines += ["", "faults of the actuator", *(f"  {told}" for told in faults(found).values())]
     lines += ["", f"{'error ladder':34}{'fitted':>10}{'held out':>10}   (1 is the floor)"]
     for rung in found.ladder:
         held = "" if rung.holdout_rmse is None else f"{rung.holdout_rmse:10.3f}"

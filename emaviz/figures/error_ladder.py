@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import plotly.graph_objects as go
 
 from ema_model.discovery import Discovery
@@ -9,6 +11,7 @@ from emaviz.discovery_words import rung_title
 from emaviz.figures import quantity, theme
 
 FITTED, HELD_OUT = theme.MEASURED, theme.MODEL
+_WIDE = 15.0  # times the floor, from which on the scale is logarithmic
 
 
 def figure(found: Discovery, *, dark: bool = False) -> go.Figure:
@@ -53,9 +56,13 @@ def figure(found: Discovery, *, dark: bool = False) -> go.Figure:
             hoverinfo="skip",
         )
     )
-    most = max(value for *_, values in lines for value in values if value == value)
+    shown = [1.0, *(value for *_, values in lines for value in values if math.isfinite(value) and value > 0.0)]
     chart.update_xaxes(
         tickvals=places, ticktext=titles, range=[-0.5, len(places) - 0.5], showgrid=False, zeroline=False, nticks=0
     )
-    chart.update_yaxes(range=[0.0, 1.2 * max(most, 1.0)], rangemode="tozero")
+    if max(shown) > _WIDE:  # on a straight scale all else would lie on the axis
+        low, high = math.log10(0.4 * min(shown)), math.log10(2.0 * max(shown))
+        chart.update_yaxes(type="log", range=[low, high], dtick=1)
+    else:
+        chart.update_yaxes(range=[0.0, 1.2 * max(shown)], rangemode="tozero")
     return chart

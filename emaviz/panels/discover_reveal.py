@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import html
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from ema_model.challenges.truth import Truth
 from ema_model.discovery import Discovery
 from ema_model.discovery.result import Added
 from ema_model.effects import CATALOGUE, find
-from ema_model.faults import FAULTS, NAMES, sentences
+from ema_model.faults import FAULTS, HEALTHY, NAMES, sentences
 from ema_model.titles import in_sentence, parameter_title, unit_of
-from emaviz.discovery_words import effect_title, fitted_of
+from emaviz.discovery_words import effect_title, fitted_of, value
 from emaviz.figures import quantity
 from emaviz.panels.discover_cards import BOX
 
@@ -20,32 +21,38 @@ _GOOD, _BAD = "#2b8a3e", "#e03131"
 _NEAR = 0.25  # of the true value, within which a strength counts as found where its interval misses it
 
 
-# What of the model's parameters tells a fault; the others, of windings and rotor, are Identify's to find.
+# What of the model's parameters tells a fault that is slight enough to pass for it.
 _OF_FAULT = {"k1": "friction", "k2": "backlash", "k8": "position_gain"}
 
 
 def agrees(truth: Truth, found: Discovery, added: tuple[Added, ...]) -> bool:
-    """Whether the answer names exactly what is hidden: the effects, or a torque of its own for an unknown one.
-
-    Of the faults those count that a parameter of the model tells.
-    """
+    """Whether the answer names exactly what is hidden: the effects, or a torque of its own for an unknown one."""
     named = {one.name for one in added if one.name in CATALOGUE and not find(one.name).duplicates}
     own = any(one.name not in CATALOGUE for one in added)
-    seen = all(_sees(found, fault) for fault in truth.faults if fault in _OF_FAULT)
-    return named == set(truth.effects) and own == bool(truth.torque) and seen
+    seen = all(_sees(found, fault) for fault in truth.faults)
+    return named == set(truth.effects) and own == bool(truth.torque) and seen and not _invented(truth, found)
 
 
 def _sees(found: Discovery, fault: str) -> bool:
-    return any(_OF_FAULT[fault] in path for path in found.parameters_outside_tolerance)
+    told = _OF_FAULT.get(fault)
+    return fault in found.faults or (told is not None and any(told in p for p in found.parameters_outside_tolerance))
+
+
+def _invented(truth: Truth, found: Discovery) -> list[str]:
+    """Faults that were named and are not there; a phase belongs to its modulus."""
+    return [name for name in found.faults if name not in truth.faults and name != "k7"]
 
 
 def _fault(fault: str, k: ArrayLike, found: Discovery) -> str:
     index = NAMES.index(fault)
     what = f"{in_sentence(FAULTS[index].title)} fault: {sentences(k, found.plant.actuator)[index]}"
-    if fault not in _OF_FAULT:
-        return _row(None, what, "a fault that Identify finds, not Discover")
+    if fault in found.faults:
+        own, true = found.faults[fault], float(np.asarray(k)[index])
+        low, high = own.interval90
+        near = low <= true <= high or abs(own.value - true) <= _NEAR * abs(true - HEALTHY[index])
+        return _row(near, what, f"{fault} {true:g} in truth, {value(own)} found")
     good = _sees(found, fault)
-    return _row(good, what, "its parameter is outside its tolerance" if good else "no parameter tells it")
+    return _row(good, what, "its parameter is outside its tolerance" if good else "not found; try Identify")
 
 
 def reveal(truth: Truth, found: Discovery, added: tuple[Added, ...]) -> str:
@@ -54,6 +61,9 @@ def reveal(truth: Truth, found: Discovery, added: tuple[Added, ...]) -> str:
     verdict = "Your answer agrees." if good else "Your answer differs."
     rows = [_effect(name, given, found, added) for name, given in truth.effects.items()]
     rows += [_fault(fault, truth.k, found) for fault in truth.faults]
+    rows += [
+        _row(False, f"{FAULTS[NAMES.index(name)].label} fault", "is not there") for name in _invented(truth, found)
+    ]
     if truth.torque:
         own = next((one for one in added if one.name not in CATALOGUE), None)
         what = f"an effect outside the library: T = {truth.torque}"

@@ -32,12 +32,12 @@ FLOOR_NOTE = (
 
 def headline(found: Discovery) -> str:
     """The verdict in one sentence."""
-    faulty = f"the fault{'s' if len(_faults(found)) > 1 else ''} {_listed(_faults(found))}"
+    faulty = _faulty(found)
     if found.verdict == "effects_found":
         # Once, where two orders of one effect were added.
         names = _listed(list(dict.fromkeys(in_sentence(effect_title(one.name)) for one in found.effects)))
-        return f"The model lacks {names}{f', and the actuator has {faulty}' if found.faults else ''}."
-    if found.verdict == "adequate" and found.faults:
+        return f"The model lacks {names}{f', and the actuator has {faulty}' if faulty else ''}."
+    if found.verdict == "adequate" and faulty:
         return f"No physics is missing: the actuator has {faulty}."
     if found.verdict == "adequate" and found.parameters_outside_tolerance:
         return "No physics is missing, but not all parameters are within their tolerance."
@@ -93,9 +93,10 @@ def faults(found: Discovery) -> dict[str, str]:
     return {name: f"{labels[name]} {value(one)} ({phrases[name]})" for name, one in found.faults.items()}
 
 
-def _faults(found: Discovery) -> list[str]:
-    """Their titles; a phase belongs to its modulus."""
-    return [fault.label for fault in FAULTS if fault.name in found.faults and fault.name != "k7"]
+def _faulty(found: Discovery) -> str:
+    """'the faults k1 friction and k2 backlash', "" without one; a phase belongs to its modulus."""
+    labels = [fault.label for fault in FAULTS if fault.name in found.faults and fault.name != "k7"]
+    return f"the fault{'s' if len(labels) > 1 else ''} {_listed(labels)}" if labels else ""
 
 
 def effect_title(name: str) -> str:

@@ -61,9 +61,8 @@ def reveal(truth: Truth, found: Discovery, added: tuple[Added, ...]) -> str:
     verdict = "Your answer agrees." if good else "Your answer differs."
     rows = [_effect(name, given, found, added) for name, given in truth.effects.items()]
     rows += [_fault(fault, truth.k, found) for fault in truth.faults]
-    rows += [
-        _row(False, f"{FAULTS[NAMES.index(name)].label} fault", "is not there") for name in _invented(truth, found)
-    ]
+    for name in _invented(truth, found):
+        rows.append(_row(False, f"the fault {FAULTS[NAMES.index(name)].label}", "is not hidden here"))
     if truth.torque:
         own = next((one for one in added if one.name not in CATALOGUE), None)
         what = f"an effect outside the library: T = {truth.torque}"
@@ -79,7 +78,7 @@ def reveal(truth: Truth, found: Discovery, added: tuple[Added, ...]) -> str:
             else:
                 why = "is not hidden here"
             rows.append(_row(False, in_sentence(effect_title(one.name)), why))
-    if not truth.effects and not truth.torque and not truth.faults and not added:
+    if not rows:
         rows.append(_row(True, "nothing is hidden", "and you added nothing"))
     head = f'<div style="font-size:16px;font-weight:600;color:{_GOOD if good else _BAD}">{verdict}</div>'
     return f"<div {BOX}>{head}<div>{html.escape(truth.answer)}</div>{''.join(rows)}</div>"

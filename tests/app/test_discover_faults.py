@@ -1,0 +1,92 @@
+"""A worn actuator in Discover: its faults are told from missing physics, revealed, and kept by a session."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from on_page import wait_until
+
+from ema_model.actuator import load_actuator
+from ema_model.challenges.truth import Truth
+from ema_model.errors import InputError
+from emaviz.comparing import Comparing
+from emaviz.data_folder import DataFolder
+from emaviz.discovering import Discovering
+from emaviz.discovery_record import checked
+from emaviz.discovery_words import faults, headline, sentences
+from emaviz.panels.discover_result import answer
+from emaviz.panels.discover_reveal import agrees, reveal
+from emaviz.session import Session
+
+
+@pytest.fixture(scope="module")
+def worn(tmp_path_factory):
+    """A plant with twenty times the backlash, sealed in Explore and opened in Discover."""
+    folder = DataFolder(tmp_path_factory.mktemp("worn"))
+    session = Session(load_actuator(), folder.recordings)
+    comparing = Comparing(session, folder)
+    discovering = Discovering(session, comparing)
+    session.settings.set_fault(1, 0.2)
+    sealed = []
+    discovering.sealing.events.sealed.append(sealed.append)
+    assert discovering.sealing.seal("Worn", "It rattles.")
+    wait_until(lambda: sealed)
+    (name,) = discovering.source.sealed
+    discovering.choose(name)
+    begin(discovering, discovering.start)
+    yield discovering
+    discovering.close()
+    comparing.close()
+    session.close()
+
+
+def begin(discovering, step):
+    """Takes a step, and waits until it has ended."""
+    ended = []
+    discovering.events.ended.append(ended.append)
+    assert step() in (True, None)
+    wait_until(lambda: ended and not discovering.running)
+    discovering.events.ended.remove(ended.append)
+
+
+def test_start_takes_the_fault_into_the_model(worn):
+    look = worn.look
+    assert list(look.found.faults) == ["k2"] and not look.added and not look.promising
+    assert [rung.label for rung in look.found.ladder] == ["calibrated", "fault k2 backlash"]
+    assert look.rmse < 1.1 < look.found.ladder[0].rmse
+    assert headline(look.found) == "No physics is missing: the actuator has the fault k2 backlash."
+    assert "k2 backlash" in faults(look.found)["k2"] and "µrad" in faults(look.found)["k2"]
+    assert any("k2 backlash" in text for text in sentences(look.found))
+    assert "#2b8a3e" in answer(look), "at the floor"
+
+
+def test_reveal_holds_the_faults_against_the_truth(worn):
+    truth = worn.source.reveal()
+    assert truth.faults == {"k2": 0.2}
+    assert agrees(truth, worn.look.found, ())
+    told = reveal(truth, worn.look.found, ())
+    assert "Your answer agrees" in told and "k2 0.2 in truth" in told
+    nothing = Truth("", 0, "nothing")
+    assert not agrees(nothing, worn.look.found, ()) and "not hidden here" in reveal(nothing, worn.look.found, ())
+    shorted = Truth("", 0, "a short", faults={"k3": 0.4})
+    assert not agrees(shorted, worn.look.found, ()) and "not found" in reveal(shorted, worn.look.found, ())
+
+
+def test_a_session_keeps_the_fault_and_undo_takes_it_back(worn):
+    saved = json.loads(json.dumps(worn.saved()))
+    assert saved["steps"][0]["faults"] == ["k2"]
+    before = worn.look.found
+    begin(worn, lambda: worn.restore(saved, {name: name for name in worn.files()}))
+    assert [rung.label for rung in worn.look.found.ladder] == [rung.label for rung in before.ladder]
+    assert worn.look.rmse == pytest.approx(before.ladder[-1].rmse, rel=0.01)
+    assert worn.look.found.faults["k2"].value == pytest.approx(before.faults["k2"].value, abs=0.01)
+    worn.undo()
+    assert not worn.look.found.faults and worn.look.rmse > 10.0
+    wait_until(lambda: not worn.running)
+
+
+@pytest.mark.parametrize("bad", [7, ["k9"], ["k2", "k2"], [["k2"]], "k2"])
+def test_damaged_faults_of_a_session_are_refused(bad):
+    with pytest.raises(InputError, match="damaged"):
+        checked([{"model": "", "starts": {}, "faults": bad}])

@@ -18,6 +18,7 @@ from ema_model.discovery.fitting import Data, Fit, fit
 from ema_model.discovery.result import Candidate
 from ema_model.discovery.score import beyond, movable
 from ema_model.discovery.trial import LEAST_BIC, Trial, pays, worth
+from ema_model.discovery.unknown import TEETH
 from ema_model.faults import HEALTHY, NAMES
 
 Array = NDArray[np.float64]
@@ -46,7 +47,8 @@ def fault_for(
 ) -> Trial | None:
     """The fault that tells more than any effect, or as much as the best one, in the model and refitted.
 
-    None where there is none; `Trial.same_as` names the effect that tells as much.
+    None where there is none; `Trial.same_as` names the effect that tells as much.  That one goes first, unless it
+    repeats less often in a turn than teeth or poles do, as what an eccentric rotor does.
     ranked: the effects, the most promising first; effects() refits those that are worth it, the best first.
     Faults are those of a motor with three phases and a cascade: other actuators have none here.
     """
@@ -63,7 +65,9 @@ def fault_for(
     more = worth(current, fault) - (0.0 if rival is None else worth(current, rival))
     if rival is None or more > LEAST_BIC:
         return fault
-    return replace(fault, same_as=rival.candidate.name) if more > -LEAST_BIC else None
+    if more < -LEAST_BIC:
+        return None
+    return replace(fault, same_as=rival.candidate.name, yields=rival.candidate.settings.get("order", TEETH) >= TEETH)
 
 
 def _scores(data: Data, current: Fit) -> list[_Scored]:

@@ -126,8 +126,7 @@ class Story:
         found = fault_for(self.data, self.held, self.current, ranked, effects, tell)
         if found and found.same_as:
             self.ties[found.candidate.name] = found.same_as
-            return None
-        return found
+        return None if found and found.yields else found
 
     def curve(self, explanation: Explanation | None, tell: Progress = lambda text: None) -> Trial | None:
         """The residual's own curve as a torque, refitted, if the data pay for it."""

@@ -36,6 +36,7 @@ class Trial:
     drop: float  # of χ²
     faults: tuple[str, ...] = ()  # k1 … k8 that it frees, in place of effects
     same_as: str = ""  # of a fault: the effect that tells as much
+    yields: bool = False  # to that effect
 
 
 def tried(

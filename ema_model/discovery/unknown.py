@@ -13,7 +13,7 @@ from ema_model.effects import find
 
 _HALF = 0.5
 _KNOT = 3.0  # χ² that each knot must be worth beside a parameter: knots lie on one smooth line
-_TEETH = 4  # periods in a turn from which on a torque is one of teeth or poles
+TEETH = 4  # periods in a turn from which on a torque is one of teeth or poles
 
 
 def curve_for(
@@ -58,4 +58,4 @@ def curve_instead(
 
 def is_a_shape(orders: list[float]) -> bool:
     """Whether several low orders together are no teeth, but one shape within the turn, which no order is."""
-    return len(orders) > 1 and max(orders) < _TEETH
+    return len(orders) > 1 and max(orders) < TEETH

@@ -32,13 +32,18 @@ def masked(added: Sequence[Added], axes: Axes) -> list[str]:
 
 
 def as_well(ties: Mapping[str, str], added: Sequence[Added], faults: Sequence[str]) -> list[str]:
-    """One line for each fault that would explain as much as an effect which was added; ties: effects by fault."""
-    names = {one.name for one in added}
-    return [
-        f"The fault {FAULTS[NAMES.index(fault)].label} would explain as much as {in_sentence(find(effect).title)}."
-        for fault, effect in ties.items()
-        if effect in names and fault not in faults
-    ]
+    """One line for each fault and effect of which one was taken, and the other would explain as much.
+
+    ties: effects by fault.
+    """
+    names, lines = {one.name for one in added}, []
+    for fault, effect in ties.items():
+        label, title = f"the fault {FAULTS[NAMES.index(fault)].label}", find(effect).title
+        if effect in names and fault not in faults:
+            lines.append(f"T{label[1:]} would explain as much as {in_sentence(title)}.")
+        elif fault in faults and effect not in names:
+            lines.append(f"{title} would explain as much as {label}.")
+    return lines
 
 
 def untold(first: str, second: str) -> str:

@@ -40,6 +40,7 @@ FAULTS = (
     Fault("k8", "Proportional gain", 0.5),
 )
 NAMES = tuple(fault.name for fault in FAULTS)
+BY_NAME = {fault.name: fault for fault in FAULTS}
 HEALTHY: NDArray[np.float64] = np.array([fault.healthy for fault in FAULTS])
 HEALTHY.setflags(write=False)
 

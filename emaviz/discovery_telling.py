@@ -10,7 +10,7 @@ from ema_model.comparison.result import Explanation
 from ema_model.discovery import Candidate, Story, result_of
 from ema_model.discovery.result import Experiment
 from ema_model.discovery.story import Step, with_drops
-from ema_model.discovery.trial import Trial
+from ema_model.discovery.trial import Trial, promising
 from ema_model.effects import CATALOGUE
 from emaviz.discovery_look import Assessment, Look, assessed, look_at
 from emaviz.discovery_record import experiment_saved, steps_of
@@ -43,11 +43,15 @@ class Telling:
     def take_faults(self, tell: Callable[[str], None]) -> bool:
         """Takes the actuator's fault into the model that tells more than any effect would; False if there is none."""
         story, ranked = self.story, self.known[self.story.steps[-1]].candidates
-        fault = story.fault(ranked, lambda: story.tried(ranked, _SHARE, _MOST, tell), tell)
+        fault = story.fault(ranked, lambda: self._refitted(ranked, tell), tell)
         if fault:
             story.add(fault)
             self.first = ()  # what was ranked was ranked without it
         return fault is not None
+
+    def _refitted(self, ranked: Sequence[Candidate], tell: Callable[[str], None]) -> list[Trial]:
+        """The most promising of the last model's candidates; what is added of them later is fitted already."""
+        return [self.trials.of(self.story, one, tell) for one in promising(self.story.current, ranked, _SHARE, _MOST)]
 
     def add(self, trial: Trial, alike: Sequence[str]) -> None:
         """Takes a trial for the next model; alike: effects that cannot be told from it."""

@@ -10,7 +10,7 @@ from ema_model.discovery import Discovery
 from ema_model.discovery.result import Added, Rung
 from ema_model.effects import find
 from ema_model.errors import InputError
-from ema_model.faults import FAULTS, NAMES
+from ema_model.faults import BY_NAME, FAULTS, NAMES
 from ema_model.faults import sentences as phrases_of
 from ema_model.measurement import SIGNALS
 from ema_model.titles import in_sentence
@@ -89,8 +89,7 @@ def next_experiment(found: Discovery) -> list[str]:
 def faults(found: Discovery) -> dict[str, str]:
     """Each fault that was found, by name: 'k2 backlash 0.201 ± 0.012 (backlash 209 µrad)'."""
     phrases = dict(zip(NAMES, phrases_of(found.calibration.k, found.actuator)))
-    labels = {fault.name: fault.label for fault in FAULTS}
-    return {name: f"{labels[name]} {value(one)} ({phrases[name]})" for name, one in found.faults.items()}
+    return {name: f"{BY_NAME[name].label} {value(one)} ({phrases[name]})" for name, one in found.faults.items()}
 
 
 def _faulty(found: Discovery) -> str:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ema_model.calibration.problem import unknown_of
 from ema_model.discovery.fitting import Data, Fit, fit
 from ema_model.discovery.result import Candidate
-from ema_model.discovery.score import beyond, movable
+from ema_model.discovery.score import amounts_of, movable
 from ema_model.discovery.trial import LEAST_BIC, Trial, pays, worth
 from ema_model.discovery.unknown import TEETH
 from ema_model.faults import HEALTHY, NAMES
@@ -88,11 +88,7 @@ def _scores(data: Data, current: Fit) -> list[_Scored]:
     jacobian, gram = movable(current)
     best: dict[tuple[str, ...], _Scored] = {}
     for names, size, its in tried:
-        columns = (signals[its] - signals[0]).T
-        own = beyond(jacobian, gram, columns)
-        energy, toward = columns.T @ own, -(own.T @ current.residual)
-        amounts = np.linalg.solve(energy + 1e-9 * (np.trace(energy) + 1e-300) * np.eye(len(energy)), toward)
-        one = _at(names, size, amounts, energy, toward)
+        one = _at(names, size, *amounts_of(current, (signals[its] - signals[0]).T, jacobian, gram))
         if names not in best or one.drop > best[names].drop:
             best[names] = one
     return sorted(best.values(), key=lambda one: -one.drop)

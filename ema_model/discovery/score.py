@@ -46,7 +46,7 @@ def signatures(found: Fit, prints: Mapping[str, Sequence[Fingerprint]]) -> dict[
     jacobian, gram = movable(found)
     told = {}
     for name, its in prints.items():
-        own = [beyond(jacobian, gram, one.columns) for one in its]
+        own = [_beyond(jacobian, gram, one.columns) for one in its]
         parts = [columns @ np.linalg.lstsq(columns, -found.residual, rcond=None)[0] for columns in own]
         told[name] = min(parts, key=lambda part: float(np.sum((found.residual + part) ** 2)))
     return told
@@ -77,24 +77,31 @@ def movable(found: Fit) -> tuple[Array, Array]:
     return jacobian, jacobian.T @ jacobian + np.eye(jacobian.shape[1])
 
 
-def beyond(jacobian: Array, gram: Array, columns: Array) -> Array:
+def _beyond(jacobian: Array, gram: Array, columns: Array) -> Array:
     """What of some columns the parameters cannot do; gram: JᵀJ with the prior's weights."""
     return columns - jacobian @ np.linalg.solve(gram, jacobian.T @ columns)
 
 
-def _scored(found: Fit, one: Fingerprint, jacobian: Array, gram: Array) -> Candidate:
-    columns = one.columns
-    own = beyond(jacobian, gram, columns)
+def amounts_of(found: Fit, columns: Array, jacobian: Array, gram: Array) -> tuple[Array, Array, Array]:
+    """How much of some columns the residual asks for beyond what the parameters can do, and what that is worth.
+
+    The amounts a (columns,), and E and t, such that χ² falls by 2 a·t − a·E·a with any amounts.
+    """
+    own = _beyond(jacobian, gram, columns)
     energy = columns.T @ own
     toward = -(own.T @ found.residual)  # the residual is model − measurement
+    ridge = energy + 1e-9 * (np.trace(energy) + 1e-300) * np.eye(len(energy))
+    return np.linalg.solve(ridge, toward), energy, toward
+
+
+def _scored(found: Fit, one: Fingerprint, jacobian: Array, gram: Array) -> Candidate:
+    amounts, energy, toward = amounts_of(found, one.columns, jacobian, gram)
     effect = find(one.name)
     first = effect.parameters[0]
     strong = effect.severities[2] / one.settings[first.name]
     reason = ""
     if np.max(np.diag(energy)) * strong**2 < _LEAST_ENERGY:
         reason = "these recordings cannot show it: what it would change is within the noise"
-    ridge = energy + 1e-9 * (np.trace(energy) + 1e-300) * np.eye(len(energy))
-    amounts = np.linalg.solve(ridge, toward)
     settings = dict(one.settings)
     if len(amounts) == 1:
         amount = float(amounts[0])

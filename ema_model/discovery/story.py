@@ -28,7 +28,7 @@ from ema_model.discovery.trial import Trial, promising, tried
 from ema_model.discovery.unknown import curve_for
 from ema_model.discovery.worded import NOT_REPEATABLE
 from ema_model.effects import CATALOGUE, catalogue_name, find
-from ema_model.faults import FAULTS, NAMES
+from ema_model.faults import BY_NAME
 from ema_model.measurement import Measurement
 from ema_model.recordings import check_same_actuator
 from ema_model.titles import in_sentence
@@ -172,7 +172,7 @@ class Story:
         """What a step that adds this is called."""
         name = trial.candidate.name
         if trial.faults:
-            return f"fault {FAULTS[NAMES.index(name)].label}"
+            return f"fault {BY_NAME[name].label}"
         path = find(name).duplicates
         if path:
             return f"{self.current.actuator.axes.path(path)} outside its tolerance"

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from ema_model.axes import Axes
 from ema_model.discovery.result import Added
 from ema_model.effects import find
-from ema_model.faults import FAULTS, NAMES
+from ema_model.faults import BY_NAME
 from ema_model.titles import in_sentence, parameter_title
 
 NOT_REPEATABLE = (
@@ -38,7 +38,7 @@ def as_well(ties: Mapping[str, str], added: Sequence[Added], faults: Sequence[st
     """
     names, lines = {one.name for one in added}, []
     for fault, effect in ties.items():
-        label, title = f"the fault {FAULTS[NAMES.index(fault)].label}", find(effect).title
+        label, title = f"the fault {BY_NAME[fault].label}", find(effect).title
         if effect in names and fault not in faults:
             lines.append(f"T{label[1:]} would explain as much as {in_sentence(title)}.")
         elif fault in faults and effect not in names:

@@ -11,7 +11,7 @@ from ema_model.challenges.truth import Truth
 from ema_model.discovery import Discovery
 from ema_model.discovery.result import Added
 from ema_model.effects import CATALOGUE, find
-from ema_model.faults import FAULTS, HEALTHY, NAMES, sentences
+from ema_model.faults import BY_NAME, NAMES, sentences
 from ema_model.titles import in_sentence, parameter_title, unit_of
 from emaviz.discovery_words import effect_title, fitted_of, value
 from emaviz.figures import quantity
@@ -45,11 +45,11 @@ def _invented(truth: Truth, found: Discovery) -> list[str]:
 
 def _fault(fault: str, k: ArrayLike, found: Discovery) -> str:
     index = NAMES.index(fault)
-    what = f"{in_sentence(FAULTS[index].title)} fault: {sentences(k, found.plant.actuator)[index]}"
+    what = f"{in_sentence(BY_NAME[fault].title)} fault: {sentences(k, found.plant.actuator)[index]}"
     if fault in found.faults:
         own, true = found.faults[fault], float(np.asarray(k)[index])
         low, high = own.interval90
-        near = low <= true <= high or abs(own.value - true) <= _NEAR * abs(true - HEALTHY[index])
+        near = low <= true <= high or abs(own.value - true) <= _NEAR * abs(true - BY_NAME[fault].healthy)
         return _row(near, what, f"{fault} {true:g} in truth, {value(own)} found")
     good = _sees(found, fault)
     return _row(good, what, "its parameter is outside its tolerance" if good else "not found; try Identify")
@@ -62,7 +62,7 @@ def reveal(truth: Truth, found: Discovery, added: tuple[Added, ...]) -> str:
     rows = [_effect(name, given, found, added) for name, given in truth.effects.items()]
     rows += [_fault(fault, truth.k, found) for fault in truth.faults]
     for name in _invented(truth, found):
-        rows.append(_row(False, f"the fault {FAULTS[NAMES.index(name)].label}", "is not hidden here"))
+        rows.append(_row(False, f"the fault {BY_NAME[name].label}", "is not hidden here"))
     if truth.torque:
         own = next((one for one in added if one.name not in CATALOGUE), None)
         what = f"an effect outside the library: T = {truth.torque}"

@@ -6,48 +6,36 @@ import json
 
 import pytest
 from on_page import wait_until
+from rig import Rig
 
-from ema_model.actuator import load_actuator
 from ema_model.challenges.truth import Truth
 from ema_model.errors import InputError
-from emaviz.comparing import Comparing
-from emaviz.data_folder import DataFolder
-from emaviz.discovering import Discovering
 from emaviz.discovery_record import checked
 from emaviz.discovery_words import faults, headline, sentences
 from emaviz.panels.discover_result import answer
 from emaviz.panels.discover_reveal import agrees, reveal
-from emaviz.session import Session
 
 
 @pytest.fixture(scope="module")
-def worn(tmp_path_factory):
+def rig(tmp_path_factory):
     """A plant with twenty times the backlash, sealed in Explore and opened in Discover."""
-    folder = DataFolder(tmp_path_factory.mktemp("worn"))
-    session = Session(load_actuator(), folder.recordings)
-    comparing = Comparing(session, folder)
-    discovering = Discovering(session, comparing)
-    session.settings.set_fault(1, 0.2)
+    rig = Rig(tmp_path_factory.mktemp("worn"))
+    rig.session.settings.set_fault(1, 0.2)
     sealed = []
-    discovering.sealing.events.sealed.append(sealed.append)
-    assert discovering.sealing.seal("Worn", "It rattles.")
+    rig.discovering.sealing.events.sealed.append(sealed.append)
+    assert rig.discovering.sealing.seal("Worn", "It rattles.")
     wait_until(lambda: sealed)
-    (name,) = discovering.source.sealed
-    discovering.choose(name)
-    begin(discovering, discovering.start)
-    yield discovering
-    discovering.close()
-    comparing.close()
-    session.close()
+    (name,) = rig.discovering.source.sealed
+    rig.discovering.choose(name)
+    assert rig.discovering.start()
+    rig.done()
+    yield rig
+    rig.close()
 
 
-def begin(discovering, step):
-    """Takes a step, and waits until it has ended."""
-    ended = []
-    discovering.events.ended.append(ended.append)
-    assert step() in (True, None)
-    wait_until(lambda: ended and not discovering.running)
-    discovering.events.ended.remove(ended.append)
+@pytest.fixture
+def worn(rig):
+    return rig.discovering
 
 
 def test_start_takes_the_fault_into_the_model(worn):
@@ -73,11 +61,12 @@ def test_reveal_holds_the_faults_against_the_truth(worn):
     assert not agrees(shorted, worn.look.found, ()) and "not found" in reveal(shorted, worn.look.found, ())
 
 
-def test_a_session_keeps_the_fault_and_undo_takes_it_back(worn):
+def test_a_session_keeps_the_fault_and_undo_takes_it_back(rig, worn):
     saved = json.loads(json.dumps(worn.saved()))
     assert saved["steps"][0]["faults"] == ["k2"]
     before = worn.look.found
-    begin(worn, lambda: worn.restore(saved, {name: name for name in worn.files()}))
+    worn.restore(saved, {name: name for name in worn.files()})
+    rig.done()
     assert [rung.label for rung in worn.look.found.ladder] == [rung.label for rung in before.ladder]
     assert worn.look.rmse == pytest.approx(before.ladder[-1].rmse, rel=0.01)
     assert worn.look.found.faults["k2"].value == pytest.approx(before.faults["k2"].value, abs=0.01)

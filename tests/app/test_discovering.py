@@ -8,14 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from on_page import wait_until
+from rig import Rig
 
 from ema_model.actuator import load_actuator
 from ema_model.errors import InputError
 from ema_model.faults import HEALTHY
 from ema_model.user_effects import user_torque
-from emaviz.comparing import Comparing
-from emaviz.data_folder import DataFolder
-from emaviz.discovering import Discovering
 from emaviz.figures.discovery_tracks import tracks
 from emaviz.panels import discover_cards
 from emaviz.panels.discover_actuator import _SHOWN, run_of
@@ -24,7 +22,6 @@ from emaviz.panels.discover_next import as_csv
 from emaviz.panels.discover_reveal import agrees, reveal
 from emaviz.recording.read import read
 from emaviz.scene.motion import motion
-from emaviz.session import Session
 
 EASY = "first_bench_run"
 
@@ -32,19 +29,15 @@ EASY = "first_bench_run"
 @pytest.fixture(scope="module")
 def discovering(tmp_path_factory):
     """With the easy challenge calibrated, and nothing added."""
-    folder = DataFolder(tmp_path_factory.mktemp("data"))
-    session = Session(load_actuator(), folder.recordings)
-    comparing = Comparing(session, folder)
-    made = Discovering(session, comparing)
+    rig = Rig(tmp_path_factory.mktemp("data"))
+    made = rig.discovering
     with pytest.raises(InputError, match="no recording to fit is chosen"):
         made.start()
     made.source.choose(EASY)
     assert made.start()
     wait_until(lambda: not made.running)
     yield made
-    made.close()
-    comparing.close()
-    session.close()
+    rig.close()
 
 
 @pytest.fixture

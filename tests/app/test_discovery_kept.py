@@ -8,55 +8,18 @@ import shutil
 import numpy as np
 import pytest
 from on_page import wait_until
+from rig import Rig
 
 from ema_model.actuator import load_actuator
 from ema_model.discovery.result import Experiment
 from ema_model.errors import InputError
 from ema_model.user_effects import user_torque
-from emaviz import session_file
-from emaviz.comparing import Comparing
-from emaviz.data_folder import DataFolder
-from emaviz.discovering import Discovering
 from emaviz.discovery_sealing import sensors_of, truth_of
 from emaviz.panels.discover_reveal import agrees, reveal
-from emaviz.session import Session
-from emaviz.session_file import Part
 from emaviz.state import Settings
 
 EASY = "first_bench_run"
 HIDDEN = {"amplitude_Nm": 0.02, "order": 12.0, "phase_rad": 0.5}
-
-
-class Rig:
-    """An app without a screen."""
-
-    def __init__(self, folder):
-        self.folder = DataFolder(folder)
-        self.session = Session(load_actuator(), self.folder.recordings)
-        self.comparing = Comparing(self.session, self.folder)
-        self.discovering = Discovering(self.session, self.comparing)
-        self.part = Part(self.discovering.saved, self.discovering.restore, self.discovering.files)
-        self.told, self.ended = [], []
-        self.session.events.told.append(lambda *line: self.told.append(line))
-        self.discovering.events.ended.append(self.ended.append)
-
-    def close(self):
-        self.discovering.close()
-        self.comparing.close()
-        self.session.close()
-
-    def done(self, seconds=240.0):
-        wait_until(lambda: self.ended, seconds)
-        self.ended.clear()
-        wait_until(lambda: not self.discovering.running)
-
-    def save(self):
-        path = session_file.free_path(self.folder, "kept")
-        session_file.write(path, {"discovery": self.part}, self.folder, self.part.files())
-        return path
-
-    def load(self, path):
-        session_file.read(path, {"discovery": self.part}, self.folder)
 
 
 @pytest.fixture(scope="module")

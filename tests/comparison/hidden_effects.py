@@ -10,6 +10,7 @@ import numpy as np
 from ema_model.actuator import load_actuator
 from ema_model.calibration import default_free
 from ema_model.commands import command
+from ema_model.faults import vector
 from ema_model.measurement import Measurement
 from ema_model.sensors import Sensors
 from ema_model.simulation import Run, simulate_reference
@@ -37,6 +38,7 @@ def recorded(
     *,
     commands: Sequence[Command] = (SINE,),
     effects: Mapping[str, Mapping[str, float]] | None = None,
+    faults: Mapping[str, float] | None = None,
     extra: Mapping[str, float] | None = None,
     load: float = 0.0,
     noise_A: float = 0.45,
@@ -47,7 +49,10 @@ def recorded(
     return [
         sensors.record(
             simulate_reference(
-                Run(command(name, dict(settings)), seconds, load_torque_Nm=load), actuator, effects=effects
+                Run(command(name, dict(settings)), seconds, load_torque_Nm=load),
+                actuator,
+                vector(dict(faults or {})),
+                effects,
             ),
             seed + 7 * i,
         )

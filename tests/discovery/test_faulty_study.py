@@ -10,14 +10,10 @@ from collections import Counter
 
 import numpy as np
 import pytest
-from hidden_effects import SINE, plant
+from hidden_effects import SINE, recorded
 
-from ema_model.commands import command
 from ema_model.discovery import discover
 from ema_model.effects import CATALOGUE
-from ema_model.faults import vector
-from ema_model.sensors import Sensors
-from ema_model.simulation import Run, simulate_reference
 
 pytestmark = pytest.mark.study
 
@@ -26,15 +22,6 @@ UNSEEN = [("sine", {"amplitude_rad": 0.02, "frequency_Hz": 5}, 0.5)]
 FAULTS = ("k1", "k2", "k3", "k6", "k8")
 EFFECTS = ("cogging_torque", "stribeck_friction", "hinge_moment", "asymmetric_friction", "position_sensor_delay")
 RUNS = 25
-
-
-def recorded(seed, commands, faults, effects):
-    actuator, sensors = plant(seed), Sensors(0.45, 12)
-    runs = [Run(command(name, dict(settings)), seconds) for name, settings, seconds in commands]
-    return [
-        sensors.record(simulate_reference(run, actuator, vector(faults), effects), seed + 7 * i)
-        for i, run in enumerate(runs)
-    ]
 
 
 def drawn(seed, with_effect):
@@ -59,7 +46,8 @@ def test_faults_are_told_from_missing_physics(with_effect):
     counts: Counter[str] = Counter()
     for seed in range(RUNS):
         faults, effects = drawn(seed, with_effect)
-        found = discover(recorded(seed, COMMANDS, faults, effects), holdout=recorded(seed, UNSEEN, faults, effects))
+        fitted, unseen = (recorded(seed, commands=runs, faults=faults, effects=effects) for runs in (COMMANDS, UNSEEN))
+        found = discover(fitted, holdout=unseen)
         names = {one.name for one in found.effects}
         said = {name for name in faults if any(f"fault {name} " in text for text in found.warnings)}
         right = set(found.faults) - {"k7"} == set(faults) - {"k7"}

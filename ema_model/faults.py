@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.errors import InputError
-from ema_model.titles import in_sentence
+from ema_model.quantities.titles import in_sentence
 
 _LEAST_TURNS = 0.02  # less, and the three-phase model diverges when two phases are shorted
 

@@ -36,7 +36,7 @@ DRIVES = (*CIRCUITS, "current", "voltage")
 CONTROLLERS = ("cascade", "position")
 _PACKAGE = Path(__file__).parent
 # All that a kernel may inline; `tests/model/test_stacks.py` checks that kernels import nothing else of ours.
-_COMPILED = ("numba_options.py", "stacks.py", "physics/*.py", "kernels/*.py", "effects/*.py")
+_COMPILED = ("stacks.py", "physics/*.py", "kernels/*.py", "effects/*.py")
 _KEPT_VERSIONS = 6  # folders of other hashes (older sources or versions) that are left in the cache
 
 
@@ -118,7 +118,7 @@ def _composition(circuit: str, controller: str, effects: Sequence[Any]) -> str:
     """Source of the stack's composition.py."""
     imports = [
         '"""Generated: the places where this stack\'s effects act."""',
-        "from ema_model.numba_options import scalar",
+        "from ema_model.physics.jit import scalar",
         f"from ema_model.physics.controller import {controller}_controller as control",
         f"from ema_model.physics.drive import {circuit}_drive as advance_current",
     ]

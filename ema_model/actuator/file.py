@@ -18,9 +18,9 @@ from ema_model.actuator.parameters import (
     check_value,
     number,
 )
-from ema_model.axes import KINDS as AXIS_KINDS
-from ema_model.axes import Axes
 from ema_model.errors import InputError
+from ema_model.quantities.axes import KINDS as AXIS_KINDS
+from ema_model.quantities.axes import Axes
 
 _OTHERS = ("schema", "name", "description", "axes", "model", "effects", "recordings")
 _MODEL = ("step_s", "filter_s", "torque_known")
@@ -116,7 +116,7 @@ def _effects(
     """The effects that belong to the actuator's model, checked by the catalogue."""
     # the catalogue's kernels need not be loaded for an actuator without effects
     from ema_model.effects import find
-    from ema_model.user_effects.entries import kind_of, read_entries
+    from ema_model.effects.user.entries import kind_of, read_entries
 
     effects: dict[str, dict[str, float]] = {}
     for given_name in given:

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, fields, replace
 from fnmatch import fnmatchcase
 from typing import Any
 
-from ema_model.axes import Axes
 from ema_model.errors import InputError
+from ema_model.quantities.axes import Axes
 
 _FAR = 1e9  # rad, where an end stop is out of reach
 
@@ -116,7 +116,7 @@ _ANY_SIGN = {"rotor_offset_rad", "current_bias_A", "stop_low_rad", "stop_high_ra
 
 @dataclass(frozen=True)
 class Actuator:
-    """All parameters of one actuator; SI units, which the names say (for linear axes see `ema_model.axes`)."""
+    """All parameters of one actuator; SI units, which the names say (for linear axes see `ema_model.quantities.axes`)."""
 
     name: str
     controller: Controller

@@ -14,7 +14,7 @@ from ema_model.errors import InputError
 from ema_model.whole_file import whole_file
 
 if TYPE_CHECKING:
-    from ema_model.user_effects import UserEffect
+    from ema_model.effects.user import UserEffect
 
 
 def save_actuator(actuator: Actuator, path: str | os.PathLike[str]) -> None:
@@ -60,7 +60,7 @@ def as_toml(actuator: Actuator) -> str:
 def _effects(actuator: Actuator) -> list[str]:
     """The tables of its effects; a user's are numbered where there are several of a kind."""
     from ema_model.effects import find  # the kernels need not be loaded for an actuator without effects
-    from ema_model.user_effects import UserEffect
+    from ema_model.effects.user import UserEffect
 
     lines: list[str] = []
     kinds: list[str] = []
@@ -81,14 +81,14 @@ def _effects(actuator: Actuator) -> list[str]:
 
 
 def _users(actuator: Actuator, effect: UserEffect) -> list[str]:
-    """The entries of a user's effect, as `ema_model.user_effects.entries` reads them."""
+    """The entries of a user's effect, as `ema_model.effects.user.entries` reads them."""
     lines = [f"{key} = {_text(v) if isinstance(v, str) else repr(v)}" for key, v in effect.definition.items()]
     values = {name: float(value) for name, value in actuator.effects[effect.name].items()}
     path = f"effects.{effect.name}"
     if effect.kind == "torque_curve":
         knots = [f"    {_value(actuator, f'{path}.{name}', value)}," for name, value in values.items()]
         return [*lines, "values = [", *knots, "]"]
-    from ema_model.user_effects.entries import parameter_ranges
+    from ema_model.effects.user.entries import parameter_ranges
 
     ranges = parameter_ranges(effect)
     for name, value in values.items():

@@ -14,13 +14,13 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from ema_model.actuator import Actuator, load_actuator
-from ema_model.calibration import default_free
 from ema_model.challenges.truth import Truth
 from ema_model.commands import command
-from ema_model.measurement import Measurement
-from ema_model.sensors import Sensors
-from ema_model.simulation import Effects, Run, simulate_reference
-from ema_model.user_effects import user_torque
+from ema_model.effects.user import user_torque
+from ema_model.estimation import default_free
+from ema_model.recordings import Measurement
+from ema_model.simulation.run import Effects, Run, simulate_reference
+from ema_model.simulation.sensors import Sensors
 
 RUNS = {
     "chirp": Run(command("chirp"), 0.5),

@@ -24,7 +24,7 @@ from typing import Any
 
 from ema_model.challenges.challenge import Challenge
 from ema_model.errors import InputError
-from ema_model.measurement.refusal import shown
+from ema_model.recordings.refusal import shown
 from ema_model.whole_file import whole_file
 
 SUFFIX = ".challenge"

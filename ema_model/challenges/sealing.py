@@ -19,8 +19,8 @@ from ema_model.challenges.make import RUNS, SENSORS, recorded, write
 from ema_model.challenges.sealed_file import HIDDEN, MOST_CHARACTERS, SUFFIX, read_parts, write_sealed
 from ema_model.challenges.truth import Truth, truth_of
 from ema_model.errors import InputError
-from ema_model.measurement.refusal import shown
-from ema_model.sensors import Sensors
+from ema_model.recordings.refusal import shown
+from ema_model.simulation.sensors import Sensors
 
 _HELD_OUT = "unseen"
 _GRADE = 0  # nobody has judged how hard it is

@@ -26,7 +26,7 @@ class Truth:
     seed: int  # of the plant's parameters, and of the sensors' noise
     answer: str  # in words, for when the student is done
     effects: dict[str, dict[str, float]] = field(default_factory=dict)  # of the catalogue, with their settings
-    torque: str = ""  # outside the catalogue: an expression of `ema_model.user_effects`, N·m at the motor
+    torque: str = ""  # outside the catalogue: an expression of `ema_model.effects.user`, N·m at the motor
     torque_parameters: dict[str, float] = field(default_factory=dict)
     faults: dict[str, float] = field(default_factory=dict)  # k1 … k8 that are not healthy
 

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
-from ema_model.calibration import Calibration, Floor
 from ema_model.comparison.residuals import Adjustable, Residuals, join
 from ema_model.effects import find
-from ema_model.kernel_rows import reduced_circuit
-from ema_model.plants import Plant, Stretch, Window
+from ema_model.estimation import Calibration, Floor
+from ema_model.models import Plant, Stretch, Window
+from ema_model.simulation.pack import reduced_circuit
 
 Array = NDArray[np.float64]
 

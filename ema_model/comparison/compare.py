@@ -10,23 +10,23 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ema_model.actuator import Actuator, load_actuator
-from ema_model.calibration import Calibration, Floor, floor
-from ema_model.calibration import calibrate as fit
-from ema_model.calibration.fit import SIGNALS
-from ema_model.calibration.floor import twin_error
 from ema_model.comparison.assemble import residuals_of
 from ema_model.comparison.result import Compared, Comparison, SignalError
-from ema_model.comparison.sampling import evaluation_stretches, fit_stretches
 from ema_model.comparison.verdict import judge
 from ema_model.effects import find
 from ema_model.errors import InputError
+from ema_model.estimation import Calibration, Floor, floor
+from ema_model.estimation import calibrate as fit
+from ema_model.estimation.calibrate import SIGNALS
+from ema_model.estimation.floor import twin_error
 from ema_model.faults import HEALTHY
-from ema_model.measurement import Measurement
-from ema_model.measurement.equivalent_current import with_current
-from ema_model.measurement.health import health
-from ema_model.measurement.side_file import stated
-from ema_model.plants import ClosedLoop, Plant, Stretch, Window, plant_for
-from ema_model.recordings import check_same_actuator
+from ema_model.models import ClosedLoop, Plant, Stretch, Window, plant_for
+from ema_model.models.stretches import evaluation_stretches, fit_stretches
+from ema_model.recordings import Measurement
+from ema_model.recordings.equivalent_current import with_current
+from ema_model.recordings.health.card import health
+from ema_model.recordings.read import check_same_actuator
+from ema_model.recordings.side_file.read import stated
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]

@@ -14,13 +14,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ema_model.axes import Axes
+from ema_model.comparison.cross_validation import FOLDS, Folds, Given, LeftOut, nothing_given, share_out
 from ema_model.comparison.curves import families, harmonics, orders_in, quantile_knots
-from ema_model.comparison.folds import FOLDS, Folds, Given, LeftOut, nothing_given, share_out
 from ema_model.comparison.residuals import Residuals
 from ema_model.comparison.result import Explanation
-from ema_model.comparison.words import explanation_sentence
-from ema_model.measurement import SIGNALS
+from ema_model.comparison.sentences import explanation_sentence
+from ema_model.quantities.axes import Axes
+from ema_model.recordings import SIGNALS
 
 Array = NDArray[np.float64]
 

@@ -13,10 +13,10 @@ from ema_model.comparison.residuals import Residuals
 
 if TYPE_CHECKING:
     from ema_model.actuator import Actuator
-    from ema_model.calibration.fit import Calibration
     from ema_model.comparison.orders import Order
-    from ema_model.measurement import Measurement
-    from ema_model.measurement.health import Health
+    from ema_model.estimation.calibrate import Calibration
+    from ema_model.recordings import Measurement
+    from ema_model.recordings.health.card import Health
 
 Array = NDArray[np.float64]
 

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from ema_model.axes import Axes
-from ema_model.calibration import Calibrated, Calibration
 from ema_model.comparison.result import Comparison, SignalError
+from ema_model.estimation import Calibrated, Calibration
+from ema_model.quantities.axes import Axes
 
 
 def as_dict(comparison: Comparison) -> dict[str, Any]:

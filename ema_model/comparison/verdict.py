@@ -9,16 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
-from ema_model.calibration import Calibration
-from ema_model.calibration.floor import CORRELATED_S
 from ema_model.comparison.explain import explain, used_blocks
 from ema_model.comparison.orders import Order, residual_orders
 from ema_model.comparison.regions import worst_regions
 from ema_model.comparison.residuals import Residuals
 from ema_model.comparison.result import Explanation, Region, SignalError
-from ema_model.comparison.words import order_sentence
-from ema_model.measurement import SIGNALS
-from ema_model.titles import in_sentence, parameter_title
+from ema_model.comparison.sentences import order_sentence
+from ema_model.estimation import Calibration
+from ema_model.estimation.floor import CORRELATED_S
+from ema_model.quantities.titles import in_sentence, parameter_title
+from ema_model.recordings import SIGNALS
 
 Array = NDArray[np.float64]
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from ema_model.discovery.discover import discover, result_of, settings_of, walk
+from ema_model.discovery.path import Story, begun
 from ema_model.discovery.result import Added, Candidate, Discovery, Experiment, Rung
-from ema_model.discovery.story import Story, begun
 from ema_model.discovery.summary import as_dict
 
 __all__ = [

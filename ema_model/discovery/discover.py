@@ -13,15 +13,15 @@ import numpy as np
 
 from ema_model.actuator import Actuator, load_actuator
 from ema_model.comparison.result import Explanation
-from ema_model.discovery.experiments import next_experiment
 from ema_model.discovery.harmonics import with_further_orders
+from ema_model.discovery.next_test import next_experiment
+from ema_model.discovery.path import Story, begun, with_drops
+from ema_model.discovery.refit import LEAST_BIC, Trial, fitted_count, pays
 from ema_model.discovery.result import Candidate, Discovery, Experiment
-from ema_model.discovery.story import Story, begun, with_drops
-from ema_model.discovery.trial import LEAST_BIC, Trial, fitted_count, pays
+from ema_model.discovery.sentences import as_well, masked, untold
 from ema_model.discovery.unknown import curve_instead, is_a_shape
-from ema_model.discovery.worded import as_well, masked, untold
 from ema_model.effects import CATALOGUE, find
-from ema_model.measurement import Measurement
+from ema_model.recordings import Measurement
 
 Progress = Callable[[str], None]
 

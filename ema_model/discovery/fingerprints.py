@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
-from ema_model.discovery.fitting import Data, Fit
+from ema_model.discovery.model_fit import Data, Fit
 from ema_model.effects import CATALOGUE, Effect, find
-from ema_model.kernel_rows import stack_for
+from ema_model.simulation.pack import stack_for
 from ema_model.stacks import Stack
 
 Array = NDArray[np.float64]

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from ema_model.discovery.fingerprints import fingerprints
-from ema_model.discovery.fitting import Data, Fit
+from ema_model.discovery.model_fit import Data, Fit
+from ema_model.discovery.refit import LEAST_BIC, Trial, pays, tried
 from ema_model.discovery.result import Candidate
 from ema_model.discovery.score import scored_together
-from ema_model.discovery.trial import LEAST_BIC, Trial, pays, tried
 from ema_model.effects import catalogue_name, find
 
 _MOST = 5  # further orders

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from ema_model.actuator import Actuator
-from ema_model.discovery.fitting import Data, Fit
-from ema_model.plants import Plant
+from ema_model.discovery.model_fit import Data, Fit
+from ema_model.models import Plant
 
 Array = NDArray[np.float64]
 

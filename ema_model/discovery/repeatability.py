@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
 from ema_model.actuator import Actuator
-from ema_model.calibration.floor import CORRELATED_S
-from ema_model.discovery.fitting import Data, Fit
-from ema_model.plants import ClosedLoop
+from ema_model.discovery.model_fit import Data, Fit
+from ema_model.estimation.floor import CORRELATED_S
+from ema_model.models import ClosedLoop
 
 Array = NDArray[np.float64]
 

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
-from ema_model.calibration import Calibrated, Calibration, Floor
 from ema_model.comparison.result import Explanation
-from ema_model.plants import Plant
+from ema_model.estimation import Calibrated, Calibration, Floor
+from ema_model.models import Plant
 
 Array = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.discovery.fingerprints import Fingerprint
-from ema_model.discovery.fitting import Fit
+from ema_model.discovery.model_fit import Fit
 from ema_model.discovery.result import Candidate
 from ema_model.effects import find
 

@@ -20,9 +20,9 @@ AnyEffect = TypeVar("AnyEffect", bound=Effect)
 CATALOGUE: dict[str, Effect] = {
     module.name: replace(importlib.import_module(f"{__name__}.{module.name}").EFFECT, name=module.name)
     for module in sorted(pkgutil.iter_modules(__path__), key=lambda module: module.name)
-    if module.name != "effect"
+    if module.name != "effect" and not module.ispkg
 }
-_OF_THE_USER: dict[str, Effect] = {}  # made at run time by `ema_model.user_effects`; not part of the catalogue
+_OF_THE_USER: dict[str, Effect] = {}  # made at run time by `ema_model.effects.user`; not part of the catalogue
 
 
 def find(name: str) -> Effect:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from ema_model.effects.effect import Effect, Parameter
-from ema_model.numba_options import scalar
 from ema_model.physics.elementary import sign
+from ema_model.physics.jit import scalar
 
 
 @scalar

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ema_model.effects.effect import Effect, Parameter
-from ema_model.numba_options import scalar
+from ema_model.physics.jit import scalar
 
 
 @scalar

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from ema_model.effects.effect import Effect, Parameter
-from ema_model.numba_options import scalar
 from ema_model.physics.elementary import clamp
+from ema_model.physics.jit import scalar
 
 _ZERO_A = 0.2  # current below which the pause costs less: a sign that jumps would chatter about zero
 

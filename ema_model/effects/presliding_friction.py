@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from ema_model.effects.effect import Effect, Parameter
-from ema_model.numba_options import scalar
 from ema_model.physics.elementary import decay
+from ema_model.physics.jit import scalar
 
 _STICK_RAD_S = 1.0  # speed over which the level falls from static to dynamic, which the base law lets fall at once
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from ema_model.effects.effect import Effect, Parameter
-from ema_model.numba_options import scalar
 from ema_model.physics.elementary import sine
+from ema_model.physics.jit import scalar
 
 _TURN = 2.0 * math.pi
 

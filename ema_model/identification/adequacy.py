@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ema_model.calibration.floor import CORRELATED_S
+from ema_model.estimation.floor import CORRELATED_S
 from ema_model.identification.fit import Fitted
-from ema_model.measurement import SIGNALS as SIGNAL_NAMES
-from ema_model.titles import in_sentence, parameter_title
+from ema_model.quantities.titles import in_sentence, parameter_title
+from ema_model.recordings import SIGNALS as SIGNAL_NAMES
 
 Array = NDArray[np.floating]
 

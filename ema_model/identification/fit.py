@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ema_model.calibration.floor import floor
+from ema_model.estimation.descent import Descent
+from ema_model.estimation.floor import floor
 from ema_model.faults import HEALTHY
-from ema_model.identification.descent import Descent
+from ema_model.identification.model_bias import Twins, twins
 from ema_model.identification.problem import Problem, Weights
-from ema_model.identification.twin import Twins, twins
 from ema_model.identification.unknowns import FAULTS, LOAD, Nuisance, nuisances, to_k, to_x
-from ema_model.plants import ClosedLoop
+from ema_model.models import ClosedLoop
 
 Array = NDArray[np.float64]
 

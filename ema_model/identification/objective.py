@@ -9,12 +9,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.errors import InputError
-from ema_model.kernel_rows import initial_state, monitor_rows
-from ema_model.measurement import Measurement
+from ema_model.models.closed_loop import ClosedLoop
+from ema_model.models.window import BLOCK_S, Window
 from ema_model.physics.rows import LANES
-from ema_model.plants.closed_loop import ClosedLoop
-from ema_model.plants.window import BLOCK_S, Window
-from ema_model.simulation import Run, simulate_reference
+from ema_model.recordings import Measurement
+from ema_model.simulation.pack import initial_state, monitor_rows
+from ema_model.simulation.run import Run, simulate_reference
 from ema_model.stacks import exclusive
 
 Array = NDArray[np.float64]

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ema_model.calibration.floor import Floor
+from ema_model.estimation.floor import Floor
 from ema_model.faults import HEALTHY, NAMES
 from ema_model.identification.unknowns import ECCENTRICITY, FAULTS, LOAD, Nuisance, fault_bounds, to_k, to_x
-from ema_model.plants import ClosedLoop
+from ema_model.models import ClosedLoop
 
 Array = NDArray[np.float64]
 

@@ -13,10 +13,10 @@ from numpy.typing import ArrayLike, NDArray
 from ema_model import faults
 from ema_model.errors import InputError
 from ema_model.identification.fit import Setting, refine, refine_best, setting
-from ema_model.identification.intervals import Uncertainty, uncertainty
 from ema_model.identification.objective import Objective
 from ema_model.identification.optimisers import OPTIMISERS, Optimiser, create
 from ema_model.identification.search import search
+from ema_model.identification.uncertainty import Uncertainty, uncertainty
 from ema_model.identification.unknowns import to_k
 
 Array = NDArray[np.float64]

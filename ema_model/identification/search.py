@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ema_model.estimation.descent import Descent
 from ema_model.faults import HEALTHY
-from ema_model.identification.descent import Descent
 from ema_model.identification.problem import Problem
 from ema_model.identification.unknowns import FAULTS, to_x
 

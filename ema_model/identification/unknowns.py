@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ema_model.actuator import Actuator
-from ema_model.calibration.floor import Floor
-from ema_model.calibration.problem import unknown_of
-from ema_model.plants import ClosedLoop
+from ema_model.estimation.floor import Floor
+from ema_model.estimation.problem import unknown_of
+from ema_model.models import ClosedLoop
 
 Array = NDArray[np.float64]
 

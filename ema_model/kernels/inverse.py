@@ -5,8 +5,8 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from ema_model.numba_options import parallel_kernel, scalar
 from ema_model.physics.elementary import clamp
+from ema_model.physics.jit import parallel_kernel, scalar
 from ema_model.physics.rows import (
     DYNAMIC_FRICTION,
     GEAR_RATIO,

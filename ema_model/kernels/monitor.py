@@ -9,7 +9,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from ema_model.numba_options import parallel_kernel
+from ema_model.physics.jit import parallel_kernel
 from ema_model.physics.rows import LANES, OMEGA, THETA
 
 from .monitor_step import advance, shown_current, shown_position

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from ema_model.numba_options import kernel
 from ema_model.physics.backlash import advance_play
 from ema_model.physics.controller import advance_integral, current_reference, speed_reference
 from ema_model.physics.elementary import clamp, rotate
 from ema_model.physics.friction import advance_rotor, borello_friction
 from ema_model.physics.inverter import relay
+from ema_model.physics.jit import kernel
 from ema_model.physics.phases import (
     air_gap,
     equivalent_current,

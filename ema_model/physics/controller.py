@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ema_model.numba_options import scalar
 from ema_model.physics.elementary import clamp
+from ema_model.physics.jit import scalar
 
 
 @scalar

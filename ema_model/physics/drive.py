@@ -5,8 +5,8 @@ Two for the thesis's hysteresis current loop, whose demand is a current, and two
 
 from __future__ import annotations
 
-from ema_model.numba_options import scalar
 from ema_model.physics.elementary import clamp, sign
+from ema_model.physics.jit import scalar
 
 
 @scalar

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ema_model.numba_options import scalar
+from ema_model.physics.jit import scalar
 
 _TURNS = 0.5 / math.pi
 # sin 2πw for |w| ≤ ¼

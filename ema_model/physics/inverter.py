@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ema_model.numba_options import scalar
+from ema_model.physics.jit import scalar
 
 
 @scalar

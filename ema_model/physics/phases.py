@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ema_model.numba_options import scalar
+from ema_model.physics.jit import scalar
 
 _HALF_SQRT3 = math.sqrt(3.0) / 2.0
 

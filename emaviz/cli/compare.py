@@ -7,8 +7,8 @@ from pathlib import Path
 
 from ema_model.comparison import Comparison, as_dict, compare
 from ema_model.errors import InputError
-from ema_model.measurement import SIGNALS
-from ema_model.recordings import read_recording
+from ema_model.recordings import SIGNALS
+from ema_model.recordings.read import read_recording
 from emaviz.cli import options, output
 
 HELP = "show where the model fails beside recordings"

@@ -9,9 +9,9 @@ from ema_model.actuator import save_actuator
 from ema_model.discovery import Discovery, as_dict, discover
 from ema_model.effects import find
 from ema_model.errors import InputError
-from ema_model.recordings import read_recording
+from ema_model.recordings.read import read_recording
 from emaviz.cli import options, output
-from emaviz.discovery_words import VERDICTS, faults, next_experiment, settings
+from emaviz.text.discovery import VERDICTS, faults, next_experiment, settings
 
 HELP = "find the physical effects that the model lacks, and add them"
 _CURRENT_ONLY = ("current_A",)
@@ -76,7 +76,7 @@ def run(arguments: argparse.Namespace) -> int:
 def _write(found: Discovery, arguments: argparse.Namespace) -> None:
     """The recording and the report, last: if one fails, the answer is there."""
     if arguments.record:
-        from emaviz.recording.discovery import write_discovery  # rerun takes a second to import
+        from emaviz.recording.discovery.write import write_discovery  # rerun takes a second to import
 
         write_discovery(found, arguments.record, output.configuration(arguments))
     if arguments.report:

@@ -20,6 +20,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Serves the app until interrupted."""
-    from emaviz.app import serve
+    from emaviz.page.app import serve
 
     return serve(arguments)

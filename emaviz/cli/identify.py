@@ -9,12 +9,12 @@ import numpy as np
 
 from ema_model import faults
 from ema_model.actuator import Actuator
-from ema_model.discovery.fitting import with_effect
+from ema_model.discovery.model_fit import with_effect
 from ema_model.errors import InputError
 from ema_model.identification.objective import FITNESSES, Objective, simulated
 from ema_model.identification.run import ALGORITHMS, ROBUST, Identification, Progress, identify
-from ema_model.measurement import Measurement, read_measurement
-from ema_model.sensors import Sensors
+from ema_model.recordings import Measurement, read_measurement
+from ema_model.simulation.sensors import Sensors
 from emaviz.cli import options, output
 
 HELP = "find the faults k1 … k8 of recordings, or of a simulated actuator"

@@ -10,10 +10,10 @@ from ema_model import faults
 from ema_model.actuator import Actuator, load_actuator
 from ema_model.commands import COMMANDS, Command, Recorded, command
 from ema_model.effects import find
+from ema_model.effects.user.entries import kind_of, read_entries
 from ema_model.errors import InputError
-from ema_model.measurement import read_measurement
-from ema_model.simulation import Run
-from ema_model.user_effects.entries import kind_of, read_entries
+from ema_model.recordings import read_measurement
+from ema_model.simulation.run import Run
 
 
 def add_actuator(parser: argparse.ArgumentParser) -> None:

@@ -9,10 +9,10 @@ import numpy as np
 
 from ema_model.errors import InputError
 from ema_model.faults import readings
-from ema_model.measurement import Measurement, write_measurement
-from ema_model.measurement.write import check_target
-from ema_model.sensors import Sensors
-from ema_model.simulation import simulate_monitor, simulate_reference
+from ema_model.recordings import Measurement, write_measurement
+from ema_model.recordings.write import check_target
+from ema_model.simulation.run import simulate_monitor, simulate_reference
+from ema_model.simulation.sensors import Sensors
 from emaviz.cli import options, output
 
 HELP = "simulate one run of the reference or the monitor model and write it as a recording"

@@ -6,8 +6,8 @@ import plotly.graph_objects as go
 
 from ema_model.discovery import Discovery
 from ema_model.discovery.result import Candidate
-from emaviz.discovery_words import effect_title
 from emaviz.figures import theme
+from emaviz.text.discovery import effect_title
 
 PREDICTED, REFITTED = theme.MEASURED, theme.MODEL
 

@@ -11,7 +11,7 @@ import viser
 from emaviz.figures.colours import DIFFERENCE, MONITOR, REFERENCE
 from emaviz.figures.decimate import envelope
 from emaviz.figures.signals import CHARTS, legend, time_axis, value_axis
-from emaviz.library import SHOWN, Felt
+from emaviz.session.library import SHOWN, Felt
 
 _POINTS, _SMALL_POINTS = 800, 160
 _WIDTH, _HEIGHT = 120, 44  # of a small picture, pixels

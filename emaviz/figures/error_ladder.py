@@ -7,8 +7,8 @@ import math
 import plotly.graph_objects as go
 
 from ema_model.discovery import Discovery
-from emaviz.discovery_words import rung_title
 from emaviz.figures import quantity, theme
+from emaviz.text.discovery import rung_title
 
 FITTED, HELD_OUT = theme.MEASURED, theme.MODEL
 _WIDE = 15.0  # times the floor, from which on the scale is logarithmic

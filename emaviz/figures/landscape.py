@@ -10,11 +10,11 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 
 from ema_model.faults import FAULTS
+from ema_model.identification.landscape import Landscape, Way
 from ema_model.identification.run import ALGORITHMS as TITLES
 from emaviz.figures import theme
 from emaviz.figures.colours import TRUTH
 from emaviz.figures.convergence import colour
-from emaviz.landscape import Landscape, Way
 
 Array = NDArray[np.floating]
 

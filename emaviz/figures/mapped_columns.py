@@ -7,7 +7,7 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from ema_model.errors import InputError
-from ema_model.measurement import SIGNALS, ColumnMapping, apply_mapping
+from ema_model.recordings import SIGNALS, ColumnMapping, apply_mapping
 from emaviz.figures.colours import COMMAND, REFERENCE
 from emaviz.figures.decimate import envelope
 

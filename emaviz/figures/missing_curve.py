@@ -6,7 +6,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from ema_model.discovery import Discovery
-from ema_model.measurement import SIGNALS
+from ema_model.recordings import SIGNALS
 from emaviz.figures import quantity, theme
 from emaviz.figures.quantity import Quantity
 

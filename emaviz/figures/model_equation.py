@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from ema_model.discovery import Discovery
 from ema_model.discovery.result import Added
 from ema_model.effects import Effect, find
-from emaviz.discovery_words import effect_title, settings
 from emaviz.figures.colours import ALGORITHMS, MONITOR, TRUTH
+from emaviz.text.discovery import effect_title, settings
 
 COLOURS = (MONITOR, ALGORITHMS["ssa"], ALGORITHMS["do"], TRUTH)
 # Where an effect acts, the equation of the base model that it stands in, in the order of the page.

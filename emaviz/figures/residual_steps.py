@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import plotly.graph_objects as go
 
-from ema_model.measurement import SIGNALS
+from ema_model.recordings import SIGNALS
 from emaviz.figures import floor_band, quantity, theme
 from emaviz.figures.discovery_tracks import Track
 from emaviz.figures.lines import line

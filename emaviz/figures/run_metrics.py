@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ema_model.measurement import Measurement
+from ema_model.recordings import Measurement
 from emaviz.figures.signals import CHARTS
 
 _MISSING = "–"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from ema_model.measurement import Measurement
+from ema_model.recordings import Measurement
 from emaviz.figures.colours import COMMAND, GHOST, MONITOR, REFERENCE
 from emaviz.figures.lines import line
 from emaviz.figures.signals import CHARTS, at

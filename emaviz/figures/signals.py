@@ -9,7 +9,7 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from ema_model.measurement import Measurement
+from ema_model.recordings import Measurement
 from emaviz.figures.colours import COMMAND, DIFFERENCE, GHOST, MONITOR, PHASES, REFERENCE
 from emaviz.figures.decimate import envelope
 

@@ -13,8 +13,8 @@ from ema_model import faults
 from ema_model.commands import Recorded
 from ema_model.identification.objective import Objective
 from ema_model.identification.run import Identification, Progress
-from ema_model.measurement import Measurement
-from ema_model.simulation import Run, simulate_monitor
+from ema_model.recordings import Measurement
+from ema_model.simulation.run import Run, simulate_monitor
 from emaviz.recording.writer import RecordingWriter
 
 _RESIDUAL = ("current_A", "user_position_rad", "motor_position_rad", "motor_speed_rad_s")

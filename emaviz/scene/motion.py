@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.faults import physical
-from ema_model.measurement import Measurement
+from ema_model.recordings import Measurement
 from emaviz.scene.actuator import ActuatorScene
 from emaviz.scene.drivetrain import ARM
 

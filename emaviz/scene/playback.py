@@ -13,7 +13,7 @@ import numpy as np
 from ema_model.actuator import Actuator
 from emaviz.scene.actuator import ActuatorScene
 from emaviz.scene.motion import Motion, enlargement, motion
-from emaviz.session import Simulation
+from emaviz.session.session import Simulation
 
 _POSES_PER_S = 30.0
 # While a slider is dragged one watches the charts, and without a GPU one picture of the scene takes the time of all of

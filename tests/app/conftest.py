@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from on_page import wait_until
+from support.on_page import wait_until
 
-from emaviz.app import App
+from emaviz.page.app import App
 
 
 @pytest.fixture(scope="module")

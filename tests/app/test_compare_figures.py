@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from comparison_by_hand import comparison as by_hand
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from plotly.offline import get_plotlyjs
+from support.comparison_by_hand import comparison as by_hand
 
 from emaviz.figures import (
     calibration_scores,

@@ -6,14 +6,14 @@ import time
 
 import numpy as np
 import pytest
-from on_page import wait_until
+from support.on_page import wait_until
 
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
-from ema_model.measurement import write_measurement
-from ema_model.sensors import Sensors
-from ema_model.simulation import Run, simulate_reference
-from emaviz.app import App
+from ema_model.recordings import write_measurement
+from ema_model.simulation.run import Run, simulate_reference
+from ema_model.simulation.sensors import Sensors
+from emaviz.page.app import App
 
 pytestmark = pytest.mark.browser
 

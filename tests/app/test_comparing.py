@@ -12,14 +12,14 @@ import pytest
 from ema_model.actuator import load_actuator, shipped
 from ema_model.commands import command
 from ema_model.errors import InputError
-from ema_model.measurement import ColumnMapping, MappedColumn, read_side_file, side_path, write_measurement
-from ema_model.sensors import Sensors
-from ema_model.simulation import Run, simulate_reference
-from emaviz.actuator_files import UPLOADED, shipped_actuators
-from emaviz.comparing import Comparing
-from emaviz.data_folder import DataFolder
+from ema_model.recordings import ColumnMapping, MappedColumn, read_side_file, side_path, write_measurement
+from ema_model.simulation.run import Run, simulate_reference
+from ema_model.simulation.sensors import Sensors
 from emaviz.recording import read
-from emaviz.session import Session
+from emaviz.session.actuators import UPLOADED, shipped_actuators
+from emaviz.session.compare.comparing import Comparing
+from emaviz.session.data_folder import DataFolder
+from emaviz.session.session import Session
 
 
 @pytest.fixture(scope="module")

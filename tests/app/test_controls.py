@@ -9,12 +9,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from on_page import choose, field, fill, wait_until
+from support.on_page import choose, field, fill, wait_until
 
 from ema_model.faults import HEALTHY
-from ema_model.identification.separation import Suggestion
+from ema_model.identification.next_test import Suggestion
 from emaviz.recording import read
-from emaviz.state import Settings
+from emaviz.session.settings import Settings
 
 pytestmark = pytest.mark.browser
 

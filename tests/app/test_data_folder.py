@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from ema_model.errors import InputError
-from emaviz.data_folder import DataFolder, sanitised
+from emaviz.session.data_folder import DataFolder, sanitised
 
 ROWS = "time_s,current_A\n" + "\n".join(f"{i * 1e-3},{i % 3}" for i in range(200)) + "\n"
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 import json
 
 import pytest
-from on_page import wait_until
-from rig import Rig
+from support.on_page import wait_until
+from support.rig import Rig
 
 from ema_model.challenges.truth import Truth
 from ema_model.errors import InputError
-from emaviz.discovery_record import checked
-from emaviz.discovery_words import faults, headline, sentences
-from emaviz.panels.discover_result import answer
-from emaviz.panels.discover_reveal import agrees, reveal
+from emaviz.page.discover.result import answer
+from emaviz.page.discover.reveal import agrees, reveal
+from emaviz.session.discover.record import checked
+from emaviz.text.discovery import faults, headline, sentences
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 import pytest
-from on_page import wait_until
+from support.on_page import wait_until
 
 pytestmark = pytest.mark.browser
 

@@ -7,19 +7,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from on_page import wait_until
-from rig import Rig
+from support.on_page import wait_until
+from support.rig import Rig
 
 from ema_model.actuator import load_actuator
+from ema_model.effects.user import user_torque
 from ema_model.errors import InputError
 from ema_model.faults import HEALTHY
-from ema_model.user_effects import user_torque
 from emaviz.figures.discovery_tracks import tracks
-from emaviz.panels import discover_cards
-from emaviz.panels.discover_actuator import _SHOWN, run_of
-from emaviz.panels.discover_guide import STEPS, step
-from emaviz.panels.discover_next import as_csv
-from emaviz.panels.discover_reveal import agrees, reveal
+from emaviz.page.discover import cards as discover_cards
+from emaviz.page.discover.actuator import _SHOWN, run_of
+from emaviz.page.discover.guide import STEPS, step
+from emaviz.page.discover.next_test import as_csv
+from emaviz.page.discover.reveal import agrees, reveal
 from emaviz.recording.read import read
 from emaviz.scene.motion import motion
 

@@ -7,16 +7,16 @@ import shutil
 
 import numpy as np
 import pytest
-from on_page import wait_until
-from rig import Rig
+from support.on_page import wait_until
+from support.rig import Rig
 
 from ema_model.actuator import load_actuator
 from ema_model.discovery.result import Experiment
+from ema_model.effects.user import user_torque
 from ema_model.errors import InputError
-from ema_model.user_effects import user_torque
-from emaviz.discovery_sealing import sensors_of, truth_of
-from emaviz.panels.discover_reveal import agrees, reveal
-from emaviz.state import Settings
+from emaviz.page.discover.reveal import agrees, reveal
+from emaviz.session.discover.sealing import sensors_of, truth_of
+from emaviz.session.settings import Settings
 
 EASY = "first_bench_run"
 HIDDEN = {"amplitude_Nm": 0.02, "order": 12.0, "phase_rad": 0.5}

@@ -7,21 +7,21 @@ import math
 
 import numpy as np
 import pytest
-from on_page import wait_until
+from support.on_page import wait_until
 
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
 from ema_model.effects import CATALOGUE
 from ema_model.errors import InputError
 from ema_model.faults import HEALTHY
-from ema_model.measurement import Measurement, read_measurement
-from ema_model.simulation import Run, simulate_monitor, simulate_reference
+from ema_model.recordings import Measurement, read_measurement
+from ema_model.simulation.run import Run, simulate_monitor, simulate_reference
 from emaviz.figures import run_signals
 from emaviz.figures.run_metrics import differences, metrics, rise_time_s
 from emaviz.figures.signals import _within, at, beneath
-from emaviz.panels.explore_presets import CUSTOM, PRESETS, name_of
-from emaviz.session import Session
-from emaviz.state import Settings
+from emaviz.page.explore.presets import CUSTOM, PRESETS, name_of
+from emaviz.session.session import Session
+from emaviz.session.settings import Settings
 
 CHART = """(title) => {
   const charts = Object.values(window.__viserTestpoints.uplots).map(u => u.chart);

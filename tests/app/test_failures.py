@@ -13,9 +13,9 @@ from collections import namedtuple
 import pytest
 
 from ema_model.actuator import load_actuator
-from emaviz.app import App
+from emaviz.page.app import App
 from emaviz.recording import RecordingError, paths, read
-from emaviz.session import Session
+from emaviz.session.session import Session
 
 Usage = namedtuple("Usage", "total used free")
 LOST = "rerun was hidden by this test"
@@ -64,7 +64,7 @@ def test_without_rerun_an_identification_runs_and_says_what_is_lost(session, mon
 
 
 def test_the_app_is_imported_without_rerun():
-    code = "import sys; sys.modules['rerun'] = None; import emaviz.app; print('fine')"
+    code = "import sys; sys.modules['rerun'] = None; import emaviz.page.app; print('fine')"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
     assert done.stdout.strip() == "fine", done.stderr
 
@@ -117,7 +117,7 @@ def no_port(*_, **__):
 
 @pytest.mark.browser
 def test_a_viewer_without_a_port_is_told_and_a_browser_that_leaves_ends_nothing(browser, tmp_path, monkeypatch):
-    monkeypatch.setattr("emaviz.app.ViewerHost", no_port)
+    monkeypatch.setattr("emaviz.page.app.ViewerHost", no_port)
     app = App("127.0.0.1", 0, tmp_path)
     try:
         assert app.wait_for_first_picture(120.0) and app.viewer is None

@@ -7,22 +7,22 @@ import time
 
 import numpy as np
 import pytest
-from on_page import wait_until
+from support.on_page import wait_until
 
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
 from ema_model.errors import InputError
 from ema_model.faults import performance_coefficient, vector
 from ema_model.identification.run import ALGORITHMS, Progress
-from ema_model.measurement import read_measurement, write_measurement
-from ema_model.sensors import Sensors
-from ema_model.simulation import Run, simulate_reference
+from ema_model.recordings import read_measurement, write_measurement
+from ema_model.simulation.run import Run, simulate_reference
+from ema_model.simulation.sensors import Sensors
 from emaviz.figures import swarm
 from emaviz.figures.identified_table import Row, table
-from emaviz.identifying import MOST_FRAMES, Reins, Track
-from emaviz.panels.identify_swarm import at_iteration, telling
-from emaviz.session import Session
-from emaviz.state import Settings
+from emaviz.page.identify.swarm import at_iteration, telling
+from emaviz.session.race import MOST_FRAMES, Reins, Track
+from emaviz.session.session import Session
+from emaviz.session.settings import Settings
 
 CHART = """(title) => {
   const charts = Object.values(window.__viserTestpoints.uplots).map(u => u.chart);

@@ -10,11 +10,11 @@ import pytest
 
 from ema_model.errors import InputError
 from ema_model.faults import HEALTHY, vector
-from ema_model.identification.separation import Suggestion
+from ema_model.identification.landscape import Landscape, Way, extent, slices, ways
+from ema_model.identification.next_test import Suggestion
 from emaviz.figures import landscape as figures
-from emaviz.landscape import Landscape, Way, extent, slices, ways
-from emaviz.panels.identify_words import sure_words
-from emaviz.run_words import run_in_words
+from emaviz.text.identification import sure_words
+from emaviz.text.run import run_in_words
 
 TRUTH = vector({"k1": 0.3, "k6": 0.4})
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from on_page import wait_until
+from support.on_page import wait_until
 
 from emaviz.recording import read
 

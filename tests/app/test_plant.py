@@ -6,16 +6,16 @@ import threading
 
 import numpy as np
 import pytest
-from on_page import wait_until
+from support.on_page import wait_until
 
 from ema_model.actuator import load_actuator
 from ema_model.errors import InputError
 from ema_model.faults import HEALTHY, vector
-from ema_model.simulation import Run, simulate_monitor, simulate_reference
-from emaviz import plant
-from emaviz.actuator_files import shipped_actuators
-from emaviz.app import App
-from emaviz.session import Session
+from ema_model.simulation import plant
+from ema_model.simulation.run import Run, simulate_monitor, simulate_reference
+from emaviz.page.app import App
+from emaviz.session.actuators import shipped_actuators
+from emaviz.session.session import Session
 
 SERVO, DRIVE = "XL330 on a pendulum", "ODrive motor"
 

@@ -9,15 +9,15 @@ from urllib.parse import quote
 
 import numpy as np
 import pytest
-from on_page import field, wait_until
+from support.on_page import field, wait_until
 
 from ema_model.actuator import load_actuator
 from ema_model.errors import InputError
 from emaviz.figures import two_recordings
-from emaviz.recorded import Recorded
 from emaviz.recording import RecordingWriter, read
 from emaviz.recording.viewer import ViewerHost
-from emaviz.session import Session
+from emaviz.session.archive import Recorded
+from emaviz.session.session import Session
 
 
 def identify(session, seconds=60.0):

@@ -8,7 +8,7 @@ import socket
 import pytest
 
 from ema_model.errors import InputError
-from emaviz.safe_server import open_server
+from emaviz.page.server import open_server
 
 
 @pytest.fixture(scope="module")

@@ -11,11 +11,11 @@ import pytest
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
 from ema_model.faults import vector
-from ema_model.simulation import Run, simulate_reference
+from ema_model.simulation.run import Run, simulate_reference
 from emaviz.scene import drivetrain, motor, solids
 from emaviz.scene.motion import enlargement, motion
 from emaviz.scene.playback import Playback
-from emaviz.session import Simulation
+from emaviz.session.session import Simulation
 
 SOLIDS = {
     "block": solids.block(1.0, 2.0, 3.0),

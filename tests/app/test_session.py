@@ -12,7 +12,7 @@ import pytest
 
 from ema_model.actuator import load_actuator
 from emaviz.recording import RecordingError, read
-from emaviz.session import Session
+from emaviz.session.session import Session
 
 
 @pytest.fixture
@@ -103,7 +103,7 @@ def test_a_diverging_model_is_told_and_the_session_goes_on(session, monkeypatch)
         raise FloatingPointError("the reference model diverged")
 
     with monkeypatch.context() as patch:
-        patch.setattr("emaviz.plant.simulate_reference", diverge)
+        patch.setattr("ema_model.simulation.plant.simulate_reference", diverge)
         session.refresh()
         assert told.wait(10.0)
     session.events.simulated.append(lambda _: drawn.set())

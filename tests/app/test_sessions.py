@@ -8,18 +8,18 @@ import zipfile
 
 import numpy as np
 import pytest
-from on_page import wait_until
+from support.on_page import wait_until
 
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
 from ema_model.errors import InputError
 from ema_model.faults import HEALTHY
-from ema_model.measurement import write_measurement
-from ema_model.simulation import Run, simulate_reference
-from emaviz import session_file
-from emaviz.data_folder import DataFolder
-from emaviz.session_file import Part
-from emaviz.state import Settings
+from ema_model.recordings import write_measurement
+from ema_model.simulation.run import Run, simulate_reference
+from emaviz.session import saved as session_file
+from emaviz.session.data_folder import DataFolder
+from emaviz.session.saved import Part
+from emaviz.session.settings import Settings
 
 
 def changed_settings():

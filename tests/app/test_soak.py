@@ -10,7 +10,7 @@ import numpy as np
 import psutil
 import pytest
 
-from emaviz.app import App
+from emaviz.page.app import App
 
 pytestmark = pytest.mark.browser
 TABS = ("Explore", "Identify", "Compare", "Recordings")

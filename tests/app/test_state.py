@@ -7,7 +7,7 @@ import math
 import pytest
 
 from ema_model.errors import InputError
-from emaviz.state import Settings
+from emaviz.session.settings import Settings
 
 NONSENSE = [math.nan, math.inf, "abc", None, "", [], {}, "<script>"]
 

@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from emaviz.worker import Worker
+from emaviz.session.worker import Worker
 
 
 @pytest.fixture

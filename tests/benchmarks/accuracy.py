@@ -16,8 +16,8 @@ from ema_model.actuator import load_actuator
 from ema_model.identification.objective import Objective, simulated
 from ema_model.identification.optimisers import create
 from ema_model.identification.run import identify
-from ema_model.sensors import Sensors
-from ema_model.simulation import Run
+from ema_model.simulation.run import Run
+from ema_model.simulation.sensors import Sensors
 
 CASES = (
     ("friction k1 = 0.25", {"k1": 0.25}),

@@ -21,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from conftest import SOFTWARE_GL
 
-from emaviz.app import App
+from emaviz.page.app import App
 
 WORDS_PER_S = 4.0
 ANSWERED = """async ([name, sign]) => {

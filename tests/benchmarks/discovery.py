@@ -20,7 +20,7 @@ REPEATS = 3
 def times() -> None:
     """Prints the first use of this process, then the best of some repeats, for one and for three recordings."""
     started = time.perf_counter()
-    from hidden_effects import SINE, recorded
+    from support.hidden_effects import SINE, recorded
 
     from ema_model.discovery import discover
 

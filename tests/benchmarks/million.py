@@ -15,10 +15,10 @@ from pathlib import Path
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
 from ema_model.comparison import compare
-from ema_model.measurement import Measurement, write_measurement
-from ema_model.recordings import read_recording
-from ema_model.sensors import Sensors
-from ema_model.simulation import Run, simulate_reference
+from ema_model.recordings import Measurement, write_measurement
+from ema_model.recordings.read import read_recording
+from ema_model.simulation.run import Run, simulate_reference
+from ema_model.simulation.sensors import Sensors
 from emaviz.report import write_report
 
 KEPT = ("time_s", "command_rad", "user_position_rad", "motor_position_rad", "motor_speed_rad_s", "current_A")

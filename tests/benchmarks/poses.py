@@ -20,8 +20,8 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from conftest import SOFTWARE_GL
 
-from emaviz.app import App
-from emaviz.safe_server import open_server
+from emaviz.page.app import App
+from emaviz.page.server import open_server
 from emaviz.scene.actuator import ActuatorScene
 
 SECONDS, PUSHED_PER_S = 8.0, 32.0

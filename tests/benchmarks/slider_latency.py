@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from conftest import SOFTWARE_GL
 
-from emaviz.app import App
+from emaviz.page.app import App
 
 PRESSES, DRAGGED_S = 40, 8.0
 PAGE = """() => {

@@ -20,9 +20,9 @@ from ema_model.actuator import load_actuator
 from ema_model.identification.objective import Objective, simulated
 from ema_model.identification.optimisers import OPTIMISERS
 from ema_model.identification.run import identify
-from ema_model.kernel_rows import initial_state, monitor_rows
 from ema_model.physics.rows import CURRENT, LANES
-from ema_model.simulation import Run, simulate_reference
+from ema_model.simulation.pack import initial_state, monitor_rows
+from ema_model.simulation.run import Run, simulate_reference
 from ema_model.stacks import Stack
 
 STACKS = (
@@ -34,7 +34,7 @@ START = """
 import time; started = time.perf_counter()
 import tempfile
 from pathlib import Path
-from emaviz.app import App
+from emaviz.page.app import App
 app = App("127.0.0.1", 0, Path(tempfile.mkdtemp()))
 app.wait_for_first_picture(300.0)
 print(f"FIRST {time.perf_counter() - started:.1f}")

@@ -11,12 +11,12 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from hidden_effects import ACTUATOR, SINE, plant, recorded
+from support.hidden_effects import ACTUATOR, SINE, plant, recorded
 
 from ema_model.actuator import load_actuator
 from ema_model.comparison import as_dict, compare
 from ema_model.errors import InputError
-from ema_model.measurement import SIGNALS, Measurement
+from ema_model.recordings import SIGNALS, Measurement
 
 COGGING = {"cogging_torque": {"amplitude_Nm": 0.012}}
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from ema_model.actuator import load_actuator
-from ema_model.calibration.floor import floor
 from ema_model.commands import command
-from ema_model.plants import ClosedLoop
-from ema_model.simulation import Run, simulate_reference
+from ema_model.estimation.floor import floor
+from ema_model.models import ClosedLoop
+from ema_model.simulation.run import Run, simulate_reference
 
 ACTUATOR = load_actuator()
 

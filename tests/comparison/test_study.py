@@ -14,7 +14,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from hidden_effects import ACTUATOR, SINE, recorded
+from support.hidden_effects import ACTUATOR, SINE, recorded
 
 from ema_model.comparison import compare
 

@@ -13,7 +13,6 @@ import pytest
 
 import ema_model
 from ema_model.actuator import load_actuator
-from ema_model.calibration import default_free
 from ema_model.challenges import challenges, folder
 from ema_model.challenges.__main__ import main
 from ema_model.challenges.make import COLUMNS, RUNS, make, plant_of
@@ -21,7 +20,8 @@ from ema_model.challenges.truth import read_truth, truths
 from ema_model.discovery import discover
 from ema_model.effects import CATALOGUE
 from ema_model.errors import InputError
-from ema_model.measurement import read_measurement
+from ema_model.estimation import default_free
+from ema_model.recordings import read_measurement
 
 # A few that a test has time for.
 NAMES = ("cogging_torque", "stribeck_friction", "hinge_moment", "dead_time")

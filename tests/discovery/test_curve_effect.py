@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hidden_effects import ACTUATOR, SINE, recorded
+from support.hidden_effects import ACTUATOR, SINE, recorded
 
 from ema_model.actuator import load_actuator, save_actuator
 from ema_model.actuator.parameters import Controller, Inverter
@@ -15,11 +15,11 @@ from ema_model.comparison.compare import known_error, prepared
 from ema_model.comparison.explain import explain
 from ema_model.comparison.residuals import Residuals
 from ema_model.comparison.result import Explanation
-from ema_model.discovery.curve_effect import curve_of, is_torque, with_curve
-from ema_model.discovery.fitting import Data, Fit, fit, gather, holdout_error
+from ema_model.discovery.model_fit import Data, Fit, fit, gather, holdout_error
+from ema_model.discovery.torque_curve import curve_of, is_torque, with_curve
 from ema_model.effects import find
+from ema_model.effects.user import user_torque
 from ema_model.errors import InputError
-from ema_model.user_effects import user_torque
 
 COMMANDS = [("chirp", {}, 0.5), ("step", {"final_rad": 0.005}, 0.5), SINE]
 UNSEEN = [("sine", {"amplitude_rad": 0.02, "frequency_Hz": 5}, 0.6)]

@@ -6,7 +6,7 @@ import json
 
 import numpy as np
 import pytest
-from hidden_effects import ACTUATOR, SINE, recorded
+from support.hidden_effects import ACTUATOR, SINE, recorded
 
 from ema_model.actuator import load_actuator, save_actuator
 from ema_model.comparison import compare
@@ -104,7 +104,7 @@ def test_mixed_maps_and_runs_are_refused():
     [run] = recorded(1)
     from dataclasses import replace
 
-    from ema_model.measurement import SideFile
+    from ema_model.recordings import SideFile
 
     with pytest.raises(InputError, match="static maps and runs"):
         discover([run, replace(run, side=SideFile(kind="map"))], ACTUATOR)

@@ -18,16 +18,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hidden_effects import ACTUATOR, SINE, recorded
+from support.hidden_effects import ACTUATOR, SINE, recorded
 
-from ema_model.calibration import default_free
-from ema_model.calibration.problem import Problem
 from ema_model.comparison.compare import prepared, weights_of
 from ema_model.discovery import discover
-from ema_model.discovery.fitting import fit, gather
+from ema_model.discovery.model_fit import fit, gather
 from ema_model.effects import CATALOGUE
+from ema_model.effects.user import user_torque
+from ema_model.estimation import default_free
+from ema_model.estimation.problem import Problem
 from ema_model.faults import HEALTHY
-from ema_model.user_effects import user_torque
 
 pytestmark = pytest.mark.study
 

@@ -9,13 +9,13 @@ from ema_model.actuator import load_actuator
 from ema_model.commands import command
 from ema_model.discovery import discover
 from ema_model.discovery.discover import result_of
-from ema_model.discovery.faulty import fault_for
-from ema_model.discovery.fitting import holdout_error
-from ema_model.discovery.story import begun
+from ema_model.discovery.faults import fault_for
+from ema_model.discovery.model_fit import holdout_error
+from ema_model.discovery.path import begun
 from ema_model.discovery.summary import as_dict
 from ema_model.faults import vector
-from ema_model.sensors import Sensors
-from ema_model.simulation import Run, simulate_reference
+from ema_model.simulation.run import Run, simulate_reference
+from ema_model.simulation.sensors import Sensors
 
 ACTUATOR = load_actuator()
 RIG = Sensors(current_noise_A=0.45, encoder_bits=12)

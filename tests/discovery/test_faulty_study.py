@@ -10,7 +10,7 @@ from collections import Counter
 
 import numpy as np
 import pytest
-from hidden_effects import SINE, recorded
+from support.hidden_effects import SINE, recorded
 
 from ema_model.discovery import discover
 from ema_model.effects import CATALOGUE

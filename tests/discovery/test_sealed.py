@@ -19,9 +19,9 @@ from ema_model.challenges.sealing import seal, unseal
 from ema_model.challenges.truth import Truth
 from ema_model.effects import CATALOGUE
 from ema_model.errors import InputError
-from ema_model.recordings import read_recording
-from ema_model.sensors import Sensors
-from ema_model.simulation import simulate_reference
+from ema_model.recordings.read import read_recording
+from ema_model.simulation.run import simulate_reference
+from ema_model.simulation.sensors import Sensors
 
 HIDDEN = {"cogging_torque": {"amplitude_Nm": 0.02, "order": 12.0, "phase_rad": 0.5}}
 TRUTH = Truth("", 7, "Hidden: cogging torque.", HIDDEN, faults={"k1": 0.4})

@@ -6,20 +6,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hidden_effects import ACTUATOR, SINE, recorded
+from support.hidden_effects import ACTUATOR, SINE, recorded
 
-from ema_model.calibration.floor import floor
 from ema_model.commands import command
 from ema_model.comparison.compare import prepared, weights_of
 from ema_model.discovery import discover
-from ema_model.discovery.experiments import allowed, next_experiment
 from ema_model.discovery.fingerprints import fingerprints
-from ema_model.discovery.fitting import fit, gather, with_effect
+from ema_model.discovery.model_fit import fit, gather, with_effect
+from ema_model.discovery.next_test import allowed, next_experiment
 from ema_model.discovery.repeatability import is_lost, with_divergence
 from ema_model.discovery.score import scored, scored_together
-from ema_model.plants import plant_for
-from ema_model.sensors import Sensors
-from ema_model.simulation import Run, simulate_reference
+from ema_model.estimation.floor import floor
+from ema_model.models import plant_for
+from ema_model.simulation.run import Run, simulate_reference
+from ema_model.simulation.sensors import Sensors
 
 COMMANDS = [("chirp", {}, 0.5), ("step", {"final_rad": 0.005}, 0.5)]
 ORDERS = {

@@ -5,11 +5,11 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
-from discovered import with_cogging
+from support.discovered import with_cogging
 
 from ema_model.discovery.result import StoodIn
+from ema_model.discovery.sentences import NOT_REPEATABLE, masked, untold
 from ema_model.discovery.summary import as_dict
-from ema_model.discovery.worded import NOT_REPEATABLE, masked, untold
 from emaviz.report import write_discovery_report
 
 RAW = re.compile(r"[a-z]+\.[a-z_]+_|cogging_torque|torque_ripple|_Nm|_A\b")

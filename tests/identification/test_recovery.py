@@ -12,11 +12,11 @@ from ema_model.commands import command
 from ema_model.errors import InputError
 from ema_model.faults import HEALTHY, NAMES, error_percent, vector
 from ema_model.identification.fit import refine, setting
-from ema_model.identification.intervals import uncertainty
 from ema_model.identification.objective import Objective, simulated
 from ema_model.identification.run import Identification, Progress, identify, steps
-from ema_model.sensors import Sensors
-from ema_model.simulation import Run
+from ema_model.identification.uncertainty import uncertainty
+from ema_model.simulation.run import Run
+from ema_model.simulation.sensors import Sensors
 
 ACTUATOR = load_actuator()
 CASES = ({"k1": 0.25}, {"k2": 0.75}, {"k3": 0.25}, {"k8": 0.75})

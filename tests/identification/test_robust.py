@@ -9,17 +9,17 @@ from scipy.stats import norm
 from ema_model import faults
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
-from ema_model.discovery.fitting import with_effect
+from ema_model.discovery.model_fit import with_effect
 from ema_model.errors import InputError
-from ema_model.identification.belts import above_zero, length_of_vector
-from ema_model.identification.descent import Descent
+from ema_model.estimation.descent import Descent
+from ema_model.estimation.feldman_cousins import above_zero, length_of_vector
 from ema_model.identification.fit import refine, setting
+from ema_model.identification.model_bias import TWINS, _spread
 from ema_model.identification.objective import Objective, simulated
 from ema_model.identification.run import identify
-from ema_model.identification.twin import TWINS, _spread
 from ema_model.identification.unknowns import to_k, to_x
-from ema_model.sensors import Sensors
-from ema_model.simulation import Run, simulate_reference
+from ema_model.simulation.run import Run, simulate_reference
+from ema_model.simulation.sensors import Sensors
 
 ACTUATOR = load_actuator()
 MULTI = {"k1": 0.0133, "k2": 0.05, "k3": 0.003, "k6": 0.012, "k8": 0.35}

@@ -20,8 +20,8 @@ from ema_model.actuator import Actuator, load_actuator
 from ema_model.effects import CATALOGUE
 from ema_model.identification.objective import Objective, simulated
 from ema_model.identification.run import identify
-from ema_model.sensors import Sensors
-from ema_model.simulation import Run, simulate_reference
+from ema_model.simulation.run import Run, simulate_reference
+from ema_model.simulation.sensors import Sensors
 
 pytestmark = pytest.mark.study
 

@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 from scipy.io import savemat
 
 from ema_model.errors import InputError
-from ema_model.measurement import read_columns, read_measurement
-from ema_model.measurement.health import health
+from ema_model.recordings import read_columns, read_measurement
+from ema_model.recordings.health.card import health
 
 N = 120
 MOST_BYTES = 10_000_000  # that a file may take

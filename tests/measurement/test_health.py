@@ -10,15 +10,15 @@ import pytest
 
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
-from ema_model.measurement import (
+from ema_model.recordings import (
     Measurement,
     SideFile,
     can_have_current,
     with_equivalent_current,
 )
-from ema_model.measurement.health import health
-from ema_model.sensors import Sensors
-from ema_model.simulation import Run, simulate_reference
+from ema_model.recordings.health.card import health
+from ema_model.simulation.run import Run, simulate_reference
+from ema_model.simulation.sensors import Sensors
 
 ACTUATOR = load_actuator()
 PERIOD = 1e-3

@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ema_model.errors import InputError
-from ema_model.measurement import (
+from ema_model.quantities.units import UNITS, find_unit
+from ema_model.recordings import (
     SIGNALS,
     ColumnMapping,
     MappedColumn,
@@ -19,7 +20,6 @@ from ema_model.measurement import (
     parse_mapping,
     read_measurement,
 )
-from ema_model.measurement.units import UNITS, find_unit
 
 # header: the signal of each column in its order, with the unit where it is not the signal's own; - is left aside
 HEADERS = {

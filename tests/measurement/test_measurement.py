@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ema_model.errors import InputError
-from ema_model.measurement import Measurement
+from ema_model.recordings import Measurement
 
 
 def line(time, **more):

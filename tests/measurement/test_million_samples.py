@@ -7,8 +7,8 @@ from time import perf_counter
 import numpy as np
 import pytest
 
-from ema_model.measurement import Measurement, read_measurement, write_measurement
-from ema_model.measurement.health import health
+from ema_model.recordings import Measurement, read_measurement, write_measurement
+from ema_model.recordings.health.card import health
 
 
 @pytest.mark.study

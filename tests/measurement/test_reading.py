@@ -10,9 +10,9 @@ import pyarrow.parquet as pq
 import pytest
 
 from ema_model.errors import InputError
-from ema_model.measurement import SIGNALS, Measurement, check_needed, read_measurement, write_measurement
-from ema_model.measurement.formats import FORMATS
-from ema_model.measurement.signals import lookalikes
+from ema_model.quantities.signals import lookalikes
+from ema_model.recordings import SIGNALS, Measurement, check_needed, read_measurement, write_measurement
+from ema_model.recordings.formats import FORMATS
 
 N = 120
 

@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from ema_model.errors import InputError
-from ema_model.measurement import (
+from ema_model.recordings import (
     ColumnMapping,
     MappedColumn,
     SideFile,
@@ -22,7 +22,7 @@ from ema_model.measurement import (
     side_path,
     write_side_file,
 )
-from ema_model.measurement.side_file import SENSOR_KEYS
+from ema_model.recordings.side_file.read import SENSOR_KEYS
 
 N = 600
 TEXT = """

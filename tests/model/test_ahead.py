@@ -9,8 +9,8 @@ import sys
 HERE = """
 import sys, time
 from ema_model.actuator import load_actuator
-from ema_model import ahead
-from ema_model.simulation import Run, simulate_monitor
+from ema_model.simulation import precompile as ahead
+from ema_model.simulation.run import Run, simulate_monitor
 from ema_model.stacks import find_stack
 
 stack = find_stack("reduced", ["dead_time"])

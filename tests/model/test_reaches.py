@@ -10,7 +10,7 @@ from ema_model.commands import command
 from ema_model.effects import CATALOGUE
 from ema_model.faults import NAMES, vector
 from ema_model.identification.objective import Objective, simulated
-from ema_model.simulation import Run, simulate_monitor, simulate_reference
+from ema_model.simulation.run import Run, simulate_monitor, simulate_reference
 
 ACTUATOR = load_actuator()
 FAULTY = vector({"k3": 0.3, "k6": 0.2})  # so that the rotor's angle matters

@@ -20,7 +20,7 @@ from ema_model.commands import command
 from ema_model.effects import CATALOGUE
 from ema_model.errors import InputError
 from ema_model.physics.rows import PARAMETER_ROWS
-from ema_model.simulation import Run, simulate_monitor, simulate_reference
+from ema_model.simulation.run import Run, simulate_monitor, simulate_reference
 from ema_model.stacks import CIRCUITS, PLACES, find_stack
 
 PACKAGE = Path(ema_model.__file__ or "").parent if ema_model.__file__ else Path(stacks.__file__).parent
@@ -156,7 +156,7 @@ def test_kernels_import_nothing_of_ours_that_is_not_hashed():
 PROGRAM = """
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
-from ema_model.simulation import Run, simulate_monitor
+from ema_model.simulation.run import Run, simulate_monitor
 effects = {{"cogging_torque": {{"amplitude_Nm": 0.02}}}} if {effect} else {{}}
 s = simulate_monitor(Run(command("chirp"), 0.05), load_actuator(), effects=effects)
 print("RESULT", repr(float((s["current_A"] ** 2).mean())))
@@ -261,7 +261,7 @@ import numpy as np
 from ema_model.actuator import load_actuator
 from ema_model.faults import HEALTHY
 from ema_model.identification.objective import Objective, simulated
-from ema_model.simulation import Run, simulate_monitor
+from ema_model.simulation.run import Run, simulate_monitor
 import numba
 actuator = load_actuator()
 recording = simulated(Run(duration_s=0.05), actuator, HEALTHY)

@@ -12,10 +12,10 @@ from ema_model.actuator.file import shipped
 from ema_model.actuator.parameters import Tolerance
 from ema_model.commands import command
 from ema_model.effects import find
+from ema_model.effects.user import UserEffect, torque_curve, user_torque
 from ema_model.errors import InputError
-from ema_model.measurement import read_measurement
-from ema_model.simulation import Run, simulate_monitor
-from ema_model.user_effects import UserEffect, torque_curve, user_torque
+from ema_model.recordings import read_measurement
+from ema_model.simulation.run import Run, simulate_monitor
 from emaviz.cli import main
 from emaviz.cli.options import split_at_commas
 

@@ -17,14 +17,14 @@ import ema_model
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
 from ema_model.effects import CATALOGUE, Effect, find
+from ema_model.effects.user import torque_curve, user_torque
 from ema_model.errors import InputError
 from ema_model.faults import HEALTHY
 from ema_model.identification.objective import Objective, simulated
-from ema_model.measurement import Measurement
-from ema_model.plants import ClosedLoop, InverseDynamics
-from ema_model.simulation import Run, simulate_monitor, simulate_reference
+from ema_model.models import ClosedLoop, InverseDynamics
+from ema_model.recordings import Measurement
+from ema_model.simulation.run import Run, simulate_monitor, simulate_reference
 from ema_model.stacks import find_stack
-from ema_model.user_effects import torque_curve, user_torque
 
 ACTUATOR = load_actuator()
 RUN = Run(command("chirp"), 0.1)
@@ -267,8 +267,8 @@ def test_inverse_dynamics_shows_a_torque_without_value():
 
 PROGRAM = """
 from ema_model.actuator import load_actuator
-from ema_model.simulation import Run, simulate_monitor
-from ema_model.user_effects import user_torque
+from ema_model.simulation.run import Run, simulate_monitor
+from ema_model.effects.user import user_torque
 effect = user_torque("A*tanh(omega/w) - t*B")
 s = simulate_monitor(Run(duration_s=0.02), load_actuator(), effects={effect.name: {"A": 0.01}})
 print("RESULT", effect.name, repr(float((s["current_A"] ** 2).mean())))

@@ -13,10 +13,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from ema_model.effects.user import Expression, parse, user_torque
+from ema_model.effects.user.expression import FUNCTIONS, MOST_CHARACTERS
+from ema_model.effects.user.torque import kernels
 from ema_model.errors import InputError
-from ema_model.user_effects import Expression, parse, user_torque
-from ema_model.user_effects.expression import FUNCTIONS, MOST_CHARACTERS
-from ema_model.user_effects.torque import kernels
 
 WRONG = [
     ("foo(theta)", "column 1: unknown function 'foo'; functions are sin, cos"),

@@ -23,7 +23,7 @@ from ema_model.faults import (
     sentences,
     vector,
 )
-from ema_model.simulation import Run, simulate_monitor, simulate_reference
+from ema_model.simulation.run import Run, simulate_monitor, simulate_reference
 
 ACTUATOR = load_actuator()
 TAU = ACTUATOR.transmission.gear_ratio

@@ -7,9 +7,9 @@ import pytest
 
 from ema_model.actuator import Actuator, load_actuator
 from ema_model.errors import InputError
-from ema_model.measurement import Measurement, SideFile
-from ema_model.plants import InverseDynamics
-from ema_model.plants.motion import motion_of
+from ema_model.models import InverseDynamics
+from ema_model.models.motion import motion_of
+from ema_model.recordings import Measurement, SideFile
 
 FREE = """
 name = "free motor"

@@ -27,7 +27,7 @@ from ema_model.physics.phases import (
     plus_120,
     winding_coefficients,
 )
-from ema_model.simulation import Run, simulate_monitor, simulate_reference
+from ema_model.simulation.run import Run, simulate_monitor, simulate_reference
 
 ACTUATOR = load_actuator()
 TAU = ACTUATOR.transmission.gear_ratio

@@ -11,9 +11,9 @@ import pytest
 from ema_model.actuator import Actuator, load_actuator
 from ema_model.commands import Recorded
 from ema_model.errors import InputError
-from ema_model.measurement import Measurement
-from ema_model.plants import ClosedLoop
-from ema_model.simulation import Run, simulate_monitor, simulate_reference
+from ema_model.models import ClosedLoop
+from ema_model.recordings import Measurement
+from ema_model.simulation.run import Run, simulate_monitor, simulate_reference
 
 SERVO = """
 name = "servo"
@@ -165,7 +165,7 @@ def test_reference_model_is_refused_for_another_drive(tmp_path):
 
 
 def test_long_windows_are_simulated_in_pieces_that_join(tmp_path, monkeypatch):
-    from ema_model.plants import closed_loop
+    from ema_model.models import closed_loop
 
     actuator = servo(tmp_path, PENDULUM)
     whole = let_go(actuator, 0.3, 2.0, 0.0)

@@ -7,7 +7,7 @@ import pytest
 
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
-from ema_model.simulation import Run, simulate_monitor, simulate_reference
+from ema_model.simulation.run import Run, simulate_monitor, simulate_reference
 from ema_model.stacks import CIRCUITS
 
 ACTUATOR = load_actuator()

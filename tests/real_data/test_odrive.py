@@ -6,7 +6,7 @@ import pytest
 
 from ema_model.actuator import load_actuator
 from ema_model.comparison import compare
-from ema_model.recordings import read_recording
+from ema_model.recordings.read import read_recording
 
 KNOWN_ORDERS = {7, 12, 14, 28, 36, 84}
 

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from comparison_by_hand import comparison as by_hand
 from numpy.testing import assert_allclose, assert_array_equal
 from rerun.chunk import RrdReader
+from support.comparison_by_hand import comparison as by_hand
 
 from ema_model.errors import InputError
 from emaviz.recording import read

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from discovered import with_cogging, with_unknown
 from numpy.testing import assert_allclose, assert_array_equal
 from rerun.chunk import RrdReader
+from support.discovered import with_cogging, with_unknown
 
 from ema_model.errors import InputError
 from emaviz.recording import read
-from emaviz.recording.discovery import write_discovery
+from emaviz.recording.discovery.write import write_discovery
 
 
 @pytest.fixture(scope="module")

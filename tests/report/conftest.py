@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from comparison_by_hand import comparison as by_hand
+from support.comparison_by_hand import comparison as by_hand
 
 from ema_model.comparison.result import Comparison
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from discovered import with_cogging, with_unknown
+from support.discovered import with_cogging, with_unknown
 
 from ema_model.discovery import Discovery
 from ema_model.discovery.result import Experiment

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from ema_model.discovery.result import Added
 from ema_model.effects import Effect, find
-from ema_model.titles import in_sentence
-from emaviz.discovery_words import effect_title, fitted_of
+from ema_model.quantities.titles import in_sentence
 from emaviz.figures import quantity
 from emaviz.report.discovery.subject import Told
 from emaviz.report.markup import escape, paragraph, table
 from emaviz.report.section import Figures, Section
+from emaviz.text.discovery import effect_title, fitted_of
 
 
 class AddedEffects(Section[Told]):

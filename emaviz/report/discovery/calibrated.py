@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from ema_model.faults import NAMES
-from ema_model.titles import in_sentence
-from emaviz.discovery_words import parameter
+from ema_model.quantities.titles import in_sentence
 from emaviz.figures import quantity
 from emaviz.report.discovery.subject import Told
 from emaviz.report.markup import bullets, paragraph, table
 from emaviz.report.section import Figures, Section
+from emaviz.text.discovery import parameter
 
 _MARK = "\x1e"  # before a parameter at its bound
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from ema_model.measurement import SIGNALS
-from emaviz.discovery_words import FLOOR_NOTE, rung_title
+from ema_model.recordings import SIGNALS
 from emaviz.figures import error_ladder, quantity
 from emaviz.figures.quantity import Quantity
 from emaviz.report.discovery.subject import Told
 from emaviz.report.markup import paragraph, table
 from emaviz.report.section import Figures, Section
+from emaviz.text.discovery import FLOOR_NOTE, rung_title
 
 
 class Ladder(Section[Told]):

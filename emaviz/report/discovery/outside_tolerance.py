@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from emaviz.discovery_words import parameter
 from emaviz.figures import quantity
 from emaviz.report.discovery.subject import Told
 from emaviz.report.markup import paragraph, table
 from emaviz.report.section import Figures, Section
+from emaviz.text.discovery import parameter
 
 _NOTE = (
     "Nothing new has to act for these: a value of the actuator's file is wrong, or the part is another than the file "

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ema_model.measurement import SIGNALS
+from ema_model.recordings import SIGNALS
 from emaviz.figures import residual_steps
 from emaviz.figures.discovery_tracks import Track, primary
 from emaviz.report.discovery.subject import Told

@@ -1,8 +1,0 @@
-"""Calibration: the actuator's own parameters, fitted to recordings within their tolerances."""
-
-from __future__ import annotations
-
-from ema_model.calibration.fit import Calibrated, Calibration, calibrate, default_free
-from ema_model.calibration.floor import Floor, floor
-
-__all__ = ["Calibrated", "Calibration", "Floor", "calibrate", "default_free", "floor"]

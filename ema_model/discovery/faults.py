@@ -1,0 +1,129 @@
+"""Faults of the actuator itself, k1 … k8: tried beside the effects, since a worn actuator looks like missing physics.
+
+A fault is taken into the model when it tells more than any effect could.  It then stays free like a parameter, and
+what is found afterwards is found beside it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ema_model.discovery.model_fit import Data, Fit, fit
+from ema_model.discovery.refit import LEAST_BIC, Trial, pays, worth
+from ema_model.discovery.result import Candidate
+from ema_model.discovery.score import amounts_of, movable
+from ema_model.discovery.unknown import TEETH
+from ema_model.estimation.problem import unknown_of
+from ema_model.faults import HEALTHY, NAMES
+
+Array = NDArray[np.float64]
+
+# What is free together: of the eccentricity its modulus and its phase.
+_FAULTS = (("k1",), ("k2",), ("k3",), ("k4",), ("k5",), ("k6", "k7"), ("k8",))
+_SIZES = (0.03, 0.3)  # of a k, that its columns are made with: a straight line and a chord
+_MOST_REFITTED = 2
+_RIVAL = 0.3  # of the best effect's score, below which a fault is not refitted
+
+
+@dataclass(frozen=True)
+class _Scored:
+    names: tuple[str, ...]
+    k: dict[str, float]
+    drop: float  # of χ², as predicted
+
+
+def fault_for(
+    data: Data,
+    held: Data | None,
+    current: Fit,
+    ranked: Sequence[Candidate],
+    effects: Callable[[], Sequence[Trial]],
+    tell: Callable[[str], None],
+) -> Trial | None:
+    """The fault that tells more than any effect, or as much as the best one, in the model and refitted.
+
+    None where there is none; `Trial.same_as` names the effect that tells as much.  That one goes first, unless it
+    repeats less often in a turn than teeth or poles do, as what an eccentric rotor does.
+    ranked: the effects, the most promising first; effects() refits those that are worth it, the best first.
+    Faults are those of a motor with three phases and a cascade: other actuators have none here.
+    """
+    if not current.actuator.has_reference_model:
+        return None
+    best = max((one.predicted_drop for one in ranked), default=0.0)
+    strong = [one for one in _scores(data, current) if one.drop > max(LEAST_BIC, _RIVAL * best)]
+    trials = [_refitted(data, current, one, tell) for one in strong[:_MOST_REFITTED]]
+    trials = [trial for trial in trials if pays(current, trial, data, held)]
+    if not trials:
+        return None
+    fault = max(trials, key=lambda trial: worth(current, trial))
+    rival = max(effects(), key=lambda trial: worth(current, trial), default=None)
+    more = worth(current, fault) - (0.0 if rival is None else worth(current, rival))
+    if rival is None or more > LEAST_BIC:
+        return fault
+    if more < -LEAST_BIC:
+        return None
+    return replace(fault, same_as=rival.candidate.name, yields=rival.candidate.settings.get("order", TEETH) >= TEETH)
+
+
+def _scores(data: Data, current: Fit) -> list[_Scored]:
+    """Each fault at the strength that suits best, beyond what the parameters can do; the most telling first."""
+    left = [names for names in _FAULTS if names[0] not in current.faults]
+    k = current.calibration.k
+    lanes, tried = [k], []
+    for names in left:
+        for size in _SIZES:
+            own = [_with(k, names[0], size, phase) for phase in ((0.0, 0.25) if len(names) == 2 else (0.0,))]
+            tried.append((names, size, range(len(lanes), len(lanes) + len(own))))
+            lanes += own
+    shown = [
+        current.plant.signals(window, current.calibration.actuator, np.stack(lanes), *current.calibration.start_of(i))  # pyright: ignore[reportArgumentType]
+        for i, window in enumerate(current.plant.windows)
+    ]
+    signals = np.nan_to_num(data.over_floor(current.plant, shown))
+    jacobian, gram = movable(current)
+    best: dict[tuple[str, ...], _Scored] = {}
+    for names, size, its in tried:
+        one = _at(names, size, *amounts_of(current, (signals[its] - signals[0]).T, jacobian, gram))
+        if names not in best or one.drop > best[names].drop:
+            best[names] = one
+    return sorted(best.values(), key=lambda one: -one.drop)
+
+
+def _at(names: tuple[str, ...], size: float, amounts: Array, energy: Array, toward: Array) -> _Scored:
+    """The fault at these multiples of what its columns were made with, as far as k may go."""
+    healthy = float(HEALTHY[NAMES.index(names[0])])
+    length = math.hypot(*amounts)
+    if len(names) == 2:
+        amounts = amounts * min(1.0, 1.0 / (size * length + 1e-300))
+        phase = (0.5 + math.atan2(amounts[1], amounts[0]) / (2.0 * math.pi)) % 1.0
+        k = {names[0]: size * math.hypot(*amounts), names[1]: phase}
+    else:
+        amounts = np.clip(amounts, -healthy / size, (1.0 - healthy) / size)
+        k = {names[0]: healthy + size * float(amounts[0])}
+    return _Scored(names, k, float(2.0 * amounts @ toward - amounts @ energy @ amounts))
+
+
+def _with(k: Array, name: str, size: float, turned: float) -> Array:
+    """k with one fault more; the eccentricity's phase turned by a share of a turn."""
+    changed = k.copy()
+    changed[NAMES.index(name)] += size
+    if turned:
+        changed[NAMES.index("k7")] = (float(HEALTHY[NAMES.index("k7")]) + turned) % 1.0
+    return changed
+
+
+def _refitted(data: Data, current: Fit, one: _Scored, tell: Callable[[str], None]) -> Trial:
+    """The fault free beside the parameters, from where they are and from the file's values."""
+    tell(f"trying the fault {' and '.join(one.names)}")
+    unknowns = {name: unknown_of(current.actuator, name) for name in one.names}
+    guess = {name: (one.k[name] - unknown.nominal) / unknown.sigma for name, unknown in unknowns.items()}
+    kept = {name: x for name, x in current.starts.items() if name.startswith(("effects.", "k"))}
+    faults = (*current.faults, *one.names)
+    fits = [fit(data, current.actuator, {**start, **guess}, tell, faults) for start in (current.starts, kept)]
+    best = min(fits, key=lambda found: found.chi2)
+    return Trial(Candidate(one.names[0], one.drop, {}), {}, best, current.chi2 - best.chi2, one.names)

@@ -1,0 +1,176 @@
+"""A model with some effects, fitted to the recordings; the floors are measured once."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ema_model.actuator import Actuator, Tolerance
+from ema_model.effects import find
+from ema_model.estimation import Calibration, Floor, calibrate, default_free, floor
+from ema_model.models import Plant, plant_for
+from ema_model.recordings import Measurement
+
+Array = NDArray[np.float64]
+
+_SHARE = 0.5  # 1 σ of an effect's parameter, of the value that its fingerprint suggests
+_ANGLE_SIGMA = 0.7  # rad
+
+
+@dataclass(frozen=True, eq=False)
+class Data:
+    """Recordings, the floors of their windows, and the signals to fit with their weights."""
+
+    measurements: Sequence[Measurement]
+    stretches: Sequence[list[slice] | None] | None
+    floors: Sequence[Floor]
+    signals: Mapping[str, float]
+
+    def plant(self, actuator: Actuator) -> Plant:
+        """The recordings beside this actuator's model."""
+        return plant_for(self.measurements, actuator, stretches=self.stretches)
+
+    def over_floor(self, plant: Plant, shown: Sequence[Mapping[str, Array]]) -> Array:
+        """Signals of each window of the plant, (…, blocks), over the floor, in a residual's order: (…, values)."""
+        parts = [
+            signals[name] * (weight / one.fit_sigma(name))
+            for window, one, signals in zip(plant.windows, self.floors, shown)
+            for name, weight in self.signals.items()
+            if name in window.measured
+        ]
+        return np.concatenate(parts, axis=-1)
+
+    def beside(self, found: Fit) -> Data:
+        """The data with the model's floor at a calibrated model as well, where that is greater."""
+        plant = self.plant(found.calibration.actuator)
+        again = [floor(plant, window) for window in plant.windows]
+        return replace(self, floors=[one.beside(other) for one, other in zip(self.floors, again)])
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A calibrated model."""
+
+    actuator: Actuator  # as it went in: with effects, their suggested settings and tolerances
+    plant: Plant
+    calibration: Calibration
+    starts: dict[str, float]  # x by name
+    faults: tuple[str, ...] = ()  # k1 … k8 that move beside the parameters
+
+    @property
+    def residual(self) -> Array:
+        """Model − measurement over the floor, (values,)."""
+        return self.calibration.residual
+
+    @property
+    def chi2(self) -> float:
+        """Of the signals over their floor, and the prior."""
+        return float(self.residual @ self.residual + self.calibration.x @ self.calibration.x)
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """The effects in the model."""
+        return tuple(self.actuator.effects)
+
+    def error(self) -> float:
+        """rms of the residual in units of the floor that fits are weighted by."""
+        return float(np.sqrt(np.mean(self.residual**2)))
+
+
+def gather(
+    measurements: Sequence[Measurement],
+    actuator: Actuator,
+    signals: Mapping[str, float],
+    stretches: Sequence[list[slice] | None] | None,
+) -> Data:
+    """The data with the floors of the bare model."""
+    plant = plant_for(measurements, actuator, stretches=stretches)
+    return Data(measurements, stretches, [floor(plant, window) for window in plant.windows], signals)
+
+
+def with_effect(actuator: Actuator, name: str, settings: Mapping[str, float]) -> Actuator:
+    """The actuator with an effect, its parameters free around these settings; whole numbers stay."""
+    effect = find(name)
+    tolerances = dict(actuator.tolerances)
+    full = effect.settings(dict(settings))
+    for parameter in effect.parameters:
+        if not parameter.integer:
+            value = full[parameter.name]
+            sigma = _ANGLE_SIGMA if parameter.name == "phase_rad" else _SHARE * abs(value)
+            sigma = sigma or _SHARE * abs(parameter.default) or 0.01 * (parameter.high - parameter.low)
+            tolerances[f"effects.{name}.{parameter.name}"] = Tolerance(sigma, True)
+    return replace(actuator, effects={**actuator.effects, name: full}, tolerances=tolerances)
+
+
+def without_effect(actuator: Actuator, name: str) -> Actuator:
+    """The actuator without one of its effects."""
+    kept = {path: one for path, one in actuator.tolerances.items() if not path.startswith(f"effects.{name}.")}
+    return replace(
+        actuator, effects={other: given for other, given in actuator.effects.items() if other != name}, tolerances=kept
+    )
+
+
+def fit(
+    data: Data,
+    actuator: Actuator,
+    start: Mapping[str, float] | None = None,
+    tell: Callable[[str], None] | None = None,
+    faults: tuple[str, ...] = (),
+) -> Fit:
+    """Calibrates the base parameters, those of the actuator's effects, and these faults (k1 … k8) together."""
+    plant = data.plant(actuator)
+    calibration = calibrate(
+        plant,
+        data.floors,
+        free=(*default_free(actuator), *faults),
+        signals=data.signals,
+        start=start,
+        on_progress=None if tell is None else lambda evaluations: tell(f"fitting: {evaluations} simulations"),
+    )
+    names = [*calibration.parameters, *calibration.starts]
+    starts = {name: float(x) for name, x in zip(names, calibration.x)}
+    return Fit(actuator, plant, calibration, starts, faults)
+
+
+def holdout_error(data: Data, found: Fit) -> float:
+    """The same as `floor_ratio` on recordings that were not fitted; only their starts are."""
+    return holdout_fit(data, found)[0]
+
+
+@lru_cache(maxsize=8)  # a trial is judged by it, and its step of the ladder shows it
+def holdout_fit(data: Data, found: Fit) -> tuple[float, dict[str, float]]:
+    """`floor_ratio` of recordings that were not fitted, and `rms_by_signal`; only their starts are fitted."""
+    plant = data.plant(found.calibration.actuator)
+    calibration = calibrate(plant, data.floors, free=(), k=found.calibration.k, signals=data.signals)
+    ratio = floor_ratio(data, plant, calibration.signals)
+    return ratio if math.isfinite(ratio) else math.inf, rms_by_signal(data, plant, calibration.signals)
+
+
+def rms_by_signal(data: Data, plant: Plant, shown: Sequence[Mapping[str, Array]]) -> dict[str, float]:
+    """rms of model − measurement, in the signals' units."""
+    parts: dict[str, list[Array]] = {}
+    for window, signals in zip(plant.windows, shown):
+        for name in data.signals:
+            if name in window.measured:
+                parts.setdefault(name, []).append(signals[name] - window.measured[name])
+    return {name: float(np.sqrt(np.mean(np.concatenate(part) ** 2))) for name, part in parts.items()}
+
+
+def floor_ratio(data: Data, plant: Plant, shown: Sequence[Mapping[str, Array]]) -> float:
+    """rms of measurement − model in units of the floor, pooled over windows and signals: 1 is the floor.
+
+    A standstill counts as 25 ms of motion do.
+    """
+    each = [
+        (((signals[name] - window.measured[name]) / one.sigma(name)) ** 2, one.counts)
+        for window, one, signals in zip(plant.windows, data.floors, shown)
+        for name in data.signals
+        if name in window.measured
+    ]
+    squared, counts = (np.concatenate(parts) for parts in zip(*each))
+    return float(np.sqrt(np.average(squared, weights=counts)))

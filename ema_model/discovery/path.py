@@ -1,0 +1,296 @@
+"""How a model grows: from the calibrated one, an effect a step, each with its error; steps can be taken back.
+
+`discover` walks by itself; a person at the page takes the same steps by hand.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ema_model.actuator import Actuator
+from ema_model.comparison.compare import prepared, weights_of
+from ema_model.comparison.result import Explanation
+from ema_model.discovery.faults import fault_for
+from ema_model.discovery.fingerprints import Fingerprint, fingerprints, stacks_of_their_own
+from ema_model.discovery.model_fit import (
+    Data,
+    Fit,
+    fit,
+    floor_ratio,
+    gather,
+    holdout_fit,
+    rms_by_signal,
+    without_effect,
+)
+from ema_model.discovery.refit import Trial, promising, tried
+from ema_model.discovery.remaining import Left, left_by
+from ema_model.discovery.repeatability import by_inverse_dynamics, is_lost, with_divergence
+from ema_model.discovery.result import Added, Candidate, Rung, StoodIn
+from ema_model.discovery.score import scored, signatures
+from ema_model.discovery.sentences import NOT_REPEATABLE
+from ema_model.discovery.unknown import curve_for
+from ema_model.effects import CATALOGUE, catalogue_name, find
+from ema_model.faults import BY_NAME
+from ema_model.models.stretches import fit_stretches
+from ema_model.quantities.titles import in_sentence
+from ema_model.recordings import Measurement
+from ema_model.recordings.read import check_same_actuator
+from ema_model.simulation.precompile import compile_ahead
+
+Progress = Callable[[str], None]
+Array = NDArray[np.float64]
+
+_SAME_CHI2 = 25.0  # between two effects, below which they cannot be told apart
+_SAME_DIRECTION = 1.0 - 0.98**2  # sin² between their signatures, likewise
+_MOVED = 1.5  # σ that a parameter comes back by, when it had been standing in for an effect
+_NOT_LOOKED_FOR = ("pendulum_load",)  # whoever has an arm on the shaft knows of it
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """A model on the way: its fit, its rung of the ladder, and the effects that were added so far."""
+
+    fit: Fit
+    rung: Rung
+    added: tuple[Added, ...]
+
+
+@dataclass
+class Story:
+    """The steps so far, and the recordings that they are judged by."""
+
+    data: Data
+    held: Data | None
+    steps: list[Step]
+    repeatable: bool = True
+    warnings: list[str] = field(default_factory=list)
+    ties: dict[str, str] = field(default_factory=dict)  # effects by the fault that would explain as much
+    _prints: list[Fingerprint] = field(default_factory=list)
+
+    @property
+    def base(self) -> Fit:
+        """The calibrated model without any effect."""
+        return self.steps[0].fit
+
+    @property
+    def current(self) -> Fit:
+        """The last model."""
+        return self.steps[-1].fit
+
+    @property
+    def added(self) -> tuple[Added, ...]:
+        """The effects in the last model."""
+        return self.steps[-1].added
+
+    @property
+    def ladder(self) -> list[Rung]:
+        """The error of each step."""
+        return [step.rung for step in self.steps]
+
+    def left(self) -> Left:
+        """What the last model leaves."""
+        return left_by(self.data, self.current)
+
+    def ranked(self, names: Sequence[str] | None = None, left: Left | None = None) -> list[Candidate]:
+        """All effects (or these) with the fall of χ² that is predicted for each, the most promising first."""
+        known = self.current.actuator.effects
+        wanted = [name for name in names or CATALOGUE if name not in known and name not in _NOT_LOOKED_FOR]
+        orders = (left or self.left()).orders
+        self._prints = fingerprints(self.data, self.current, wanted, orders, self._prints)
+        return scored(self.current, self._prints)
+
+    def signatures(self, ranked: Sequence[Candidate]) -> dict[str, Array]:
+        """What each candidate, of the last `ranked`, would take from what is measured less the model.
+
+        (values,), over the floor, at the strength that suits best; only what the calibration cannot do as well.
+        """
+        prints = {
+            one.name: [p for p in self._prints if p.name == one.name and p.settings.get("order") == order]
+            for one in ranked
+            for order in (one.settings.get("order"),)
+        }
+        return signatures(self.current, {name: its for name, its in prints.items() if its})
+
+    def tried(self, ranked: Sequence[Candidate], share: float, most: int, tell: Progress) -> list[Trial]:
+        """The most promising candidates, each in the model and refitted, the best first."""
+        trials = []
+        for candidate in promising(self.current, ranked, share, most):
+            tell(f"trying {candidate.name}")
+            trials.append(self.trial(candidate, tell))
+        return sorted(trials, key=lambda trial: -trial.drop)
+
+    def trial(self, candidate: Candidate, tell: Progress = lambda text: None) -> Trial:
+        """One candidate in the model, refitted."""
+        return tried(self.data, self.current, candidate, {candidate.name: candidate.settings}, tell)
+
+    def fault(
+        self, ranked: Sequence[Candidate], effects: Callable[[], Sequence[Trial]], tell: Progress = lambda text: None
+    ) -> Trial | None:
+        """A fault of the actuator in the model, refitted, where it tells more than any of the effects() refitted."""
+        found = fault_for(self.data, self.held, self.current, ranked, effects, tell)
+        if found and found.same_as:
+            self.ties[found.candidate.name] = found.same_as
+        return None if found and found.yields else found
+
+    def curve(self, explanation: Explanation | None, tell: Progress = lambda text: None) -> Trial | None:
+        """The residual's own curve as a torque, refitted, if the data pay for it."""
+        return curve_for(self.data, self.held, self.current, explanation, tell)
+
+    def add(self, trial: Trial, label: str = "", ties: Sequence[str] = ()) -> None:
+        """Takes a trial for the next model."""
+        before, moved = self.steps[-1].rung, _stood_in(self.current, trial.fit)
+        rung = self._rung(label or self.label(trial), trial.fit)
+        errors = before.rmse, rung.rmse, before.holdout_rmse, rung.holdout_rmse
+        new = [Added(catalogue_name(key), {}, *errors, tuple(ties), key, {}, moved) for key in trial.effects]
+        self._append(trial.fit, rung, (*self.added, *new))
+
+    def remove(self, key: str, found: Fit | None = None) -> None:
+        """Takes an effect out again, as a step of its own; found: the fit without it, if it is known."""
+        smaller = found or self.without(key)
+        name = next(one.name for one in self.added if one.key == key)
+        self._append(smaller, self._rung(f"− {name}", smaller), tuple(one for one in self.added if one.key != key))
+
+    def without(self, key: str, tell: Progress = lambda text: None) -> Fit:
+        """The last model without one of its effects, refitted."""
+        return fit(
+            self.data, without_effect(self.current.actuator, key), self.current.starts, tell, self.current.faults
+        )
+
+    def undo(self) -> bool:
+        """Takes the last step back; False where there is none."""
+        if len(self.steps) == 1:
+            return False
+        self.steps.pop()
+        return True
+
+    @property
+    def bare(self) -> int:
+        """The number of steps before the first effect: the calibrated model, and its faults."""
+        return next((i for i, step in enumerate(self.steps) if step.added), len(self.steps))
+
+    def restart(self) -> None:
+        """Takes all effects back."""
+        del self.steps[self.bare :]
+
+    def label(self, trial: Trial) -> str:
+        """What a step that adds this is called."""
+        name = trial.candidate.name
+        if trial.faults:
+            return f"fault {BY_NAME[name].label}"
+        path = find(name).duplicates
+        if path:
+            return f"{self.current.actuator.axes.path(path)} outside its tolerance"
+        return f"+ {in_sentence(find(name).title)}" if name not in CATALOGUE else f"+ {name}"
+
+    def _append(self, found: Fit, rung: Rung, added: Sequence[Added]) -> None:
+        # All with the last model's values: what is added later moves what was there.
+        self.steps.append(Step(found, rung, tuple(_refreshed(one, found) for one in added)))
+
+    def _rung(self, label: str, found: Fit) -> Rung:
+        return rung_of(label, found, self.data, self.held)
+
+
+def begun(
+    measurements: Sequence[Measurement],
+    actuator: Actuator,
+    holdout: Sequence[Measurement] = (),
+    signals: Sequence[str] | None = None,
+    tell: Progress = lambda text: None,
+) -> Story:
+    """The calibrated model, before any effect.
+
+    A loop that is not repeatable is taken by inverse dynamics, where the recordings allow it.
+    Raises InputError for recordings that cannot be compared.
+    """
+    check_same_actuator([*measurements, *holdout])
+    compile_ahead(stacks_of_their_own(actuator))
+    story = _calibrated(measurements, actuator, holdout, signals, tell)
+    inverse = None if story.repeatable else by_inverse_dynamics(story.data, actuator)
+    if inverse is None:
+        return story
+    story = _calibrated(measurements, inverse, holdout, signals, tell)
+    story.warnings.append(NOT_REPEATABLE)
+    return story
+
+
+def _calibrated(
+    measurements: Sequence[Measurement],
+    actuator: Actuator,
+    holdout: Sequence[Measurement],
+    signals: Sequence[str] | None,
+    tell: Progress,
+) -> Story:
+    tell("measuring the model's floor")
+    data, held = (_data(recordings, actuator, signals) for recordings in (measurements, holdout))
+    assert data is not None
+    tell("calibrating")
+    base = fit(data, actuator, tell=tell)
+    # How the two models differ depends on their parameters: on where the motor comes to stand above all.
+    data, lost = with_divergence(data.beside(base), base)
+    held = None if held is None else held.beside(base)
+    base = fit(data, actuator, base.starts, tell)
+    return Story(data, held, [Step(base, rung_of("calibrated", base, data, held), ())], not is_lost(lost))
+
+
+def _data(recordings: Sequence[Measurement], actuator: Actuator, signals: Sequence[str] | None) -> Data | None:
+    if not recordings:
+        return None
+    inside = [prepared(recording, actuator) for recording in recordings]
+    return gather(inside, actuator, weights_of(signals, actuator), fit_stretches(inside, actuator))
+
+
+def rung_of(label: str, found: Fit, data: Data, held: Data | None) -> Rung:
+    """A fit's errors, with those of what was held out."""
+    shown = found.calibration.signals
+    ratio, rms = floor_ratio(data, found.plant, shown), rms_by_signal(data, found.plant, shown)
+    unseen, unseen_rms = (None, {}) if held is None else holdout_fit(held, found)
+    return Rung(label, ratio, unseen, rms, unseen_rms, shown)
+
+
+def with_drops(ranked: Sequence[Candidate], trials: Sequence[Trial]) -> list[Candidate]:
+    """All candidates with what their refits gave, the best first."""
+    drops: Mapping[str, float] = {trial.candidate.name: trial.drop for trial in trials}
+    told = [replace(one, refitted_drop=drops.get(one.name)) for one in ranked]
+    return sorted(told, key=lambda one: -(one.refitted_drop if one.refitted_drop is not None else -math.inf))
+
+
+def _stood_in(before: Fit, after: Fit) -> tuple[StoodIn, ...]:
+    """Parameters that came back toward the file's value."""
+    moved = []
+    for path, one in before.calibration.parameters.items():
+        now = after.calibration.parameters[path]
+        if not path.startswith("effects.") and abs(one.z) - abs(now.z) > _MOVED:
+            moved.append(StoodIn(path, one.z, now.z))
+    return tuple(moved)
+
+
+def _refreshed(one: Added, found: Fit) -> Added:
+    """With the values of a fit."""
+    path = f"effects.{one.key}."
+    fitted = {
+        name.removeprefix(path): value for name, value in found.calibration.parameters.items() if name.startswith(path)
+    }
+    settings = found.calibration.actuator.effects[one.key]
+    chosen = {name: value for name, value in settings.items() if name not in fitted}
+    return replace(one, parameters=fitted, chosen=chosen)
+
+
+def alike(signatures: Mapping[str, Array]) -> dict[str, tuple[str, ...]]:
+    """Effects whose signatures no refit is expected to tell apart, by name."""
+    return {
+        name: tuple(other for other, its in signatures.items() if other != name and _same(own, its))
+        for name, own in signatures.items()
+    }
+
+
+def _same(one: Array, other: Array) -> bool:
+    first, second, shared = one @ one, other @ other, one @ other
+    if min(first, second) == 0.0:
+        return False
+    apart = 1.0 - max(shared, 0.0) ** 2 / (first * second)
+    return bool(apart < _SAME_DIRECTION or max(first, second) * apart < _SAME_CHI2)

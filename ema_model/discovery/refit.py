@@ -1,0 +1,104 @@
+"""A candidate in the model, refitted, and whether the data pay for it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ema_model.discovery.model_fit import Data, Fit, fit, holdout_error, with_effect
+from ema_model.discovery.result import Candidate
+from ema_model.effects import find
+
+Progress = Callable[[str], None]
+
+LEAST_BIC = 10.0
+_LEAST_FALL = 0.004  # of the error: what is less is immaterial
+_FALL = 0.01  # below which the data must be twice as sure
+_LEAST_T = 2.4  # of the mean gain over blocks of time: 1 % of chance
+_HELD = 0.01  # of the held-out error: at the floor chance may raise it so much, above the floor it must fall so much
+_AGREES = 0.8  # of the held-out error: so great a fall there needs no test over time
+_FLOOR = 1.1  # of the floor, up to which an error counts as at it
+_CORRELATED = 50  # values of a signal that may share their error
+_SCORE = 0.4  # of what a refit gives, that a score may have fallen short of predicting
+_FAINT = 0.1  # of the suggested strength, from which a fit that went astray begins anew
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Effects in the model: settings by name."""
+
+    candidate: Candidate
+    effects: Mapping[str, Mapping[str, float]]
+    fit: Fit
+    drop: float  # of χ²
+    faults: tuple[str, ...] = ()  # k1 … k8 that it frees, in place of effects
+    same_as: str = ""  # of a fault: the effect that tells as much
+    yields: bool = False  # to that effect
+
+
+def tried(
+    data: Data, current: Fit, candidate: Candidate, effects: Mapping[str, Mapping[str, float]], tell: Progress
+) -> Trial:
+    """The effects in the model, refitted together with all that it holds."""
+    best = _refitted(data, current, effects, tell)
+    if best.chi2 > current.chi2:  # it began too strong to find back
+        faint = {name: _weakened(name, settings) for name, settings in effects.items()}
+        best = min(best, _refitted(data, current, faint, tell), key=lambda one: one.chi2)
+    return Trial(candidate, effects, best, current.chi2 - best.chi2)
+
+
+def worth(current: Fit, trial: Trial) -> float:
+    """How much of χ² a trial takes beyond what its parameters must (BIC)."""
+    count = sum(fitted_count(name) for name in trial.effects) + len(trial.faults)
+    return trial.drop - count * math.log(len(current.residual))
+
+
+def pays(current: Fit, trial: Trial, data: Data, held: Data | None) -> bool:
+    """Whether the data pay for the parameters: most of the time, materially, and where they were not fitted."""
+    values = len(current.residual)
+    fall = 1.0 - trial.fit.error() / current.error()
+    if fall < _LEAST_FALL or worth(current, trial) < (LEAST_BIC if fall > _FALL else 2.0 * LEAST_BIC):
+        return False
+    if held is not None:
+        before, after = holdout_error(held, current), holdout_error(held, trial.fit)
+        if after < _AGREES * before:
+            return True  # no chance repeats itself where it was not fitted
+        if not _holds(before, after):
+            return False
+    gains = np.array_split(current.residual**2 - trial.fit.residual**2, max(8, values // _CORRELATED))
+    sums = np.array([gain.sum() for gain in gains])
+    return bool(sums.sum() >= _LEAST_T * np.std(sums, ddof=1) * np.sqrt(len(sums)))
+
+
+def _holds(before: float, after: float) -> bool:
+    """Whether what was not fitted agrees: an effect need not show in every recording, but must not be at odds."""
+    return after < (1.0 - _HELD if before > _FLOOR else 1.0 + _HELD) * before
+
+
+def _refitted(data: Data, current: Fit, effects: Mapping[str, Mapping[str, float]], tell: Progress) -> Fit:
+    actuator = current.actuator
+    for name, settings in effects.items():
+        actuator = with_effect(actuator, name, settings)
+    return fit(data, actuator, current.starts, tell, current.faults)
+
+
+def _weakened(name: str, settings: Mapping[str, float]) -> dict[str, float]:
+    first = find(name).parameters[0]
+    return {**settings, first.name: max(first.low, _FAINT * settings[first.name])}
+
+
+def promising(current: Fit, ranked: Sequence[Candidate], share: float, most: int) -> list[Candidate]:
+    """Candidates worth a refit: near the best, and such that a refit might make the data pay for them."""
+    values = len(current.residual)
+    material = (1.0 - (1.0 - _LEAST_FALL) ** 2) * current.chi2
+    needed = {c.name: max(material, fitted_count(c.name) * np.log(values) + LEAST_BIC) for c in ranked}
+    chosen = [c for c in ranked if not c.untestable_reason and c.predicted_drop > _SCORE * needed[c.name]]
+    return [c for c in chosen if c.predicted_drop >= share * chosen[0].predicted_drop][:most]
+
+
+def fitted_count(name: str) -> int:
+    """Number of an effect's parameters that are fitted."""
+    return sum(not parameter.integer for parameter in find(name).parameters)

@@ -1,0 +1,58 @@
+"""What a fitted model leaves in the recordings: whether it is anything, what explains it, its strongest orders."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+from ema_model.comparison.assemble import residuals_of
+from ema_model.comparison.compare import known_error
+from ema_model.comparison.curves import orders_in
+from ema_model.comparison.explain import advance_of, explain, used_blocks
+from ema_model.comparison.orders import Order
+from ema_model.comparison.orders import orders as orders_of
+from ema_model.comparison.residuals import Residuals
+from ema_model.comparison.result import Explanation
+from ema_model.comparison.verdict import ORDER_OF_PRIMARY
+from ema_model.discovery.model_fit import Data, Fit
+
+
+@dataclass(frozen=True)
+class Left:
+    """Of the residual that `comparison` would explain: the current's, where it is measured."""
+
+    explained: list[Explanation]  # all that was tried
+    orders: list[int]  # that the recordings can show, the strongest first
+
+    @property
+    def explanation(self) -> Explanation | None:
+        """The most significant."""
+        return next((one for one in self.explained if one.significant), None)
+
+
+@lru_cache(maxsize=4)  # a walk asks before and after it has looked for the next effect
+def left_by(data: Data, found: Fit) -> Left:
+    """What a fit leaves."""
+    residuals = residuals_left(data, found)
+    primary = next(name for name in ORDER_OF_PRIMARY if name in residuals.values)
+    orders = sorted(_orders(residuals, primary), key=lambda one: -one.significance)
+    return Left(explain(residuals, primary, found.actuator.axes), [one.order for one in orders])
+
+
+def residuals_left(data: Data, found: Fit) -> Residuals:
+    """The residuals of a fit beside the variables that may explain them."""
+    known = [known_error(found.plant, window, found.calibration) for window in found.plant.windows]
+    return residuals_of(
+        found.plant, data.floors, found.calibration.signals, known, found.calibration.actuator, found.calibration
+    )
+
+
+def _orders(residuals: Residuals, primary: str) -> list[Order]:
+    used = used_blocks(residuals, primary)
+    angle = residuals.variables.get("motor_angle")
+    if used is None or angle is None:
+        return []
+    advance = advance_of(residuals, used)
+    if not len(orders_in(residuals.turns, advance)):
+        return []
+    return orders_of(angle[used.chosen], used.values, residuals.turns, advance)

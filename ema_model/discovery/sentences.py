@@ -1,0 +1,52 @@
+"""A discovery's warnings in plain words, as the page, the reports and the recordings show them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from ema_model.discovery.result import Added
+from ema_model.effects import find
+from ema_model.faults import BY_NAME
+from ema_model.quantities.axes import Axes
+from ema_model.quantities.titles import in_sentence, parameter_title
+
+NOT_REPEATABLE = (
+    "The closed loop is not repeatable (a change of 0.05 % in the inertia moves its signals by more than the noise): "
+    "what the measured motion needs is compared instead."
+)
+
+
+def masked(added: Sequence[Added], axes: Axes) -> list[str]:
+    """One line for each effect that parameters of the model had been standing in for, and where they are now."""
+    lines = []
+    for one in added:
+        moved = [
+            f"{in_sentence(parameter_title(axes.path(part.path)))} ({part.before:+.1f} → {part.after:+.1f} σ)"
+            for part in one.stood_in
+            if part.path != find(one.name).duplicates
+        ]
+        if moved:
+            came = ", ".join(moved).replace("-", "−")
+            lines.append(f"{find(one.name).title} had been masked: back toward the file's value came {came}.")
+    return lines
+
+
+def as_well(ties: Mapping[str, str], added: Sequence[Added], faults: Sequence[str]) -> list[str]:
+    """One line for each fault and effect of which one was taken, and the other would explain as much.
+
+    ties: effects by fault.
+    """
+    names, lines = {one.name for one in added}, []
+    for fault, effect in ties.items():
+        label, title = f"the fault {BY_NAME[fault].label}", find(effect).title
+        if effect in names and fault not in faults:
+            lines.append(f"T{label[1:]} would explain as much as {in_sentence(title)}.")
+        elif fault in faults and effect not in names:
+            lines.append(f"{title} would explain as much as {label}.")
+    return lines
+
+
+def untold(first: str, second: str) -> str:
+    """That no test is known which would tell two effects apart."""
+    one, other = (in_sentence(find(name).title) for name in (first, second))
+    return f"No command within the range of these recordings tells {one} from {other}."

@@ -1,0 +1,98 @@
+"""A user's effect as the entries of a table: of an actuator file, or of a command line's `--effect`.
+
+    [effects.user_torque]                     [effects.torque_curve]
+    expression = "c*omega + A*sin(7*theta)"   variable = "theta"    # or omega, q, user, load
+    c = -1e-4                                 modulator = "1"       # or sign_speed, current
+    A = { value = 0.02, sigma = 0.005 }       low = 0.0
+                                              high = 6.283185307179586
+                                              values = [0.01, { value = 0.02, sigma = 0.005 }]
+
+Several of a kind are told apart by an ending: [effects.user_torque_2].
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from ema_model.actuator.parameters import number
+from ema_model.effects.user.curve import torque_curve
+from ema_model.effects.user.expression import parse
+from ema_model.effects.user.torque import RANGE, user_torque
+from ema_model.effects.user.user_effect import UserEffect
+from ema_model.errors import InputError
+
+KINDS = ("user_torque", "torque_curve")
+_NAME = re.compile(rf"({'|'.join(KINDS)})(_[A-Za-z0-9_]+)?")
+_CURVE = ("variable", "modulator", "low", "high", "values")
+
+
+def kind_of(name: str) -> str | None:
+    """The kind of user's effect that a table of this name holds; None for any other name."""
+    found = _NAME.fullmatch(name)
+    return found.group(1) if found else None
+
+
+def read_entries(kind: str, entries: Mapping[str, Any]) -> tuple[UserEffect, dict[str, Any]]:
+    """The effect, registered, and the entries of its parameters: a number, or a table with a value, each.
+
+    Raises InputError for an entry that is missing, unknown or no such thing; the numbers themselves are left to the
+    reader of the file.
+    """
+    return _torque(entries) if kind == "user_torque" else _curve(entries)
+
+
+def parameter_ranges(effect: UserEffect) -> dict[str, tuple[float, float]]:
+    """The ranges that the user has set, by parameter: they stand in the file beside its value."""
+    return {p.name: (p.low, p.high) for p in effect.parameters if (p.low, p.high) != RANGE}
+
+
+def _torque(entries: Mapping[str, Any]) -> tuple[UserEffect, dict[str, Any]]:
+    text = entries.get("expression")
+    if not isinstance(text, str):
+        raise InputError('needs expression = "…", a torque in N·m such as "c*omega + A*sin(7*theta)"')
+    try:
+        known = parse(text).parameters
+    except InputError as error:
+        raise InputError(f"expression: {error}") from None
+    given: dict[str, Any] = {name: entry for name, entry in entries.items() if name != "expression"}
+    ranges = {}
+    for name, entry in given.items():
+        if name not in known:
+            raise InputError(f"has no {name!r}; its expression has {', '.join(known) or 'no parameters'}")
+        if isinstance(entry, dict):
+            given[name] = {key: part for key, part in entry.items() if key not in ("low", "high")}
+            ranges[name] = (_number("low", entry.get("low", RANGE[0])), _number("high", entry.get("high", RANGE[1])))
+    for name in known:
+        if name not in given:
+            raise InputError(f"lacks {name}, a parameter of its expression; give it a value")
+    return user_torque(text, ranges), given
+
+
+def _curve(entries: Mapping[str, Any]) -> tuple[UserEffect, dict[str, Any]]:
+    for name in entries:
+        if name not in _CURVE:
+            raise InputError(f"has no {name!r}; it has {', '.join(_CURVE)}")
+    for name in _CURVE:
+        if name not in entries and name != "modulator":
+            raise InputError(f"lacks {name}; it has {', '.join(_CURVE)}")
+    values = entries["values"]
+    if not isinstance(values, list):
+        raise InputError("values must be a list of numbers, one for each knot of the curve")
+    numbers = [entry.get("value") if isinstance(entry, dict) else entry for entry in values]
+    effect = torque_curve(
+        [_number(f"value {j} of the curve", one) for j, one in enumerate(numbers)],
+        _number("low", entries["low"]),
+        _number("high", entries["high"]),
+        str(entries["variable"]),
+        str(entries.get("modulator", "1")),
+    )
+    return effect, {parameter.name: entry for parameter, entry in zip(effect.parameters, values)}
+
+
+def _number(name: str, value: Any) -> float:
+    if not math.isfinite(number(value)):
+        raise InputError(f"{name} must be a number, not {str(value)[:40]!r}")
+    return float(value)

@@ -1,0 +1,240 @@
+"""Fits the actuator's parameters to recordings: least squares with the tolerances as a prior."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ema_model.actuator import Actuator
+from ema_model.estimation.floor import CORRELATED_S, Floor
+from ema_model.estimation.problem import BOUND, Problem, Unknown
+from ema_model.faults import HEALTHY
+from ema_model.models import Plant
+from ema_model.quantities.axes import Axes
+from ema_model.quantities.titles import unit_of
+
+Array = NDArray[np.float64]
+
+SIGNALS = ("current_A", "motor_torque_Nm", "motor_position_rad", "user_position_rad")
+_Z90 = 1.645
+_OUTSIDE_Z = 2.99  # from which on a parameter stands at the edge of its tolerance
+_DRAWN = 192  # of the prior, from which further starts are taken
+_STARTS = 5
+_MISFIT = 25.0  # χ² per value, from which on the model misses by far
+_LONGEST = 40  # evaluations of a start
+
+
+@dataclass(frozen=True)
+class Calibrated:
+    """What a parameter was found to be."""
+
+    value: float
+    initial: float  # the file's
+    interval90: tuple[float, float]
+    unit: str
+    z: float  # σ from the file's value
+    at_bound: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """The fit and what it leaves."""
+
+    converged: bool
+    parameters: dict[str, Calibrated]  # "section.parameter", k1…k8
+    starts: dict[str, Calibrated]  # of the windows: "turned 0" and "play 0", rad at the motor
+    actuator: Actuator  # with the fitted values
+    k: Array  # (8,)
+    residual: Array  # (values,), model − measurement over the floor that weights the fit
+    chi2_per_value: float  # of the signals over the floor they are weighted by
+    signals: list[dict[str, Array]]  # the fitted model's, per window, (blocks,) each
+    before: list[dict[str, Array]]  # the file's own model's
+    sensitivities: list[dict[str, Array]]  # per window and fitted signal: ∂signal/∂x, (blocks, unknowns)
+    weighted_sensitivities: list[dict[str, Array]]  # the same over the floor that weights the fit
+    x: Array  # (unknowns,), the fitted values, in σ from the file's
+    room: tuple[Array, Array]  # (unknowns,) each, how far x may still go down and up, in σ
+    evaluations: int
+    confounded: tuple[tuple[str, str], ...]  # pairs that trade against each other
+    free: tuple[str, ...]
+
+    def start_of(self, window: int | None) -> tuple[float, float]:
+        """Where a fitted window began: the motor's angle and its place in the play, rad at the motor; 0 if unknown."""
+        turned, play = (self.starts.get(f"{kind} {window}") for kind in ("turned", "play"))
+        return 0.0 if turned is None else turned.value, 0.0 if play is None else play.value
+
+    @property
+    def weighted_jacobian(self) -> Array:
+        """`weighted_sensitivities` below each other, beside `residual`: (values, unknowns)."""
+        return np.concatenate([part[name] for part in self.weighted_sensitivities for name in part])
+
+    @property
+    def outside_tolerance(self) -> tuple[str, ...]:
+        """Parameters that stand at 3 σ of their tolerance, or would go beyond."""
+        return tuple(name for name, one in self.parameters.items() if abs(one.z) > _OUTSIDE_Z)
+
+
+def calibrate(
+    plant: Plant,
+    floors: Sequence[Floor],
+    *,
+    free: Sequence[str] | None = None,
+    k: ArrayLike = HEALTHY,
+    signals: Mapping[str, float] | None = None,
+    start: Mapping[str, float] | None = None,
+    on_progress: Callable[[int], None] | None = None,
+) -> Calibration:
+    """Fits the free parameters ("section.name", "effects.name.parameter", or k1…k8), and each window's start.
+
+    signals: those to fit, with weights; without it, current and positions as their floors say.
+    free: what may move; without it, every parameter that the actuator's file leaves free.
+    Two starts or more; the best is kept, and the fit has converged when it ended before its limit and two agree.
+    start: x by name, from an earlier fit, from which alone this one begins.
+    on_progress is told the evaluations so far, and may raise to stop.
+    Raises InputError for a parameter that does not exist or has no tolerance.
+    """
+    chosen = default_free(plant.actuator) if free is None else tuple(free)
+    problem = Problem(plant, floors, chosen, k, signals or dict.fromkeys(SIGNALS, 1.0))
+    search = _Search(problem, on_progress)
+    fit = search.solve(start)
+    x = fit.x
+    chi2 = fit.chi2
+    covariance = np.linalg.inv(fit.jacobian.T @ fit.jacobian) * max(1.0, chi2)
+    if chi2 > _MISFIT:  # errors of a wrong model last
+        covariance *= max(1.0, CORRELATED_S / min(one.block_s for one in floors))
+    actuator, fitted_k = problem.actuator(x)
+    after, before = problem.simulate(x), problem.simulate(np.zeros(len(x)))
+    axes = plant.actuator.axes
+    found = {u.name: _calibrated(u, x[i], np.sqrt(covariance[i, i]), axes) for i, u in enumerate(problem.unknowns)}
+    return Calibration(
+        converged=fit.converged,
+        parameters={name: one for name, one in found.items() if name in chosen},
+        starts={name: one for name, one in found.items() if name not in chosen},
+        actuator=actuator,
+        k=fitted_k,
+        residual=fit.residual,
+        chi2_per_value=chi2,
+        signals=[{name: values[0] for name, values in one.items()} for one in after],
+        before=[{name: values[0] for name, values in one.items()} for one in before],
+        sensitivities=problem.split(fit.jacobian),
+        weighted_sensitivities=problem.split(fit.jacobian, weighted=True),
+        x=x,
+        room=(problem.bounds[0] - x, problem.bounds[1] - x),
+        evaluations=search.evaluations,
+        confounded=_confounded(problem.unknowns, covariance),
+        free=chosen,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    x: Array
+    residual: Array  # (values,)
+    jacobian: Array
+    chi2: float  # of the signals, per value
+    cost: float
+    converged: bool
+
+
+class _Search:
+    """Least squares from several starts, until the two best agree."""
+
+    def __init__(self, problem: Problem, on_progress: Callable[[int], None] | None) -> None:
+        self.problem = problem
+        self.on_progress = on_progress
+        self.evaluations = 0
+        self._at, self._jacobian = np.zeros(0), np.zeros((0, 0))  # of the last evaluation
+
+    def residual(self, x: Array) -> Array:
+        """Also keeps the Jacobian there, which an accepted step asks for next."""
+        self.evaluations += 1
+        if self.on_progress is not None:
+            self.on_progress(self.evaluations)
+        residual, self._jacobian = self.problem.linearised(x)
+        self._at = x.copy()
+        return residual
+
+    def jacobian(self, x: Array) -> Array:
+        """∂residual/∂x."""
+        return self._jacobian if np.array_equal(x, self._at) else self.problem.jacobian(x)
+
+    def solve(self, start: Mapping[str, float] | None) -> _Found:
+        """The best fit; where the model misses by far, one in which large errors count less."""
+        count = len(self.problem.unknowns)
+        if not count:
+            fun = self.problem.residual(np.zeros(0))
+            return _Found(np.zeros(0), fun, np.zeros((len(fun), 0)), float(fun @ fun) / self.problem.values, 0.0, True)
+        if start is not None:
+            starts = [np.array([start.get(u.name, 0.0) for u in self.problem.unknowns])]
+        else:
+            starts = [np.zeros(count), *_promising(self.problem)]
+        found = self._from(starts, 1.0, "linear")
+        if found.chi2 > _MISFIT:
+            scale = np.sqrt(found.chi2) / 3.0
+            found = self._from([found.x, *starts], scale, "soft_l1")
+        return found
+
+    def _from(self, starts: Sequence[Array], scale: float, loss: str) -> _Found:
+        from scipy.optimize import least_squares  # takes a third of a second to import
+
+        least, greatest = self.problem.bounds
+        fits = []
+        for start in starts:
+            fits.append(
+                least_squares(
+                    self.residual,
+                    np.clip(start, 0.98 * least, 0.98 * greatest),
+                    jac=self.jacobian,  # pyright: ignore[reportArgumentType]
+                    bounds=(least, greatest),
+                    max_nfev=_LONGEST,
+                    xtol=1e-4,
+                    ftol=5e-5,
+                    loss=loss,
+                    f_scale=scale,
+                    tr_solver="lsmr",  # the default's singular values of the long Jacobian cost more than all else
+                )
+            )
+            fits.sort(key=lambda fit: fit.cost)
+            # "At most a hundredth apart": two minima of the same depth are one answer.
+            if len(fits) > 1 and fits[1].cost < 1.01 * fits[0].cost + 2.0:
+                break
+        best = fits[0]
+        agree = len(starts) == 1 or fits[1].cost < 1.01 * best.cost + 2.0
+        x = best.x
+        fun, jacobian = self.problem.linearised(x)  # the fit's own are weighted by its loss
+        chi2 = float(fun @ fun - x @ x) / self.problem.values
+        return _Found(x, fun[: self.problem.values], jacobian, chi2, float(best.cost), bool(best.status > 0 and agree))
+
+
+def _promising(problem: Problem) -> Array:
+    """Starts of their own: the best of a population drawn from the prior, (starts, unknowns)."""
+    least, greatest = problem.bounds
+    drawn = np.random.default_rng(0).standard_normal((_DRAWN, len(least)))
+    drawn = np.clip(drawn, np.maximum(0.8 * least, -2.0), np.minimum(0.8 * greatest, 2.0))
+    return drawn[np.argsort(problem.costs(drawn))[:_STARTS]]
+
+
+def default_free(actuator: Actuator) -> tuple[str, ...]:
+    """What the actuator's file leaves free to calibrate."""
+    return tuple(path for path, tolerance in actuator.tolerances.items() if tolerance.free)
+
+
+def _calibrated(unknown: Unknown, x: float, sigma: float, axes: Axes) -> Calibrated:
+    value = unknown.nominal + unknown.sigma * x
+    half = _Z90 * unknown.sigma * min(1.0, float(sigma))  # never less sure than the file itself
+    at_bound = bool(x < unknown.low + 0.01 or x > unknown.high - 0.01)
+    return Calibrated(
+        value, unknown.nominal, (value - half, value + half), unit_of(axes.path(unknown.name)), float(x), at_bound
+    )
+
+
+def _confounded(unknowns: Sequence[Unknown], covariance: NDArray[np.floating]) -> tuple[tuple[str, str], ...]:
+    scale = np.sqrt(np.diag(covariance))
+    correlation = np.abs(covariance / np.outer(scale, scale))
+    pairs = [(i, j) for i in range(len(unknowns)) for j in range(i) if correlation[i, j] > 0.95]
+    return tuple((unknowns[j].name, unknowns[i].name) for i, j in pairs)
+
+
+__all__ = ["BOUND", "SIGNALS", "Calibrated", "Calibration", "calibrate", "default_free"]

@@ -1,0 +1,116 @@
+"""What the Monitor Model lacks at one answer: the difference to its three-phase twin, the Reference Model.
+
+The difference changes slowly with k, so that MM(k) + [RM(k̂) − MM(k̂)] predicts the Reference Model near k̂, and a
+fit of it does not carry the low-fidelity model's bias into k.  The position's lag changes faster (with shorted
+phases, the winding's inductance, the bus voltage), so that half of its difference counts as not known.
+Hysteresis chopping makes the Reference Model's ripple depend on the smallest change of k: the mean of several
+twins, each with a slightly different k, is what is known of the difference, and their spread is what is not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
+
+from ema_model.commands import Recorded
+from ema_model.estimation.floor import CORRELATED_S
+from ema_model.identification.problem import Problem, Weights
+from ema_model.identification.unknowns import FAULTS, LOAD, to_k
+from ema_model.simulation.run import Run, simulate_reference
+
+Array = NDArray[np.float64]
+
+TWINS = 4
+# σ of the twins' k about the answer.  In saturation the ripple repeats for the same k, but not for one that a fit may
+# still move to: twins that are too close together would call it known.
+_HAIR = 3e-3
+_SLACK = 0.5  # share of a lasting difference that is not trusted to stay when the fit moves
+WHITE = frozenset({"current_A"})  # the ripple's spread: alternating in the current, lasting in the positions
+
+
+@dataclass(frozen=True, eq=False)
+class Twins:
+    """What to add to the Monitor Model, by window, and what is then left unknown of it."""
+
+    added: list[dict[str, Array]]  # by signal, (blocks,)
+    spread: list[dict[str, Array]]  # by signal, (blocks,): 1 σ
+    deviations: list[dict[str, Array]]  # by signal, (twins, blocks): of each twin from their mean
+
+    def weights(self, before: Sequence[Weights]) -> list[Weights]:
+        """The weights of a fit with this added."""
+        return [Weights(replace(one.floor, model=spread), WHITE) for one, spread in zip(before, self.spread)]
+
+
+def twins(problem: Problem, x: Array, seed: int, before: Twins | None = None) -> Twins | None:
+    """The difference at x (unknowns,), its spread from earlier ones too; None if there is no twin, or it diverges."""
+    if not problem.plant.actuator.has_reference_model:
+        return None
+    near = np.repeat(x[None, :], TWINS, axis=0)
+    near[:, :FAULTS] += _HAIR * np.random.default_rng([seed, 2]).standard_normal((TWINS, FAULTS))
+    near = problem.clip(near)
+    added, spread, deviations = [], [], []
+    for i, window in enumerate(problem.plant.windows):
+        try:
+            errors = _errors(problem, near, i)
+        except FloatingPointError:
+            return None
+        means = {name: error.mean(axis=0) for name, error in errors.items()}
+        own = {name: error - means[name] for name, error in errors.items()}
+        if before:  # the more twins, the better known is their spread
+            own = {name: np.concatenate([before.deviations[i][name], one]) for name, one in own.items()}
+        added.append(means)
+        deviations.append(own)
+        spread.append({name: _spread(one, means[name], name, window.block_s) for name, one in own.items()})
+    return Twins(added, spread, deviations)
+
+
+def _spread(deviations: Array, mean: Array, name: str, block_s: float) -> Array:
+    """1 σ of what the twins' mean leaves open, (blocks,): smooth over the time in which it stays alike."""
+    rounds = len(deviations) // TWINS
+    square = (1.0 + 1.0 / TWINS) * np.sum(deviations**2, axis=0) / (rounds * (TWINS - 1))
+    if name not in WHITE:
+        square = square + (_SLACK * mean) ** 2
+    width = max(3, round(CORRELATED_S / block_s) | 1)
+    return np.sqrt(np.maximum(uniform_filter1d(square, width, mode="nearest"), 0.0))  # its running sum rounds
+
+
+def _errors(problem: Problem, x: Array, place: int) -> dict[str, Array]:
+    """Reference less Monitor Model for x (n, unknowns), both under a constant load and an even supply: (n, blocks)."""
+    plant, window = problem.plant, problem.plant.windows[place]
+    count = len(window.command)
+    mean_load = float(window.load.mean())
+    monitor = problem.simulate(place, x, load=np.full(count, mean_load), supply=np.ones(count))
+    command = Recorded(np.arange(count) * window.step_s, window.command)
+    effects = {name: given for name, given in plant.effects.items() if name != LOAD}
+    names = problem.signals[place]
+    found: dict[str, list[Array]] = {name: [] for name in names}
+    for one in x:
+        values, start, load = problem.rig(one, place)
+        actuator = plant.actuator.varied(window.values | values)
+        run = Run(
+            command,
+            duration_s=count * window.step_s,
+            sample_rate_Hz=1.0 / (window.steps_per_sample * window.step_s),
+            load_torque_Nm=mean_load + load,
+        )
+        twin = simulate_reference(
+            run,
+            actuator,
+            to_k(one),
+            effects,
+            start_rad=window.user_rad + start["turned"] * actuator.transmission.gear_ratio,
+            start_speed_rad_s=window.speed_rad_s,
+            start_play_rad=window.play_rad + start["play"],
+        )
+        sensors = actuator.sensors
+        for name in names:
+            values_ = twin[name][1:].reshape(-1, window.samples_per_block).mean(axis=1)
+            if name == "current_A":
+                values_ = sensors.current_gain * values_ + sensors.current_bias_A
+            late = sensors.delay_s - plant.actuator.sensors.delay_s
+            found[name].append(values_ - late * np.gradient(values_, window.block_s) if late else values_)
+    return {name: np.array(values) - monitor[name] for name, values in found.items()}

@@ -1,0 +1,97 @@
+"""The run that would tell apart what a recording cannot: each of some commands, judged by what it would add."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ema_model.commands import command
+from ema_model.errors import InputError
+from ema_model.estimation.floor import Floor, repeats_of
+from ema_model.identification.fit import Fitted
+from ema_model.identification.problem import Problem, Weights
+from ema_model.identification.unknowns import FAULTS, Nuisance
+from ema_model.models import ClosedLoop
+from ema_model.simulation.run import Run, simulate_monitor
+
+Array = NDArray[np.floating]
+
+_COMMANDS: tuple[tuple[str, dict[str, float], float], ...] = (
+    ("chirp", {"amplitude_rad": 0.005}, 0.5),
+    ("chirp", {"amplitude_rad": 0.02}, 0.5),
+    ("sine", {"amplitude_rad": 0.005, "frequency_Hz": 6.0}, 0.5),
+    ("sine", {"amplitude_rad": 0.05, "frequency_Hz": 2.0}, 0.5),
+    ("step", {"final_rad": 0.005}, 0.5),
+    ("staircase", {"step_rad": 0.002}, 0.5),
+)
+_CURRENT_A = 0.2  # noise of a block, where the recording does not tell
+
+
+@dataclass(frozen=True)
+class Suggestion:
+    """A run, and how much less k would be spread after it."""
+
+    command: str
+    settings: dict[str, float]  # of the command; the others are its usual ones
+    duration_s: float
+    gain: float  # of the σ of the k in question, before over after
+
+    @property
+    def options(self) -> str:
+        """The run as `emaviz simulate` takes it."""
+        chosen = "".join(f" --set {name}={value:g}" for name, value in self.settings.items())
+        return f"--command {self.command}{chosen} --duration {self.duration_s:g}"
+
+
+def separating(found: Fitted, covariance: Array, names: Sequence[str]) -> Suggestion | None:
+    """The command after which the k of these names (k1…k8) would be known best; None if none helps."""
+    columns = sorted({c for name in names for c in _columns(name)})
+    best: Suggestion | None = None
+    before = np.sqrt(np.diag(covariance)[columns])
+    for name, settings, duration in _COMMANDS:
+        information = _information(found, Run(command(name, settings), duration))
+        if information is None:
+            continue
+        after = np.linalg.inv(np.linalg.inv(covariance) + information)
+        gain = float(np.max(before / np.sqrt(np.diag(after)[columns])))
+        if gain > 1.3 and (best is None or gain > best.gain):
+            best = Suggestion(name, settings, duration, gain)
+    return best
+
+
+def _columns(name: str) -> tuple[int, ...]:
+    return {"k6": (5, 6), "k7": (5, 6), "k8": (7,)}.get(name, (int(name[1]) - 1,))
+
+
+def _information(found: Fitted, run: Run) -> Array | None:
+    """Inverse covariance (8, 8) of k that such a recording would bring, its rig's unknowns integrated out."""
+    problem = found.problem
+    plant = problem.plant
+    try:
+        recording = simulate_monitor(run, plant.actuator, found.k, plant.effects, plant.stack.circuit)
+        own = ClosedLoop([recording], plant.actuator, effects=plant.effects, circuit=plant.stack.circuit)
+    except (InputError, FloatingPointError):
+        return None
+    window = own.windows[0]
+    typical = problem.weights[0]
+    known = typical.floor.model
+    noise = {name: typical.noise.get(name, _CURRENT_A) for name in window.measured}
+    model = {
+        name: np.full(window.blocks, np.sqrt(np.mean(known[name] ** 2)) if name in known else 0.0)
+        for name in window.measured
+    }
+    kept: list[Nuisance] = [n for n in problem.nuisances if " " not in n.name or n.name.endswith(" 0")]
+    own_floor = Floor(noise, model, repeats_of(window, noise), window.block_s)
+    own_problem = Problem(own, [Weights(own_floor, typical.white)], kept)
+    x = np.zeros(own_problem.count)
+    x[:FAULTS] = found.x[:FAULTS]
+    _, slopes = own_problem.jacobians(x[None, :])
+    hessian = slopes[0].T @ slopes[0]
+    rest = slice(FAULTS, None)
+    if own_problem.count == FAULTS:
+        return hessian
+    mixed = np.linalg.solve(hessian[rest, rest], hessian[rest, :FAULTS])
+    return hessian[:FAULTS, :FAULTS] - hessian[:FAULTS, rest] @ mixed

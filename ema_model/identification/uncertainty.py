@@ -1,0 +1,252 @@
+"""How sure an identification is: intervals, a joint test of health, and what the data cannot separate.
+
+Everything is linearised at the best fit, in which the base parameters, the starts and unrecorded loads moved with
+k.  The covariance is the sandwich H⁻¹ M H⁻¹: H from the weighted derivatives and the tolerances' prior, M from what
+the errors really are — the recordings' white noise, the tolerances, and the twins' deviations, which last.  A few twins
+tell their own spread roughly: what rests on it is widened as Student's t is beyond the normal distribution.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtri, stdtrit
+
+from ema_model import faults
+from ema_model.estimation.feldman_cousins import above_zero, length_of_vector
+from ema_model.identification.adequacy import Adequacy, adequacy
+from ema_model.identification.fit import Fitted
+from ema_model.identification.model_bias import TWINS
+from ema_model.identification.next_test import Suggestion, separating
+from ema_model.identification.unknowns import ECCENTRICITY, FAULTS, GAIN, to_x
+
+Array = NDArray[np.floating]
+
+_Z90 = 1.645
+_ALARM = 0.01 / 7  # of each of seven k, so that all together give a false one in 1 % of healthy actuators
+_ALARM_Z = 2.98  # one-sided, of a k that is healthy at 0
+_ALARM_Z_BOTH = 3.19  # two-sided
+_ALARM_LENGTH = float(np.sqrt(-2.0 * np.log(_ALARM)))  # of a vector
+_INSEPARABLE = 0.9
+_WIDE = 0.03  # σ of a k below which it counts as known
+_ANY = 0.4  # width of an interval from which on a k is hardly known
+_LEAST_SPREAD = 0.02  # of a fit that left the base parameters where they were
+_SLIGHT = 2e-5  # least σ: as well as the models' steps in time let any k be told
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """What the recordings leave open about k.
+
+    k7 is an angle: its interval stands about k7 and may reach beyond 0 or 1; it is 0 … 1 where k6 may be 0.
+    """
+
+    interval90: Array  # (8, 2)
+    healthy: bool  # joint test at 1 %, of a model that fits
+    alarms: tuple[str, ...]  # the k that are surely not healthy; none where the model does not fit
+    ambiguous: tuple[tuple[str, ...], ...]  # groups that these recordings cannot separate
+    hardly_known: tuple[str, ...] = ()  # k, without the angle k7, that could be nearly anything
+    adequate: bool = True  # the model with this k leaves no more than the floor
+    warnings: tuple[str, ...] = ()
+    separated_by: Suggestion | None = None  # the run that would tell the groups apart, and the hardly known
+    covariance: Array = field(default_factory=lambda: np.zeros((FAULTS, FAULTS)))  # of the faults' part of x
+
+
+def uncertainty(found: Fitted, k: Array) -> Uncertainty:
+    """Intervals and tests of a best fit; the intervals contain the answer k (8,) that is shown.
+
+    Where other basins fit within the floor as well, intervals reach over all of them, and an alarm is one of each.
+    """
+    best, *others = [_basin(found, k), *(_basin(one, one.k) for one in found.rivals)]
+    interval = best.interval90
+    for one in others:
+        lower, upper = zip(interval.T, one.interval90.T)
+        interval = np.stack([np.minimum(*lower), np.maximum(*upper)], axis=1)
+    if interval[5, 0] <= 0.0 or np.ptp(interval[6]) >= 1.0:
+        interval[6] = 0.0, 1.0
+    groups = _groups(best.covariance)
+    hardly = tuple(name for name, width in zip(faults.NAMES, np.ptp(interval, axis=1)) if width > _ANY and name != "k7")
+    unclear = [*hardly, *(name for group in groups for name in group)]
+    return Uncertainty(
+        interval90=interval,
+        healthy=best.healthy or any(one.healthy for one in others),
+        alarms=tuple(name for name in best.alarms if all(name in one.alarms for one in others)),
+        ambiguous=groups,
+        hardly_known=hardly,
+        adequate=best.fit.adequate,
+        warnings=_warnings(best.fit),
+        separated_by=separating(found, best.covariance, unclear) if unclear else None,
+        covariance=best.covariance,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Basin:
+    """What one best fit alone says."""
+
+    covariance: Array  # of the faults' part of x
+    fit: Adequacy
+    interval90: Array  # (8, 2)
+    healthy: bool
+    alarms: tuple[str, ...]
+
+
+def _basin(found: Fitted, k: Array) -> _Basin:
+    covariance = _covariance(found)[:FAULTS, :FAULTS]
+    fit = adequacy(found)
+    if not fit.adequate:  # a misfit says how wrong the model is, and the intervals with it
+        covariance = covariance * max(1.0, fit.ratio) ** 2
+    free = _unbounded(found)[:FAULTS]
+    healthy = _from_healthy(free, covariance) < float(chdtri(FAULTS, 0.01))
+    return _Basin(
+        covariance,
+        fit,
+        _intervals(free, covariance, k),
+        bool(healthy and fit.adequate),
+        () if healthy or not fit.adequate else _alarms(free, covariance),
+    )
+
+
+def _covariance(found: Fitted) -> Array:
+    """Of x, (unknowns, unknowns), such that z of the normal distribution is right for 90 %."""
+    problem, slopes = found.problem, found.slopes
+    rows = slice(0, problem.values)
+    held = problem.prior.copy()  # as the fit had it; what is really unknown is the whole tolerance
+    held[problem.base] /= max(found.spread, _LEAST_SPREAD)
+    hessian = slopes[rows].T @ slopes[rows] + np.diag(held**2)
+    inverse = np.linalg.inv(hessian)
+    meat = np.diag(held**4 / problem.prior**2)
+    for window, name, rows in problem.parts():
+        part = slopes[rows]
+        noise = np.full(rows.stop - rows.start, problem.weights[window].noise[name])
+        if found.twins is None:  # the model's own error, taken to last as its weight says
+            noise = 1.0 / problem.over_sigma(window, name, np.ones(len(noise)))
+        weighted = part * problem.over_sigma(window, name, noise)[:, None]
+        meat = meat + weighted.T @ weighted
+    covariance = inverse @ meat @ inverse + _SLIGHT**2 * np.eye(len(inverse))
+    if found.twins is not None:
+        scores = _twin_scores(found) @ inverse
+        freedom = len(scores) // TWINS * (TWINS - 1)
+        of_twins = (1.0 + 1.0 / TWINS) * scores.T @ scores / freedom
+        covariance += of_twins
+        share = np.diag(of_twins) / np.diag(covariance)
+        wider = stdtrit(freedom / np.maximum(share, 1e-6) ** 2, 0.95) / _Z90  # Welch and Satterthwaite's freedom
+        covariance *= np.outer(wider, wider)
+    return 0.5 * (covariance + covariance.T)
+
+
+def _twin_scores(found: Fitted) -> Array:
+    """What each twin's deviation would move the fit by, before the curvature: (twins, unknowns)."""
+    assert found.twins is not None
+    total = 0.0
+    for window, name, rows in found.problem.parts():
+        deviations = found.problem.over_sigma(window, name, found.twins.deviations[window][name])
+        total = total + deviations @ found.slopes[rows]
+    return np.asarray(total)
+
+
+def _unbounded(found: Fitted) -> Array:
+    """Where x would be without its bounds: a Gauss–Newton step from the fit, the prior as the fit had it."""
+    problem, x = found.problem, found.x
+    moves = np.ones(problem.count, dtype=bool)
+    prior = problem.prior.copy()
+    if found.spread > 0.0:
+        prior[problem.base] /= found.spread
+    else:
+        moves &= ~problem.base
+    rows = slice(0, problem.values)
+    slopes, residual = found.slopes[rows][:, moves], found.residual[rows]
+    hessian = slopes.T @ slopes + np.diag(prior[moves] ** 2)
+    gradient = slopes.T @ residual + (prior**2 * (x - problem.middle))[moves]
+    at_bound = (x <= problem.low + 1e-6) | (x >= problem.high - 1e-6)
+    step = np.zeros(problem.count)
+    if (at_bound & moves)[:FAULTS].any():  # elsewhere the fit is there already
+        step[moves] = -np.linalg.solve(hessian + 1e-9 * np.diag(np.diag(hessian)), gradient)
+    return x + step
+
+
+def _intervals(free: Array, covariance: Array, k: Array) -> Array:
+    sigma = np.sqrt(np.diag(covariance))
+    interval = np.zeros((8, 2))
+    for i in range(5):
+        interval[i] = _bounded(free[i], sigma[i])
+    gain = free[GAIN]
+    interval[7] = gain - _Z90 * sigma[GAIN], gain + _Z90 * sigma[GAIN]
+    along, across, length = _polar(free, covariance)
+    low, high = length_of_vector(length / along)
+    interval[5] = low * along, high * along
+    interval = np.clip(interval, 0.0, 1.0)
+    interval[:, 0], interval[:, 1] = np.minimum(interval[:, 0], k), np.maximum(interval[:, 1], k)
+    half = _Z90 * across / max(length, 1e-9) / (2.0 * np.pi)
+    interval[6] = (0.0, 1.0) if interval[5, 0] <= 0.0 or half >= 0.5 else (k[6] - half, k[6] + half)
+    return interval
+
+
+def _bounded(value: float, sigma: float) -> tuple[float, float]:
+    """Of a k between 0 and 1, the nearer end counting."""
+    if value > 0.5:
+        low, high = above_zero((1.0 - value) / sigma)
+        return 1.0 - high * sigma, 1.0 - low * sigma
+    low, high = above_zero(value / sigma)
+    return low * sigma, high * sigma
+
+
+def _polar(free: Array, covariance: Array) -> tuple[float, float, float]:
+    """σ along and across the eccentricity's vector, and its length."""
+    index = list(ECCENTRICITY)
+    vector = free[index]
+    part = covariance[np.ix_(index, index)]
+    length = float(np.hypot(*vector))
+    if length < 1e-9:
+        both = float(np.sqrt(np.trace(part) / 2.0))
+        return both, both, length
+    along = vector / length
+    across = np.array([-along[1], along[0]])
+    return float(np.sqrt(along @ part @ along)), float(np.sqrt(across @ part @ across)), length
+
+
+def _from_healthy(free: Array, covariance: Array) -> float:
+    """χ² by which health fits worse than the best k that can be."""
+    from scipy.optimize import lsq_linear  # takes a third of a second to import
+
+    root = np.linalg.inv(np.linalg.cholesky(covariance))
+    low = np.array([0.0] * 5 + [-1.0, -1.0, 0.0])
+    best = lsq_linear(root, root @ free, bounds=(low, np.ones(FAULTS)))
+    healthy = root @ (to_x(faults.HEALTHY) - free)
+    return float(healthy @ healthy - 2.0 * best.cost)
+
+
+def _alarms(free: Array, covariance: Array) -> tuple[str, ...]:
+    sigma = np.sqrt(np.diag(covariance))
+    outside = [faults.NAMES[i] for i in range(5) if free[i] > _ALARM_Z * sigma[i]]
+    along, _, length = _polar(free, covariance)
+    if length > _ALARM_LENGTH * along:
+        outside.append("k6")
+    if abs(free[GAIN] - faults.HEALTHY[7]) > _ALARM_Z_BOTH * sigma[GAIN]:
+        outside.append("k8")
+    return tuple(outside)
+
+
+def _groups(covariance: Array) -> tuple[tuple[str, ...], ...]:
+    """k that trade against each other: strongly correlated and, each, poorly known."""
+    names = [*faults.NAMES[:5], "k6", "k6", "k8"]
+    sigma = np.sqrt(np.diag(covariance))
+    correlation = np.abs(covariance / np.outer(sigma, sigma))
+    groups: list[set[str]] = []
+    for i in range(FAULTS):
+        for j in range(i):
+            if correlation[i, j] > _INSEPARABLE and min(sigma[i], sigma[j]) > _WIDE and names[i] != names[j]:
+                touching = [g for g in groups if names[i] in g or names[j] in g]
+                groups = [g for g in groups if g not in touching] + [set.union({names[i], names[j]}, *touching)]
+    return tuple(tuple(sorted(group)) for group in groups)
+
+
+def _warnings(fit: Adequacy) -> tuple[str, ...]:
+    if fit.adequate:
+        return ()
+    return (
+        f"The model does not fit, whatever k: {fit.reason}. What is found here may stand in for physics that the model "
+        "lacks; `emaviz discover` on the same recordings looks for it.",
+    )

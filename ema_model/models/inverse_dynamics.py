@@ -1,0 +1,229 @@
+"""Motion in, current or torque out: for recordings whose controller is not known, and for static maps.
+
+The current that the measured motion needs is held against the measured one after both have passed the filter
+of the motion (`ema_model.models.motion`).  In a static map (the current that holds the rotor, against its
+angle) nothing moves: what the model has to say there is what effects pull at the shaft.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ema_model.actuator import Actuator
+from ema_model.effects import find
+from ema_model.errors import InputError
+from ema_model.faults import HEALTHY
+from ema_model.models.motion import Motion, motion_of
+from ema_model.models.window import CONTEXT
+from ema_model.physics.rows import LANES
+from ema_model.recordings import Measurement
+from ema_model.simulation.pack import monitor_rows, stack_for
+from ema_model.stacks import exclusive
+
+Array = NDArray[np.float64]
+
+_BLOCKS_PER_FILTER = 6  # compared values in a half width of the motion's filter
+_CHUNK = 100_000  # samples that are computed at once
+_STILL_STEPS = 3.0  # of the encoder within the filter, under which the motor counts as standing
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """One run of a recording; sample arrays are (samples,), block arrays (blocks,).
+
+    Blocks at standstill are left out: friction holds any current up to its static limit there.
+    """
+
+    name: str
+    recording: int
+    first: int  # the recording's sample that is its start
+    time_s: Array  # (blocks,)
+    motion: Motion
+    position: Array  # (samples,), motor, rad
+    load: Array  # (samples,), N·m at the user
+    still: float  # rad/s
+    measured: dict[str, Array]  # (blocks,): current_A or motor_torque_Nm, filtered like the model's
+    context: dict[str, Array]  # (blocks,)
+    noise: dict[str, float]  # rms per block, of the sensors
+    moving: NDArray[np.intp]  # (blocks,), which of the run's blocks these are
+    samples_per_block: int
+    period_s: float
+    values: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def blocks(self) -> int:
+        """Number of compared values."""
+        return len(self.time_s)
+
+    @property
+    def block_s(self) -> float:
+        """Time between compared values, s."""
+        return self.samples_per_block * self.period_s
+
+
+class InverseDynamics:
+    """Recordings with the motor's position and its current or torque."""
+
+    starts = False
+
+    def __init__(
+        self,
+        measurements: Sequence[Measurement],
+        actuator: Actuator,
+        *,
+        effects: Mapping[str, Mapping[str, float]] | None = None,
+        stretches: Sequence[list[slice] | None] | None = None,
+    ) -> None:
+        if not measurements:
+            raise InputError("one recording or more is needed")
+        self.actuator = actuator
+        self.effects = {name: find(name).settings(dict(given)) for name, given in (effects or {}).items()}
+        self.stack = stack_for(actuator, self.effects)
+        self.recorded = list(measurements)  # before they were put on an even grid
+        self.measurements = [m if m.is_uniform or m.is_map else _even(m) for m in measurements]
+        chosen = stretches or [None] * len(self.measurements)
+        self.windows = [
+            stretch
+            for i, (m, parts) in enumerate(zip(self.measurements, chosen))
+            for stretch in _stretches(m, actuator, recording=i, parts=parts)
+        ]
+
+    def signals(
+        self,
+        window: Stretch,
+        actuator: Actuator | None = None,
+        k: ArrayLike = HEALTHY,
+        turned_rad: ArrayLike = 0.0,
+        play_rad: ArrayLike = 0.0,
+        effects: Mapping[str, Mapping[str, Any]] | None = None,
+    ) -> dict[str, Array]:
+        """The current (A) or torque (N·m) that the motion needs, k (n, 8) → (n, blocks); friction's k1 alone counts.
+
+        Parameters may be arrays (n,); the angles at the start mean nothing here.
+        """
+        k = np.atleast_2d(np.asarray(k, dtype=float))
+        actuator = (actuator or self.actuator).varied(window.values)
+        rows = monitor_rows(actuator, k, self.stack, self.effects if effects is None else effects)
+        # Effects see the angle as it was read; the acceleration's own part has passed the filter already.
+        static = self._currents(rows, len(k), window, np.zeros_like(window.position))
+        moving = self._currents(rows, len(k), window, window.motion.acceleration)
+        needed = window.motion.filtered(static) + moving - static
+        size = window.samples_per_block
+        whole = needed.shape[1] // size
+        current = needed[:, : whole * size].reshape(len(k), whole, size).mean(axis=2)[:, window.moving]
+        sensors = actuator.sensors
+        return {
+            "current_A": _each(sensors.current_gain) * current + _each(sensors.current_bias_A),
+            "motor_torque_Nm": _each(actuator.motor.torque_constant_Nm_A) * current,
+        }
+
+    def _currents(self, rows: Array, n: int, window: Stretch, acceleration: Array) -> Array:
+        """(n, samples), A"""
+        currents = np.empty((n, window.position.size))
+        for first in range(0, window.position.size, _CHUNK):
+            part = slice(first, min(first + _CHUNK, window.position.size))
+            result = np.empty((len(rows), part.stop - part.start, LANES))
+            exclusive(
+                self.stack.inverse.currents,
+                rows,
+                window.position[part],
+                window.motion.speed[part],
+                acceleration[part],
+                window.load[part],
+                window.still,
+                result,
+            )
+            currents[:, part] = result.transpose(0, 2, 1).reshape(len(rows) * LANES, -1)[:n]
+        return currents
+
+
+def _even(measurement: Measurement) -> Measurement:
+    return measurement.resampled(measurement.sample_period_s)
+
+
+def _stretches(
+    measurement: Measurement, actuator: Actuator, *, recording: int, parts: list[slice] | None
+) -> list[Stretch]:
+    measurement.require("motor_position_rad")
+    target = next((name for name in ("current_A", "motor_torque_Nm") if name in measurement), None)
+    if target is None:
+        raise InputError(f"{measurement.name}: nothing to compare; current_A or motor_torque_Nm is needed")
+    values = {path: value for rule in actuator.rules_for(measurement.name) for path, value in rule.values.items()}
+    period = measurement.sample_period_s
+    size = 1 if measurement.is_map else max(1, round(actuator.filter_s / _BLOCKS_PER_FILTER / period))
+    found = []
+    runs = [slice(0, measurement.samples)] if measurement.is_map else parts or measurement.runs
+    for run in runs:
+        position = measurement["motor_position_rad"][run]
+        blocks = position.size // size
+        if blocks < 10:
+            continue
+        motion = _standing(position) if measurement.is_map else motion_of(position, period, actuator.filter_s)
+        still = max(1e-9, _STILL_STEPS * _step_of(position) / (motion.kernel.size * period))
+        slowest = np.abs(motion.speed[: blocks * size]).reshape(blocks, size).min(axis=1)
+        moving = np.arange(blocks) if measurement.is_map else np.flatnonzero(slowest > still)
+        if moving.size < 10:
+            continue
+        load = measurement.get("load_torque_Nm")
+
+        def means(values: Array, blocks: int = blocks, moving: NDArray[np.intp] = moving) -> Array:
+            return values[: blocks * size].reshape(blocks, size).mean(axis=1)[moving]
+
+        raw = measurement[target][run]
+        context = {
+            "motor_position_rad": means(position),
+            "motor_speed_rad_s": means(motion.speed),
+            "acceleration_rad_s2": means(motion.acceleration),
+            **{name: means(measurement[name][run]) for name in CONTEXT if name in measurement},
+        }
+        found.append(
+            Stretch(
+                name=measurement.name,
+                recording=recording,
+                first=run.start,
+                time_s=means(measurement.time_s[run]),
+                motion=motion,
+                position=position,
+                load=np.zeros_like(position) if load is None else load[run],
+                still=still,
+                measured={target: means(motion.filtered(raw))},
+                context=context,
+                noise={target: _noise(raw, motion.kernel, size)},
+                moving=moving,
+                samples_per_block=size,
+                period_s=period,
+                values=values,
+            )
+        )
+    if not found:
+        raise InputError(f"{measurement.name}: too little motion to compare; {10 * size} samples in motion are needed")
+    return found
+
+
+def _standing(position: Array) -> Motion:
+    zero = np.zeros_like(position)
+    return Motion(position, zero, zero, np.ones(1))
+
+
+def _step_of(position: Array) -> float:
+    """The smallest step between samples, rad: the encoder's resolution where it is seen."""
+    steps = np.abs(np.diff(position))
+    steps = steps[steps > 1e-9]
+    return float(np.quantile(steps, 0.01)) if steps.size else 0.0
+
+
+def _noise(raw: Array, kernel: Array, size: int) -> float:
+    """White noise of the raw signal after the filter and the mean over a block, rms."""
+    third = np.diff(raw, 3)
+    white = 1.4826 * float(np.median(np.abs(third))) / np.sqrt(20.0) if third.size else 0.0
+    return white * float(np.sqrt(np.sum(np.convolve(kernel, np.full(size, 1.0 / size)) ** 2)))
+
+
+def _each(value: ArrayLike) -> Array:
+    """One number, or one for each individual, as a column."""
+    return np.atleast_1d(np.asarray(value, dtype=float))[:, None]

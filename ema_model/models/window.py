@@ -1,0 +1,149 @@
+"""A stretch of a recording, ready for the kernels: inputs per step of the model, block means to compare with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ema_model.actuator import Actuator
+from ema_model.commands.recorded import between
+from ema_model.errors import InputError
+from ema_model.recordings import Measurement
+from ema_model.simulation.run import steps_per_sample
+
+Array = NDArray[np.float64]
+
+COMPARED = ("current_A", "motor_speed_rad_s", "motor_position_rad", "user_position_rad")
+_SLOPE_SAMPLES = 10  # on either side of a start in mid-run, over which the speed is found
+CONTEXT = ("load_torque_Nm", "temperature_C")
+BLOCK_S = 0.5e-3  # means over it take the chopping ripple away, which no low-fidelity model follows (MODEL §2)
+
+
+@dataclass(frozen=True, eq=False)
+class Window:
+    """One run, or a part of it.  Block arrays are (blocks,), step arrays (steps,)."""
+
+    name: str
+    recording: int  # which of the recordings, from 0
+    first: int  # the recording's sample that is its start
+    time_s: Array  # (blocks,), middle of each block, as recorded
+    command: Array  # (steps,), rad
+    load: Array  # (steps,), N·m at the user
+    supply: Array  # (steps,), bus voltage over nominal; 0 where the drive is off
+    measured: dict[str, Array]  # block means of the signals of `COMPARED`, as recorded
+    context: dict[str, Array]  # block means of what else was recorded of `CONTEXT`
+    samples_per_block: int
+    steps_per_sample: int
+    step_s: float
+    user_rad: float  # where it starts: the motor's angle as a user's, rad
+    speed_rad_s: float
+    play_rad: float  # place in the play, rad at the motor
+    values: dict[str, float] = field(default_factory=dict)  # of the actuator, in this recording alone
+
+    @property
+    def blocks(self) -> int:
+        """Number of compared values."""
+        return len(self.time_s)
+
+    @property
+    def steps_per_block(self) -> int:
+        """Model steps between compared values."""
+        return self.samples_per_block * self.steps_per_sample
+
+    @property
+    def block_s(self) -> float:
+        """Time between compared values, s."""
+        return self.steps_per_block * self.step_s
+
+
+def cut(
+    measurement: Measurement,
+    actuator: Actuator,
+    *,
+    recording: int = 0,
+    block_s: float = BLOCK_S,
+    stretches: list[slice] | None = None,
+) -> list[Window]:
+    """Windows of a recording on an even grid: its runs, or the given stretches of samples.
+
+    block_s: 0 compares every sample.  Raises InputError if nothing can be compared.
+    """
+    measurement.require("command_rad")
+    if not any(name in measurement for name in COMPARED):
+        raise InputError(f"{measurement.name}: nothing to compare; one of {', '.join(COMPARED)} is needed")
+    period = measurement.sample_period_s
+    samples = max(1, round(block_s / period))
+    steps = steps_per_sample(period, actuator.step_s)
+    step_s = period / steps
+    values = {path: value for rule in actuator.rules_for(measurement.name) for path, value in rule.values.items()}
+    windows = []
+    for run in stretches or measurement.runs:
+        blocks = (run.stop - run.start - 1) // samples
+        if blocks < 10:
+            continue
+        compared = slice(run.start + 1, run.start + 1 + blocks * samples)
+
+        def means(name: str, compared: slice = compared, blocks: int = blocks) -> Array:
+            return measurement[name][compared].reshape(blocks, samples).mean(axis=1)
+
+        inputs = _inputs(measurement, actuator, run, blocks * samples * steps, step_s)
+        user, speed, play = _start(measurement, actuator, run.start)
+        windows.append(
+            Window(
+                name=measurement.name,
+                recording=recording,
+                first=run.start,
+                time_s=means("time_s"),
+                command=inputs[0],
+                load=inputs[1],
+                supply=inputs[2],
+                measured={name: means(name) for name in COMPARED if name in measurement},
+                context={name: means(name) for name in CONTEXT if name in measurement},
+                samples_per_block=samples,
+                steps_per_sample=steps,
+                step_s=step_s,
+                user_rad=user,
+                speed_rad_s=speed,
+                play_rad=play,
+                values=values,
+            )
+        )
+    if not windows:
+        short = f"{measurement.duration_s:g} s are too short to compare"
+        raise InputError(f"{measurement.name}: {short}; {10 * samples * period:g} s are needed")
+    return windows
+
+
+def _inputs(measurement: Measurement, actuator: Actuator, run: slice, steps: int, step_s: float) -> tuple[Array, ...]:
+    """Command, load and supply at every step; linear between samples, but for jumps and the drive's switch."""
+    time = measurement.time_s[run] - measurement.time_s[run.start]
+    at = np.arange(steps) * step_s - actuator.sensors.delay_s
+    command: Array = between(at, time, measurement["command_rad"][run]).astype(float)
+    load = measurement.get("load_torque_Nm")
+    loads = np.zeros(steps) if load is None else np.interp(at, time, load[run])
+    bus = measurement.get("bus_voltage_V")
+    supply = np.ones(steps)
+    if bus is not None and actuator.inverter.kind == "voltage":
+        supply = np.interp(at, time, bus[run]) / actuator.inverter.bus_voltage_V
+    enabled = measurement.get("drive_enabled")
+    if enabled is not None:
+        held = np.clip(np.searchsorted(time, at, side="right") - 1, 0, time.size - 1)
+        supply = np.where(enabled[run][held] > 0.5, supply, 0.0)
+    return command, loads, supply
+
+
+def _start(measurement: Measurement, actuator: Actuator, at: int) -> tuple[float, float, float]:
+    """Where the actuator stands at a sample: motor angle as a user's, motor speed, place in the play."""
+    tau = actuator.transmission.gear_ratio
+    user = measurement.get("user_position_rad")
+    motor = measurement.get("motor_position_rad")
+    speed = measurement.get("motor_speed_rad_s")
+    at_user = float(measurement["command_rad"][at] if user is None else user[at])
+    if motor is None:
+        return at_user, 0.0 if speed is None else float(speed[at]), 0.0
+    # A rig's speed is often the encoder's difference, far too coarse for one sample.
+    near = slice(max(0, at - _SLOPE_SAMPLES), at + _SLOPE_SAMPLES)
+    omega = 0.0 if at == 0 else float(np.polyfit(measurement.time_s[near], motor[near], 1)[0])
+    return float(motor[at]) * tau, omega, 0.0 if user is None else at_user / tau - float(motor[at])

@@ -1,0 +1,1 @@
+"""Quantities: signals, units, titles and axes, each fact in one row."""

@@ -1,0 +1,37 @@
+"""Recordings of a real or simulated actuator: signals on one time base, read, checked, resampled and written."""
+
+from __future__ import annotations
+
+from ema_model.quantities.signals import SIGNALS, Signal
+from ema_model.recordings.checks import check_needed
+from ema_model.recordings.columns.guess import guess_mapping
+from ema_model.recordings.columns.mapping import ColumnMapping, MappedColumn, apply_mapping, parse_mapping
+from ema_model.recordings.equivalent_current import can_have_current, with_equivalent_current
+from ema_model.recordings.file import read_columns, read_measurement
+from ema_model.recordings.measurement import Measurement
+from ema_model.recordings.side_file.read import SideFile, find_side_file, read_side_file, side_path
+from ema_model.recordings.side_file.write import write_side_file
+from ema_model.recordings.write import check_target, write_measurement
+
+__all__ = [
+    "SIGNALS",
+    "ColumnMapping",
+    "MappedColumn",
+    "Measurement",
+    "SideFile",
+    "Signal",
+    "apply_mapping",
+    "can_have_current",
+    "check_needed",
+    "check_target",
+    "find_side_file",
+    "guess_mapping",
+    "parse_mapping",
+    "read_columns",
+    "read_measurement",
+    "read_side_file",
+    "side_path",
+    "with_equivalent_current",
+    "write_measurement",
+    "write_side_file",
+]

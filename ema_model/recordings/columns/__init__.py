@@ -1,0 +1,1 @@
+"""Which column of a file is which signal: names, units, guesses and mappings."""

@@ -1,0 +1,223 @@
+"""Which column of a file is which signal, in which unit and with which sign; its text form and its use."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ema_model.errors import InputError
+from ema_model.quantities.signals import SIGNALS
+from ema_model.quantities.units import Unit, dimensions_of, find_unit, known_units
+from ema_model.recordings.columns.words import readings
+from ema_model.recordings.refusal import listed, shown
+
+Array = NDArray[np.float64]
+
+_LATE_START_S = 1e5  # clocks of a computer start later than any recording lasts
+_MOST = 1e30  # so that no product overflows
+_FORM = "write signal=column[unit], e.g. motor_speed_rad_s=speed[rpm]"
+_OPTION = re.compile(r"(sign|scale|offset)\s*=\s*(\S+)")
+
+
+@dataclass(frozen=True)
+class MappedColumn:
+    """One column as one signal: signal = sign·scale·(column in SI) + offset; the offset in the signal's SI unit.
+
+    Raises InputError for an unknown signal or unit, a sign other than ±1 and numbers that are too large.
+    """
+
+    signal: str
+    column: str
+    unit: str = ""  # "" is the signal's own SI unit
+    sign: int = 1
+    scale: float = 1.0
+    offset: float = 0.0
+    confidence: float = 1.0  # of a guess, 0 to 1
+    reason: str = ""  # of a guess, in plain words
+
+    def __post_init__(self) -> None:
+        if self.signal not in SIGNALS:
+            raise InputError(f"mapping: no signal {shown(self.signal)!r}; there are {', '.join(SIGNALS)}")
+        if not self.column:
+            raise InputError(f"mapping of {self.signal}: the column's name is missing; {_FORM}")
+        if self.sign not in (1, -1):
+            raise InputError(f"mapping of {self.signal}: the sign must be 1 or -1, not {shown(self.sign)}")
+        if not 0.0 < abs(self.scale) <= _MOST or not abs(self.offset) <= _MOST:
+            raise InputError(f"mapping of {self.signal}: scale and offset must be numbers up to 1e30, the scale not 0")
+        _unit(self.signal, self.unit)
+
+    @property
+    def converter(self) -> Unit:
+        """The unit, with its factor to SI."""
+        return _unit(self.signal, self.unit)
+
+    @property
+    def text(self) -> str:
+        """As on the command line: `signal=column[unit, sign=-1, scale=2.0, offset=0.1]`."""
+        options = [
+            *([self.unit] if self.unit else []),
+            # Said where the column's name would say otherwise.
+            *([SIGNALS[self.signal].unit] if self._must_say_si else []),
+            *([f"sign={self.sign}"] if self.sign != 1 else []),
+            *([f"scale={self.scale!r}"] if self.scale != 1.0 else []),
+            *([f"offset={self.offset!r}"] if self.offset != 0.0 else []),
+        ]
+        return f"{self.signal}={self.column}" + (
+            f"[{', '.join(options)}]" if options or self.column.endswith("]") else ""
+        )
+
+    @property
+    def _must_say_si(self) -> bool:
+        return not self.unit and self.column != self.signal and unit_in_name(self.column, self.signal) != ""
+
+    def values(self, raw: ArrayLike) -> Array:
+        """The signal, from the column's numbers as they stand in the file; the same shape."""
+        si = self.converter.to_si(raw)
+        if self.sign * self.scale != 1.0:
+            si *= self.sign * self.scale
+        if self.offset:
+            si += self.offset
+        return si
+
+
+@dataclass(frozen=True)
+class ColumnMapping:
+    """The columns in use, one per signal, and those left aside, with the reason.
+
+    Raises InputError if a signal stands twice.
+    """
+
+    entries: tuple[MappedColumn, ...] = ()
+    unmapped: tuple[tuple[str, str], ...] = ()  # column, why
+
+    def __post_init__(self) -> None:
+        seen: dict[str, MappedColumn] = {}
+        for entry in self.entries:
+            if entry.signal in seen:
+                both = f"{shown(seen[entry.signal].column)!r} and {shown(entry.column)!r}"
+                raise InputError(f"mapping: {entry.signal} is given two columns, {both}; keep one")
+            seen[entry.signal] = entry
+
+    def get(self, signal: str) -> MappedColumn | None:
+        """The column of a signal, if it has one."""
+        return next((entry for entry in self.entries if entry.signal == signal), None)
+
+    @property
+    def texts(self) -> tuple[str, ...]:
+        """One `signal=column[unit]` per entry, as for `--map`."""
+        return tuple(entry.text for entry in self.entries)
+
+    def with_entry(self, entry: MappedColumn) -> ColumnMapping:
+        """A copy in which the entry takes the place of its signal's old one."""
+        kept = (other for other in self.entries if other.signal != entry.signal)
+        unmapped = tuple(pair for pair in self.unmapped if pair[0] != entry.column)
+        return ColumnMapping((*kept, entry), unmapped)
+
+
+def parse_mapping(texts: Iterable[str], columns: Collection[str] = ()) -> ColumnMapping:
+    """The mapping that `signal=column[unit]` texts give.
+
+    With the file's `columns`, one whose own name ends in brackets is found too: `speed [rpm]` is then a
+    column with its unit in the name.  Raises InputError for a text of another form.
+    """
+    return ColumnMapping(tuple(_parsed(text, columns) for text in texts))
+
+
+def _parsed(text: str, columns: Collection[str]) -> MappedColumn:
+    signal, equals, right = (part.strip() for part in text.partition("="))
+    if not equals or not signal or not right:
+        raise InputError(f"mapping {shown(text)!r} is not understood; {_FORM}")
+    if signal not in SIGNALS:
+        raise InputError(f"mapping {shown(text)!r}: no signal {shown(signal)!r}; there are {', '.join(SIGNALS)}")
+    inside = re.fullmatch(r"(.+?)\s*\[([^\[\]]*)\]", right)
+    if right in columns or not inside:
+        return MappedColumn(signal, right, unit_in_name(right, signal))
+    column = inside[1]
+    given: dict[str, str] = {}
+    for part in inside[2].split(","):
+        option = _OPTION.fullmatch(part.strip())
+        name, value = (option[1], option[2]) if option else ("unit", part.strip())
+        if name in given:
+            raise InputError(f"mapping {shown(text)!r}: {name} stands twice; {_FORM}")
+        given[name] = value
+    numbers = {name: _number(text, name, given[name]) for name in ("sign", "scale", "offset") if name in given}
+    if numbers.get("sign", 1.0) not in (1.0, -1.0):
+        raise InputError(f"mapping {shown(text)!r}: the sign must be 1 or -1, not {shown(given['sign'])}")
+    return MappedColumn(
+        signal,
+        column,
+        given.get("unit", unit_in_name(column, signal)),
+        int(numbers.get("sign", 1.0)),
+        numbers.get("scale", 1.0),
+        numbers.get("offset", 0.0),
+    )
+
+
+def unit_in_name(column: str, signal: str) -> str:
+    """The unit of the signal's kind that a column's name ends in, or "": `speed [rpm]`, `speed_rpm`."""
+    units = (find_unit(name.unit, SIGNALS[signal].unit) for name in readings(column) if name.unit)
+    return next((unit.name for unit in units if unit), "")
+
+
+def _number(text: str, name: str, value: str) -> float:
+    try:
+        return float(value)
+    except ValueError:
+        raise InputError(f"mapping {shown(text)!r}: {name} must be a number, not {shown(value)!r}") from None
+
+
+def _unit(signal: str, text: str) -> Unit:
+    dimension = SIGNALS[signal].unit
+    if not text:
+        return Unit(dimension, dimension)
+    unit = find_unit(text, dimension)
+    if unit is None:
+        other = dimensions_of(text)
+        what = f"{shown(text)!r} is a unit of another kind" if other else f"the unit {shown(text)!r} is not known"
+        raise InputError(f"mapping of {signal}: {what}; it takes {', '.join(known_units(dimension)) or 'no unit'}")
+    if math.isnan(unit.numerator):
+        raise InputError(f"mapping of {signal}: counts need the counts per turn; write [counts/4096] for 4096 per turn")
+    return unit
+
+
+def apply_mapping(table: Mapping[str, ArrayLike], mapping: ColumnMapping) -> tuple[dict[str, Array], tuple[str, ...]]:
+    """The mapped signals in SI units, and notes on what was done to them.
+
+    `table` holds the columns by their own names, (n,) each; columns that already have a signal's name and
+    are not mapped stay as they are.  Raises InputError if a mapped column is missing.
+    """
+    missing = [entry.column for entry in mapping.entries if entry.column not in table]
+    if missing:
+        raise InputError(f"mapping: no column {shown(missing[0])!r}; present: {listed(table)}")
+    used = {entry.column for entry in mapping.entries}
+    taken = {entry.signal for entry in mapping.entries}
+    signals, notes = {}, []
+    for name, values in table.items():
+        if name in SIGNALS and name not in used and name not in taken:
+            signals[name] = np.array(values, np.float64)
+    for entry in mapping.entries:
+        raw = np.asarray(table[entry.column], np.float64)
+        start = 0.0
+        if entry.signal == "time_s" and raw.size and abs(entry.values(raw[:1])[0]) > _LATE_START_S:
+            # Taken off before the conversion, while its digits are all there.
+            start = raw[0]
+            first = float(entry.values(start))
+            notes.append(f"time counts from the first sample, which the file puts at {first:.6f} s")
+        signals[entry.signal] = entry.values(raw - start if start else raw)
+        if entry.text != f"{entry.signal}={entry.signal}":
+            notes.append(f"{entry.signal} is {_told(entry)}")
+    ordered = {name: signals[name] for name in SIGNALS if name in signals}
+    return ordered, tuple(notes)
+
+
+def _told(entry: MappedColumn) -> str:
+    unit = "" if entry.converter.is_si else f", converted from {entry.unit}"
+    turned = ", its sign turned" if entry.sign < 0 else ""
+    scale = f", times {entry.scale:g}" if entry.scale != 1.0 else ""
+    offset = f", plus {entry.offset:g}" if entry.offset else ""
+    return f"column {shown(entry.column)!r}{unit}{turned}{scale}{offset}"

@@ -1,0 +1,118 @@
+"""What a column's name says: its words, its unit, and what they mean in test-bench jargon."""
+
+from __future__ import annotations
+
+import itertools
+import re
+from dataclasses import dataclass
+
+from ema_model.quantities.units import UNITS, find_unit
+from ema_model.recordings.columns.german import in_english, without_umlauts
+
+# What is measured.
+QUANTITIES: dict[str, frozenset[str]] = {
+    name: frozenset(words.split())
+    for name, words in {
+        "time": "t time times timestamp timestamps timestep clock elapsed stamp",
+        "position": "pos position positions angle theta q phi encoder enc rotation displacement stroke x joint "
+        "resolver",
+        "speed": "speed velocity vel omega w rpm dq qd qdot dtheta thetadot dx xdot angularvelocity",
+        "current": "current curr cur iq ieq amps amperage i im imot",
+        "torque": "torque trq tau moment",
+        "force": "force thrust",
+        "voltage": "voltage volt volts v u vbus vdc vin vm vmot vq ubus udc vsupply vbat",
+        "duty": "duty dutycycle pwm",
+        "temperature": "temp temperature temps",
+        "enabled": "enable enabled",
+        "segment": "segment seg run trial episode repetition rep lap",
+    }.items()
+}
+# Whose it is.
+COMMAND = frozenset("cmd command commanded setpoint sp set target goal ref reference desired des demand wanted".split())
+MEASURED = frozenset(
+    "act actual meas measured fb feedback present raw value val estimate estimated est filtered".split()
+)
+MOTOR = frozenset("motor mot rotor drive m mech".split())
+USER = frozenset("user u output out load joint link arm surface flap rudder aileron elevator actuator rod ram".split())
+LOAD = frozenset("load ext external disturbance hinge aero".split())
+BUS = frozenset("bus vbus vdc vin ubus udc vsupply vbat dc dclink supply battery bat input".split())
+# What spoils a match: another axis of the same quantity.
+OTHER = {
+    "current": frozenset("id bus dc battery bat supply input limit max min".split()),
+    "speed": frozenset("limit max min user output load link".split()),
+    "voltage": frozenset("vd limit max min".split()),
+    "torque": frozenset("limit max min enable enabled friction".split()),
+    "position": frozenset("limit max min error err".split()),
+    "temperature": frozenset("limit max".split()),
+}
+_MERGED = (
+    (("time", "stamp"), "timestamp"),
+    (("set", "point"), "setpoint"),
+    (("duty", "cycle"), "dutycycle"),
+    (("angular", "velocity"), "angularvelocity"),
+    (("angular", "speed"), "angularvelocity"),
+    (("angular", "position"), "angle"),
+    (("i", "q"), "iq"),
+    (("i", "d"), "id"),
+    (("v", "bus"), "vbus"),
+    (("v", "dc"), "vdc"),
+    (("v", "in"), "vin"),
+    (("u", "dc"), "udc"),
+    (("v", "q"), "vq"),
+    (("v", "d"), "vd"),
+    (("q", "dot"), "qdot"),
+    (("theta", "dot"), "thetadot"),
+    (("d", "theta"), "dtheta"),
+    (("d", "q"), "dq"),
+)
+_GREEK = str.maketrans({"θ": " theta ", "ω": " omega ", "φ": " phi ", "ϕ": " phi ", "τ": " tau ", "Δ": " d "})
+# Single letters are words as often as units; they count as a unit where the quantity fits.
+_MOST_WORDS_OF_A_UNIT = 3
+
+
+@dataclass(frozen=True)
+class Name:
+    """A column's name, taken apart: small words, the unit's text or "", and whether brackets set the unit off."""
+
+    words: tuple[str, ...]
+    unit: str
+    bracketed: bool = False
+
+    def has(self, words: frozenset[str]) -> bool:
+        """Whether any of these is among its words."""
+        return not words.isdisjoint(self.words)
+
+
+def readings(column: str) -> list[Name]:
+    """The ways to read a name: with its last words as a unit, where they are one, longest first, then without."""
+    bracketed = re.fullmatch(r"(.*?)[\s_,;:]*[\[({]([^\[\](){}]*)[\])}]\s*", column, re.S)
+    if bracketed and _is_unit(bracketed[2]):
+        return [Name(_words(bracketed[1]), bracketed[2].strip(), True)]
+    spoken = re.fullmatch(r"(.*\S)\s+in\s+(\S+)\s*", column, re.S)
+    if spoken and _is_unit(spoken[2]):
+        return [Name(_words(spoken[1]), spoken[2], True)]
+    parts = [part for part in re.split(r"[\s_.,;:()\[\]{}|-]+", re.sub(r"(?<=[a-z])(?=[A-Z])", "_", column)) if part]
+    found = []
+    for length in range(min(_MOST_WORDS_OF_A_UNIT, len(parts) - 1), 0, -1):
+        unit = "_".join(parts[-length:])
+        if _is_unit(unit):
+            found.append(Name(_words("_".join(parts[:-length])), unit))
+    return [*found, Name(_words(column), "")]
+
+
+def _is_unit(text: str) -> bool:
+    return len(text) <= 24 and any(find_unit(text, dimension) for dimension in UNITS)
+
+
+def _words(text: str) -> tuple[str, ...]:
+    text = text[:200].translate(_GREEK).replace("Ω", " ")
+    text = re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z]{2})", " ", text)
+    spelt = (word.rstrip("0123456789") or word for word in re.split(r"[^a-z0-9]+", without_umlauts(text)) if word)
+    merged: list[str] = []
+    for word in itertools.chain.from_iterable(map(in_english, spelt)):
+        merged.append(word)
+        for pair, whole in _MERGED:
+            if tuple(merged[-2:]) == pair:
+                merged[-2:] = [whole]
+                break
+    return tuple(merged)

@@ -1,0 +1,156 @@
+"""Reads a measurement from a file of any format."""
+
+from __future__ import annotations
+
+import os
+import stat
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ema_model.errors import InputError
+from ema_model.recordings.checks import check_finite, check_length, check_names, check_values, choose_columns
+from ema_model.recordings.columns.mapping import ColumnMapping, apply_mapping, parse_mapping
+from ema_model.recordings.formats import format_of
+from ema_model.recordings.measurement import Measurement
+from ema_model.recordings.refusal import listed, reason, refusal, shown
+from ema_model.recordings.side_file.read import SideFile, find_side_file, read_side_file
+
+Array = NDArray[np.float64]
+
+
+def read_measurement(
+    path: str | os.PathLike[str],
+    mapping: ColumnMapping | Sequence[str] | None = None,
+    *,
+    side: SideFile | None = None,
+    max_bytes: int = 2_000_000_000,
+) -> Measurement:
+    """The measurement in a file, its name the file's stem, its notes what was found and left aside.
+
+    `mapping`, or texts as of `--map`, says which columns are which signals; columns with canonical names
+    need none.  `side` is what else is known; without it the file's side file is read, or its folder's, if there
+    is one, and its mapping, window and segments are used.  A given mapping's entries go before the side file's.
+    Raises InputError, one line with the file, the place in it and what to do, for whatever is wrong with the
+    file; `max_bytes` bounds its size, on the disk and in memory.
+    """
+    path = os.fspath(path)
+    check_file(path, max_bytes)
+    file_format = format_of(path)
+    notes = []
+    if side is None:
+        found = find_side_file(path)
+        side = read_side_file(found) if found else SideFile()
+        if found:
+            notes.append(f"the side file {shown(found.name, 100)} is used")
+    try:
+        header = file_format.header(path, max_bytes)
+        used = _merged(path, side, mapping, header)
+        known, foreign = choose_columns(path, header, used, needs_time=side.kind == "run")
+        columns = file_format.read(path, known, max_bytes)
+        check_length(path, next(iter(columns.arrays.values())).size)
+        check_finite(path, columns.arrays, columns.place)
+        signals, done = apply_mapping(columns.arrays, used)
+    except OSError as error:
+        raise refusal(path, f"cannot be read ({reason(error)}); check the disk and the permissions") from None
+    except MemoryError:
+        raise refusal(path, "does not fit into memory; split it, or keep fewer columns") from None
+    if side.kind == "map" and "time_s" not in signals:
+        signals = {"time_s": np.arange(float(next(iter(signals.values())).size)), **signals}
+        done = (*done, "a static map without time: time_s counts the samples")
+    check_values(path, signals, columns.place)
+    measurement = _measurement(path, signals, (*columns.notes, *notes, *done), foreign, side)
+    if side.window_s is not None or side.segments is not None:
+        try:
+            measurement = measurement.selected(side.window_s, side.segments)
+        except InputError as error:
+            raise refusal(path, str(error).removeprefix(f"{shown(measurement.name, 100)}: ")) from None
+        check_length(path, measurement.samples)
+    return measurement
+
+
+def read_columns(path: str | os.PathLike[str], *, max_bytes: int = 2_000_000_000) -> dict[str, Array]:
+    """The columns of numbers as they stand in the file, for a mapping step to show; others are left out.
+
+    Raises InputError for a file that cannot be read as a table at all; the values are not checked.
+    """
+    path = os.fspath(path)
+    check_file(path, max_bytes)
+    file_format = format_of(path)
+    columns = {}
+    problem = None
+    try:
+        names = [name for name in file_format.header(path, max_bytes) if name]
+        check_names(path, names)
+        try:
+            return file_format.read(path, names, max_bytes).arrays
+        except InputError as error:
+            problem = error
+        for name in names:
+            with suppress(InputError):  # text, or of another shape
+                columns |= file_format.read(path, [name], max_bytes).arrays
+    except OSError as error:
+        raise refusal(path, f"cannot be read ({reason(error)}); check the disk and the permissions") from None
+    except MemoryError:
+        raise refusal(path, "does not fit into memory; split it, or keep fewer columns") from None
+    if not columns:
+        raise problem or refusal(path, "has no columns")
+    return columns
+
+
+def _merged(
+    path: str, side: SideFile, given: ColumnMapping | Sequence[str] | None, header: Sequence[str]
+) -> ColumnMapping:
+    """The mapping to use, given entries before the side file's; InputError if a column is missing."""
+    if isinstance(given, str):
+        given = [given]
+    if given is not None and not isinstance(given, ColumnMapping):
+        given = parse_mapping(given, header)
+    merged = side.mapping or ColumnMapping()
+    for entry in given.entries if given else ():
+        merged = merged.with_entry(entry)
+    for entry in merged.entries:
+        if entry.column not in header:
+            by_side = side.mapping is not None and entry in side.mapping.entries and side.path
+            asker = f", which {shown(Path(side.path).name, 100)} asks for" if by_side and side.path else ""
+            missing = f"no column {shown(entry.column)!r} for {entry.signal}{asker}"
+            raise refusal(path, f"{missing}; correct the mapping (present: {listed(header)})")
+    return merged
+
+
+def check_file(path: str, max_bytes: int) -> None:
+    """Raises InputError for what is no file, an empty or too large a one."""
+    try:
+        status = os.stat(path)
+    except (FileNotFoundError, NotADirectoryError):
+        raise refusal(path, "no such file; check the name and the folder") from None
+    except (OSError, ValueError) as error:
+        raise refusal(path, f"cannot be read ({reason(error)}); check the name and the permissions") from None
+    if stat.S_ISDIR(status.st_mode):
+        raise refusal(path, "is a folder; the file of a measurement is expected")
+    if not stat.S_ISREG(status.st_mode):
+        raise refusal(path, "is not a regular file; the file of a measurement is expected")
+    if status.st_size == 0:
+        raise refusal(path, "is empty; a measurement of 100 samples or more is expected")
+    if status.st_size > max_bytes:
+        size = f"is {status.st_size / 1e6:.6g} MB large, over the limit of {max_bytes / 1e6:g} MB"
+        raise refusal(path, f"{size}; split it, or record fewer samples")
+
+
+def _measurement(
+    path: str, signals: dict[str, Array], notes: Sequence[str], foreign: Sequence[str], side: SideFile
+) -> Measurement:
+    for values in signals.values():
+        values.flags.writeable = False  # ours alone, so that it need not be copied
+    notes = list(notes)
+    named = [name for name in foreign if name]
+    if named:
+        notes.append(f"left aside, as their names are not known: {listed(named)}")
+    bare = Measurement(signals)
+    if not bare.is_uniform:
+        off = f"samples lie up to {100.0 * bare.jitter:.3g} % of a period off a regular grid"
+        notes.append(f"{off}; the median step is {bare.sample_period_s:.6g} s")
+    return Measurement(bare.signals, Path(path).stem, tuple(notes), side)

@@ -1,0 +1,73 @@
+"""MATLAB's .mat, version 5 to 7: one vector per signal, alone or as a field of a struct."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from ema_model.recordings.formats.arrays import Kind, as_columns, check_column, check_size, column_names, is_column
+from ema_model.recordings.formats.format import Array, Columns, Format
+from ema_model.recordings.formats.mat5 import HEADER_BYTES, Damaged, Leaf, TooLarge, leaves
+from ema_model.recordings.refusal import refusal, shown
+
+
+def _header(path: str, max_bytes: int) -> list[str]:
+    return column_names(_kinds(_load(path, max_bytes)))
+
+
+def _read(path: str, names: Sequence[str], max_bytes: int) -> Columns:
+    arrays = _load(path, max_bytes)
+    kinds = _kinds(arrays)
+    for name in names:
+        check_column(path, name, kinds[name])
+    check_size(path, kinds, names, max_bytes)
+    aside = [name for name, kind in kinds.items() if not is_column(kind)]
+    return as_columns(path, {name: arrays[name].values() for name in names}, aside)
+
+
+def _write(signals: Mapping[str, Array], path: str) -> None:
+    with open(path, "wb") as file:
+        from scipy.io import savemat  # reading does without it
+
+        savemat(file, dict(signals), oned_as="column", long_field_names=True)
+
+
+def _kinds(arrays: Mapping[str, Leaf]) -> dict[str, Kind]:
+    other = {"text": np.dtype(str), "complex numbers": np.dtype(complex)}
+    return {
+        name: (leaf.shape, other.get(leaf.other, np.dtype(object)) if leaf.other else np.dtype(leaf.dtype))
+        for name, leaf in arrays.items()
+    }
+
+
+def _load(path: str, max_bytes: int) -> dict[str, Leaf]:
+    """All arrays, under their own names, or under "struct.field" where a name stands twice.
+
+    Raises InputError for a file of another version, a damaged or too large one.
+    """
+    with open(path, "rb") as file:
+        _check_version(path, file.read(HEADER_BYTES))
+        try:
+            found = [leaf for leaf in leaves(file, max_bytes) if leaf.path[-1]]
+        except Damaged as error:
+            raise refusal(path, f"is not a whole .mat file ({error}); save it again") from None
+        except TooLarge:
+            raise refusal(path, f"unpacks to over {max_bytes / 1e6:g} MB, which is the limit; split it") from None
+    twice = [path for path, count in Counter(leaf.path for leaf in found).items() if count > 1]
+    if twice:
+        raise refusal(path, f"array {shown('.'.join(twice[0]))!r} stands twice; save it again with one of each name")
+    count = Counter(leaf.path[-1] for leaf in found)
+    return {leaf.path[-1] if count[leaf.path[-1]] == 1 else ".".join(leaf.path): leaf for leaf in found}
+
+
+def _check_version(path: str, header: bytes) -> None:
+    version = header[124:128]
+    if version == b"\0\2IM" or header.startswith(b"\x89HDF"):
+        raise refusal(path, "is a MATLAB v7.3 (HDF5) file, which is not read; save it with -v7")
+    if version not in (b"\0\1IM", b"\1\0MI"):
+        raise refusal(path, "is not a MATLAB file of version 5 to 7; save it with -v7")
+
+
+FORMAT = Format(".mat", "MATLAB", _header, _read, _write)

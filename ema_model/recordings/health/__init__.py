@@ -1,0 +1,1 @@
+"""Data health: what a recording's own numbers say about its sampling, sensors, signs and limits."""

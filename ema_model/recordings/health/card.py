@@ -1,0 +1,72 @@
+"""The data health card: what a recording's own numbers say about its sampling, sensors, signs and limits."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ema_model.recordings.health import checks as checks
+from ema_model.recordings.health.finding import Finding, Severity
+from ema_model.recordings.measurement import Measurement
+
+__all__ = ["Finding", "Health", "health"]
+
+_WORST_FIRST: tuple[Severity, ...] = ("warning", "note", "good")
+
+
+@dataclass(frozen=True)
+class Health:
+    """All findings, in the order of the checks."""
+
+    name: str
+    findings: tuple[Finding, ...] = field(default_factory=tuple)
+
+    @property
+    def severity(self) -> Severity:
+        """The worst of all findings."""
+        found = {finding.severity for finding in self.findings}
+        for severity in _WORST_FIRST:
+            if severity in found:
+                return severity
+        return "good"
+
+    def of(self, check: str, signal: str | None = None) -> Finding | None:
+        """The first finding of a check, such as "noise", of one signal where given."""
+        fits = (f for f in self.findings if f.check == check and signal in (None, f.signal))
+        return next(fits, None)
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON: numbers that are not known are null."""
+        findings = []
+        for finding in self.findings:
+            entry = asdict(finding)
+            entry["values"] = {k: v if np.isfinite(v) else None for k, v in finding.values.items()}
+            findings.append(entry)
+        return {"name": self.name, "severity": self.severity, "findings": findings}
+
+
+def health(
+    measurement: Measurement, *, current_limit_A: float | None = None, pole_pairs: float | None = None
+) -> Health:
+    """The health card of a recording; checks whose signals are missing are left out.
+
+    The current's limit is taken from the side file where it is not given; without one flat tops are sought.
+    """
+    limit = current_limit_A or measurement.side.sensors.get("current_limit_A")
+    return Health(measurement.name, tuple(_findings(measurement, limit, pole_pairs)))
+
+
+def _findings(measurement: Measurement, limit: float | None, pole_pairs: float | None) -> Iterator[Finding]:
+    if not measurement.is_map:
+        yield from checks.sampling(measurement)
+    yield from checks.sensors(measurement)
+    yield from checks.saturation(measurement, limit)
+    if measurement.is_map:
+        return
+    yield from checks.delay(measurement)
+    yield from checks.signs(measurement)
+    yield from checks.phases(measurement, pole_pairs)
+    yield from checks.standstill(measurement)

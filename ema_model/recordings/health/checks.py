@@ -1,0 +1,238 @@
+"""The checks of the data health card; each yields findings, or nothing where its signals are missing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ema_model.quantities.signals import SIGNALS
+from ema_model.quantities.titles import in_sentence
+from ema_model.recordings.equivalent_current import PHASES
+from ema_model.recordings.health import estimates
+from ema_model.recordings.health.finding import Finding
+from ema_model.recordings.measurement import Measurement
+
+Array = NDArray[np.float64]
+
+_GAP = 3.0  # periods
+# What a wrong unit makes of a speed.
+_UNIT_FACTORS = {
+    180.0 / np.pi: "in deg/s",
+    30.0 / np.pi: "in rpm",
+    1.0 / (2.0 * np.pi): "in turns per second",
+    1000.0: "a thousandfold",
+    1e-3: "a thousandth",
+}
+
+
+def sampling(measurement: Measurement) -> Iterator[Finding]:
+    """Rate, jitter, gaps and duration."""
+    steps = np.concatenate([np.diff(measurement.time_s[run]) for run in measurement.runs])
+    if not steps.size:
+        return
+    period, runs = float(np.median(steps)), len(measurement.runs)
+    length = f"{measurement.samples} samples over {measurement.duration_s:.4g} s"
+    several = f" in {runs} runs" if runs > 1 else ""
+    numbers = {"duration_s": measurement.duration_s, "samples": float(measurement.samples), "runs": float(runs)}
+    yield Finding("duration", "good", f"{length}{several}.", numbers)
+    usual = steps[steps < _GAP * period]
+    jitter = float(np.std(usual)) / period if usual.size else 0.0
+    severity = "good" if jitter < 0.01 else "note" if jitter < 0.3 else "warning"
+    sentence = f"Sampled at {1.0 / period:.5g} Hz; the steps scatter by {100.0 * jitter:.2g} % rms of a period."
+    yield Finding("rate", severity, sentence, {"rate_Hz": 1.0 / period, "jitter": jitter, "period_s": period})
+    gaps = steps[steps >= _GAP * period]
+    if gaps.size:
+        sentence = (
+            f"{gaps.size} gap{'s' * (gaps.size > 1)} of {_GAP:g} periods or more; the longest is {gaps.max():.4g} s."
+        )
+        severity = "warning" if gaps.sum() > 0.01 * measurement.duration_s else "note"
+    else:
+        sentence, severity = "No gaps.", "good"
+    longest = float(gaps.max()) if gaps.size else 0.0
+    yield Finding("gaps", severity, sentence, {"gaps": float(gaps.size), "longest_s": longest})
+
+
+def sensors(measurement: Measurement) -> Iterator[Finding]:
+    """Quantisation and noise of each measured signal."""
+    for name in measurement:
+        signal = SIGNALS.get(name)
+        if signal is None or signal.kind in ("time", "state") or name.startswith("command"):
+            continue
+        unit = f" {signal.unit}" if signal.unit else ""
+        values = measurement[name]
+        if np.all(values == values[0]):
+            yield Finding("constant", "note", f"{signal.title} is constant, {values[0]:.4g}{unit}.", {}, name)
+            continue
+        blocks = estimates.sample_blocks(values, measurement.runs)
+        step = estimates.quantisation_step(blocks)
+        spread = float(np.std(values))
+        if step:
+            coarse = step > 0.05 * spread
+            sentence = f"{signal.title} comes in steps of {step:.4g}{unit}."
+            yield Finding("quantisation", "note" if coarse else "good", sentence, {"step": step}, name)
+        noise = estimates.noise_rms(blocks)
+        if measurement.is_map or not np.isfinite(noise):
+            continue
+        if noise < step / np.sqrt(12.0):
+            sentence = f"{signal.title}: noise is below what its steps show, {step:.4g}{unit}."
+        else:
+            sentence = (
+                f"{signal.title}: noise about {noise:.3g}{unit} rms, {100.0 * noise / spread:.2g} % of its spread."
+            )
+        severity = "good" if noise < 0.1 * spread else "note" if noise < 0.5 * spread else "warning"
+        yield Finding("noise", severity, sentence, {"noise_rms": noise, "spread": spread}, name)
+
+
+def saturation(measurement: Measurement, limit: float | None) -> Iterator[Finding]:
+    """How long the current is at its limit, which is given or seen as flat tops."""
+    if "current_A" not in measurement:
+        return
+    values = measurement["current_A"]
+    if limit:
+        share = float(np.mean(np.abs(values) >= 0.98 * limit))
+        sentence = f"The current is at its limit of {limit:.4g} A for {100.0 * share:.3g} % of the time."
+        severity = "good" if share < 0.001 else "note" if share < 0.1 else "warning"
+        yield Finding("saturation", severity, sentence, {"share": share, "limit_A": limit}, "current_A")
+        return
+    noise = estimates.noise_rms(estimates.sample_blocks(values, measurement.runs))
+    level, share = estimates.flat_tops(values, noise)
+    if share:
+        sentence = f"The current seems cut off at {level:.4g} A, for {100.0 * share:.3g} % of the time."
+        yield Finding("saturation", "note", sentence, {"share": share, "limit_A": level}, "current_A")
+    else:
+        sentence = "The current shows no flat tops, so no saturation is seen."
+        yield Finding("saturation", "good", sentence, {"share": 0.0}, "current_A")
+
+
+def delay(measurement: Measurement) -> Iterator[Finding]:
+    """How much later the position moves than its command, and whether it does so the same way."""
+    for kind in ("rad", "m"):
+        command, response = f"command_{kind}", f"user_position_{kind}"
+        if response not in measurement:
+            response = f"motor_position_{kind}"
+        if command not in measurement or response not in measurement:
+            continue
+        run = max(measurement.runs, key=lambda run: run.stop - run.start)
+        if run.stop - run.start < 32:
+            continue
+        found, likeness = estimates.delay_s(
+            measurement[command][run], measurement[response][run], measurement.time_s[run]
+        )
+        title = in_sentence(SIGNALS[response].title)
+        values = {"delay_s": found, "correlation": likeness}
+        if not abs(likeness) > 0.2:
+            sentence = f"The delay from command to {title} cannot be told; their movements hardly agree."
+            yield Finding("delay", "note", sentence, values, response)
+            continue
+        sentence = f"The {title} moves {1000.0 * found:.4g} ms after the command (correlation {likeness:.2f})."
+        if likeness < 0.0:
+            sentence = f"The {title} moves against the command ({1000.0 * found:.4g} ms after it): turn a sign."
+        severity = "warning" if likeness < 0.0 or found < -2.0 * measurement.sample_period_s else "good"
+        yield Finding("delay", severity, sentence, values, response)
+
+
+def signs(measurement: Measurement) -> Iterator[Finding]:
+    """Whether speed is the position's derivative, in sign and size, and user and motor turn the same way."""
+    edges = estimates.window_edges(measurement.runs)
+    for kind, rate in (("rad", "rad_s"), ("m", "m_s")):
+        motor, user, speed = f"motor_position_{kind}", f"user_position_{kind}", f"motor_speed_{rate}"
+        position = motor if motor in measurement else user
+        if position in measurement and speed in measurement and edges:
+            yield from _speed_sign(measurement, position, speed, edges)
+        if motor in measurement and user in measurement and edges:
+            yield from _gear(measurement, motor, user, edges)
+
+
+def _speed_sign(
+    measurement: Measurement, position: str, speed: str, edges: list[NDArray[np.intp]]
+) -> Iterator[Finding]:
+    moved = np.concatenate([estimates.changes_over(measurement[position], cut) for cut in edges])
+    travelled = estimates.integrated(measurement[speed], measurement.time_s)
+    expected = np.concatenate([estimates.changes_over(travelled, cut) for cut in edges])
+    # The speed over the position's derivative, so that a speed in rpm reads 9.55.
+    slope = estimates.slope(expected, moved)
+    title = in_sentence(SIGNALS[position].title)
+    values = {"ratio": slope.ratio, "correlation": slope.correlation}
+    if not abs(slope.correlation) > 0.5:
+        sentence = f"Motor speed and the derivative of the {title} hardly agree (correlation {slope.correlation:.2f})."
+        yield Finding("speed", "warning" if np.any(moved) and np.any(expected) else "note", sentence, values, speed)
+        return
+    sentence = f"Motor speed is {slope.ratio:.4g} times the derivative of the {title}."
+    hint = next((h for factor, h in _UNIT_FACTORS.items() if abs(abs(slope.ratio) / factor - 1.0) < 0.03), None)
+    severity = "good"
+    if position.startswith("user") and slope.ratio > 0.0:
+        severity = "good" if abs(slope.ratio - 1.0) < 0.05 else "note"
+    elif slope.ratio < 0.0:
+        severity, sentence = "warning", f"{sentence} Their signs disagree: turn one."
+    elif hint:
+        severity, sentence = "warning", f"{sentence} It seems to be {hint}."
+    elif abs(slope.ratio - 1.0) > 0.05:
+        severity = "warning"
+    yield Finding("speed", severity, sentence, values, speed)
+
+
+def _gear(measurement: Measurement, motor: str, user: str, edges: list[NDArray[np.intp]]) -> Iterator[Finding]:
+    turned, moved = (
+        np.concatenate([estimates.changes_over(measurement[name], cut) for cut in edges]) for name in (motor, user)
+    )
+    slope = estimates.slope(turned, moved)
+    if not abs(slope.correlation) > 0.5:
+        return
+    way = "the same way" if slope.ratio > 0.0 else "against each other"
+    sentence = f"The motor moves {abs(slope.ratio):.4g} times as far as the user, {way}."
+    severity = "good" if slope.ratio > 0.0 else "warning"
+    yield Finding("gear", severity, sentence, {"ratio": slope.ratio, "correlation": slope.correlation}, user)
+
+
+def phases(measurement: Measurement, pole_pairs: float | None) -> Iterator[Finding]:
+    """Whether the phase currents add to zero, and in which order they follow the motor."""
+    if not all(name in measurement for name in PHASES):
+        return
+    currents = np.array([measurement[name] for name in PHASES])
+    rms = float(np.sqrt(np.mean(currents**2)))
+    left = float(np.sqrt(np.mean(np.sum(currents, axis=0) ** 2)))
+    if rms > 0.0:
+        # The sensors' own noise does not cancel.
+        noise = [estimates.noise_rms(estimates.sample_blocks(current, measurement.runs)) for current in currents]
+        noisy = float(np.nan_to_num(np.linalg.norm(noise)))
+        excess = max(0.0, left**2 - (1.2 * noisy) ** 2) ** 0.5
+        severity = "good" if excess < 0.05 * rms else "note" if excess < 0.3 * rms else "warning"
+        sentence = f"The three phase currents add to {left:.3g} A rms, where zero is expected of {rms:.3g} A each."
+        yield Finding("phase_sum", severity, sentence, {"sum_rms_A": left, "rms_A": rms})
+    if "motor_position_rad" not in measurement:
+        return
+    angle = measurement["motor_position_rad"]
+    pairs, forward, backward, offset = estimates.rotation_order(currents, angle, pole_pairs)
+    values = {"pole_pairs": pairs, "a_b_c": forward, "a_c_b": backward, "rotor_offset_rad": offset}
+    likeness = max(forward, backward)
+    if not likeness > 0.3 or abs(forward - backward) < 0.1 * likeness or np.ptp(angle) * pairs < np.pi:
+        sentence = "The order of the phases cannot be told; the motor turns too little or the currents too seldom."
+        yield Finding("phase_order", "note", sentence, values)
+    elif forward > backward:
+        sentence = f"The phases follow the motor in the order A-B-C, with {pairs:g} pole pairs."
+        yield Finding("phase_order", "good", sentence, values)
+    else:
+        values["rotor_offset_rad"] = float("nan")
+        sentence = (
+            f"The phases follow the motor in the order A-C-B ({pairs:g} pole pairs): swap two, or turn the angle."
+        )
+        yield Finding("phase_order", "warning", sentence, values)
+
+
+def standstill(measurement: Measurement) -> Iterator[Finding]:
+    """How much of the time nothing moves: below a hundredth of the fast speed over windows of a thousandth."""
+    names = ("motor_position_rad", "user_position_rad", "motor_position_m", "user_position_m")
+    name = next((name for name in names if name in measurement), None)
+    edges = estimates.window_edges(measurement.runs)
+    if name is None or not edges:
+        return
+    moved = np.concatenate([np.abs(estimates.changes_over(measurement[name], cut)) for cut in edges])
+    lasted = np.concatenate([estimates.changes_over(measurement.time_s, cut) for cut in edges])
+    speed = moved / lasted
+    fast = float(np.quantile(speed, 0.98))
+    share = float(np.sum(lasted[speed <= 0.01 * fast]) / np.sum(lasted))
+    sentence = f"The axis stands still for {100.0 * share:.3g} % of the time."
+    severity = "good" if share < 0.5 else "note" if share < 0.9 else "warning"
+    yield Finding("standstill", severity, sentence, {"share": share}, name)

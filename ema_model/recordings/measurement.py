@@ -1,0 +1,187 @@
+"""Signals of one run on a common time base."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from typing import TypeVar, overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ema_model.errors import InputError
+from ema_model.quantities.signals import SIGNALS
+from ema_model.recordings.refusal import listed, shown
+from ema_model.recordings.side_file.read import SideFile
+
+Array = NDArray[np.float64]
+Default = TypeVar("Default")
+
+_MOST_SAMPLES = 100_000_000
+_JITTER = 1e-3  # of the period, from which on the samples count as off the grid
+
+
+@dataclass(frozen=True, eq=False)
+class Measurement:
+    """Signals of one run on a common time base, in SI units under canonical names (`ema_model.recordings.SIGNALS`).
+
+    `signals` are float64 arrays of one length that cannot be written to; they include `time_s`.  Time
+    increases, but for the starts of new runs, where the `segment` signal changes.  Raises InputError if the
+    time is missing or the lengths differ.
+    """
+
+    signals: dict[str, Array]
+    name: str = ""  # file stem or title
+    notes: tuple[str, ...] = ()  # what reading found and did, in plain words
+    side: SideFile = field(
+        default_factory=SideFile
+    )  # what else is known: the actuator's file, the sensors' accuracy, the kind
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "signals", {name: _frozen(values) for name, values in self.signals.items()})
+        self.require("time_s")
+        for name, values in self.signals.items():
+            if values.shape != (self.time_s.size,):
+                raise InputError(f"{name} has the shape {values.shape}, but time_s has {self.time_s.size} samples")
+
+    def __getitem__(self, name: str) -> Array:
+        return self.signals[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.signals
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.signals)
+
+    @overload
+    def get(self, name: str) -> Array | None: ...
+    @overload
+    def get(self, name: str, default: Default) -> Array | Default: ...
+    def get(self, name: str, default: object = None) -> object:
+        """The signal, or `default` where it was not recorded."""
+        return self.signals.get(name, default)
+
+    @property
+    def time_s(self) -> Array:
+        """Time, s, increasing within each run."""
+        return self.signals["time_s"]
+
+    @property
+    def samples(self) -> int:
+        """Number of samples."""
+        return self.time_s.size
+
+    @property
+    def runs(self) -> list[slice]:
+        """The samples of each run: all of them, or those between changes of the `segment` signal."""
+        changes = np.flatnonzero(np.diff(self.signals["segment"])) + 1 if "segment" in self else np.zeros(0, int)
+        edges = [0, *changes.tolist(), self.samples]
+        return [slice(start, stop) for start, stop in pairwise(edges) if start < stop]
+
+    @property
+    def duration_s(self) -> float:
+        """From the first sample to the last, s, summed over the runs."""
+        return float(sum(self.time_s[run][-1] - self.time_s[run][0] for run in self.runs))
+
+    @property
+    def sample_period_s(self) -> float:
+        """Median time between samples of a run, s; NaN where no run has two samples."""
+        steps = np.diff(self.time_s)
+        if "segment" in self:
+            steps = steps[np.diff(self.signals["segment"]) == 0.0]
+        return float(np.median(steps)) if steps.size else float("nan")
+
+    @property
+    def jitter(self) -> float:
+        """How far samples lie off the regular grid of their run, and its period off the median, per period."""
+        period, worst = self.sample_period_s, 0.0
+        for run in self.runs:
+            time = self.time_s[run]
+            if time.size > 1:
+                grid = np.linspace(time[0], time[-1], time.size)
+                mean = (time[-1] - time[0]) / (time.size - 1)
+                worst = max(worst, float(np.max(np.abs(time - grid))) / period, abs(mean / period - 1.0))
+        return worst
+
+    @property
+    def is_uniform(self) -> bool:
+        """Whether no sample is off a regular grid by a thousandth of the period or more."""
+        return self.jitter < _JITTER
+
+    def with_signals(self, **arrays: ArrayLike) -> Measurement:
+        """A copy in which these signals are added or take the place of the old ones."""
+        return replace(self, signals={**self.signals, **{name: _frozen(values) for name, values in arrays.items()}})
+
+    @property
+    def is_map(self) -> bool:
+        """Whether it is a static map, current or torque against angle; its time only counts the samples."""
+        return self.side.kind == "map"
+
+    def with_notes(self, *notes: str) -> Measurement:
+        """A copy with these notes added."""
+        return replace(self, notes=(*self.notes, *notes))
+
+    def selected(
+        self, window_s: tuple[float, float] | None = None, segments: Sequence[int] | None = None
+    ) -> Measurement:
+        """The samples from one time to another, both included, and of these segments; the rest is cut off.
+
+        Raises InputError if nothing is left, or there are no segments.
+        """
+        keep = np.ones(self.samples, bool)
+        if segments is not None:
+            self.require("segment")
+            keep &= np.isin(self["segment"], np.asarray(segments, float))
+        if window_s is not None:
+            keep &= (self.time_s >= window_s[0]) & (self.time_s <= window_s[1])
+        if not keep.any():
+            where = f"{shown(self.name, 100)}: " if self.name else ""
+            raise InputError(f"{where}no sample lies in the chosen window and segments; widen them")
+        cut = {name: values[keep] for name, values in self.signals.items()}
+        note = f"{keep.sum()} of {keep.size} samples are in the chosen window and segments; the others are left aside"
+        return replace(self, signals=cut, notes=self.notes if keep.all() else (*self.notes, note))
+
+    def require(self, *names: str) -> None:
+        """Raises InputError if any of these signals is missing; it names them and those present."""
+        missing = [name for name in names if name not in self.signals]
+        if missing:
+            where = shown(self.name, 100) or "the recording"
+            present = listed(self.signals)
+            raise InputError(f"{where}: column {', '.join(missing)} is needed; add it (present: {present})")
+
+    def resampled(self, period_s: float) -> Measurement:
+        """The signals on a grid of equal steps that starts with the first sample (of each run).
+
+        Between samples signals are linear and states held; nothing is filtered, so a grid much coarser than
+        the samples folds fast contents down.  Raises InputError for a period that gives no usable grid.
+        """
+        if not (np.isfinite(period_s) and period_s > 0.0):
+            raise InputError(f"the sample period must be a time above 0 s, not {period_s:g}")
+        if not self.duration_s < _MOST_SAMPLES * period_s:
+            raise InputError(f"a sample period of {period_s:g} s gives over {_MOST_SAMPLES} samples; take a longer one")
+        parts = [self._on_grid(run, period_s) for run in self.runs]
+        signals = {name: np.concatenate([self[name][:0], *(part[name] for part in parts)]) for name in self}
+        note = f"resampled from {self.sample_period_s:.6g} s (median) to {period_s:.6g} s by linear interpolation"
+        return replace(self, signals=signals, notes=(*self.notes, note))
+
+    def _on_grid(self, run: slice, period_s: float) -> dict[str, Array]:
+        time = self.time_s[run]
+        # Rounding must cost neither the last sample nor a held state its first one.
+        slack = 1e-6
+        grid = time[0] + period_s * np.arange(int((time[-1] - time[0]) / period_s + slack) + 1)
+        held = np.searchsorted(time, grid + slack * period_s, side="right") - 1
+        resampled = {}
+        for name, values in self.signals.items():
+            state = name in SIGNALS and SIGNALS[name].kind == "state"
+            resampled[name] = values[run][held] if state else np.interp(grid, time, values[run])
+        return {**resampled, "time_s": grid}
+
+
+def _frozen(values: ArrayLike) -> Array:
+    """The values as float64 that cannot be written to; an array that is so already is shared, not copied."""
+    if isinstance(values, np.ndarray) and values.dtype == np.float64 and not values.flags.writeable:
+        return values
+    array = np.array(values, dtype=np.float64)
+    array.flags.writeable = False
+    return array

@@ -1,0 +1,1 @@
+"""The side file NAME.toml beside a recording, read and written."""

@@ -1,0 +1,212 @@
+"""The side file NAME.toml beside a recording: its actuator, mapping, sensors, sampling, window and kind.
+
+One named recordings.toml serves the recordings of its folder that have none of their own.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import tomllib
+from dataclasses import dataclass, field
+from pathlib import Path, PurePosixPath, PureWindowsPath
+from typing import Any, Literal, cast
+
+from ema_model.errors import InputError
+from ema_model.quantities.signals import SIGNALS
+from ema_model.recordings.columns.mapping import ColumnMapping, MappedColumn, parse_mapping
+from ema_model.recordings.refusal import listed, reason, refusal, shown
+
+Kind = Literal["run", "map"]
+Sampling = Literal["mean", "instantaneous"]
+
+_OF_A_FOLDER = "recordings.toml"
+_MOST_BYTES = 100_000
+_KEYS = ("schema", "actuator", "kind", "sampling", "segments", "window", "mapping", "sensors")
+_LARGEST = 2**53  # up to which whole numbers are exact as floats
+_NUMBERS = ("sign", "scale", "offset")
+_COLUMN_KEYS = ("column", "unit", *_NUMBERS)
+
+
+def stated(name: str, what: str) -> str:
+    """The name of a signal's accuracy: motor_speed_rad_s and noise give motor_speed_noise_rad_s."""
+    unit = {"rad": "rad", "rad/s": "rad_s", "m": "m", "m/s": "m_s", "N·m": "Nm", "°C": "C"}
+    ending = unit.get(SIGNALS[name].unit, SIGNALS[name].unit)
+    stem = name.removesuffix(f"_{ending}") if ending else name
+    return "_".join(part for part in (stem, what, ending) if part)
+
+
+_MEASURED = [name for name, signal in SIGNALS.items() if signal.kind not in ("time", "state")]
+# What can be said of the sensors: noise (rms, white), step, and accuracy (rms, slow) of each signal, and these.
+SENSOR_KEYS = (
+    *(stated(name, what) for what in ("noise", "step", "accuracy") for name in _MEASURED),
+    *("encoder_bits", "current_limit_A"),
+)
+
+
+@dataclass(frozen=True)
+class SideFile:
+    """What is known of a recording besides its columns; everything may be left open."""
+
+    actuator: str | None = None  # the actuator file, as written
+    kind: Kind = "run"
+    sampling: Sampling | None = None  # each sample is the mean over its period, or an instant's value
+    mapping: ColumnMapping | None = None
+    sensors: dict[str, float] = field(default_factory=dict)  # of SENSOR_KEYS
+    window_s: tuple[float, float] | None = None
+    segments: tuple[int, ...] | None = None  # those to use
+    path: str | None = None
+
+    @property
+    def actuator_path(self) -> str | None:
+        """The actuator file, sought from the side file's folder."""
+        if self.actuator is None or self.path is None:
+            return self.actuator
+        return str(Path(self.path).parent / self.actuator)
+
+
+def side_path(path: str | os.PathLike[str]) -> Path:
+    """Where the side file of a recording's own stands: run.csv has run.toml."""
+    return Path(path).with_suffix(".toml")
+
+
+def find_side_file(path: str | os.PathLike[str]) -> Path | None:
+    """The side file that a recording uses: its own, else its folder's `recordings.toml`, else none."""
+    own = side_path(path)
+    return next((side for side in (own, own.with_name(_OF_A_FOLDER)) if side.is_file()), None)
+
+
+def read_side_file(path: str | os.PathLike[str]) -> SideFile:
+    """The side file itself; raises InputError, one line, for whatever is wrong in it."""
+    path = os.fspath(path)
+    try:
+        with open(path, "rb") as file:
+            raw = file.read(_MOST_BYTES + 1)
+        if len(raw) > _MOST_BYTES:
+            raise refusal(path, "is over 100 kB large; the side file of a recording is expected")
+        return _parsed(path, tomllib.loads(raw.decode("utf-8")))
+    except InputError:
+        raise
+    except UnicodeDecodeError:
+        raise refusal(path, "is not text in UTF-8; save it as UTF-8") from None
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise refusal(path, f"is not valid TOML: {shown(error, 120)}; correct it") from None
+    except OSError as error:
+        raise refusal(path, f"cannot be read ({reason(error)}); check the name and the permissions") from None
+    except ValueError:  # thousands of digits
+        raise refusal(path, "holds a number with too many digits; correct it") from None
+
+
+def _parsed(path: str, document: dict[str, Any]) -> SideFile:
+    _check_keys(path, "", document, _KEYS)
+    if document.get("schema", 1) != 1:
+        raise refusal(path, f"schema {shown(document['schema'])} is not known; write schema = 1")
+    actuator = document.get("actuator")
+    if actuator is not None:
+        _check_actuator(path, actuator)
+    kind = _one_of(path, "kind", document.get("kind", "run"), ("run", "map"))
+    sampling = document.get("sampling")
+    if sampling is not None:
+        sampling = _one_of(path, "sampling", sampling, ("mean", "instantaneous"))
+    sensors = _table(path, document, "sensors")
+    _check_keys(path, "[sensors] ", sensors, SENSOR_KEYS)
+    accuracy = {name: _number(path, f"[sensors] {name}", value, least=0.0) for name, value in sensors.items()}
+    return SideFile(
+        actuator,
+        cast(Kind, kind),
+        cast("Sampling | None", sampling),
+        _mapping(path, _table(path, document, "mapping")),
+        accuracy,
+        _window(path, document),
+        _segments(path, document),
+        path,
+    )
+
+
+def _check_actuator(path: str, given: object) -> None:
+    """A side file comes with data from elsewhere: it may name actuator files near it, and no other files at all."""
+    if not isinstance(given, str) or not given.isprintable() or not given.endswith(".toml"):
+        raise refusal(path, f"actuator must be the name of an actuator file (.toml), not {shown(given)!r}")
+    if PurePosixPath(given).is_absolute() or PureWindowsPath(given).drive:
+        raise refusal(path, f"actuator {shown(given, 100)!r} must be given from the side file's folder")
+
+
+def _mapping(path: str, table: dict[str, Any]) -> ColumnMapping | None:
+    entries = tuple(_entry(path, signal, given) for signal, given in table.items())
+    return ColumnMapping(entries) if entries else None
+
+
+def _entry(path: str, signal: str, given: object) -> MappedColumn:
+    """`signal = "column[unit]"`, or a table with the column and what else is to be said of it."""
+    where = f"[mapping] {shown(signal)}"
+    fields: dict[str, Any] = {}
+    if isinstance(given, dict):
+        _check_keys(path, f"{where}: ", given, _COLUMN_KEYS)
+        fields = {name: _number(path, f"{where} {name}", given[name]) for name in _NUMBERS if name in given}
+        for name in ("column", "unit"):
+            fields[name] = given.get(name, "")
+            if not isinstance(fields[name], str):
+                raise refusal(path, f"{where}: {name} must be text, not {shown(fields[name])}")
+    elif not isinstance(given, str):
+        raise refusal(path, f"{where}: a column's name or a table is expected, not {shown(given)}")
+    if fields.get("sign") in (1.0, -1.0):
+        fields["sign"] = int(fields["sign"])
+    try:
+        return MappedColumn(signal, **fields) if fields else parse_mapping([f"{signal}={given}"]).entries[0]
+    except InputError as error:
+        raise refusal(path, str(error)) from None
+
+
+def _window(path: str, document: dict[str, Any]) -> tuple[float, float] | None:
+    table = _table(path, document, "window")
+    if not table:
+        return None
+    _check_keys(path, "[window] ", table, ("from_s", "to_s"))
+    start = _number(path, "[window] from_s", table.get("from_s", -math.inf), endless=True)
+    stop = _number(path, "[window] to_s", table.get("to_s", math.inf), endless=True)
+    if not start < stop:
+        raise refusal(path, f"[window] from_s ({start:g}) must be before to_s ({stop:g})")
+    return start, stop
+
+
+def _segments(path: str, document: dict[str, Any]) -> tuple[int, ...] | None:
+    given = document.get("segments")
+    if given is None:
+        return None
+    if (
+        not isinstance(given, list)
+        or not given
+        or any(type(number) is not int or abs(number) > _LARGEST for number in given)
+    ):
+        raise refusal(path, f"segments must be a list of whole numbers, e.g. [0, 1, 4], not {shown(given)}")
+    return tuple(given)
+
+
+def _table(path: str, document: dict[str, Any], name: str) -> dict[str, Any]:
+    table = document.get(name, {})
+    if not isinstance(table, dict):
+        raise refusal(path, f"{name} must be a table; write [{name}] above its entries")
+    return table
+
+
+def _check_keys(path: str, where: str, given: dict[str, Any], known: tuple[str, ...]) -> None:
+    for key in given:
+        if key not in known:
+            raise refusal(path, f"{where}unknown entry {shown(key)!r}; correct or remove it (known: {listed(known)})")
+
+
+def _one_of(path: str, name: str, value: object, known: tuple[str, ...]) -> str:
+    if not isinstance(value, str) or value not in known:
+        raise refusal(path, f"{name} must be {' or '.join(json.dumps(word) for word in known)}, not {shown(value)!r}")
+    return value
+
+
+def _number(path: str, name: str, value: object, least: float = -math.inf, endless: bool = False) -> float:
+    if isinstance(value, int) and abs(value) > _LARGEST:
+        raise refusal(path, f"{name} must be below 2⁵³ in size, or written with a decimal point")
+    if isinstance(value, bool) or not isinstance(value, int | float) or math.isnan(value) or value < least:
+        raise refusal(path, f"{name} must be a number{' of 0 or more' * (least == 0.0)}, not {shown(value)!r}")
+    if math.isinf(value) and not endless:
+        raise refusal(path, f"{name} must be finite; leave it out if it is not known")
+    return float(value)

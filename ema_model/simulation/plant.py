@@ -1,0 +1,79 @@
+"""Which model plays the plant that Explore breaks: the Reference Model, or the Monitor Model where there is none."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from numpy.typing import ArrayLike
+
+from ema_model.actuator import Actuator
+from ema_model.errors import InputError
+from ema_model.identification.objective import simulated
+from ema_model.recordings import Measurement
+from ema_model.simulation.run import Run, simulate_monitor, simulate_reference
+
+_RATE_HZ = {"filtered": 10_000.0, "raw": 100_000.0}  # of what is identified
+
+
+def can_be_explored(actuator: Actuator) -> bool:
+    """Whether any model can follow a command."""
+    return actuator.controller.kind != "unknown"
+
+
+def note(actuator: Actuator) -> str:
+    """What the page says of it in one sentence; empty where the plant is the Reference Model."""
+    if actuator.has_reference_model:
+        return ""
+    if not can_be_explored(actuator):
+        return (
+            f"{actuator.name} cannot be explored: its controller is not described, so that no command can be "
+            "simulated; Compare and Discover take its recordings all the same."
+        )
+    return (
+        f"{actuator.name} has no three-phase reference model, which is of a cascade with a hysteresis inverter: the "
+        "plant here is the monitor model with these faults, it starts at rest and has no phase currents."
+    )
+
+
+def simulate(
+    run: Run,
+    actuator: Actuator,
+    k: ArrayLike,
+    effects: Mapping[str, Any],
+    *,
+    start_rad: float | None = None,
+    start_speed_rad_s: float = 0.0,
+    start_play_rad: float = 0.0,
+) -> Measurement:
+    """The plant's signals; of the start, which is as `simulate_reference` takes it, a Monitor Model takes the angle.
+
+    Raises InputError for an actuator that no command can be simulated of, FloatingPointError if the model diverges.
+    """
+    if actuator.has_reference_model:
+        return simulate_reference(
+            run,
+            actuator,
+            k,
+            effects,
+            start_rad=start_rad,
+            start_speed_rad_s=start_speed_rad_s,
+            start_play_rad=start_play_rad,
+        )
+    _require(actuator)
+    return simulate_monitor(run, actuator, k, effects, start_rad=start_rad)
+
+
+def to_identify(run: Run, actuator: Actuator, k: ArrayLike, fitness: str, effects: Mapping[str, Any]) -> Measurement:
+    """The plant as an identification takes it, sampled at its fitness's rate; raises as `simulate`."""
+    if actuator.has_reference_model:
+        return simulated(run, actuator, k, fitness, effects)
+    _require(actuator)
+    return simulate_monitor(
+        Run(run.command, run.duration_s, _RATE_HZ[fitness], run.load_torque_Nm), actuator, k, effects
+    )
+
+
+def _require(actuator: Actuator) -> None:
+    if not can_be_explored(actuator):
+        raise InputError(note(actuator))

@@ -1,0 +1,183 @@
+"""One run of a model: a command and a load in, signals out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ema_model.actuator import Actuator
+from ema_model.commands import Command, command
+from ema_model.effects import find
+from ema_model.errors import InputError
+from ema_model.faults import HEALTHY
+from ema_model.physics.rows import LANES
+from ema_model.recordings import Measurement
+from ema_model.simulation.pack import initial_reference_state, initial_state, monitor_rows, reference_rows, stack_for
+from ema_model.stacks import exclusive
+
+Array = NDArray[np.float64]
+Effects = Mapping[str, Mapping[str, float]]
+
+MONITOR_STEP_S = 1e-5
+REFERENCE_SUBSTEPS = 10  # of the Reference Model in one step of the Monitor Model
+_LONGEST_S = 600.0
+
+
+@dataclass(frozen=True)
+class Run:
+    """What is asked of the actuator, and how it is sampled.
+
+    Sample k stands at t = k / sample_rate, k = 0, 1, …; its current is the mean over the period that ends
+    there, the other signals are instantaneous.
+    """
+
+    command: Command = field(default_factory=lambda: command("chirp"))
+    duration_s: float = 0.5
+    sample_rate_Hz: float = 10_000.0
+    load_torque_Nm: float = 0.0  # on the user shaft, positive opposes positive motion
+
+    def __post_init__(self) -> None:
+        if not 1e-3 <= self.duration_s <= _LONGEST_S:
+            raise InputError(f"the duration must lie between 0.001 and {_LONGEST_S:g} s, not {self.duration_s:g}")
+        if not 100.0 <= self.sample_rate_Hz <= 1e6:
+            raise InputError(f"the sample rate must lie between 100 and 1000000 Hz, not {self.sample_rate_Hz:g}")
+        if not abs(self.load_torque_Nm) <= 1e6:
+            raise InputError(f"the load torque must be a number of N·m up to 1e6, not {self.load_torque_Nm:g}")
+        if self.duration_s * self.sample_rate_Hz < 1.0:
+            raise InputError("the run must last for one sample or more")
+
+    @property
+    def samples(self) -> int:
+        """Sampling periods in the run."""
+        return round(self.duration_s * self.sample_rate_Hz)
+
+    @property
+    def time_s(self) -> Array:
+        """Times of the samples, (samples + 1,)."""
+        return np.arange(self.samples + 1) / self.sample_rate_Hz
+
+
+def steps_per_sample(period_s: float, step_s: float = MONITOR_STEP_S) -> int:
+    """Monitor steps in a sampling period: as many as keep them at `step_s` or just below."""
+    return max(1, int(np.ceil(period_s / step_s - 1e-6)))
+
+
+def simulate_reference(
+    run: Run,
+    actuator: Actuator,
+    k: ArrayLike = HEALTHY,
+    effects: Effects | None = None,
+    *,
+    start_rad: float | None = None,
+    start_speed_rad_s: float = 0.0,
+    start_play_rad: float = 0.0,
+    voltages: bool = False,
+) -> Measurement:
+    """The three-phase Reference Model's signals; with `voltages`, also the legs' (V, against the bus's middle).
+
+    It starts at start_rad, a user's angle, or where the command starts; with a motor speed, and at a place in
+    the play (rad at the motor), both 0 unless given.
+    Raises InputError for settings of effects that do not exist, FloatingPointError if the model diverges.
+    """
+    effects = {name: find(name).settings(dict(given)) for name, given in (effects or {}).items()}
+    if not actuator.has_reference_model:
+        raise InputError(
+            f"{actuator.name}: the reference model is of a cascade with a hysteresis inverter; use the monitor model"
+        )
+    stack = stack_for(actuator, effects)
+    period = steps_per_sample(1.0 / run.sample_rate_Hz)
+    dt = 1.0 / run.sample_rate_Hz / period
+    times = np.arange(run.samples * period + 1) * dt
+    demand = run.command.at(times)
+    load = np.full_like(times, run.load_torque_Nm)
+    start = float(demand[0]) if start_rad is None else start_rad
+    result = np.empty((run.samples, 11))
+    stack.reference.run(
+        initial_reference_state(actuator, start, start_speed_rad_s, start_play_rad, stack),
+        reference_rows(actuator, k, stack, effects),
+        demand,
+        load,
+        period,
+        REFERENCE_SUBSTEPS,
+        dt / REFERENCE_SUBSTEPS,
+        result,
+    )
+    signals = _signals(run, actuator, result, start)
+    for column, name in enumerate(
+        ("phase_a_current_A", "phase_b_current_A", "phase_c_current_A", "motor_torque_Nm"), 4
+    ):
+        signals[name] = np.concatenate([[0.0], result[:, column]])
+    if voltages:
+        for column, name in enumerate(("leg_a_voltage_V", "leg_b_voltage_V", "leg_c_voltage_V"), 8):
+            signals[name] = np.concatenate([[0.0], result[:, column]])
+    return Measurement(_finite(signals, "the reference model"), name="reference model")
+
+
+def simulate_monitor(
+    run: Run,
+    actuator: Actuator,
+    k: ArrayLike = HEALTHY,
+    effects: Effects | None = None,
+    circuit: str = "reduced",
+    *,
+    start_rad: float | None = None,
+) -> Measurement:
+    """The Monitor Model's signals; raises as `simulate_reference`."""
+    effects = {name: find(name).settings(dict(given)) for name, given in (effects or {}).items()}
+    if actuator.controller.kind == "unknown":
+        raise InputError(f"{actuator.name}: its controller is not known, so that no command can be simulated")
+    stack = stack_for(actuator, effects, circuit)
+    period = steps_per_sample(1.0 / run.sample_rate_Hz, actuator.step_s)
+    dt = 1.0 / run.sample_rate_Hz / period
+    demand = run.command.at(np.arange(run.samples * period + 1) * dt)
+    start = float(demand[0]) if start_rad is None else start_rad
+    result = np.empty((1, run.samples, 4, LANES))
+    exclusive(
+        stack.monitor.traces,
+        initial_state(actuator, 1, start, stack=stack),
+        monitor_rows(actuator, k, stack, effects),
+        demand,
+        np.full_like(demand, run.load_torque_Nm),
+        np.ones_like(demand),
+        period,
+        1,
+        dt,
+        result,
+    )
+    signals = _signals(run, actuator, result[0, :, :, 0], start)
+    return Measurement(_finite(signals, "the monitor model"), name="monitor model")
+
+
+def _signals(run: Run, actuator: Actuator, result: Array, start_rad: float) -> dict[str, Array]:
+    """The kernels' columns as named signals; sample 0 is the start, at rest."""
+    time = run.time_s
+    demand = run.command.at(time)
+    tau = actuator.transmission.gear_ratio
+
+    def column(index: int, start: float) -> Array:
+        return np.concatenate([[start], result[:, index]])
+
+    transmission = actuator.transmission
+    theta = float(np.clip(start_rad, transmission.stop_low_rad, transmission.stop_high_rad)) / tau
+    signals = {
+        "time_s": time,
+        "command_rad": demand,
+        "user_position_rad": column(3, tau * theta),
+        "motor_position_rad": column(2, theta),
+        "motor_speed_rad_s": column(1, 0.0),
+        "current_A": column(0, 0.0),
+    }
+    if run.load_torque_Nm:
+        signals["load_torque_Nm"] = np.full_like(time, run.load_torque_Nm)
+    return signals
+
+
+def _finite(signals: dict[str, Array], what: str) -> dict[str, Array]:
+    for name, values in signals.items():
+        if not np.all(np.isfinite(values)):
+            at = signals["time_s"][int(np.argmin(np.isfinite(values)))]
+            raise FloatingPointError(f"{what} diverged: {name} is not finite from {at:g} s on; check the settings")
+    return signals

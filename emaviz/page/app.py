@@ -1,0 +1,295 @@
+"""The app: builds the page and joins it to the session."""
+
+from __future__ import annotations
+
+import argparse
+import html
+import sys
+import threading
+import time
+import traceback
+import webbrowser
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+
+import viser
+
+from ema_model.actuator import load_actuator
+from ema_model.comparison.result import Comparison
+from ema_model.faults import HEALTHY
+from ema_model.recordings import Measurement
+from ema_model.simulation import plant
+from emaviz.page.compare.keep import KeepControls
+from emaviz.page.compare.moment import hold
+from emaviz.page.compare.result import ResultPanel
+from emaviz.page.compare.tab import ComparePanel
+from emaviz.page.discover.cards import TABS
+from emaviz.page.discover.keep import DiscoveryKeep
+from emaviz.page.discover.result import DiscoveryPanel
+from emaviz.page.discover.tab import DiscoverPanel
+from emaviz.page.docked import LEFT_PX, Docked
+from emaviz.page.explore.charts import ChartsPanel
+from emaviz.page.explore.export import ExportControls
+from emaviz.page.explore.seal import SealControls
+from emaviz.page.explore.suggested_run import take_experiment, take_separating
+from emaviz.page.explore.tab import ExplorePanel
+from emaviz.page.identify.result import IdentifyResult
+from emaviz.page.identify.tab import IdentifyPanel
+from emaviz.page.identify.to_discover import take_to_discover
+from emaviz.page.library.tab import EffectPage, LibraryPanel
+from emaviz.page.page import Page
+from emaviz.page.playback import PlaybackStrip
+from emaviz.page.recordings.result import RecordingsResult
+from emaviz.page.recordings.sessions import SessionControls, parts
+from emaviz.page.recordings.tab import RecordingsPanel
+from emaviz.page.server import LOOPBACK, open_server
+from emaviz.recording.viewer import ViewerHost
+from emaviz.scene.actuator import ActuatorScene
+from emaviz.scene.playback import Playback
+from emaviz.session.archive import Recorded, recovered
+from emaviz.session.compare.comparing import Comparing
+from emaviz.session.data_folder import DataFolder
+from emaviz.session.discover.discovering import Discovering
+from emaviz.session.discover.source import COMPARED
+from emaviz.session.library import Library
+from emaviz.session.race import measured
+from emaviz.session.session import Session, Simulation
+from emaviz.session.worker import Worker
+
+_FASTEST_REDRAW_S = 0.04
+_SLOW_REDRAW_S = 0.3  # of what nobody watches while dragging
+_NOTE = "padding:6px 12px;font-size:13px;line-height:1.45;border-left:3px solid #e8590c"
+_BRAND = (47, 111, 222)
+
+
+class App:
+    """One page on one address; `close` ends its threads and servers."""
+
+    def __init__(
+        self, host: str, port: int, folder: Path, actuator_file: str | None = None, files: Sequence[Path] = ()
+    ) -> None:
+        """files: recordings to open on Compare, which is then the first tab.  InputError: one of them is none."""
+        started = time.perf_counter()
+        actuator = load_actuator(actuator_file)
+        data = DataFolder(folder)
+        given = [data.take_in(file) for file in files]
+        recordings = data.recordings
+        self.server = open_server(host, port)
+        self.viewer, no_viewer = _viewer(recordings)
+        self.session = Session(actuator, recordings)
+        self.screen = Worker("emaviz-screen", self._on_screen_error, rest_s=_FASTEST_REDRAW_S)
+        self._slow_screen = Worker("emaviz-slow-screen", self._on_screen_error, rest_s=_SLOW_REDRAW_S)
+        self._recording_files = Worker("emaviz-recordings", self._on_screen_error)
+        self.page = Page(self.server, self.session, self.screen)
+        self._docked = Docked(self.server)
+        self.comparing = Comparing(self.session, data)
+        self.session.open_file = partial(measured, self.comparing)
+        self.discovering = Discovering(self.session, self.comparing)
+        self.scene = ActuatorScene(self.server, round(actuator.motor.pole_pairs))
+        self.strip = PlaybackStrip(self.page, self.scene, lambda: self.charts.window_s, self._theme)
+        self.playback = Playback(self.scene, actuator, self.strip.moved)
+        self._build(recordings, compare_first=bool(given))
+        self.strip.connect(self.playback)
+        self._first = threading.Event()
+        self.first_picture_s = 0.0
+        if not plant.can_be_explored(actuator):
+            self._first.set()  # there will be no picture of a run
+        events = self.session.events
+        events.simulated.append(lambda simulation: self.screen.post("signals", lambda: self._draw(simulation, started)))
+        events.status.append(lambda text: self.screen.post("status", lambda: self._status(text)))
+        events.told.append(self._told)
+        self.session.start()
+        for path in given:
+            self.comparing.add(data.name_of(path))
+        for line in recovered(recordings):
+            self.explore.status.content = line
+        if no_viewer:
+            self.server.on_client_connect(lambda _: self.page.notify("The Rerun viewer cannot be shown", no_viewer))
+
+    def _build(self, recordings: Path, compare_first: bool) -> None:
+        gui = self.server.gui
+        self._theme(dark=False)
+        gui.set_panel_label("emaviz")
+        gui.main_panel.dock_left()
+        gui.main_panel.set_width(LEFT_PX)
+        docked = self._docked
+        self.signals_panel, self._result_panel, self._discovery_panel = docked.add(), docked.add(), docked.add()
+        self._library_panel, self._search_panel = docked.add(), docked.add()
+        self._recordings_panel = docked.add(viewer=True)
+        search = IdentifyResult(
+            self.page, self._slow_screen, self._search_panel, lambda: docked.bring(self._search_panel)
+        )
+        opened = RecordingsResult(self.page, self._recordings_panel, lambda: docked.bring(self._recordings_panel))
+        export = ExportControls(self.page, self.scene, self.playback)
+        self.charts = ChartsPanel(self.page, self._slow_screen, self.signals_panel, export.build)
+        export.connect(lambda: self.charts.ghost, lambda: self.charts.window_s)
+        with self._result_panel.add_tab("Comparison", viser.Icon.ARROWS_DIFF):
+            result = ResultPanel(
+                self.page,
+                lambda: docked.bring(self._result_panel),
+                self._hold,
+                lambda: KeepControls(self.page, self.comparing, self.viewer),
+            )
+        with self._discovery_panel.add_tab("Discovery", viser.Icon.BULB):
+            discovery = DiscoveryPanel(
+                self.page,
+                self.discovering,
+                lambda: docked.bring(self._discovery_panel),
+                lambda: DiscoveryKeep(self.page, self.discovering, self.viewer),
+                lambda one: take_experiment(self.explore, one),
+                self._play,
+            )
+        library = Library(self.session)
+        with self._library_panel.add_tab("Effect", viser.Icon.BOOK):
+            effect = EffectPage(self.page, library, lambda: docked.bring(self._library_panel))
+        docked.dock()
+        builders = [
+            lambda tabs: self._build_explore(tabs),
+            lambda tabs: self._build_identify(tabs, search, opened),
+            lambda tabs: self._build_compare(tabs, result),
+            lambda tabs: self._build_discover(tabs, discovery),
+            lambda tabs: self._build_library(tabs, library, effect),
+            lambda tabs: self._build_recordings(tabs, Recorded(recordings), opened),
+        ]
+        if compare_first:
+            builders.insert(0, builders.pop(2))
+        gui.add_html(TABS)
+        tabs = gui.add_tab_group()
+        for build in builders:
+            build(tabs)
+        self.compare.add_drop()
+        self.sessions.connect(
+            parts(
+                self.page,
+                self.comparing,
+                self.strip,
+                self.explore,
+                self.identify,
+                search,
+                self.compare,
+                self.discovering,
+            )
+        )
+        search.to_explore = partial(take_separating, self.explore)
+        self.compare.session_uploaded = self.sessions.uploaded
+        self.compare.challenge_uploaded = self.discover.source.uploaded
+        self.identify.to_discover = partial(
+            take_to_discover, self.page, self.discovering, lambda: self.discover.source.choose(COMPARED)
+        )
+
+    def _theme(self, dark: bool) -> None:
+        self.server.gui.configure_theme(show_logo=False, show_share_button=False, brand_color=_BRAND, dark_mode=dark)
+
+    def _build_explore(self, tabs: viser.GuiTabGroupHandle) -> None:
+        with tabs.add_tab("Explore", viser.Icon.ADJUSTMENTS):
+            if text := plant.note(self.session.actuator):
+                self.server.gui.add_html(f'<div style="{_NOTE}">{html.escape(text)}</div>')
+            self.explore = ExplorePanel(self.page)
+            SealControls(self.page, self.discovering.sealing)
+
+    def _build_recordings(self, tabs: viser.GuiTabGroupHandle, recorded: Recorded, result: RecordingsResult) -> None:
+        with tabs.add_tab("Recordings", viser.Icon.LIST):
+            panel = RecordingsPanel(self.page, self.viewer, recorded, self._recording_files, result)
+            self.sessions = SessionControls(self.page, self.comparing, self._recording_files)
+        self.comparing.events.kept.append(lambda _: panel.refresh_soon())
+
+    def _build_identify(
+        self, tabs: viser.GuiTabGroupHandle, result: IdentifyResult, recordings: RecordingsResult
+    ) -> None:
+        with tabs.add_tab("Identify", viser.Icon.SEARCH):
+            self.identify = IdentifyPanel(self.page, self.comparing, self.viewer, result)
+        self.identify.open_viewer = recordings.open
+
+    def _build_compare(self, tabs: viser.GuiTabGroupHandle, result: ResultPanel) -> None:
+        with tabs.add_tab("Compare", viser.Icon.ARROWS_DIFF):
+            self.compare = ComparePanel(self.page, self.comparing, result)
+
+    def _build_discover(self, tabs: viser.GuiTabGroupHandle, result: DiscoveryPanel) -> None:
+        with tabs.add_tab("Discover", viser.Icon.BULB):
+            self.discover = DiscoverPanel(self.page, self.discovering, result, self.compare.uploads)
+
+    def _build_library(self, tabs: viser.GuiTabGroupHandle, library: Library, effect: EffectPage) -> None:
+        with tabs.add_tab("Library", viser.Icon.BOOK):
+            LibraryPanel(self.page, library, effect)
+
+    def _play(self, run: Measurement | None) -> None:
+        """A run on the 3D actuator; without one, Explore's."""
+        shown = self.session.simulation if run is None else Simulation(run, run, HEALTHY, 0.0)
+        if shown is not None:
+            self.playback.show(shown)
+
+    def _hold(self, comparison: Comparison, recording: int, time_s: float) -> None:
+        self.strip.play(False)
+        hold(self.playback, self.scene, comparison, recording, time_s)
+
+    @property
+    def address(self) -> str:
+        """Where the page is."""
+        return f"http://{self.server.get_host()}:{self.server.get_port()}"
+
+    def wait_for_first_picture(self, timeout_s: float) -> bool:
+        """Whether the first simulation was drawn within that time."""
+        return self._first.wait(timeout_s)
+
+    def close(self) -> None:
+        """Ends everything that was started."""
+        self.playback.close()
+        self.discovering.close()
+        self.comparing.close()
+        self.session.close()
+        self.screen.close()
+        self._slow_screen.close()
+        self._recording_files.close()
+        if self.viewer is not None:
+            self.viewer.close()
+        self.server.stop()
+
+    def _draw(self, simulation: Simulation, started: float) -> None:
+        self.charts.show(simulation)
+        self.playback.show(simulation)
+        if self.playback.motion is not None:
+            self.strip.say(self.playback.motion.sentence())
+        self.explore.show_preset()
+        if self.explore.monitor.value != self.session.settings.monitor:
+            self.explore.show_monitor(self.session.settings.monitor)
+        if not self._first.is_set():
+            self.first_picture_s = time.perf_counter() - started
+            self._first.set()
+        elif simulation.asked:
+            self._docked.bring(self.signals_panel)
+
+    def _status(self, text: str) -> None:
+        self.explore.status.content = text
+
+    def _told(self, title: str, text: str) -> None:
+        self.page.notify(title, text)
+
+    def _on_screen_error(self, error: BaseException) -> None:
+        traceback.print_exception(error)
+
+
+def serve(arguments: argparse.Namespace) -> int:
+    """Runs the app until interrupted (the command line's `gui`)."""
+    files = [Path(file) for file in arguments.files]
+    app = App(arguments.host, arguments.port, arguments.data_dir, arguments.actuator, files)
+    print(f"emaviz is at {app.address}  (Ctrl-C ends it)", flush=True)
+    if arguments.host not in LOOPBACK:
+        print("It is open to the network: whoever reaches this address can use it.", file=sys.stderr)
+    if arguments.open:
+        webbrowser.open(app.address)
+    if app.wait_for_first_picture(120.0):
+        print(f"first picture after {app.first_picture_s:.1f} s", flush=True)
+    try:
+        threading.Event().wait()
+    finally:
+        app.close()
+    return 0
+
+
+def _viewer(recordings: Path) -> tuple[ViewerHost | None, str]:
+    """The Rerun viewer's host, or why there is none: the app works without."""
+    try:
+        return ViewerHost(recordings), ""
+    except OSError as error:
+        return None, str(error)

@@ -1,0 +1,42 @@
+"""What stays of a comparison: the report, which the browser also saves, and the recording for Rerun."""
+
+from __future__ import annotations
+
+import html
+from pathlib import Path
+
+import viser
+
+from emaviz.page.identify.tab import recording_link
+from emaviz.page.page import Page
+from emaviz.recording.viewer import ViewerHost
+from emaviz.session.compare.comparing import Comparing
+
+
+class KeepControls:
+    """Two buttons, and what they have written."""
+
+    def __init__(self, page: Page, comparing: Comparing, viewer: ViewerHost | None) -> None:
+        self._comparing, self._viewer = comparing, viewer
+        self._asked: viser.ClientHandle | None = None  # who is sent the report
+        gui = page.server.gui
+        report = gui.add_button("Save report", icon=viser.Icon.FILE_TEXT, hint="One HTML file that opens offline")
+        record = gui.add_button("Record", icon=viser.Icon.DEVICE_FLOPPY, hint="An .rrd file for the Rerun viewer")
+        self._links = gui.add_html("")
+
+        def save(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
+            self._asked = event.client
+            comparing.save_report()
+
+        report.on_click(save)
+        record.on_click(lambda _: comparing.record())
+        comparing.events.kept.append(lambda path: page.screen.post("kept", lambda: self._kept(path)))
+
+    def _kept(self, path: Path) -> None:
+        if path.suffix == ".rrd":
+            self._links.content = recording_link(self._viewer, path)
+            return
+        name = html.escape(self._comparing.folder.name_of(path))
+        self._links.content = f'<div style="padding:2px 10px;font-size:13px">Also kept in the data folder: {name}</div>'
+        if self._asked is not None:
+            self._asked.send_file_download(path.name, path.read_bytes(), save_immediately=True)

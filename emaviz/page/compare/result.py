@@ -1,0 +1,228 @@
+"""The comparison on the right: the answer in words, where the model fails, and the plots."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import viser
+
+from ema_model.comparison.result import Comparison, Region
+from ema_model.recordings import SIGNALS
+from emaviz.figures import mapped_columns
+from emaviz.page.compare.plots import ComparePlots, View
+from emaviz.page.page import Page
+from emaviz.session.opened import Opened
+
+_BOX = 'style="padding:2px 12px 6px;font-size:13px;line-height:1.45"'
+_CARD = "height:auto!important;min-height:2em;padding:4px 8px;font-weight:400;font-size:13px;"
+_RESTING = (
+    "background:rgba(134,142,150,.13)!important;color:inherit!important;border-left:3px solid rgba(134,142,150,.5);"
+)
+_CHOSEN = "background:rgba(224,49,49,.14)!important;color:inherit!important;border-left:3px solid #e03131;"
+_CONFIG = {"displayModeBar": False, "responsive": False}
+
+
+class ResultPanel:
+    """Everything here is built and changed on the screen's thread.
+
+    to_front(): makes this panel the one that is seen; moment(comparison, recording, time_s): moves the 3D actuator;
+    keep(): adds what saves a comparison, below the plots.
+    """
+
+    def __init__(
+        self,
+        page: Page,
+        to_front: Callable[[], None],
+        moment: Callable[[Comparison, int, float], None],
+        keep: Callable[[], object],
+    ) -> None:
+        self._page, self._to_front, self._moment = page, to_front, moment
+        self._comparison: Comparison | None = None
+        self._region: Region | None = None
+        self._preview: Any = None
+        self._buttons: list[Any] = []
+        gui = page.server.gui
+        self._headline = gui.add_html(f"<div {_BOX}>Nothing is compared yet: upload a recording.</div>")
+        self._place = gui.add_folder("Preview of the columns", visible=False)
+        self._answer = gui.add_folder("Where the model fails", visible=False)
+        with self._answer:
+            self._hint = gui.add_html("")
+            self._style = gui.add_html("")
+        self._plots_folder = gui.add_folder("Plots", visible=False)
+        with self._plots_folder:
+            self._recording = gui.add_dropdown("Recording", ["–"], visible=False)
+            self._playhead = gui.add_slider("Moment [s]", 0.0, 1.0, 1e-3, 0.0)
+            self._plots = ComparePlots(page)
+        self._save = gui.add_folder("Keep it", visible=False)
+        with self._save:
+            keep()
+        self._playhead.on_update(lambda event: event.client and self._scrubbed())
+        self._recording.on_update(lambda event: event.client and self._chosen())
+
+    # --- before a comparison ----------------------------------------------------------------------------------------
+
+    def preview(self, opened: Opened) -> None:
+        """The signals of a file as they are mapped now."""
+        figure, aspect = mapped_columns.figure(opened.columns, opened.mapping)
+        if self._preview is None:
+            with self._place:
+                self._preview = self._page.server.gui.add_plotly(figure, config=_CONFIG, aspect=aspect)
+        else:
+            self._preview.figure, self._preview.aspect = figure, aspect
+        self._headline.content = f"<div {_BOX}><b>{html.escape(opened.path.name)}</b>, as its columns are read</div>"
+        self._place.visible = True
+        self._show_answer(False)
+        self._to_front()
+
+    def end_preview(self) -> None:
+        """Back to the comparison, if there is one."""
+        if self._comparison is not None:
+            self._place.visible = False
+            self._headline.content = headline(self._comparison)
+            self._show_answer(True)
+
+    def _show_answer(self, visible: bool) -> None:
+        for folder in (self._answer, self._plots_folder, self._save):
+            folder.visible = visible
+
+    # --- the comparison ---------------------------------------------------------------------------------------------
+
+    def show(self, comparison: Comparison) -> None:
+        """A new comparison takes the place of the old one."""
+        self._comparison, self._region = comparison, None
+        with self._page.server.atomic():
+            self._list_regions(comparison)
+            self.end_preview()
+            names = [f"{i + 1}. {one.name}" for i, one in enumerate(comparison.recordings)]
+            self._recording.options, self._recording.value = names, names[0]
+            self._recording.visible = len(names) > 1
+            self._fit_playhead(0)
+        self._to_front()
+        self._plots.begin(View(comparison))
+
+    def select(self, index: int) -> None:
+        """Highlights a region in every plot, and moves the play-head and the actuator to its worst moment."""
+        comparison = self._comparison
+        if comparison is None or not 0 <= index < len(comparison.worst_regions):
+            return
+        region = comparison.worst_regions[index]
+        self._region = region
+        recording, time_s = worst_moment(comparison, region)
+        self._style_regions(index)
+        self._recording.value = self._recording.options[recording]
+        self._fit_playhead(recording, time_s)
+        self._moment(comparison, recording, time_s)
+        self._plots.show(View(comparison, recording, region, time_s))
+
+    def _list_regions(self, comparison: Comparison) -> None:
+        for button in self._buttons:
+            button.remove()
+        self._buttons = []
+        found = len(comparison.worst_regions)
+        text = "Click one: the plots and the actuator go there." if found else "No region stands out of the floor."
+        self._hint.content = f'<div {_BOX}><span style="opacity:.65">{text}</span></div>'
+        with self._answer:
+            for i, region in enumerate(comparison.worst_regions):
+                button = self._page.server.gui.add_button(
+                    region.sentence, icon=viser.Icon.FOCUS_2, hint=_details(region)
+                )
+                button.on_click(lambda _, i=i: self._page.screen.post("region", lambda: self.select(i)))
+                self._buttons.append(button)
+        self._style_regions(None)
+
+    def _style_regions(self, chosen: int | None) -> None:
+        """viser's buttons have one line; a region's sentence is longer, so they become a list of cards."""
+        rules = []
+        for i, button in enumerate(self._buttons):
+            one = f'[id="{button._impl.uuid}"]'
+            colours = _CHOSEN if i == chosen else _RESTING
+            rules.append(f"{one}{{{_CARD}{colours}}}{one} .mantine-Button-inner{{justify-content:flex-start}}")
+            rules.append(f"{one} .mantine-Button-label{{white-space:normal;text-align:left;line-height:1.3}}")
+        self._style.content = f"<style>{''.join(rules)}</style>"
+
+    def _fit_playhead(self, recording: int, time_s: float | None = None) -> None:
+        assert self._comparison is not None
+        times = self._comparison.recordings[recording].time_s
+        self._playhead.min, self._playhead.max = float(times[0]), float(times[-1])
+        self._playhead.value = float(times[0]) if time_s is None else time_s
+
+    def _at(self) -> int:
+        options = list(self._recording.options)
+        return options.index(self._recording.value) if self._recording.value in options else 0
+
+    def _chosen(self) -> None:
+        def change() -> None:
+            if self._comparison is not None:
+                self._fit_playhead(self._at())
+                self._plots.show(View(self._comparison, self._at(), self._region))
+
+        self._page.screen.post("recording shown", change)
+
+    def _scrubbed(self) -> None:
+        def change() -> None:
+            if self._comparison is not None:
+                time_s = float(self._playhead.value)
+                self._moment(self._comparison, self._at(), time_s)
+                self._plots.move(View(self._comparison, self._at(), self._region, time_s))
+
+        self._page.screen.post("play-head", change)
+
+
+def worst_moment(comparison: Comparison, region: Region) -> tuple[int, float]:
+    """The recording and the time, s, of the block in the region whose residual is most above its floor."""
+    residuals = comparison.residuals
+    size = np.abs(residuals.values[region.signal]) / residuals.sigma[region.signal]
+    at = int(np.nanargmax(np.where(region.blocks, size, -1.0)))
+    return int(residuals.recording[at]), float(residuals.time_s[at])
+
+
+def headline(comparison: Comparison) -> str:
+    """The sentences and, for each signal, error against floor."""
+    first, *others = comparison.sentences or ("",)
+    regions = {region.sentence for region in comparison.worst_regions}  # which stand in their own list
+    colour = "#2b8a3e" if comparison.adequate else "#e03131"
+    rows = []
+    for name, error in comparison.signals.items():
+        signal = SIGNALS[name]
+        scale, unit = _readable_unit(max(error.rmse, error.rmse_initial), signal.unit)
+        ratio = error.rmse / error.noise_floor if error.noise_floor > 0.0 else np.inf
+        shade = "#2b8a3e" if ratio < 1.2 else "#e8590c" if ratio < 2.0 else "#e03131"
+        before = (
+            f'<td style="text-align:right;opacity:.65">{scale * error.rmse_initial:.3g}</td>'
+            if comparison.calibration is not None
+            else ""
+        )
+        rows.append(
+            f'<tr><td>{html.escape(signal.title)} [{unit}]</td>{before}<td style="text-align:right">'
+            f'{scale * error.rmse:.3g}</td><td style="text-align:right">{scale * error.noise_floor:.3g}</td>'
+            f'<td style="text-align:right;color:{shade}"><b>{ratio:.2f} ×</b></td></tr>'
+        )
+    heads = ["", *(["before"] if comparison.calibration is not None else []), "error", "floor", "error / floor"]
+    head = "".join(f'<th style="text-align:right;font-weight:400;opacity:.65">{text}</th>' for text in heads)
+    warnings = "".join(f'<div style="color:#e8590c">▲ {html.escape(text)}</div>' for text in comparison.warnings)
+    large = f"font-size:16px;font-weight:600;color:{colour};padding:4px 0"
+    return (
+        f'<div {_BOX}><div style="{large}">{html.escape(first)}</div>'
+        f"{''.join(f'<div>{html.escape(text)}</div>' for text in others if text not in regions)}{warnings}"
+        '<table style="width:100%;border-collapse:collapse;margin-top:6px;font-variant-numeric:tabular-nums">'
+        f"<tr>{head}</tr>{''.join(rows)}</table></div>"
+    )
+
+
+def _readable_unit(largest: float, unit: str) -> tuple[float, str]:
+    """Thousandths or millionths where the number is small: the factor, and the unit's name."""
+    for scale, prefix in ((1.0, ""), (1e3, "m"), (1e6, "µ")):
+        if largest * scale >= 0.1:
+            return scale, prefix + unit
+    return 1e6, "µ" + unit
+
+
+def _details(region: Region) -> str:
+    unit = SIGNALS[region.signal].unit
+    return (
+        f"{region.variable.replace('_', ' ')} from {region.low:.4g} to {region.high:.4g}: "
+        f"error {region.rmse:.3g} {unit} rms, {region.excess:.1f} times the floor"
+    )

@@ -1,0 +1,1 @@
+"""The Discover tab and its panels."""

@@ -1,0 +1,95 @@
+"""Texts and styles of the Discover tab's cards: what each candidate would do, in one glance."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Sequence
+
+from ema_model.discovery import Candidate
+from ema_model.effects import find
+from ema_model.quantities.titles import in_sentence, parameter_title, unit_of
+from emaviz.figures import quantity
+from emaviz.figures.quantity import number
+from emaviz.session.discover.look import Look
+from emaviz.text.discovery import effect_title
+
+BOX = 'style="padding:2px 12px 6px;font-size:13px;line-height:1.45"'
+DIM = 'style="opacity:.65"'
+_CARD = (
+    "height:auto!important;min-height:2em;padding:5px 9px;font-weight:400;font-size:12.5px;"
+    "background-color:rgba(134,142,150,.10)!important;color:inherit!important;"
+)
+_LABEL = "display:block;height:auto;overflow:visible;white-space:pre-line;text-align:left;line-height:1.35;width:100%"
+_LITTLE = 0.005  # of the error
+_BAR = "rgba(240,140,0,.28)"
+
+
+# Six tabs of the main panel in one line; it stands above them, as a tab's own content is there only once it was seen.
+TABS = (
+    "<style>[data-dock-region=left] [data-dock-tab]{padding-left:6px!important;padding-right:6px!important}"
+    "[data-dock-region=left] [data-dock-tab] > div:has(svg){display:none!important}"
+    "div:has(> .emaviz-tabs){display:none}</style><div class=emaviz-tabs></div>"
+)
+
+
+def label(look: Look, one: Candidate) -> str:
+    """The lines of a card; its first is the effect's name."""
+    title = effect_title(one.name)
+    if one.untestable_reason:
+        return title
+    lines = [title]
+    if look.is_worth(one):
+        before, after = number(look.rmse), number(look.predicted_rmse(one))
+        if look.share(one) < _LITTLE:
+            lines.append("explains a part, but hardly moves the error by itself")
+        else:
+            lines.append(f"takes about {100.0 * look.share(one):.0f} % of the error: {before} → ≈ {after} × floor")
+        lines.append(f"{strength(look, one)} · {confidence(one)}")
+        same = look.assessment.alike.get(one.name, ()) if look.assessment else ()
+        if same:
+            lines.append("≈ same as " + ", ".join(in_sentence(effect_title(name)) for name in same))
+    return "\n".join(lines)
+
+
+def strength(look: Look, one: Candidate) -> str:
+    """'Amplitude 20.4 ± 0.8 mN·m, order 14', as the residual suggests it."""
+    effect = find(one.name)
+    first = effect.parameters[0]
+    value, half = one.settings[first.name], look.uncertainty(one)
+    shown = quantity.Quantity("", unit_of(first.name)).scaled([value])
+    told = f"{in_sentence(parameter_title(first.name))} {number(shown.factor * value)}"
+    if half is not None:
+        told += f" ± {number(shown.factor * half, 2)}"
+    told = f"{told} {shown.unit}".rstrip()
+    order = one.settings.get("order")
+    return told if order is None else f"{told}, order {order:g}"
+
+
+def confidence(one: Candidate) -> str:
+    """How sure it is that something like this is missing, in a word."""
+    drop = one.predicted_drop
+    word = "plain" if drop > 200.0 else "clear" if drop > 50.0 else "faint"
+    return f"{word} (χ² −{drop:.0f})"
+
+
+def style(look: Look | None, shown: Sequence[tuple[str, Candidate | None]], opened: str | None) -> str:
+    """viser's buttons have one line and one colour; these become cards.  shown: (the button's id, its candidate)."""
+    rules = []
+    for uuid, one in shown:
+        if one is None or look is None:
+            continue
+        button = f'[id="{uuid}"]'
+        share = 100.0 * look.share(one) if look.is_worth(one) else 0.0
+        bar = f"background-image:linear-gradient(to right,{_BAR} {share:.1f}%,transparent {share:.1f}%)!important;"
+        edge = "#f08c00" if one.name == opened else "rgba(134,142,150,.5)" if share else "rgba(134,142,150,.25)"
+        grey = "opacity:.55;" if one.untestable_reason else ""
+        rules.append(f"{button}{{{_CARD}{bar}{grey}border-left:3px solid {edge}}}")
+        rules.append(f"{button} .mantine-Button-inner{{justify-content:flex-start}}")
+        rules.append(f"{button} .mantine-Button-label{{{_LABEL}}}{button} .mantine-Button-label::first-line")
+        rules.append("{font-weight:600;font-size:13.5px}")
+    return f"<style>{''.join(rules)}</style>"
+
+
+def note(text: str) -> str:
+    """A line of small print."""
+    return f"<div {BOX}><span {DIM}>{html.escape(text)}</span></div>"

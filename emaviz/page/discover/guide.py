@@ -1,0 +1,93 @@
+"""The guided first challenge: one short text at a time, chosen by how far the story is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import viser
+
+from emaviz.figures.quantity import number
+from emaviz.page.page import Page
+from emaviz.session.discover.discovering import Discovering
+from emaviz.session.discover.look import AT_FLOOR, Look
+from emaviz.text.discovery import effect_title
+
+STEPS = 6
+
+
+def step(look: Look | None, running: bool, opened: str | None, revealed: bool) -> tuple[int, str]:
+    """The number of the step, 1 … STEPS, and what to do."""
+    if look is None and not running:
+        return 1, "Read the challenge's story below. Then press **Start**: the model is calibrated to the recordings."
+    if look is None or look.assessment is None:
+        return 2, (
+            "The model's parameters move within their tolerances until it fits as well as it can; then every effect "
+            "of the library is held against what is left. This takes some seconds."
+        )
+    if not look.added and opened is None:
+        return 3, (
+            f"Even calibrated, the error is **{number(look.rmse)} times the floor**: physics is missing. "
+            "Click the **first card** below: its bar is the share of the error that it would take away."
+        )
+    if not look.added:
+        name = effect_title(opened or "")
+        return 4, (
+            f"On the right, {name.lower()} would follow the orange line, and the blue points are what the model lacks. "
+            "Where the two lie together, this is it. Press **Add it to the model**."
+        )
+    if look.rmse > AT_FLOOR:
+        return 5, "The ladder fell, but not to the floor. Take the step back with **Undo**, or add the next card."
+    if not revealed:
+        return 5, (
+            "The ladder on the right has fallen **to the floor**, on the recording that was not fitted as well. "
+            "Press **Reveal the truth** on the right to compare."
+        )
+    return 6, (
+        "That is the whole story: see where a model fails, learn what is missing, add it, watch the error fall. "
+        "Choose the next challenge, or open recordings of your own on **Compare**."
+    )
+
+
+class Guide:
+    """A box on top of the tab; begin() chooses the first challenge, on the screen's thread."""
+
+    def __init__(self, page: Page, discovering: Discovering, begin: Callable[[], None]) -> None:
+        self._discovering, self._begin = discovering, begin
+        self._on = False
+        self._last: tuple[Look | None, str | None] = (None, None)
+        gui = page.server.gui
+        self._offer = gui.add_button("Guided first challenge", icon=viser.Icon.SCHOOL, hint="About three minutes")
+        self._folder = gui.add_folder("Guide", visible=False)
+        with self._folder:
+            self._text = gui.add_markdown("")
+            end = gui.add_button("Leave the guide", icon=viser.Icon.X, color="gray")
+        self._offer.on_click(lambda _: page.screen.post("guide", self._start))
+        end.on_click(lambda _: page.screen.post("guide", self._end))
+        discovering.events.revealed.append(lambda: page.screen.post("guide", self.refresh))
+        discovering.events.began.append(lambda _: page.screen.post("guide", self.refresh))
+
+    def show(self, look: Look | None, opened: str | None) -> None:
+        """The story is here now; on the screen's thread."""
+        self._last = (look, opened)
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Says what is to be done now; on the screen's thread."""
+        self._offer.visible = not self._on and self._last[0] is None
+        if self._on:
+            look, opened = self._last
+            at, text = step(look, self._discovering.running, opened, self._discovering.source.revealed)
+            line = f"**Step {at} of {STEPS}.** {text}"
+            if self._text.content != line:
+                self._text.content = line
+
+    def _start(self) -> None:
+        self._on = True
+        self._folder.visible = True
+        self._begin()
+        self.refresh()
+
+    def _end(self) -> None:
+        self._on = False
+        self._folder.visible = False
+        self.refresh()

@@ -1,0 +1,44 @@
+"""What stays of a discovery: the report, the recording for Rerun, and the improved model."""
+
+from __future__ import annotations
+
+import html
+from pathlib import Path
+
+import viser
+
+from emaviz.page.identify.tab import recording_link
+from emaviz.page.page import Page
+from emaviz.recording.viewer import ViewerHost
+from emaviz.session.discover.discovering import Discovering
+
+
+class DiscoveryKeep:
+    """Three buttons, and what they have written."""
+
+    def __init__(self, page: Page, discovering: Discovering, viewer: ViewerHost | None) -> None:
+        self._discovering, self._viewer = discovering, viewer
+        self._asked: viser.ClientHandle | None = None  # who is sent the file
+        gui = page.server.gui
+        for label, suffix, icon, hint in (
+            ("Save the report", ".html", viser.Icon.FILE_TEXT, "One HTML file that opens offline"),
+            ("Record the discovery", ".rrd", viser.Icon.DEVICE_FLOPPY, "An .rrd file for the Rerun viewer"),
+            ("Save the improved model", ".toml", viser.Icon.TOPOLOGY_STAR, "An actuator file; Compare lists it"),
+        ):
+            button = gui.add_button(label, icon=icon, hint=hint)
+            button.on_click(lambda event, suffix=suffix: self._ask(event.client, suffix))
+        self._links = gui.add_html("")
+        discovering.events.kept.append(lambda path: page.screen.post(f"kept {path.suffix}", lambda: self._kept(path)))
+
+    def _ask(self, client: viser.ClientHandle | None, suffix: str) -> None:
+        self._asked = client
+        self._discovering.keep(suffix)
+
+    def _kept(self, path: Path) -> None:
+        if path.suffix == ".rrd":
+            self._links.content = recording_link(self._viewer, path)
+            return
+        name = html.escape(self._discovering.folder.name_of(path))
+        self._links.content = f'<div style="padding:2px 10px;font-size:13px">Also kept in the data folder: {name}</div>'
+        if self._asked is not None:
+            self._asked.send_file_download(path.name, path.read_bytes(), save_immediately=True)

@@ -1,0 +1,185 @@
+"""Discover's panel on the right: the answer so far, the ladder, the opened candidate, the equation, what is left."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Callable
+from typing import Any
+
+import plotly.graph_objects as go
+import viser
+
+from ema_model.effects import CATALOGUE
+from ema_model.recordings import SIGNALS, Measurement
+from emaviz.figures import error_ladder, explained_steps, missing_curve, residual_steps
+from emaviz.figures.discovery_tracks import Track, tracks
+from emaviz.figures.model_equation import equation
+from emaviz.figures.quantity import number
+from emaviz.page.discover import cards as cards
+from emaviz.page.discover.actuator import ActuatorSwitch
+from emaviz.page.discover.effect import CONFIG, EffectView
+from emaviz.page.discover.next_test import NextTest
+from emaviz.page.discover.reveal import reveal
+from emaviz.page.page import Page
+from emaviz.session.discover.discovering import Discovering
+from emaviz.session.discover.look import AT_FLOOR, Look
+from emaviz.text.discovery import FLOOR_NOTE, headline, sentences
+
+_RESTING = (
+    "Choose recordings on the left, and press <b>Start</b>: the model is calibrated, and what it leaves is held "
+    "against every effect of the library."
+)
+
+
+class DiscoveryPanel:
+    """Everything here is built and changed on the screen's thread.
+
+    keep() adds what saves a discovery, load(test) puts a test into Explore, play(run) shows a run on the 3D actuator.
+    """
+
+    def __init__(
+        self,
+        page: Page,
+        discovering: Discovering,
+        to_front: Callable[[], None],
+        keep: Callable[[], object],
+        load: Callable[[Any], None],
+        play: Callable[[Measurement | None], None],
+    ) -> None:
+        self._page, self._discovering, self.to_front = page, discovering, to_front
+        self._look: Look | None = None
+        self._titles: dict[str, str] = {}
+        gui = page.server.gui
+        self._headline = gui.add_html(f"<div {cards.BOX}>{_RESTING}</div>")
+        self._ladder: Any = gui.add_plotly(go.Figure(), config=CONFIG, aspect=0.5, visible=False)
+        self._effect = EffectView(page, discovering)
+        self._truth_folder = gui.add_folder("The challenge's truth", visible=False)
+        with self._truth_folder:
+            self._reveal = gui.add_button("Reveal the truth", icon=viser.Icon.EYE, color="gray")
+            self._truth = gui.add_html("")
+        self._model_folder = gui.add_folder("The improved model", visible=False)
+        with self._model_folder:
+            self._equation = gui.add_html("")
+        self._before_folder = gui.add_folder("Before and after", visible=False)
+        with self._before_folder:
+            self._recording = gui.add_dropdown("Recording", ["–"])
+            self._signal = gui.add_dropdown("Signal", ["–"])
+            self._actuator = ActuatorSwitch(page, self._track, play)
+            self._residual: Any = gui.add_plotly(go.Figure(), config=CONFIG, aspect=0.5, visible=False)
+            self._explained: Any = gui.add_plotly(go.Figure(), config=CONFIG, aspect=0.6, visible=False)
+        self._left_folder = gui.add_folder("What is left", visible=False, expand_by_default=False)
+        with self._left_folder:
+            self._left: Any = gui.add_plotly(go.Figure(), config=CONFIG, aspect=0.5, visible=False)
+        self._next = NextTest(page, discovering, load)
+        self._keep_folder = gui.add_folder("Keep it", visible=False)
+        with self._keep_folder:
+            keep()
+        self._recording.on_update(lambda event: event.client and page.screen.post("residual", self._draw_residual))
+        self._signal.on_update(lambda event: event.client and page.screen.post("residual", self._draw_residual))
+        self._reveal.on_click(lambda _: page.screen.post("reveal", self._revealed))
+
+    def connect(self, ask: Callable[[Callable[[], bool]], None], close: Callable[[], None]) -> None:
+        """ask(begin) starts a step; close() closes the opened card."""
+        self._effect.connect(ask, close)
+        self._next.connect(ask)
+
+    def busy(self, busy: bool) -> None:
+        """Whether a step runs."""
+        self._effect.busy(busy)
+        self._next.busy(busy)
+
+    def open(self, name: str | None) -> None:
+        """Opens a candidate, or closes it."""
+        self._effect.open(self._look, name)
+        if name is not None:
+            self.to_front()
+
+    def show(self, look: Look | None) -> None:
+        """A story as it stands."""
+        self._look = look
+        for folder in (self._before_folder, self._keep_folder):
+            folder.visible = look is not None
+        self._truth_folder.visible = look is not None and self._discovering.source.challenge is not None
+        self._model_folder.visible = look is not None and bool(look.added)
+        self._left_folder.visible = look is not None and look.found.unknown is not None
+        self._ladder.visible = look is not None
+        self._next.show(look)
+        if not self._discovering.source.revealed:
+            self._truth.content = ""
+        if look is None:
+            self._headline.content = f"<div {cards.BOX}>{_RESTING}</div>"
+            return
+        found = look.found
+        self._headline.content = answer(look)
+        self._ladder.figure = error_ladder.figure(found)
+        self._equation.content = f"<div {cards.BOX}>{equation(found, look.added)}</div>"
+        named = all(one.name in CATALOGUE for one in look.added)
+        self._left_folder.label = "What is left" if named else "What had no name"
+        if self._left_folder.visible:
+            self._left.figure, self._left.visible = missing_curve.figure(found), True
+        self._titles = {SIGNALS[name].title: name for name in found.ladder[0].signals}
+        names = [f"{i + 1}. {name}" for i, name in enumerate(look.reach)]
+        for dropdown, options in ((self._recording, names), (self._signal, list(self._titles))):
+            if list(dropdown.options) != options:
+                dropdown.options = options
+        self._draw_residual()
+        self._draw_explained(look)
+        if self._discovering.source.revealed:
+            self._show_truth()
+        self.to_front()
+
+    def _draw_residual(self) -> None:
+        if self._look is None:
+            return
+        signal = self._titles.get(str(self._signal.value)) or self._look.primary
+        track = self._track()
+        if track is not None:
+            self._residual.figure = residual_steps.figure(track, signal)
+            self._residual.visible = True
+        if self._actuator.active:
+            self._actuator.refresh()
+
+    def _track(self) -> Track | None:
+        """The recording that is looked at."""
+        if self._look is None:
+            return None
+        options, runs = list(self._recording.options), tracks(self._look.found)
+        at = options.index(self._recording.value) if self._recording.value in options else 0
+        return runs[min(at, len(runs) - 1)]
+
+    def _draw_explained(self, look: Look) -> None:
+        self._explained.visible = look.assessment is not None and bool(look.explained_before)
+        if look.assessment is not None and self._explained.visible:
+            self._explained.figure = explained_steps.figure(look.explained_before, look.assessment.left.explained)
+
+    def _revealed(self) -> None:
+        self._page.checked(self._show_truth)
+
+    def _show_truth(self) -> None:
+        if self._look is not None:
+            self._truth.content = reveal(self._discovering.source.reveal(), self._look.found, self._look.added)
+            for tell in self._discovering.events.revealed:
+                tell()
+
+
+def answer(look: Look) -> str:
+    """The verdict in words, its warnings, and what 1 means."""
+    found = look.found
+    done = look.rmse <= AT_FLOOR
+    if look.assessment is None:
+        first, others = f"The error is {number(look.rmse)} times the floor.", ["What is left is being looked at …"]
+    elif not look.added and look.promising:
+        first = f"Calibrated, the error is {number(look.rmse)} × the floor: physics is missing."
+        left = look.assessment.left.explanation
+        others = [left.sentence] if left is not None else []
+    else:
+        first, others = headline(found), sentences(found)
+    colour = "#2b8a3e" if done else "#e03131"
+    warnings = "".join(f'<div style="color:#e8590c">▲ {html.escape(text)}</div>' for text in found.warnings)
+    note = html.escape(FLOOR_NOTE, quote=True)
+    return (
+        f'<div {cards.BOX}><div style="font-size:16px;font-weight:600;color:{colour};padding:2px 0">'
+        f"{html.escape(first)}</div>{''.join(f'<div>{html.escape(text)}</div>' for text in others)}{warnings}"
+        f'<div style="opacity:.65;font-size:12px" title="{note}">The floor is what noise and the model\'s own limits '
+        f"leave: 1 on the ladder.</div></div>"
+    )

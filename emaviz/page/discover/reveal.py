@@ -1,0 +1,115 @@
+"""A challenge's truth beside the answer."""
+
+from __future__ import annotations
+
+import html
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ema_model.challenges.truth import Truth
+from ema_model.discovery import Discovery
+from ema_model.discovery.result import Added
+from ema_model.effects import CATALOGUE, find
+from ema_model.faults import BY_NAME, NAMES, sentences
+from ema_model.quantities.titles import in_sentence, parameter_title, unit_of
+from emaviz.figures import quantity
+from emaviz.page.discover.cards import BOX
+from emaviz.text.discovery import effect_title, fitted_of, value
+
+_GOOD, _BAD = "#2b8a3e", "#e03131"
+_NEAR = 0.25  # of the true value, within which a strength counts as found where its interval misses it
+
+
+# What of the model's parameters tells a fault that is slight enough to pass for it.
+_OF_FAULT = {"k1": "friction", "k2": "backlash", "k8": "position_gain"}
+
+
+def agrees(truth: Truth, found: Discovery, added: tuple[Added, ...]) -> bool:
+    """Whether the answer names exactly what is hidden: the effects, or a torque of its own for an unknown one."""
+    named = {one.name for one in added if one.name in CATALOGUE and not find(one.name).duplicates}
+    own = any(one.name not in CATALOGUE for one in added)
+    seen = all(_sees(found, fault) for fault in truth.faults)
+    return named == set(truth.effects) and own == bool(truth.torque) and seen and not _invented(truth, found)
+
+
+def _sees(found: Discovery, fault: str) -> bool:
+    told = _OF_FAULT.get(fault)
+    return fault in found.faults or (told is not None and any(told in p for p in found.parameters_outside_tolerance))
+
+
+def _invented(truth: Truth, found: Discovery) -> list[str]:
+    """Faults that were named and are not there; a phase belongs to its modulus."""
+    return [name for name in found.faults if name not in truth.faults and name != "k7"]
+
+
+def _fault(fault: str, k: ArrayLike, found: Discovery) -> str:
+    index = NAMES.index(fault)
+    what = f"{in_sentence(BY_NAME[fault].title)} fault: {sentences(k, found.plant.actuator)[index]}"
+    if fault in found.faults:
+        own, true = found.faults[fault], float(np.asarray(k)[index])
+        low, high = own.interval90
+        near = low <= true <= high or abs(own.value - true) <= _NEAR * abs(true - BY_NAME[fault].healthy)
+        return _row(near, what, f"{fault} {true:g} in truth, {value(own)} found")
+    good = _sees(found, fault)
+    return _row(good, what, "its parameter is outside its tolerance" if good else "not found; try Identify")
+
+
+def reveal(truth: Truth, found: Discovery, added: tuple[Added, ...]) -> str:
+    """The truth in words, then effect by effect."""
+    good = agrees(truth, found, added)
+    verdict = "Your answer agrees." if good else "Your answer differs."
+    rows = [_effect(name, given, found, added) for name, given in truth.effects.items()]
+    rows += [_fault(fault, truth.k, found) for fault in truth.faults]
+    for name in _invented(truth, found):
+        rows.append(_row(False, f"the fault {BY_NAME[name].label}", "is not hidden here"))
+    if truth.torque:
+        own = next((one for one in added if one.name not in CATALOGUE), None)
+        what = f"an effect outside the library: T = {truth.torque}"
+        how = f"found as {in_sentence(effect_title(own.name))}" if own else "not found: add the curve of what is left"
+        rows.append(_row(own is not None, what, how))
+    for one in added:
+        if one.name in CATALOGUE and one.name not in truth.effects:
+            tied = [name for name in one.same_as if name in truth.effects]
+            if find(one.name).duplicates:
+                why = "a parameter outside its tolerance; nothing of the kind is hidden"
+            elif tied:
+                why = f"cannot be told from {in_sentence(effect_title(tied[0]))} by these recordings"
+            else:
+                why = "is not hidden here"
+            rows.append(_row(False, in_sentence(effect_title(one.name)), why))
+    if not rows:
+        rows.append(_row(True, "nothing is hidden", "and you added nothing"))
+    head = f'<div style="font-size:16px;font-weight:600;color:{_GOOD if good else _BAD}">{verdict}</div>'
+    return f"<div {BOX}>{head}<div>{html.escape(truth.answer)}</div>{''.join(rows)}</div>"
+
+
+def _effect(name: str, given: dict[str, float], found: Discovery, added: tuple[Added, ...]) -> str:
+    title = in_sentence(effect_title(name))
+    order = given.get("order")
+    own = [one for one in added if one.name == name]
+    one = next((one for one in own if order is None or one.chosen.get("order") == order), own[0] if own else None)
+    if one is None:
+        return _row(False, title, "not found")
+    first = find(name).parameters[0]
+    fitted = fitted_of(found, one, first.name)
+    low, high = fitted.interval90
+    inside = low <= given[first.name] <= high
+    near = inside or abs(fitted.value - given[first.name]) <= _NEAR * abs(given[first.name])
+    shown = quantity.Quantity("", unit_of(first.name)).scaled([given[first.name]])
+    half = quantity.number(shown.factor * 0.5 * (high - low), 2)
+    told = (
+        f"{in_sentence(parameter_title(first.name))} {shown.text(given[first.name])} in truth, "
+        f"{quantity.number(shown.factor * fitted.value)} ± {half} {shown.unit} found".rstrip()
+    )
+    if order is not None:
+        told += f"; order {order:g} in truth, {one.chosen.get('order', 0.0):g} found"
+    return _row(near and (order is None or one.chosen.get("order") == order), title, told)
+
+
+def _row(good: bool | None, what: str, how: str) -> str:
+    mark, colour = ("•", "inherit") if good is None else ("✓", _GOOD) if good else ("✗", _BAD)
+    return (
+        f'<div style="padding-top:3px"><span style="color:{colour}"><b>{mark}</b></span> '
+        f"<b>{html.escape(what[:1].upper() + what[1:])}</b>: {html.escape(how)}</div>"
+    )

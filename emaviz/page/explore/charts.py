@@ -1,0 +1,100 @@
+"""Explore's tabs on the right: the signals, the phases, the run in numbers, and what can be taken away."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import viser
+
+from emaviz.figures.colours import GHOST, MONITOR, REFERENCE
+from emaviz.figures.run_metrics import differences, metrics, table
+from emaviz.figures.signals import PHASE_SIGNALS, LivePhases, LiveSignals
+from emaviz.page.page import Page
+from emaviz.page.style import TIME_CHARTS
+from emaviz.session.session import Simulation
+from emaviz.session.worker import Worker
+
+
+class ChartsPanel:
+    """Draws runs.  The signals are drawn at once, the rest, which nobody watches while dragging, a little later."""
+
+    def __init__(self, page: Page, slow: Worker, panel: viser.PanelHandle, export: Callable[[], object]) -> None:
+        self._page, self._slow = page, slow
+        self._simulation: Simulation | None = None
+        self.ghost: Simulation | None = None
+        self._window = (0.0, 1.0)  # shares of the run
+        gui = page.server.gui
+        with panel.add_tab("Signals", viser.Icon.CHART_LINE):
+            gui.add_html(TIME_CHARTS)
+            # Above the charts, which fill the panel.
+            self._freeze = gui.add_button(
+                "Freeze this run", icon=viser.Icon.SNOWFLAKE, color="gray", hint="Keeps it as a dashed line"
+            )
+            self._melt = gui.add_button("Drop the frozen run", icon=viser.Icon.X, color="gray", visible=False)
+            self.signals = LiveSignals(gui)
+            self._range = gui.add_multi_slider(
+                "Shown [%]", 0, 100, 1, (0, 100), min_range=1, hint="Of the run; zooms all charts, in full resolution"
+            )
+        with panel.add_tab("Phases", viser.Icon.WAVE_SINE):
+            gui.add_html(TIME_CHARTS)
+            self._phases = LivePhases(gui)
+        with panel.add_tab("Metrics", viser.Icon.TABLE):
+            self._table: Any = gui.add_html("")
+        with panel.add_tab("Export", viser.Icon.DOWNLOAD):
+            export()
+        self._range.on_update(lambda _: page.screen.post("window", self._zoom))
+        self._freeze.on_click(lambda _: page.screen.post("freeze", lambda: self._set_ghost(self._simulation)))
+        self._melt.on_click(lambda _: page.screen.post("freeze", lambda: self._set_ghost(None)))
+
+    def show(self, simulation: Simulation) -> None:
+        """Draws a run; on the screen's thread."""
+        self._simulation = simulation
+        self._draw_signals(simulation)
+        self._slow.post("phases", self._draw_rest)
+
+    @property
+    def window_s(self) -> tuple[float, float]:
+        """From and to when the charts show the run."""
+        if self._simulation is None:
+            return 0.0, 1.0
+        reference = self._simulation.reference
+        low, high = self._window
+        return low * reference.duration_s, high * reference.duration_s
+
+    def _draw_signals(self, simulation: Simulation) -> None:
+        ghost = self.ghost.reference if self.ghost is not None else None
+        with self._page.server.atomic():
+            self.signals.show(simulation.reference, simulation.monitor, ghost, self.window_s)
+
+    def _draw_rest(self) -> None:
+        simulation, ghost = self._simulation, self.ghost
+        if simulation is None:
+            return
+        frozen = ghost.reference if ghost is not None else None
+        runs = {
+            "plant": metrics(simulation.reference, simulation.command),
+            "monitor": metrics(simulation.monitor, simulation.command),
+        }
+        errors = {"monitor − plant": differences(simulation.reference, simulation.monitor)}
+        if ghost is not None:
+            runs["frozen plant"] = metrics(ghost.reference, ghost.command)
+            errors["frozen run's"] = differences(ghost.reference, ghost.monitor)
+        with self._page.server.atomic():
+            if all(name in simulation.reference for name in PHASE_SIGNALS):
+                self._phases.show(simulation.reference, simulation.monitor, frozen, self.window_s)
+            self._table.content = table(runs, errors, [REFERENCE, MONITOR, GHOST])
+
+    def _zoom(self) -> None:
+        low, high = (min(max(float(value), 0.0), 100.0) / 100.0 for value in self._range.value)
+        self._window = (low, high) if high > low else (0.0, 1.0)
+        self._redraw()
+
+    def _set_ghost(self, simulation: Simulation | None) -> None:
+        self.ghost = simulation
+        self._melt.visible = simulation is not None
+        self._redraw()
+
+    def _redraw(self) -> None:
+        if self._simulation is not None:
+            self.show(self._simulation)

@@ -1,0 +1,99 @@
+"""What can be taken away from Explore: the run's data, a picture of the plot, the moving scene."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import viser
+
+from ema_model.recordings import write_measurement
+from emaviz.figures import run_signals
+from emaviz.page.page import Page
+from emaviz.page.style import WIDE_MODAL
+from emaviz.scene.actuator import ActuatorScene
+from emaviz.scene.playback import Playback
+from emaviz.session.session import Simulation
+
+_FRAMES, _FRAME_S = 120, 0.04  # of an exported scene
+_NAME = "emaviz-run"
+
+
+class ExportControls:
+    """Buttons; what each makes is sent to the browser that has asked."""
+
+    def __init__(self, page: Page, scene: ActuatorScene, playback: Playback) -> None:
+        self._page, self._scene, self._playback = page, scene, playback
+        self._ghost: Callable[[], Simulation | None] = lambda: None
+        self._window_s: Callable[[], tuple[float, float]] = lambda: (0.0, 1.0)
+
+    def build(self) -> None:
+        """Adds them here."""
+        gui = self._page.server.gui
+        gui.add_markdown("The run as it stands, in the format that *Compare* reads.")
+        self._whose = gui.add_dropdown("Whose signals", ("plant", "monitor"), initial_value="plant")
+        self._button("Data as CSV", viser.Icon.FILE_SPREADSHEET, lambda client: self._send_data(client, ".csv"))
+        self._button("Data as Parquet", viser.Icon.TABLE, lambda client: self._send_data(client, ".parquet"))
+        gui.add_markdown("The charts, large; the camera above the figure saves it as **PNG**.")
+        self._button("Plot (PNG)…", viser.Icon.PHOTO, self._show_plot)
+        gui.add_markdown("The actuator with its motion, in one **HTML** file that opens offline.")
+        self._button("Scene as HTML", viser.Icon.CUBE, self._send_scene)
+
+    def connect(self, ghost: Callable[[], Simulation | None], window_s: Callable[[], tuple[float, float]]) -> None:
+        """Where the frozen run and the charts' window are to be had."""
+        self._ghost, self._window_s = ghost, window_s
+
+    def _button(self, label: str, icon: viser.IconName, act: Callable[[viser.ClientHandle], None]) -> None:
+        button = self._page.server.gui.add_button(label, icon=icon, color="gray")
+
+        @button.on_click
+        def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
+            client = event.client
+            if client is None:
+                return
+            if self._page.session.simulation is None:
+                self._page.notify("One moment", "Nothing has been simulated yet.", "yellow")
+                return
+            self._page.screen.post(f"export {label}", lambda: act(client))
+
+    def _run(self) -> Simulation:
+        simulation = self._page.session.simulation
+        assert simulation is not None, "the buttons act once there is a run"
+        return simulation
+
+    def _send_data(self, client: viser.ClientHandle, suffix: str) -> None:
+        whose = "monitor" if self._whose.value == "monitor" else "plant"
+        run = self._run()
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / f"{_NAME}-{whose}{suffix}"
+            write_measurement(run.monitor if whose == "monitor" else run.reference, path)
+            client.send_file_download(path.name, path.read_bytes(), save_immediately=True)
+
+    def _show_plot(self, client: viser.ClientHandle) -> None:
+        run, ghost = self._run(), self._ghost()
+        figure = run_signals.figure(
+            run.reference, run.monitor, ghost.reference if ghost is not None else None, self._window_s()
+        )
+        saved = {"format": "png", "filename": _NAME, "width": 1200, "height": 1000, "scale": 2}
+        modal = client.gui.add_modal("Plot")
+        with modal:
+            client.gui.add_html(WIDE_MODAL)
+            client.gui.add_plotly(
+                figure,
+                config={"displayModeBar": True, "displaylogo": False, "toImageButtonOptions": saved},
+                aspect=0.75,
+            )
+            client.gui.add_button("Close", color="gray").on_click(lambda _: modal.close())
+
+    def _send_scene(self, client: viser.ClientHandle) -> None:
+        with self._playback.still() as motion:
+            if motion is None:
+                return
+            serializer = self._page.server.get_scene_serializer()
+            for time_s in np.linspace(0.0, motion.duration_s, _FRAMES, endpoint=False):
+                motion.pose(self._scene, float(time_s))
+                serializer.insert_sleep(_FRAME_S)
+            page = serializer.as_html()
+        client.send_file_download("emaviz-actuator.html", page.encode(), save_immediately=True)

@@ -1,0 +1,74 @@
+"""A button of Explore: what is hidden in its plant becomes a sealed challenge for somebody else."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import viser
+
+from emaviz.page.discover import cards as cards
+from emaviz.page.page import Page
+from emaviz.session.discover.sealing import Sealing
+
+_TEXT = (
+    "The plant as it is set here, its hidden effects and faults, is recorded four times: a chirp, a small step, a slow "
+    "sine, and a sine to hold out. Its parameters are off within their tolerances, at random. The load and the noise "
+    "are those set here; perfect sensors are replaced by those of a usual rig. The story and the recordings can be "
+    "read, the answer only by *Reveal* on the Discover tab."
+)
+
+
+class SealControls:
+    """The button, the questions, and the file that is sent to who has asked."""
+
+    def __init__(self, page: Page, sealing: Sealing) -> None:
+        self._page, self._sealing = page, sealing
+        self._asked: viser.ClientHandle | None = None
+        gui = page.server.gui
+        self._button = gui.add_button(
+            "Seal as a challenge…", icon=viser.Icon.LOCK, color="gray", hint="One file for a colleague to solve"
+        )
+        self._status = gui.add_html("")
+        self._button.on_click(lambda event: self._ask(event.client))
+        events = sealing.events
+        events.said.append(lambda text: page.screen.post("sealing", lambda: self._say(text)))
+        events.sealed.append(lambda path: page.screen.post("sealed", lambda: self._sealed(path)))
+
+    def _ask(self, client: viser.ClientHandle | None) -> None:
+        if client is None:
+            return
+        modal = client.gui.add_modal("Seal as a challenge")
+        with modal:
+            client.gui.add_markdown(_TEXT)
+            title = client.gui.add_text("Challenge title", "")
+            story = client.gui.add_text("Its story", "", multiline=True, hint="What a colleague should know, not more")
+            seal = client.gui.add_button("Seal it", icon=viser.Icon.LOCK)
+            client.gui.add_button("Cancel", color="gray").on_click(lambda _: modal.close())
+
+        def begin() -> None:
+            self._begin(client, str(title.value), str(story.value), modal.close)
+
+        seal.on_click(lambda _: self._page.screen.post("seal", begin))
+
+    def _begin(self, client: viser.ClientHandle, title: str, story: str, close: Callable[[], None]) -> None:
+        def tried() -> None:
+            if not self._sealing.session.ready.is_set():
+                self._page.notify("One moment", "The models are still being compiled.", "yellow")
+            elif not self._sealing.seal(title, story):
+                self._page.notify("One at a time", "Another long run goes on; stop it first.", "yellow")
+            else:
+                self._asked = client
+                close()
+
+        self._page.checked(tried)
+
+    def _say(self, text: str) -> None:
+        self._button.disabled = bool(text)
+        self._status.content = cards.note(text) if text else ""
+
+    def _sealed(self, path: Path) -> None:
+        self._status.content = cards.note(f"Kept in the data folder: {self._sealing.folder.name_of(path)}")
+        self._page.notify("Challenge sealed", f"{path.name}: Discover lists it among the recordings.", "green")
+        if self._asked is not None:
+            self._asked.send_file_download(path.name, path.read_bytes(), save_immediately=True)

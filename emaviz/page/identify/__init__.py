@@ -1,0 +1,1 @@
+"""The Identify tab and its panels."""

@@ -1,0 +1,164 @@
+"""Identify's panel on the right: convergence and swarm, the answer, and the table of all runs."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import viser
+
+from ema_model.faults import HEALTHY
+from ema_model.identification.next_test import Suggestion
+from ema_model.identification.run import ALGORITHMS
+from emaviz.figures.convergence import LiveConvergence
+from emaviz.figures.fault_bars import fault_bars
+from emaviz.figures.fitted_current import LiveFit
+from emaviz.figures.identified_table import Row, table
+from emaviz.page.identify.landscape import LandscapeView
+from emaviz.page.identify.swarm import SwarmView
+from emaviz.page.page import Page
+from emaviz.session.race import Race
+from emaviz.session.worker import Worker
+from emaviz.text.identification import sure_words
+
+_BEST = "the best"
+_LEAST_S = 0.1  # between two pictures of a swarm, which browsers in software draw slowly
+_MOST_ROWS = 200
+
+
+class IdentifyResult:
+    """Drawn on the screen's thread, what changes slowly on the slow one's.
+
+    to_front(): makes this panel the one that is seen.
+    """
+
+    def __init__(self, page: Page, slow: Worker, panel: viser.PanelHandle, to_front: Callable[[], None]) -> None:
+        self._page, self._slow, self._panel, self._bring = page, slow, panel, to_front
+        self._race: Race | None = None
+        self._begun: Race | None = None  # of which something was drawn
+        self._separating: Suggestion | None = None
+        self.to_explore: Callable[[Suggestion], None] = lambda run: None  # sets a run there
+        self._drawn_at = 0.0
+        self.rows: list[Row] = []
+        gui = page.server.gui
+        with panel.add_tab("Search", viser.Icon.CHART_DOTS):
+            self._convergence = LiveConvergence(gui)
+            self._swarm = SwarmView(page)
+        with panel.add_tab("Answer", viser.Icon.TARGET_ARROW):
+            self._whose = gui.add_dropdown("Whose", (_BEST, *ALGORITHMS.values()))
+            self._bars = gui.add_html(fault_bars(HEALTHY, page.session.actuator))
+            self._sure = gui.add_html("")
+            self._try = gui.add_button(
+                "Set that command in Explore",
+                icon=viser.Icon.ADJUSTMENTS,
+                color="gray",
+                visible=False,
+                hint="The run that would tell them apart; then identify again",
+            )
+            self._fit = LiveFit(gui)
+        with panel.add_tab("Landscape", viser.Icon.MAP_2):
+            self._landscape = LandscapeView(page, slow)
+        with panel.add_tab("Runs", viser.Icon.TABLE):
+            self._table = gui.add_html(table([]))
+            clear = gui.add_button("Clear the table", icon=viser.Icon.ERASER, color="gray")
+        self._try.on_click(lambda _: page.screen.post("separating", self._try_separating))
+        self._whose.on_update(lambda _: slow.post("answer", self._draw_answer))
+        clear.on_click(lambda _: page.screen.post("runs", self._clear))
+
+    # --- from the compute thread ------------------------------------------------------------------------------------
+
+    def progressed(self, race: Race) -> None:
+        """A race has gone on; on any thread."""
+        self._race = race
+        if self._panel.visible:  # what nobody sees is not drawn
+            self._page.screen.post("swarm", lambda: self._draw(race, soon=False))
+            self._slow.post("answer", self._draw_answer)
+
+    # --- on the screen's thread -------------------------------------------------------------------------------------
+
+    def to_front(self) -> None:
+        """Makes this panel the one that is seen, and draws what has happened meanwhile."""
+        self._bring()
+        self.draw()
+
+    def draw(self) -> None:
+        """Everything as it stands now."""
+        if self._race is not None:
+            self._draw(self._race, soon=True)
+            self._slow.post("answer", self._draw_answer)
+
+    def finished(self, race: Race) -> None:
+        """The race is over: its last picture, and its rows in the table."""
+        self._draw(race, soon=True)
+        self._slow.post("answer", self._draw_answer)
+        self._landscape.answered(race)
+        performance = race.performance()
+        number = 1 + max((row.race for row in self.rows), default=0)
+        settings = race.settings
+        self.show_rows(
+            [
+                *self.rows,
+                *(
+                    Row(
+                        number,
+                        race.source,
+                        one.algorithm,
+                        settings.population,
+                        settings.iterations,
+                        settings.fitness,
+                        settings.seed,
+                        one.error_percent,
+                        one.rmse,
+                        one.evaluations,
+                        one.elapsed_s,
+                        performance.get(one.algorithm),
+                        one.stopped,
+                    )
+                    for one in race.answers
+                ),
+            ]
+        )
+
+    def show_rows(self, rows: list[Row]) -> None:
+        """The table of runs."""
+        self.rows = rows[-_MOST_ROWS:]
+        self._table.content = table(self.rows)
+
+    def _clear(self) -> None:
+        self.show_rows([])
+
+    def _try_separating(self) -> None:
+        run = self._separating
+        if run is not None and self._page.checked(lambda: self.to_explore(run)):
+            self._page.notify("Explore has the command", "On Identify, press Identify again.", "green")
+
+    def _draw(self, race: Race, soon: bool) -> None:
+        begun = race is not self._begun
+        if not (begun or soon or time.monotonic() - self._drawn_at > _LEAST_S):
+            return
+        self._drawn_at = time.monotonic()
+        self._race = self._begun = race
+        longest = max(track.iterations for track in race.tracks.values())
+        with self._page.server.atomic():
+            self._convergence.begin(tuple(race.tracks), longest)
+            self._convergence.show({name: list(track.rmse) for name, track in race.tracks.items()})
+            self._swarm.show(race, begun)
+
+    def _draw_answer(self) -> None:
+        race = self._race
+        if race is None:
+            return
+        chosen = next((name for name, title in ALGORITHMS.items() if title == self._whose.value), None)
+        track = race.tracks.get(chosen or "") or race.best
+        if track is None or track.k is None:
+            return
+        sure = track.answer.uncertainty if track.answer is not None else None
+        bars: dict[str, Any] = {} if sure is None else {"interval90": sure.interval90, "alarms": sure.alarms}
+        fitted = {name: one.current_A for name, one in race.tracks.items() if one.current_A is not None}
+        with self._page.server.atomic():
+            self._bars.content = fault_bars(track.k, self._page.session.actuator, race.truth, **bars)
+            self._sure.content = sure_words(track.answer)
+            self._separating = sure.separated_by if sure is not None else None
+            self._try.visible = self._separating is not None
+            self._fit.show(race.time_s, race.measured_A, fitted)

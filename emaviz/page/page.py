@@ -1,0 +1,36 @@
+"""What panels share: the server, the session, the screen's thread, and messages to the user."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import viser
+
+from ema_model.errors import InputError
+from emaviz.session.session import Session
+from emaviz.session.worker import Worker
+
+
+@dataclass(frozen=True)
+class Page:
+    """Handed to every panel."""
+
+    server: viser.ViserServer
+    session: Session
+    screen: Worker  # draws, at a pace that browsers can follow
+
+    def notify(self, title: str, text: str, colour: Any = "red") -> None:
+        """A message in every open browser."""
+        for client in self.server.get_clients().values():
+            client.add_notification(title, text, auto_close_seconds=8.0, color=colour)
+
+    def checked(self, change: Callable[[], Any]) -> bool:
+        """Applies a change of settings; a bad value becomes a message and leaves the old one."""
+        try:
+            change()
+        except InputError as error:
+            self.notify("That does not work", str(error))
+            return False
+        return True

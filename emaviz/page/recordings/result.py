@@ -1,0 +1,83 @@
+"""Recordings' panel on the right: the Rerun viewer in the page, and two recordings on the same axes."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Callable
+from typing import Any
+
+import viser
+
+from emaviz.figures import two_recordings
+from emaviz.page.page import Page
+from emaviz.session.archive import Entry
+
+_CONFIG = {"displayModeBar": False}
+_HINT = '<div style="padding:8px 12px;font-size:13px;opacity:.8">{}</div>'
+
+
+class RecordingsResult:
+    """Called on the files' thread.
+
+    to_front(): makes this panel the one that is seen.
+    """
+
+    def __init__(self, page: Page, panel: viser.PanelHandle, to_front: Callable[[], None]) -> None:
+        self._page, self._to_front = page, to_front
+        self._pair: tuple[tuple[Entry, Any], tuple[Entry, Any]] | None = None
+        self._plot: Any = None
+        self._tab = panel.add_tab("Rerun", viser.Icon.PLAYER_PLAY)
+        gui = page.server.gui
+        with self._tab:
+            self._frame = gui.add_html(_HINT.format("Open a recording on the left."))
+            self._close = gui.add_button("Close the viewer", icon=viser.Icon.X, color="gray", visible=False)
+        with panel.add_tab("Two recordings", viser.Icon.ARROWS_DIFF):
+            self._names = gui.add_html(_HINT.format("Choose two on the left."))
+            self._signal: Any = gui.add_dropdown("Signal", ("current_A",), visible=False)
+            self._place = gui.add_folder("Signals and search", visible=False)
+            self._table = gui.add_html("")
+        self._close.on_click(lambda _: page.screen.post("viewer", self.close_viewer))
+        self._signal.on_update(lambda event: event.client and page.screen.post("two", self._draw))
+
+    def open(self, url: str, name: str) -> None:
+        """The viewer with a recording, in the page."""
+        self._to_front()
+        source = html.escape(url, quote=True)
+        self._frame.content = (
+            f'<div style="padding:0 10px 4px;font-size:12px;overflow-wrap:anywhere"><b>{html.escape(name)}</b> · '
+            f'<a href="{source}" target="_blank" rel="noopener">in a tab of its own ↗</a></div>'
+            f'<iframe class="emaviz-rerun" src="{source}" title="Rerun viewer" '
+            'style="width:100%;height:calc(100vh - 240px);border:0"></iframe>'
+        )
+        self._close.visible = True
+
+    def close_viewer(self) -> None:
+        """Takes the viewer off the page, which frees its memory."""
+        self._frame.content = _HINT.format("Open a recording on the left.")
+        self._close.visible = False
+
+    def compare(self, first: tuple[Entry, Any], second: tuple[Entry, Any]) -> None:
+        """Two recordings, each as an entry and what was read of it."""
+        self._pair = first, second
+        names = two_recordings.signals(first[1], second[1]) or ["current_A"]
+        self._signal.options = names
+        self._signal.value = "current_A" if "current_A" in names else names[0]
+        self._signal.visible = self._place.visible = True
+        self._names.content = _HINT.format(
+            f'<b style="color:{two_recordings.FIRST}">A</b> {html.escape(first[0].name)}<br>'
+            f'<b style="color:{two_recordings.SECOND}">B</b> {html.escape(second[0].name)}'
+        )
+        self._draw()
+        self._table.content = two_recordings.table(first[0], second[0])
+        self._to_front()
+
+    def _draw(self) -> None:
+        if self._pair is None:
+            return
+        (_, first), (_, second) = self._pair
+        figure = two_recordings.figure(first, second, str(self._signal.value))
+        if self._plot is None:
+            with self._place:
+                self._plot = self._page.server.gui.add_plotly(figure, config=_CONFIG, aspect=0.85)
+        else:
+            self._plot.figure = figure

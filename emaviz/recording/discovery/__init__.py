@@ -1,0 +1,1 @@
+"""A discovery told as a recording."""

@@ -1,0 +1,1 @@
+"""The app without a screen: what is open, what is asked for, and the work on the compute thread."""

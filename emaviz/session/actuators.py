@@ -1,0 +1,29 @@
+"""The actuators that one may choose: those that come with the package, and those of the data folder."""
+
+from __future__ import annotations
+
+from importlib import resources
+from pathlib import Path
+
+from ema_model.actuator import Actuator, load_actuator
+from emaviz.session.data_folder import DataFolder
+
+UPLOADED = "uploaded: "  # before the names of those of the data folder
+
+
+def shipped_actuators() -> dict[str, Path]:
+    """The actuator files that come with the package, by the names in them."""
+    inside = resources.files("ema_model") / "assets" / "actuators"
+    folder = Path(str(inside)) if inside.is_dir() else Path(__file__).parents[2] / "assets" / "actuators"
+    return {load_actuator(path).name: path for path in sorted(folder.glob("*.toml"))}
+
+
+def names(folder: DataFolder) -> list[str]:
+    """All of them."""
+    return [*shipped_actuators(), *(UPLOADED + name for name in folder.actuator_files())]
+
+
+def named(name: str, folder: DataFolder) -> Actuator:
+    """One of `names`; InputError for another, or a file that is no actuator."""
+    path = shipped_actuators().get(name)
+    return load_actuator(folder.actuator(name.removeprefix(UPLOADED)) if path is None else path)

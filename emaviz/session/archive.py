@@ -1,0 +1,143 @@
+"""Past recordings: what the folder holds, with settings and results; renamed, deleted, read back."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass, field
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ema_model.errors import InputError
+from ema_model.recordings.refusal import shown
+from emaviz.session.data_folder import sanitised
+
+if TYPE_CHECKING:
+    from emaviz.recording.read import Recording
+
+_ENDING = ".rrd"
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One recording of the folder."""
+
+    name: str
+    at: datetime
+    size_bytes: int
+    settings: dict[str, Any] = field(default_factory=dict)  # of an identification; empty for others
+    found: dict[str, dict[str, Any]] = field(default_factory=dict)  # its answers by algorithm
+    best: str | None = None  # the algorithm to believe
+
+    @property
+    def answer(self) -> dict[str, Any] | None:
+        """The best answer: k, rmse_A, error_percent, evaluations, elapsed_s, healthy, alarms, stopped."""
+        return self.found.get(self.best or "")
+
+
+class Recorded:
+    """The folder of recordings.  Raises InputError, one line, for what is refused.
+
+    Only the names that the folder lists are taken; what a file says of itself is kept until the file changes.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder.resolve()
+        self._known: dict[str, tuple[tuple[int, int], Entry]] = {}
+
+    def names(self) -> list[str]:
+        """Names of the recordings, the newest first."""
+        found = []
+        for one in os.scandir(self.folder):
+            if one.name.endswith(_ENDING) and not one.name.startswith(".") and one.is_file():
+                found.append((-one.stat().st_mtime_ns, one.name))
+        return [name for _, name in sorted(found)]
+
+    def entry(self, name: str) -> Entry:
+        """A recording with its settings and result, as far as it says them."""
+        path = self.path(name)
+        try:
+            status = path.stat()
+        except OSError as error:
+            raise InputError(f"{shown(name)}: cannot be read ({error.strerror})") from None
+        version = status.st_mtime_ns, status.st_size
+        known = self._known.get(name)
+        if known is None or known[0] != version:
+            said = _properties(path)
+            at = datetime.fromtimestamp(status.st_mtime)
+            known = version, Entry(name, at, status.st_size, **said)
+            self._known[name] = known
+        return known[1]
+
+    def read(self, name: str) -> Recording:
+        """Everything in it."""
+        from emaviz.recording import read
+
+        try:
+            return read(self.path(name))
+        except OSError as error:
+            raise InputError(str(error)) from None
+
+    def rename(self, name: str, wanted: Any) -> str:
+        """Gives it another name, made safe, and returns that; a name that is taken is refused."""
+        path = self.path(name)
+        stem = str(wanted).strip().removesuffix(_ENDING)
+        if not stem:
+            raise InputError("a recording needs a name; type one first")
+        new = sanitised(stem + _ENDING)
+        target = self.folder / new
+        if new == name:
+            return name
+        if os.path.lexists(target):
+            raise InputError(f"{shown(new)} exists already; choose another name")
+        try:
+            path.rename(target)
+        except OSError as error:
+            raise InputError(f"{shown(name)}: cannot be renamed ({error.strerror})") from None
+        self._known.pop(name, None)
+        return new
+
+    def delete(self, name: str) -> None:
+        """Removes the file."""
+        try:
+            self.path(name).unlink()
+        except OSError as error:
+            raise InputError(f"{shown(name)}: cannot be deleted ({error.strerror})") from None
+        self._known.pop(name, None)
+
+    def path(self, name: str) -> Path:
+        """Where it is; refused unless the folder itself lists it."""
+        path = self.folder / name
+        if Path(name).name != name or not name.endswith(_ENDING) or not path.is_file() or path.is_symlink():
+            raise InputError(f"{shown(name)}: no such recording; choose one of the list")
+        return path
+
+
+def _properties(path: Path) -> dict[str, Any]:
+    """Settings, answers and the best of an identification; nothing of other or damaged files."""
+    try:
+        from emaviz.recording.read import properties
+
+        said = properties(path)
+    except (OSError, ImportError):
+        return {}
+    settings, found, best = said.get("settings"), said.get("found"), said.get("best")
+    if not (isinstance(settings, dict) and isinstance(found, dict) and isinstance(best, str)):
+        return {}
+    return {"settings": settings, "found": found, "best": best}
+
+
+def as_text(value: Any) -> str:
+    """A setting as a person reads it."""
+    return value if isinstance(value, str) else json.dumps(value)
+
+
+def recovered(recordings: Path) -> list[str]:
+    """What became of recordings of interrupted runs, a line each."""
+    try:
+        from emaviz.recording.recover import recover
+
+        return [f"Recovered a recording of an interrupted run: {found}" for found in recover(recordings)]
+    except (OSError, ImportError) as error:
+        return [f"Interrupted recordings cannot be recovered: {error}"]

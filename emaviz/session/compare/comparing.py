@@ -1,0 +1,301 @@
+"""The session's part of Compare: files in, their mapping, and comparisons on the compute thread."""
+
+from __future__ import annotations
+
+import threading
+import time
+import traceback
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from ema_model.actuator import Actuator
+from ema_model.comparison.result import Comparison
+from ema_model.errors import InputError
+from ema_model.quantities.titles import in_sentence
+from ema_model.recordings import (
+    SIGNALS,
+    ColumnMapping,
+    Measurement,
+    can_have_current,
+    guess_mapping,
+    read_columns,
+    write_side_file,
+)
+from ema_model.recordings.read import usual_mapping
+from ema_model.recordings.refusal import shown
+from ema_model.recordings.side_file.read import SideFile
+from emaviz.session import actuators as actuator_files
+from emaviz.session.compare.keep import keep
+from emaviz.session.data_folder import DataFolder
+from emaviz.session.events import notify
+from emaviz.session.opened import Opened, measured, side_file_of
+from emaviz.session.session import Session
+from emaviz.session.settings import number
+from emaviz.session.worker import Steps, Worker
+
+MOST_RECORDINGS = 20
+# By their names on a rotary axis.  The speed is mostly the position's difference, so it is not fitted unless asked for.
+COMPARABLE = ("current_A", "motor_position_rad", "user_position_rad", "motor_speed_rad_s")
+USUAL = {name: 1.0 for name in COMPARABLE[:3]}
+_MOST_WEIGHT = 1e3
+
+
+@dataclass
+class CompareEvents:
+    """What the screen listens to; called on the threads that work, so listeners only hand over."""
+
+    opened: list[Callable[[Opened], None]] = field(default_factory=list)  # also when mapped anew
+    removed: list[Callable[[], None]] = field(default_factory=list)
+    progressed: list[Callable[[str], None]] = field(default_factory=list)
+    compared: list[Callable[[Comparison, float], None]] = field(default_factory=list)  # and how long it took, s
+    ended: list[Callable[[str], None]] = field(default_factory=list)  # a comparison without a result: why
+    kept: list[Callable[[Path], None]] = field(default_factory=list)  # a report or a recording is written
+
+
+class Stopped(Exception):
+    """The user has stopped the comparison."""
+
+
+class Comparing:
+    """The chosen recordings, what is asked of the comparison, and the last one."""
+
+    def __init__(self, session: Session, folder: DataFolder) -> None:
+        self.session = session
+        self.folder = folder
+        self.events = CompareEvents()
+        self.opened: dict[str, Opened] = {}
+        self.comparison: Comparison | None = None
+        self.actuator_name = ""
+        self.actuator: Actuator = session.actuator
+        self.calibrate = True
+        self.free: set[str] = set()
+        self.weights: dict[str, float] = dict(USUAL)  # of the signals to fit
+        self.window_s: tuple[float, float] | None = None
+        self.running = False
+        self._stop = threading.Event()
+        # Reading a large file takes seconds, in which the sliders of the other tabs shall answer.
+        self._files = Worker("emaviz-files", self._on_error)
+        self._use(session.actuator)
+
+    def close(self) -> None:
+        """Ends the threads."""
+        self._stop.set()
+        self._files.close()
+
+    # --- files ------------------------------------------------------------------------------------------------------
+
+    def add(self, name: str) -> None:
+        """Opens a file of the data folder soon; what is wrong with it is told."""
+        self._files.post(f"open {name}", lambda: self._open(name))
+
+    def remove(self, name: str) -> None:
+        """Takes a recording off the list; its file stays."""
+        self.opened.pop(name, None)
+        notify(self.events.removed)
+
+    def use_mapping(self, name: str, mapping: ColumnMapping) -> None:
+        """Reads the file with this mapping soon, and remembers it in the side file."""
+        self._files.post(f"map {name}", lambda: self._map(name, mapping))
+
+    def _open(self, name: str) -> None:
+        path = self.folder.measurement(name)
+        if name not in self.opened and len(self.opened) >= MOST_RECORDINGS:
+            raise InputError(f"{MOST_RECORDINGS} recordings are the most to compare at once; remove one first")
+        columns = read_columns(path)
+        side = side_file_of(path, self.folder)
+        refused = self._take_actuator(side) if side is not None else None
+        of_actuator = usual_mapping(self.actuator, columns)
+        if side is not None or set(columns) <= set(SIGNALS) or of_actuator.entries:
+            mapping = (side.mapping if side else None) or of_actuator
+            table = Opened(name, path, columns, mapping if mapping.entries else guess_mapping(columns))
+            self._opened(measured(table, self.actuator))
+        else:
+            self._opened(Opened(name, path, columns, guess_mapping(columns)))
+        if refused is not None:
+            raise refused  # told once the recording is there all the same
+
+    def _map(self, name: str, mapping: ColumnMapping) -> None:
+        opened = self.opened.get(name)
+        if opened is None:
+            return
+        beside = self.folder.beside(opened.path)
+        side = replace(side_file_of(opened.path, self.folder) or SideFile(), mapping=mapping, path=str(beside))
+        self._opened(measured(replace(opened, mapping=mapping), self.actuator, side))
+        write_side_file(side, beside)  # last, so that nothing wrong is remembered
+
+    def _opened(self, opened: Opened) -> None:
+        self.opened[opened.name] = opened
+        notify(self.events.opened, opened)
+
+    def _take_actuator(self, side: SideFile) -> InputError | None:
+        """Takes the actuator that a side file names, if the data folder holds it; else why not."""
+        if side.actuator_path is None:
+            return None
+        try:
+            if not self.folder.holds(Path(side.actuator_path)):
+                named = shown(side.actuator, 100)
+                raise InputError(f"{named}: the side file names an actuator outside the data folder; upload it")
+            self.choose_actuator(f"{actuator_files.UPLOADED}{self.folder.name_of(Path(side.actuator_path))}")
+        except InputError as error:
+            return error
+        return None
+
+    # --- what is asked ----------------------------------------------------------------------------------------------
+
+    def actuators(self) -> list[str]:
+        """The actuator that the app was started with, those that come with it, and the uploaded ones."""
+        return list(dict.fromkeys([self.session.actuator.name, *actuator_files.names(self.folder)]))
+
+    def choose_actuator(self, name: Any) -> None:
+        """One of `actuators`; InputError for another, or a file that is no actuator."""
+        own = self.session.actuator
+        chosen = own if name == own.name else actuator_files.named(str(name), self.folder)
+        self._use(chosen)
+        self.actuator_name = str(name)
+        for opened in list(self.opened.values()):
+            if opened.measurement is None and usual_mapping(chosen, opened.columns).entries:
+                self.add(opened.name)  # this actuator's file knows their columns
+
+    def _use(self, actuator: Actuator) -> None:
+        self.actuator = actuator
+        self.actuator_name = actuator.name
+        self.free = _freed(actuator)
+
+    def set_free(self, path: str, free: bool) -> None:
+        """Whether a calibration may move a parameter of the actuator."""
+        if path not in self.actuator.tolerances:
+            raise InputError(f"{path[:60]}: the actuator's file gives it no tolerance, so it cannot be calibrated")
+        self.free = self.free | {path} if free else self.free - {path}
+
+    def set_weight(self, name: str, weight: Any) -> None:
+        """How much a signal counts in the calibration, 1 as its floor says; 0 leaves it out."""
+        if name not in COMPARABLE:
+            raise InputError(f"{name[:60]} is not compared; choose of {', '.join(COMPARABLE)}")
+        value = number(weight, f"the weight of the {in_sentence(SIGNALS[name].title)}")
+        if not 0.0 <= value <= _MOST_WEIGHT:
+            raise InputError(f"the weight of a signal must lie between 0 and {_MOST_WEIGHT:g}, not {value:g}")
+        others = {other: w for other, w in self.weights.items() if other != name}
+        self.weights = others | {name: value} if value else others
+
+    def set_window(self, start: Any, stop: Any) -> None:
+        """The time to compare, s; InputError unless it starts before it ends."""
+        first, last = number(start, "the window's start"), number(stop, "the window's end")
+        if not first < last:
+            raise InputError(f"the window must start before it ends: from {first:g} s to {last:g} s is none")
+        self.window_s = (first, last)
+
+    def signals_available(self) -> list[str]:
+        """Those of `COMPARABLE` that every recording has, or can be given."""
+        measurements = [o.measurement for o in self.opened.values() if o.measurement is not None]
+
+        def has(measurement: Measurement, name: str) -> bool:
+            if name == "current_A" and can_have_current(measurement):
+                return True
+            return self.actuator.axes.signal(name) in measurement
+
+        return [name for name in COMPARABLE if measurements and all(has(m, name) for m in measurements)]
+
+    # --- comparison -------------------------------------------------------------------------------------------------
+
+    def compare(self) -> bool:
+        """Begins a comparison of what is chosen; False while another long run goes on.
+
+        Raises InputError when something is missing.
+        """
+        waiting = [o.name for o in self.opened.values() if o.measurement is None]
+        if waiting:
+            raise InputError(f"{waiting[0]}: its columns are not mapped yet; check them and press Use")
+        measurements = [o.measurement for o in self.opened.values() if o.measurement is not None]
+        if not measurements:
+            raise InputError("no recording is chosen; upload one, or choose one of the data folder")
+        if not self.weights:
+            wanted = ", ".join(in_sentence(SIGNALS[name].title) for name in COMPARABLE)
+            raise InputError(f"no signal to fit is chosen; choose one or more of {wanted}")
+        if self.calibrate and not self.free:
+            raise InputError("calibration is on, but no parameter may move; free one, or turn it off")
+        if self.window_s is not None:
+            measurements = [m.selected(self.window_s) for m in measurements]
+        stop = threading.Event()
+        started = self.session.worker.start(self._steps(measurements, self._asked(), stop))
+        if started:
+            self._stop, self.running = stop, True
+        return started
+
+    def stop(self) -> None:
+        """Ends the comparison soon, without a result."""
+        self._stop.set()
+
+    def _asked(self) -> dict[str, Any]:
+        """What `compare` is asked beside the recordings; None stands for what the actuator's file says."""
+        chosen = {self.actuator.axes.signal(name): w for name, w in self.weights.items()}
+        return {
+            "actuator": self.actuator,
+            "calibrate": self.calibrate,
+            "free": None if self.free == _freed(self.actuator) else sorted(self.free),
+            "signals": None if self.weights == USUAL else chosen,
+        }
+
+    def _steps(self, measurements: Sequence[Measurement], asked: dict[str, Any], stop: threading.Event) -> Steps:
+        started = time.perf_counter()
+
+        def progress(text: str) -> None:
+            if stop.is_set():
+                raise Stopped
+            notify(self.events.progressed, text)
+            self.session.worker.breathe()  # the sliders of the other tabs
+
+        yield
+        try:
+            from ema_model.comparison import compare  # here, since it brings all of scipy's optimisers
+
+            comparison = compare(measurements, **asked, on_progress=progress)
+        except Stopped:
+            self._end(lambda: notify(self.events.ended, "Stopped."))
+            return
+        except Exception as error:
+            self._end(lambda: notify(self.events.ended, ""))
+            if isinstance(error, FloatingPointError):
+                raise InputError(f"{error}; check the actuator's file and the recording's units") from None
+            raise
+        elapsed_s = time.perf_counter() - started
+        self.comparison = comparison
+        self._end(lambda: notify(self.events.compared, comparison, elapsed_s))
+
+    # --- what stays -------------------------------------------------------------------------------------------------
+
+    def save_report(self) -> None:
+        """Writes the last comparison as an HTML report into the data folder, soon."""
+        self._files.post("report", lambda: self._keep(".html"))
+
+    def record(self) -> None:
+        """Writes the last comparison as a recording for Rerun into the data folder, soon."""
+        self._files.post("record", lambda: self._keep(".rrd"))
+
+    def _keep(self, suffix: str) -> None:
+        comparison = self.comparison
+        if comparison is None:
+            raise InputError("nothing is compared yet; press Compare first")
+        notify(self.events.kept, keep(comparison, self.folder, suffix))
+
+    def _end(self, tell: Callable[[], None]) -> None:
+        """Tells the end once the compute thread is free, so that a listener may start the next run."""
+
+        def ended() -> None:
+            self.running = False
+            tell()
+
+        self.session.worker.post("comparison's end", ended)
+
+    def _on_error(self, error: BaseException) -> None:
+        if isinstance(error, InputError):
+            line = str(error).replace(f"{self.folder.folder}/", "")  # the page knows its files by their names there
+            notify(self.session.events.told, "That does not work", line)
+            return
+        traceback.print_exception(error)
+        notify(self.session.events.told, "Something failed; the app goes on", f"{type(error).__name__}: {error}")
+
+
+def _freed(actuator: Actuator) -> set[str]:
+    return {path for path, tolerance in actuator.tolerances.items() if tolerance.free}

@@ -1,0 +1,307 @@
+"""The session's part of Discover: which recordings, the story so far, and its steps on the compute thread."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from ema_model.discovery import Candidate, begun, walk
+from ema_model.discovery.next_test import next_experiment
+from ema_model.discovery.refit import Trial
+from ema_model.discovery.result import Experiment
+from ema_model.discovery.unknown import curve_for
+from ema_model.effects import CATALOGUE, find
+from ema_model.effects.user import UserEffect
+from ema_model.errors import InputError
+from ema_model.quantities.titles import in_sentence
+from emaviz.session.compare.comparing import Comparing
+from emaviz.session.discover.keep import keep
+from emaviz.session.discover.look import Look
+from emaviz.session.discover.own_effect import OwnPreview
+from emaviz.session.discover.progress import Telling
+from emaviz.session.discover.record import checked, experiment_of, take_again
+from emaviz.session.discover.refits import check_value, undecided
+from emaviz.session.discover.run import DiscoverEvents, DiscoveryRun, Tell
+from emaviz.session.discover.sealing import Sealing
+from emaviz.session.discover.source import NOTHING, DiscoverySource, files_of
+from emaviz.session.events import notify
+from emaviz.session.session import Session
+from emaviz.session.worker import Worker
+
+
+class Discovering:
+    """A story, told in steps; one step runs at a time, and a stopped one leaves the story as it was."""
+
+    def __init__(self, session: Session, comparing: Comparing) -> None:
+        self.session, self.comparing = session, comparing
+        self.folder = comparing.folder
+        self.events = DiscoverEvents()
+        self.source = DiscoverySource(comparing)
+        self.sealing = Sealing(session, comparing.folder)
+        self.look: Look | None = None
+        self.run = DiscoveryRun(session, self.events, self._stopped)
+        self._told: Telling | None = None
+        self._restoring: dict[str, Any] | None = None  # what a session brought, until its steps are taken again
+        self._own = OwnPreview()
+        self._files = Worker("emaviz-discovery-files", comparing._on_error)
+
+    def close(self) -> None:
+        """Ends the threads."""
+        self.run.stop()
+        self._files.close()
+
+    # --- what is asked ----------------------------------------------------------------------------------------------
+
+    @property
+    def running(self) -> bool:
+        """Whether a step runs."""
+        return self.run.running
+
+    def choose(self, name: str) -> None:
+        """A challenge by its name, or Compare's recordings with any other; the story so far is put away."""
+        if self.running:
+            raise InputError("a step is running; stop it first")
+        self.run.stop()  # one that waits to begin
+        self.source.choose(name)
+        self._told = self.look = self._restoring = None
+        notify(self.events.looked, None)
+
+    # --- steps ------------------------------------------------------------------------------------------------------
+
+    def start(self) -> bool:
+        """Calibrates the model, and looks for what may be missing; False while another long run goes on."""
+        if not self.source.ready:
+            raise InputError(NOTHING)
+
+        def job(tell: Tell) -> None:
+            told = self._begin(self.source.recipe(), tell)
+            self._restoring = None  # what a session brought is put away
+            self._assess(told, tell)
+            while told.take_faults(tell):
+                self._assess(told, tell)
+
+        return self.run.begin("Calibrating the model", job)
+
+    def add(self, name: str) -> bool:
+        """The best of that effect into the model, refitted; then looks again."""
+        told, look = self._seen()
+        candidate = look.candidate(name)
+        if candidate is None:
+            raise InputError(f"{name[:60]}: no candidate; choose a card")
+        return self._add(candidate, told, look)
+
+    def add_own(self, effect: UserEffect, start: Mapping[str, float]) -> bool:
+        """A user's own torque into the model, its parameters fitted from these values."""
+        told, look = self._seen()
+        if any(one.key == effect.name for one in look.added):
+            raise InputError("this expression is in the model already; remove it there, or change it")
+        return self._add(Candidate(effect.name, 0.0, effect.settings(dict(start))), told, look)
+
+    def _add(self, candidate: Candidate, told: Telling, look: Look) -> bool:
+        alike = look.assessment.alike.get(candidate.name, ()) if look.assessment else ()
+
+        def job(tell: Tell) -> None:
+            tell("fitting; a combination of effects is compiled on its first use, which takes some seconds")
+            trial = told.trials.of(told.story, candidate, tell)
+            if candidate.name not in CATALOGUE:
+                trial = told.trials.followed(told.story, trial, tell)
+            self._take(told, trial, alike, tell)
+
+        return self.run.begin(f"Adding {in_sentence(find(candidate.name).title)}", job)
+
+    def preview_own(self, effect: UserEffect, settings: Mapping[str, float]) -> None:
+        """Tells soon what a user's torque with these values would change; of several requests the last one counts."""
+
+        def job() -> None:
+            told, look = self._told, self.look
+            if told is None or look is None or look.steps != len(told.story.steps) or look.assessment is None:
+                return
+            try:
+                notify(self.events.previewed, self._own.of(told.story, look, effect, settings))
+            except (InputError, FloatingPointError) as error:
+                notify(self.events.unpreviewed, str(error))
+
+        self.session.worker.post("own torque", job)
+
+    def add_curve(self) -> bool:
+        """What is left as a torque curve over the variable that explains it best."""
+        told, look = self._seen()
+        story, left = told.story, look.assessment.left.explanation if look.assessment else None
+        if left is None:
+            raise InputError("no variable explains what is left, so that there is no curve to add")
+
+        def job(tell: Tell) -> None:
+            trial = curve_for(story.data, story.held, story.current, left, tell)
+            if trial is None:
+                raise InputError("a torque curve does not pay here: the error would not fall, or only by chance")
+            self._take(told, trial, (), tell)
+
+        return self.run.begin("Adding the curve", job)
+
+    def remove(self, key: str) -> bool:
+        """One of the added effects out of the model again, refitted."""
+        told, look = self._seen()
+        if all(one.key != key for one in look.added):
+            raise InputError(f"{key[:60]} is not in the model")
+
+        def job(tell: Tell) -> None:
+            tell("fitting without it")
+            smaller = told.story.without(key, tell)
+            tell("measuring the new model's error")
+            told.story.remove(key, smaller)
+            self._assess(told, tell)
+
+        return self.run.begin(f"Removing {in_sentence(find(key).title)}", job)
+
+    def find_all(self) -> bool:
+        """Adds what pays, a step after another, as `emaviz discover` does."""
+        told, _ = self._seen()
+
+        def job(tell: Tell) -> None:
+            def say(text: str) -> None:
+                tell(text)
+                if self.look is None or self.look.steps != len(told.story.steps):
+                    self._show(told)  # a step further: the ladder grows
+
+            walk(told.story, say)
+            self._assess(told, tell)
+
+        return self.run.begin("Finding all that is missing", job)
+
+    def undo(self) -> None:
+        """The last step back, at once."""
+        told, _ = self._seen()
+        if not told.story.undo():
+            raise InputError("there is no step to take back")
+        self._show(told)
+        if not told.is_assessed:  # of a walk that went on at once
+            self.run.begin("Looking again", lambda tell: self._assess(told, tell))
+
+    @property
+    def experiment(self) -> Experiment | None:
+        """The test that was suggested last."""
+        return None if self._told is None else self._told.experiment
+
+    def suggest(self) -> bool:
+        """Looks for the test that tells the best candidates apart."""
+        told, _ = self._seen()
+        found = undecided(told.story, told.known)
+        if found is None:
+            raise InputError("there were no two candidates between which a test would have to decide")
+        base, pair = found
+
+        def job(tell: Tell) -> None:
+            trials: list[Trial] = []
+            for one in pair:
+                tell(f"fitting {in_sentence(find(one.name).title)}")
+                trials.append(told.trials.of(base, one, tell))
+            tell("simulating the tests that the actuator allows")
+            told.experiment = next_experiment(base.data, trials[0].fit, trials[1].fit)
+            self._show(told)
+            if told.experiment is None:
+                notify(self.events.unsuggested)
+
+        return self.run.begin("Looking for the best next test", job)
+
+    def stop(self) -> None:
+        """Ends the step that runs, as soon as its present simulation is done; the story stays as it was."""
+        self.run.stop()
+
+    # --- on the compute thread --------------------------------------------------------------------------------------
+
+    def _stopped(self) -> str:
+        told, look = self._told, self.look
+        if told is not None and (look is None or look.steps != len(told.story.steps)):
+            self._show(told)  # what was added before it was stopped
+        return "Stopped; the model is as the ladder shows it." if told else "Stopped."
+
+    def _begin(self, recipe: Mapping[str, Any], tell: Tell) -> Telling:
+        tell("reading")
+        given = self.source.read(recipe)
+        told = Telling(begun(given.fitted, given.actuator, given.held, given.signals, tell), recipe)
+        self._told, self.look, self.source.revealed = told, None, False
+        return told
+
+    def _take(self, told: Telling, trial: Trial, alike: Sequence[str], tell: Tell) -> None:
+        check_value(trial)
+        tell("measuring the new model's error")  # the last moment to stop
+        told.add(trial, alike)
+        self._assess(told, tell)
+
+    def _assess(self, told: Telling, tell: Tell) -> None:
+        """Shows the model as it is now, then what may be missing from it."""
+        self._show(told)
+        if not told.is_assessed:
+            tell("looking at what is left; the library of effects is compiled on its first use")
+            told.assess()
+            self._show(told)
+
+    def _show(self, told: Telling) -> None:
+        self.look = told.look()
+        notify(self.events.looked, self.look)
+
+    def _seen(self) -> tuple[Telling, Look]:
+        if self.running:
+            raise InputError("a step is running; wait for it, or stop it")
+        if self.look is None or self._told is None:
+            raise InputError("there is no calibrated model yet; press Start")
+        return self._told, self.look
+
+    # --- a session --------------------------------------------------------------------------------------------------
+
+    def saved(self) -> dict[str, Any] | None:
+        """The story as it stands, or the session's whose steps are still to be taken again; None without one.
+
+        In what JSON can hold.
+        """
+        if self._restoring is not None:
+            return self._restoring
+        return None if self._told is None else {**self._told.saved(), "revealed": self.source.revealed}
+
+    def files(self) -> list[str]:
+        """Names in the data folder of what the saved story is of."""
+        saved = self.saved()
+        return [] if saved is None else files_of(saved["recipe"])
+
+    def restore(self, saved: Any, names: Mapping[str, str]) -> None:
+        """Takes the steps of a session's story again, once no other long run goes on; InputError if it is none.
+
+        names: the files' names of now by those of then.
+        """
+        if self.running:
+            raise InputError("a step of Discover is running; stop it, and load the session again")
+        if saved is None:
+            return self.choose("")
+        if not isinstance(saved, dict) or not isinstance(saved.get("recipe"), dict):
+            raise InputError("the session's part of Discover is damaged; save it anew")
+        steps, experiment = checked(saved.get("steps")), experiment_of(saved.get("experiment"))
+        recipe = self.source.take(saved["recipe"], names)
+        self._told = self.look = None
+        self._restoring = {**saved, "recipe": dict(recipe)}
+        notify(self.events.looked, None)
+
+        def job(tell: Tell) -> None:
+            try:
+                told = self._begin(recipe, tell)
+                self._assess(told, tell)  # the first step's cards are what the report ranks
+                take_again(told.story, steps, tell, lambda: self._show(told))
+                told.experiment, self.source.revealed = experiment, bool(saved.get("revealed"))
+            finally:
+                self._restoring = None
+            self._assess(told, tell)
+
+        wanted = {*recipe.get("fitted", ()), *recipe.get("held", ())}
+        self.run.begin_when_free(
+            "Taking the session's steps again", job, lambda: wanted <= self.comparing.opened.keys()
+        )
+
+    # --- what stays -------------------------------------------------------------------------------------------------
+
+    def keep(self, suffix: str) -> None:
+        """Writes the report (.html), the recording (.rrd) or the improved model (.toml) into the data folder, soon."""
+        self._files.post(f"keep {suffix}", lambda: self._keep(suffix))
+
+    def _keep(self, suffix: str) -> None:
+        if self.look is None:
+            raise InputError("nothing is discovered yet; press Start first")
+        notify(self.events.kept, keep(self.look, self.folder, suffix))

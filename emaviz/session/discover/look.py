@@ -1,0 +1,158 @@
+"""What the page shows of a discovery at one moment: the model so far, what it leaves, and what may be missing."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ema_model.comparison.assemble import residuals_of
+from ema_model.comparison.residuals import Residuals
+from ema_model.comparison.result import Explanation
+from ema_model.discovery import Candidate, Discovery, Story
+from ema_model.discovery.path import alike
+from ema_model.discovery.refit import LEAST_BIC
+from ema_model.discovery.remaining import Left
+from ema_model.discovery.result import Added
+from ema_model.effects import find
+from emaviz.figures.discovery_tracks import primary
+
+Array = NDArray[np.float64]
+
+AT_FLOOR = 1.1  # times the floor, from which on there is little left to find
+_RIVAL = 25.0  # of χ², below which an effect is too faint to be taken for another
+_TO_90 = 1.645  # σ, of a 90 % interval
+
+
+@dataclass(frozen=True, eq=False)
+class Assessment:
+    """What a model leaves and what may be missing; it belongs to one step of a story."""
+
+    left: Left
+    candidates: Sequence[Candidate]
+    signatures: Mapping[str, Array]  # (values,) over the floor
+    alike: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """A story as it stands.  Without an assessment, the candidates are still being scored."""
+
+    found: Discovery
+    added: tuple[Added, ...]
+    steps: int
+    counts: Array  # (blocks,), how much each counts in the ladder's means
+    residuals: Residuals
+    weights: Sequence[Mapping[str, float]]  # of the fitted signals in each window, over the floor's σ
+    sigmas: Sequence[Mapping[str, Array]]
+    assessment: Assessment | None = None
+    reach: tuple[str, ...] = ()  # names of recordings: fitted
+    held: tuple[str, ...] = ()  # and held out
+    explained_before: Sequence[Explanation] = ()  # the calibrated model's residual, before any step
+
+    @property
+    def rmse(self) -> float:
+        """Error of the last model, in floors."""
+        return self.found.ladder[-1].rmse
+
+    @property
+    def promising(self) -> list[Candidate]:
+        """Candidates that are worth a refit, the best first."""
+        if self.assessment is None:
+            return []
+        return [one for one in self.assessment.candidates if not one.untestable_reason and self.is_worth(one)]
+
+    def candidate(self, name: str) -> Candidate | None:
+        """The candidate of that name."""
+        known = self.assessment.candidates if self.assessment else ()
+        return next((one for one in known if one.name == name), None)
+
+    @staticmethod
+    def is_worth(one: Candidate) -> bool:
+        """Whether so much would hardly be chance."""
+        return one.predicted_drop > LEAST_BIC
+
+    def predicted_rmse(self, one: Candidate) -> float:
+        """The error with a candidate in the model, in floors, before any refit."""
+        return min(self.error_with(one), self.rmse)
+
+    def error_with(self, one: Candidate) -> float:
+        """The same of a candidate that may make it worse."""
+        squared, counted = 0.0, 0.0
+        for signal in self.weights[0]:
+            left, change = self.residuals.values.get(signal), self.change(one, signal)
+            if left is None or change is None or len(left) != len(change):
+                return self.rmse
+            squared += float(np.sum(self.counts * ((left - change) / self.residuals.sigma[signal]) ** 2))
+            counted += float(np.sum(self.counts))
+        return math.sqrt(squared / counted) if counted else self.rmse
+
+    def share(self, one: Candidate) -> float:
+        """Of the error, that a candidate would take away, 0 … 1."""
+        return max(0.0, 1.0 - self.predicted_rmse(one) / self.rmse) if self.rmse > 0.0 else 0.0
+
+    def uncertainty(self, one: Candidate) -> float | None:
+        """Half of the 90 % interval of the first parameter; None where that is no strength.
+
+        A strength that explains d of χ² is known to 1/√d of itself.
+        """
+        first = find(one.name).parameters[0]
+        if first.low > 0.0 or one.predicted_drop <= 0.0:
+            return None
+        return _TO_90 * abs(one.settings[first.name]) / math.sqrt(one.predicted_drop)
+
+    @property
+    def primary(self) -> str:
+        """The signal whose residual tells most."""
+        return primary(self.found)
+
+    def change(self, one: Candidate, signal: str) -> Array | None:
+        """What a candidate would change in a signal, (blocks,) beside `residuals`, in the signal's unit."""
+        whole = self.assessment.signatures.get(one.name) if self.assessment else None
+        if whole is None:
+            return None
+        parts, at = [], 0
+        for weights, sigmas in zip(self.weights, self.sigmas):
+            for name, weight in weights.items():
+                blocks = len(sigmas[name])
+                if name == signal:
+                    parts.append(whole[at : at + blocks] * sigmas[name] / weight)
+                at += blocks
+        return np.concatenate(parts) if parts else None
+
+
+def assessed(story: Story) -> Assessment:
+    """What the last model of a story leaves; takes a second, and the first time a compilation."""
+    left = story.left()
+    ranked = story.ranked(None, left)
+    worth = [one for one in ranked if not one.untestable_reason]
+    signatures = story.signatures(worth)
+    rivals = {one.name: signatures[one.name] for one in worth if one.predicted_drop > _RIVAL and one.name in signatures}
+    return Assessment(left, ranked, signatures, alike(rivals))
+
+
+def look_at(story: Story, found: Discovery, assessment: Assessment | None, first: Assessment | None = None) -> Look:
+    """A picture of a story that later steps leave as it is; first: of its calibrated model."""
+    fit, data = story.current, story.data
+    known: list[dict[str, Array]] = [{} for _ in fit.plant.windows]
+    weights, sigmas = [], []
+    for window, one in zip(fit.plant.windows, data.floors):
+        names = [name for name in data.signals if name in window.measured]
+        weights.append({name: data.signals[name] for name in names})
+        sigmas.append({name: np.broadcast_to(one.fit_sigma(name), (window.blocks,)) for name in names})
+    return Look(
+        found=found,
+        added=story.added,
+        steps=len(story.steps),
+        counts=np.concatenate([one.counts for one in data.floors]),
+        residuals=residuals_of(fit.plant, data.floors, fit.calibration.signals, known, fit.calibration.actuator),
+        weights=weights,
+        sigmas=sigmas,
+        assessment=assessment,
+        reach=tuple(one.name for one in data.measurements),
+        held=() if story.held is None else tuple(one.name for one in story.held.measurements),
+        explained_before=first.left.explained if first is not None else (),
+    )

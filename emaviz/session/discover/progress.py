@@ -1,0 +1,78 @@
+"""A story and all that belongs to it: what is known of its steps, what it was made from, how it is written down."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from ema_model.comparison.result import Explanation
+from ema_model.discovery import Candidate, Story, result_of
+from ema_model.discovery.path import Step, with_drops
+from ema_model.discovery.refit import Trial, promising
+from ema_model.discovery.result import Experiment
+from ema_model.effects import CATALOGUE
+from emaviz.session.discover.look import Assessment, Look, assessed, look_at
+from emaviz.session.discover.record import experiment_saved, steps_of
+from emaviz.session.discover.refits import Trials
+
+_SHARE, _MOST = 0.25, 3  # of the best effect's score, and how many effects are refitted to compare a fault with
+
+
+@dataclass(eq=False)
+class Telling:
+    """One story as it is told on the page."""
+
+    story: Story
+    recipe: Mapping[str, Any]  # of its recordings: see `DiscoverySource.read`
+    known: dict[Step, Assessment] = field(default_factory=dict)  # so that a step back is at once
+    trials: Trials = field(default_factory=Trials)  # so that nothing is fitted twice
+    first: Sequence[Candidate] = ()  # of the first search, with what their refits gave
+    experiment: Experiment | None = None
+
+    @property
+    def is_assessed(self) -> bool:
+        """Whether it is known what may be missing from the last model."""
+        return self.story.steps[-1] in self.known
+
+    def assess(self) -> None:
+        """Looks at what the last model leaves; takes a second, and the first time a compilation."""
+        found = self.known[self.story.steps[-1]] = assessed(self.story)
+        self.first = self.first or found.candidates
+
+    def take_faults(self, tell: Callable[[str], None]) -> bool:
+        """Takes the actuator's fault into the model that tells more than any effect would; False if there is none."""
+        story, ranked = self.story, self.known[self.story.steps[-1]].candidates
+        fault = story.fault(ranked, lambda: self._refitted(ranked, tell), tell)
+        if fault:
+            story.add(fault)
+            self.first = ()  # what was ranked was ranked without it
+        return fault is not None
+
+    def _refitted(self, ranked: Sequence[Candidate], tell: Callable[[str], None]) -> list[Trial]:
+        """The most promising of the last model's candidates; what is added of them later is fitted already."""
+        return [self.trials.of(self.story, one, tell) for one in promising(self.story.current, ranked, _SHARE, _MOST)]
+
+    def add(self, trial: Trial, alike: Sequence[str]) -> None:
+        """Takes a trial for the next model; alike: effects that cannot be told from it."""
+        self.story.add(trial, ties=alike)
+        if self.first and trial.candidate.predicted_drop:
+            self.first = with_drops(self.first, [trial])
+
+    def look(self) -> Look:
+        """A picture of the story as it stands."""
+        story, known = self.story, self.known
+        found = result_of(story, self.first, self._unknown(), self.experiment)
+        return look_at(story, found, known.get(story.steps[-1]), known.get(story.steps[0]))
+
+    def _unknown(self) -> Explanation | None:
+        """What is left by the last model; with a torque of no name in it, what that one stands in for."""
+        steps = self.story.steps
+        nameless = (i for i, step in enumerate(steps) if any(one.name not in CATALOGUE for one in step.added))
+        known = self.known.get(steps[next(nameless, len(steps)) - 1])
+        return known.left.explanation if known is not None else None
+
+    def saved(self) -> dict[str, Any]:
+        """The steps, and what they were made from, in what JSON can hold."""
+        experiment = experiment_saved(self.experiment)
+        return {"recipe": dict(self.recipe), "steps": steps_of(self.story), "experiment": experiment}

@@ -1,0 +1,132 @@
+"""The session's part of the Library: a run with an effect beside the same run without, on the compute thread."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ema_model.commands import command
+from ema_model.discovery.fingerprints import off
+from ema_model.effects import CATALOGUE, find
+from ema_model.errors import InputError
+from ema_model.quantities.titles import in_sentence
+from ema_model.recordings import Measurement
+from ema_model.simulation.run import Run, simulate_monitor
+from emaviz.session.session import Session
+from emaviz.session.worker import Steps
+
+RUNS: dict[str, Run] = {
+    "sine of 3 Hz": Run(command("sine", {"amplitude_rad": 0.03, "frequency_Hz": 3.0}), 0.5),
+    "sine of 3 Hz, loaded": Run(command("sine", {"amplitude_rad": 0.03, "frequency_Hz": 3.0}), 0.5, 10_000.0, 200.0),
+    "step": Run(command("step", {"final_rad": 0.005}), 0.2),
+    "chirp": Run(command("chirp"), 0.5),
+}
+
+
+SHOWN = ("current_A", "user_position_rad", "motor_speed_rad_s")
+_LEAST = 1e-3  # of a signal's range, rms
+
+
+@dataclass(frozen=True, eq=False)
+class Felt:
+    """What an effect does in a run."""
+
+    name: str
+    run: str
+    settings: Mapping[str, float]
+    with_it: Measurement
+    without: Measurement
+
+    def change(self, name: str) -> tuple[float, NDArray[np.float64]]:
+        """What changes in a signal, (samples,), and its rms as a share of the signal's range; 0 for next to nothing."""
+        change = self.with_it[name] - self.without[name]
+        share = float(np.sqrt(np.mean(change**2))) / (float(np.ptp(self.without[name])) or 1.0)
+        return (share if share > _LEAST else 0.0), change
+
+    @property
+    def shows(self) -> str:
+        """The signal that shows it most."""
+        return max(SHOWN, key=lambda name: self.change(name)[0])
+
+    @property
+    def visibility(self) -> float:
+        """How much of that signal's range changes, rms."""
+        return self.change(self.shows)[0]
+
+
+@dataclass
+class LibraryEvents:
+    """What the screen listens to; called on the compute thread, so listeners only hand over."""
+
+    felt: list[Callable[[Felt], None]] = field(default_factory=list)  # the effect that was asked for
+    drawn: list[Callable[[Felt], None]] = field(default_factory=list)  # one of all, at its clear severity
+    said: list[Callable[[str], None]] = field(default_factory=list)
+
+
+class Library:
+    """Runs effects; those that can be switched off share one stack, which is compiled once."""
+
+    def __init__(self, session: Session) -> None:
+        self.session = session
+        self.events = LibraryEvents()
+        self._without: dict[tuple[str, tuple[str, ...]], Measurement] = {}
+
+    def feel(self, name: str, settings: Mapping[str, float], run: str) -> None:
+        """Simulates soon; of several requests the last one counts.  InputError for a setting out of range."""
+        if run not in RUNS:
+            raise InputError(f"no run {run[:40]!r}; runs are {', '.join(RUNS)}")
+        full = find(name).settings(dict(settings))
+
+        def job() -> None:
+            self._say("Simulating; the first time, the library is compiled, which takes some seconds …")
+            found = self._felt(name, full, run)
+            self._say("")
+            for listener in self.events.felt:
+                listener(found)
+
+        self.session.worker.post("library", job)
+
+    def draw_all(self) -> bool:
+        """Runs every effect at its clear severity, where it shows most; False while another long run goes on."""
+        return self.session.worker.start(self._steps())
+
+    def _steps(self) -> Steps:
+        for i, effect in enumerate(CATALOGUE.values()):
+            self._say(f"Running {in_sentence(effect.title)} … {i + 1} of {len(CATALOGUE)}")
+            settings = effect.settings({effect.parameters[0].name: effect.severities[1]})
+            found: list[Felt] = []
+            for run in RUNS:
+                with suppress(InputError):  # an effect that this actuator does not stand there
+                    found.append(self._felt(effect.name, settings, run))
+            if found:
+                best = max(found, key=lambda felt: felt.visibility)
+                for listener in self.events.drawn:
+                    listener(best)
+            yield
+        self._say("")
+
+    def _felt(self, name: str, settings: Mapping[str, float], run: str) -> Felt:
+        effect = find(name)
+        stack: dict[str, dict[str, float]] = {}
+        if off(effect) is not None:
+            stack = {
+                other.name: {**other.settings({}), other.parameters[0].name: neutral}
+                for other in CATALOGUE.values()
+                if (neutral := off(other)) is not None
+            }
+        key = run, tuple(stack)
+        try:
+            if key not in self._without:
+                self._without[key] = simulate_monitor(RUNS[run], self.session.actuator, effects=stack)
+            with_it = simulate_monitor(RUNS[run], self.session.actuator, effects={**stack, name: dict(settings)})
+        except FloatingPointError as error:
+            raise InputError(f"{effect.title}: {error}; make it weaker") from None
+        return Felt(name, run, dict(settings), with_it, self._without[key])
+
+    def _say(self, text: str) -> None:
+        for listener in self.events.said:
+            listener(text)

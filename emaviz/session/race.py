@@ -1,0 +1,238 @@
+"""A race of optimisers: the same recording, one iteration of each in turn, told and recorded as it goes."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Generator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ema_model.actuator import Actuator
+from ema_model.faults import performance_coefficient
+from ema_model.identification.objective import Objective
+from ema_model.identification.run import Identification, Progress, steps
+from ema_model.recordings import Measurement
+from ema_model.recordings.read import read_recording
+from ema_model.simulation import plant
+from emaviz.session.settings import SLIDERS, Settings
+from emaviz.session.worker import Steps
+
+if TYPE_CHECKING:
+    from emaviz.session.compare.comparing import Comparing
+
+Array = NDArray[np.float64]
+
+MOST_FRAMES = 200  # of a swarm, kept to look at again
+_PAUSE_S = 0.01  # between two looks whether to go on; sliders are answered in between
+_CURRENT_EVERY = 4  # iterations
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """A swarm at one iteration."""
+
+    iteration: int
+    population: NDArray[np.float32]  # (n, 8)
+    k: Array  # (8,), the best so far
+    rmse: float  # A, of the best
+
+
+@dataclass(eq=False)
+class Track:
+    """One optimiser of a race.  Written on the compute thread, read on any."""
+
+    algorithm: str
+    iterations: int
+    rmse: list[float] = field(default_factory=list)  # A, the best after each iteration
+    last: Progress | None = None
+    frames: list[Frame] = field(default_factory=list)  # every `stride` iterations
+    stride: int = 1
+    current_A: Array | None = None  # (blocks,), of the best
+    answer: Identification | None = None
+
+    @property
+    def k(self) -> Array | None:
+        """(8,), the best so far, or the answer."""
+        if self.answer is not None:
+            return self.answer.k
+        return None if self.last is None else self.last.k
+
+    def add(self, at: Progress) -> None:
+        """An iteration; of long searches every second frame is given up again."""
+        self.rmse.append(at.rmse)
+        self.last = at
+        if at.iteration % self.stride == 0:
+            if len(self.frames) >= MOST_FRAMES:
+                self.frames, self.stride = self.frames[::2], 2 * self.stride
+            if at.iteration % self.stride == 0:
+                self.frames.append(Frame(at.iteration, at.population.astype(np.float32), at.k, at.rmse))
+
+
+def _rank(track: Track) -> tuple[bool, float]:
+    answer = track.answer
+    return (True, track.rmse[-1]) if answer is None else (not answer.polished, answer.rmse)
+
+
+@dataclass(eq=False)
+class Race:
+    """What is identified, by whom, and how far they are."""
+
+    settings: Settings
+    tracks: dict[str, Track]
+    time_s: Array  # (blocks,), of the current that is fitted
+    measured_A: Array  # (blocks,)
+    truth: Array | None  # (8,), of the sliders' plant
+    measurement: Measurement  # what is identified
+    objective: Objective  # and its cost
+    growing: Path | None = None  # of the recording, while it is written
+    path: Path | None = None  # and once it is whole
+
+    @property
+    def source(self) -> str:
+        """What is identified, as a person reads it."""
+        return self.settings.source or "the sliders' plant"
+
+    @property
+    def answers(self) -> list[Identification]:
+        """Of the optimisers that have ended."""
+        return [track.answer for track in self.tracks.values() if track.answer is not None]
+
+    @property
+    def best(self) -> Track | None:
+        """The one to believe: an answer that a fit has freed of the monitor's own error, else the least rmse."""
+        begun = [track for track in self.tracks.values() if track.rmse]
+        return min(begun, key=_rank, default=None)
+
+    def performance(self) -> dict[str, float]:
+        """Performance coefficient, % (T 5.4), by algorithm; empty unless several have ended and the truth is known."""
+        errors = [(answer.algorithm, answer.error_percent, answer.elapsed_s) for answer in self.answers]
+        known = [(name, error, elapsed) for name, error, elapsed in errors if error is not None]
+        if len(known) < 2 or not sum(error * elapsed for _, error, elapsed in known):
+            return {}
+        coefficients = performance_coefficient([one[1] for one in known], [one[2] for one in known])
+        return {name: float(value) for (name, _, _), value in zip(known, coefficients)}
+
+
+class Reins:
+    """Stop and pause, held by the page while a race runs on the compute thread."""
+
+    def __init__(self) -> None:
+        self._stop, self._go = threading.Event(), threading.Event()
+        self._go.set()
+
+    @property
+    def stopping(self) -> bool:
+        """Whether it was asked to end."""
+        return self._stop.is_set()
+
+    @property
+    def paused(self) -> bool:
+        """Whether it rests."""
+        return not self._go.is_set() and not self.stopping
+
+    def stop(self) -> None:
+        """After the current iteration, keeping what there is."""
+        self._stop.set()
+        self._go.set()
+
+    def pause(self, paused: bool) -> None:
+        """Rests after the current iteration, or goes on."""
+        (self._go.clear if paused else self._go.set)()
+
+    def wait(self) -> Steps:
+        """Steps of a long job that do nothing while it rests."""
+        while self.paused:
+            self._go.wait(_PAUSE_S)
+            yield
+
+
+def measured(comparing: Comparing, name: str) -> Measurement:
+    """A file of the data folder as a measurement of the app's actuator; as Compare has it, if it is open there."""
+    opened = comparing.opened.get(name)
+    if opened is not None and opened.measurement is not None:
+        return opened.measurement
+    return read_recording(comparing.folder.measurement(name), comparing.session.actuator)
+
+
+def target(
+    settings: Settings, actuator: Actuator, open_file: Callable[[str], Measurement]
+) -> Generator[None, None, tuple[Measurement, Array | None]]:
+    """Steps that end with the recording to identify, and the true k if it is the sliders' plant."""
+    if settings.source != SLIDERS:
+        return (yield from _elsewhere(lambda: open_file(settings.source))), None
+    run = plant.to_identify(settings.run(), actuator, settings.k, settings.fitness, settings.effects)
+    return settings.sensors.record(run, settings.seed), settings.k
+
+
+def _elsewhere(read: Callable[[], Measurement]) -> Generator[None, None, Measurement]:
+    """Reads on a thread of its own: a large file takes seconds, in which the sliders shall answer."""
+    found: list[Measurement] = []
+    failed: list[Exception] = []
+
+    def work() -> None:
+        try:
+            found.append(read())
+        except Exception as error:
+            failed.append(error)
+
+    thread = threading.Thread(target=work, name="emaviz-read", daemon=True)
+    thread.start()
+    while thread.is_alive():
+        thread.join(_PAUSE_S)
+        yield
+    if failed:
+        raise failed[0]
+    return found[0]
+
+
+def begin(settings: Settings, objective: Objective, truth: Array | None) -> Race:
+    """A race that has not started."""
+    window = objective.windows[0]
+    time = objective.measurements[0].time_s[0] + window.block_s * (1.0 + np.arange(window.blocks))
+    tracks = {name: Track(name, settings.iterations) for name in settings.algorithms}
+    measured_A = objective.target[: window.blocks]
+    return Race(settings, tracks, time, measured_A, truth, objective.recorded[0], objective)
+
+
+def run(race: Race, objective: Objective, reins: Reins, tell: Callable[[Race, Progress | None], None]) -> Steps:
+    """All optimisers to their ends, an iteration of each in turn.
+
+    tell(race, progress): after each iteration; progress is None after an optimiser's end.
+    """
+    settings = race.settings
+    searches = {
+        name: steps(
+            objective,
+            name,
+            population=settings.population,
+            iterations=settings.iterations,
+            seed=settings.seed,
+            truth=race.truth,
+            parameters_known=race.truth is not None,
+        )
+        for name in race.tracks
+    }
+    begun = False
+    while searches:
+        for name, search in list(searches.items()):
+            yield from reins.wait()
+            track = race.tracks[name]
+            try:
+                at = search.send(reins.stopping) if begun else next(search)
+            except StopIteration as finished:
+                track.answer = finished.value
+                track.current_A = objective.currents(finished.value.k)[0, : len(race.time_s)]
+                del searches[name]
+                tell(race, None)
+            else:
+                track.add(at)
+                track.iterations = at.iterations
+                if at.iteration % _CURRENT_EVERY == 0:
+                    track.current_A = objective.currents(at.k)[0, : len(race.time_s)]
+                tell(race, at)
+            yield
+        begun = True

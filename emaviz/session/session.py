@@ -1,0 +1,253 @@
+"""The app without a screen: settings in, simulations and identifications out, on the compute thread."""
+
+from __future__ import annotations
+
+import copy
+import threading
+import time
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ema_model.actuator import Actuator
+from ema_model.errors import InputError
+from ema_model.faults import HEALTHY
+from ema_model.identification.objective import Objective
+from ema_model.identification.run import Identification, Progress, warm_up
+from ema_model.recordings import Measurement
+from ema_model.simulation import plant
+from ema_model.simulation.run import simulate_monitor
+from emaviz.session.events import notify
+from emaviz.session.race import Race, Reins, begin, run, target
+from emaviz.session.settings import Settings
+from emaviz.session.worker import Steps, Worker
+
+if TYPE_CHECKING:  # rerun may be missing or broken, and takes a second to import
+    from emaviz.recording.story import IdentificationStory
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """A run of both models, and what it was asked for."""
+
+    reference: Measurement
+    monitor: Measurement
+    k: NDArray[np.float64]
+    elapsed_s: float
+    command: str = ""  # its family
+    monitor_faults: str = "healthy"  # whose faults the monitor model has
+    asked: bool = True  # by the user, and not because something else has ended
+
+
+@dataclass
+class Events:
+    """What the screen listens to; called on the compute thread, so listeners only hand over."""
+
+    simulated: list[Callable[[Simulation], None]] = field(default_factory=list)
+    progressed: list[Callable[[Race], None]] = field(default_factory=list)
+    identified: list[Callable[[Race], None]] = field(default_factory=list)
+    ended: list[Callable[[], None]] = field(default_factory=list)  # an identification, with an answer or without
+    told: list[Callable[[str, str], None]] = field(default_factory=list)  # title, one line
+    status: list[Callable[[str], None]] = field(default_factory=list)
+
+
+class Session:
+    """Owns the settings, the compute thread and the results."""
+
+    def __init__(self, actuator: Actuator, folder: Path) -> None:
+        self.actuator = actuator
+        self.folder = folder
+        self.settings = Settings()
+        self.events = Events()
+        self.identified: Identification | None = None
+        self.simulation: Simulation | None = None
+        self.ready = threading.Event()
+        self.reins = Reins()  # of the identification that runs, or ran last
+        self.open_file: Callable[[str], Measurement] = _no_files  # by the name of a file in the data folder
+        self._compiled: set[tuple[str, ...]] = {()}  # stacks of hidden effects
+        self.worker = Worker("emaviz-compute", self._on_error)
+
+    def start(self) -> None:
+        """Compiles what the page needs, visibly, and shows the first picture."""
+        self.worker.post("warm up", self._warm_up)
+
+    def close(self) -> None:
+        """Ends the compute thread."""
+        self.reins.stop()
+        self.worker.close()
+
+    # --- simulation -------------------------------------------------------------------------------------------------
+
+    def refresh(self, asked: bool = True) -> None:
+        """Simulates the current settings soon; of several requests the last one counts."""
+        self.worker.post("simulate", lambda: self._simulate(asked))
+
+    def _simulate(self, asked: bool = True) -> None:
+        if not self.ready.is_set() or not plant.can_be_explored(self.actuator):
+            return  # the warm-up ends with a simulation
+        settings = copy.deepcopy(self.settings)
+        stack = tuple(sorted(settings.effects))
+        if stack not in self._compiled:
+            notify(self.events.status, f"Compiling the plant with {', '.join(stack).replace('_', ' ')}…")
+        started = time.perf_counter()
+        run, start = settings.run(), settings.start_rad()
+        fitted = self.identified.k if self.identified is not None else HEALTHY
+        shown = {"healthy": HEALTHY, "same faults": settings.k, "identified": fitted}[settings.monitor]
+        try:
+            reference = plant.simulate(
+                run,
+                self.actuator,
+                settings.k,
+                settings.effects,
+                start_rad=start,
+                start_speed_rad_s=settings.start_speed_rad_s,
+                start_play_rad=settings.start_play_rad(self.actuator),
+            )
+            monitor = simulate_monitor(run, self.actuator, shown, start_rad=start)
+        except FloatingPointError as error:
+            raise InputError(str(error)) from None
+        elapsed = time.perf_counter() - started
+        if stack not in self._compiled:
+            self._compiled.add(stack)
+            notify(self.events.status, f"Ready ({elapsed:.1f} s).")
+        reference = settings.sensors.record(reference, settings.seed)
+        self.simulation = Simulation(reference, monitor, settings.k, elapsed, settings.command, settings.monitor, asked)
+        notify(self.events.simulated, self.simulation)
+
+    def _warm_up(self) -> None:
+        started = time.perf_counter()
+        notify(self.events.status, "Compiling the models for this computer (the first time takes some seconds)…")
+        if not plant.can_be_explored(self.actuator):
+            self.ready.set()
+            notify(self.events.status, "Ready.")
+            return
+        run = Settings().run()
+        reference = plant.simulate(run, self.actuator, HEALTHY, {})
+        simulate_monitor(run, self.actuator)
+        self.ready.set()
+        self._simulate()
+        notify(self.events.status, "Compiling the identification…")
+        warm_up(Objective([reference], self.actuator))
+        notify(self.events.status, f"Ready ({time.perf_counter() - started:.1f} s).")
+
+    # --- identification ---------------------------------------------------------------------------------------------
+
+    def identify(self) -> bool:
+        """Begins an identification as the settings say; False while a long job runs."""
+        reins = Reins()
+        started = self.worker.start(self._identification(copy.deepcopy(self.settings), reins))
+        if started:
+            self.reins = reins
+        return started
+
+    def stop(self) -> None:
+        """Ends the identification after its current iteration, keeping what it has."""
+        self.reins.stop()
+
+    def pause(self, paused: bool) -> None:
+        """Lets the identification rest, or go on."""
+        self.reins.pause(paused)
+
+    def _identification(self, settings: Settings, reins: Reins) -> Steps:
+        story = None
+        try:
+            measurement, truth = yield from target(settings, self.actuator, self.open_file)
+            objective = Objective([measurement], self.actuator, fitness=settings.fitness)
+            race = begin(settings, objective, truth)
+            story = self._story(race, objective, measurement)
+            race.growing = None if story is None else story.path
+
+            def tell(race: Race, progress: Progress | None) -> None:
+                if story is not None and progress is not None:
+                    story.iteration(progress)
+                notify(self.events.progressed, race)
+
+            yield from run(race, objective, reins, tell)
+            self._keep(race, story)
+        except FloatingPointError as error:
+            raise InputError(str(error)) from None
+        finally:
+            if story is not None:
+                story.close()
+            notify(self.events.ended)
+
+    def _keep(self, race: Race, story: IdentificationStory | None) -> None:
+        best = race.best
+        assert best is not None and best.answer is not None, "the race is over"
+        self.identified = best.answer
+        if race.truth is not None:
+            self.settings.monitor = "identified"
+        if story is not None:
+            others = [answer for answer in race.answers if answer is not best.answer]
+            story.finish(best.answer, *others)
+            race.path = None if story.failed else story.path
+            if story.failed:
+                notify(self.events.told, "The recording could not be written", story.failed)
+        notify(self.events.identified, race)
+        if race.truth is not None:
+            self.refresh(asked=False)
+
+    def _story(self, race: Race, objective: Objective, measurement: Measurement) -> IdentificationStory | None:
+        settings = race.settings
+        stem = f"{datetime.now():%Y%m%d-%H%M%S}-{'-'.join(settings.algorithms)}"
+        source = "reference" if race.truth is not None else "measurement"
+        try:
+            from emaviz.recording.paths import free_name
+            from emaviz.recording.story import IdentificationStory
+
+            path = free_name(self.folder, stem, ".rrd")
+            return IdentificationStory(
+                path, objective, measurement, source, race.truth, readable(settings), settings.algorithms
+            )
+        except (OSError, ImportError) as error:  # a run without its recording is still a run
+            notify(self.events.told, "The recording cannot be written", " ".join(str(error).split()))
+            return None
+
+    def _on_error(self, error: BaseException) -> None:
+        if isinstance(error, InputError):
+            notify(self.events.told, "That does not work", str(error))
+            return
+        traceback.print_exception(error)
+        notify(self.events.told, "Something failed; the app goes on", f"{type(error).__name__}: {error}")
+
+
+def readable(settings: Settings) -> dict[str, Any]:
+    """The settings of an identification by name, as a recording keeps them."""
+    if settings.source:
+        return {"source": settings.source, **_search(settings)}
+    return {
+        "source": "the sliders' plant",
+        "k": " ".join(f"{value:g}" for value in settings.k),
+        "command": settings.command,
+        **{name: value for name, value in settings.run().command.settings().items()},
+        "duration_s": settings.duration_s,
+        "load_torque_Nm": settings.load_torque_Nm,
+        "current_noise_A": settings.sensors.current_noise_A,
+        "encoder_bits": settings.sensors.encoder_bits,
+        "hidden_effects": "; ".join(
+            f"{name} " + ", ".join(f"{parameter}={value:g}" for parameter, value in given.items())
+            for name, given in settings.effects.items()
+        )
+        or "none",
+        **_search(settings),
+    }
+
+
+def _search(settings: Settings) -> dict[str, Any]:
+    return {
+        "algorithms": ", ".join(settings.algorithms),
+        "population": settings.population,
+        "iterations": settings.iterations,
+        "fitness": settings.fitness,
+        "seed": settings.seed,
+    }
+
+
+def _no_files(name: str) -> Measurement:
+    raise InputError(f"{name[:100]}: there is no data folder to read it from")

@@ -1,0 +1,154 @@
+"""What a discovery found, in plain words: for the terminal, the report and the recording alike."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ema_model.discovery import Discovery
+from ema_model.discovery.result import Added, Rung
+from ema_model.effects import find
+from ema_model.errors import InputError
+from ema_model.estimation import Calibrated
+from ema_model.faults import BY_NAME, FAULTS, NAMES
+from ema_model.faults import sentences as phrases_of
+from ema_model.quantities.axes import Axes
+from ema_model.quantities.titles import in_sentence
+from ema_model.recordings import SIGNALS
+from emaviz.figures.quantity import number, parameter_title
+from emaviz.text.run import run_in_words
+
+VERDICTS = {
+    "effects_found": "effects are missing, and have been added",
+    "adequate": "nothing is missing: what is left is noise and the model's own floor",
+    "unknown_effect": "something is missing that none of the known effects explains",
+    "not_converged": "the calibration has not converged; what looks like missing physics may be an unfinished fit",
+    "not_repeatable": "the run does not repeat itself, so that a comparison over time means nothing",
+}
+FLOOR_NOTE = (
+    "Errors are rms over all fitted signals in units of the floor: 1 is what noise and the model's own limits leave. "
+    "A little below 1 is usual, as the floor is measured on the safe side."
+)
+
+
+def headline(found: Discovery) -> str:
+    """The verdict in one sentence."""
+    faulty = _faulty(found)
+    if found.verdict == "effects_found":
+        # Once, where two orders of one effect were added.
+        names = _listed(list(dict.fromkeys(in_sentence(effect_title(one.name)) for one in found.effects)))
+        return f"The model lacks {names}{f', and the actuator has {faulty}' if faulty else ''}."
+    if found.verdict == "adequate" and faulty:
+        return f"No physics is missing: the actuator has {faulty}."
+    if found.verdict == "adequate" and found.parameters_outside_tolerance:
+        return "No physics is missing, but not all parameters are within their tolerance."
+    text = VERDICTS.get(found.verdict, found.verdict.replace("_", " "))
+    return f"{text[:1].upper()}{text[1:]}."
+
+
+def sentences(found: Discovery) -> list[str]:
+    """What follows the headline: how far the error falls, what cannot be told apart, what is left."""
+    told = []
+    first, last = found.ladder[0], found.ladder[-1]
+    if found.effects:
+        told.append(f"With {'it' if len(found.effects) == 1 else 'them'} the error falls from {_times(first, last)}.")
+    else:
+        held = "" if last.holdout_rmse is None else f" ({number(last.holdout_rmse)} times on what was not fitted)"
+        told.append(f"The calibrated model's error is {number(last.rmse)} times the floor{held}.")
+    if found.faults:
+        told.append(f"{'; '.join(faults(found).values())}. What is told of effects is told beside this.")
+    for one in found.effects:
+        if one.same_as:
+            rivals = _listed([in_sentence(effect_title(name)) for name in one.same_as])
+            told.append(f"These recordings cannot tell {in_sentence(effect_title(one.name))} from {rivals}.")
+    if found.parameters_outside_tolerance:
+        outside = _listed([parameter(found.actuator.axes, path) for path in found.parameters_outside_tolerance])
+        whose = "its" if len(found.parameters_outside_tolerance) == 1 else "their"
+        told.append(f"Outside {whose} tolerance: {outside}.")
+    if found.unknown is not None:
+        told.append(("Something else is left. " if found.effects else "") + found.unknown.sentence)
+    if found.curve is not None:
+        told.append(f"A torque curve stands in for it, with which the error falls from {_times(first, last)}.")
+    return told
+
+
+def next_experiment(found: Discovery) -> list[str]:
+    """What to record next, and what it would settle; nothing where nothing is left to tell apart."""
+    best = found.next_experiment
+    if best is None:
+        return []
+    asked = f"Record {run_in_words(best.command, best.settings, best.duration_s)}"
+    if best.load_torque_Nm:
+        asked += f", under a load of {number(best.load_torque_Nm)} N·m at the user"
+    if best.add_signal:
+        names = [in_sentence(SIGNALS[name].title) if name in SIGNALS else name for name in best.add_signal.split(", ")]
+        asked += f", and measure the {_listed(names)} as well"
+    rivals = _listed([in_sentence(effect_title(name)) for name in best.separates])
+    return [f"{asked}.", f"It would tell {rivals} apart: χ² of {best.expected_chi2:.0f} is expected between them."]
+
+
+def faults(found: Discovery) -> dict[str, str]:
+    """Each fault that was found, by name: 'k2 backlash 0.201 ± 0.012 (backlash 209 µrad)'."""
+    phrases = dict(zip(NAMES, phrases_of(found.calibration.k, found.actuator)))
+    return {name: f"{BY_NAME[name].label} {value(one)} ({phrases[name]})" for name, one in found.faults.items()}
+
+
+def _faulty(found: Discovery) -> str:
+    """'the faults k1 friction and k2 backlash', "" without one; a phase belongs to its modulus."""
+    labels = [fault.label for fault in FAULTS if fault.name in found.faults and fault.name != "k7"]
+    return f"the fault{'s' if len(labels) > 1 else ''} {_listed(labels)}" if labels else ""
+
+
+def effect_title(name: str) -> str:
+    """'Cogging torque' of 'cogging_torque'; the name itself of an effect that is not known here."""
+    try:
+        return find(name).title
+    except InputError:
+        return name
+
+
+def rung_title(label: str, axes: Axes) -> str:
+    """'+ Cogging torque' of '+ cogging_torque'."""
+    sign, _, name = label.partition(" ")
+    if sign in ("+", "−"):
+        return f"{sign} {effect_title(name)}"
+    path, outside, _ = label.partition(" outside its tolerance")
+    if outside:
+        return f"{parameter(axes, path)} freed"
+    return label[:1].upper() + label[1:]
+
+
+def parameter(axes: Axes, path: str) -> str:
+    """'Motor inertia' of 'motor.inertia_kgm2', by the name that the actuator's axes give it."""
+    section, _, rest = path.partition(".")
+    if section != "effects":
+        return parameter_title(axes.path(path))
+    effect, _, name = rest.partition(".")
+    return f"{effect_title(effect)}: {in_sentence(parameter_title('.' + name))}"
+
+
+def value(one: Calibrated) -> str:
+    """'0.0122 ± 0.0007 N·m': with half of the 90 % interval."""
+    half = 0.5 * (one.interval90[1] - one.interval90[0])
+    return f"{number(one.value)} ± {number(half, 2)} {one.unit}".rstrip()
+
+
+def settings(found: Discovery, one: Added) -> dict[str, str]:
+    """Each parameter of an added effect with its value; whole numbers, which are chosen and not fitted, first."""
+    chosen = {name: f"{setting:g}" for name, setting in one.chosen.items()}
+    return chosen | {name: value(fitted_of(found, one, name)) for name in one.parameters}
+
+
+def fitted_of(found: Discovery, one: Added, name: str) -> Calibrated:
+    """A fitted parameter of an added effect as the last model has it: later effects may have moved it."""
+    return found.calibration.parameters.get(f"effects.{one.key}.{name}", one.parameters[name])
+
+
+def _times(first: Rung, last: Rung) -> str:
+    fall = f"{number(first.rmse)} to {number(last.rmse)} times the floor"
+    if first.holdout_rmse is None or last.holdout_rmse is None:
+        return fall
+    return f"{fall}, and on what was not fitted from {number(first.holdout_rmse)} to {number(last.holdout_rmse)} times"
+
+
+def _listed(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

@@ -8,12 +8,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-
-SOFTWARE_GL = (
-    "--no-sandbox --disable-quic --no-first-run --disable-background-networking --disable-component-update "
-    "--disable-sync --use-gl=angle --use-angle=gl-egl --ignore-gpu-blocklist --disable-accelerated-2d-canvas "
-    "--disable-gpu-rasterization"
-).split()
+from support.browser import SOFTWARE_GL
 
 
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:

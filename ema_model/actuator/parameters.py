@@ -116,7 +116,7 @@ _ANY_SIGN = {"rotor_offset_rad", "current_bias_A", "stop_low_rad", "stop_high_ra
 
 @dataclass(frozen=True)
 class Actuator:
-    """All parameters of one actuator; SI units, which the names say (for linear axes see `ema_model.quantities.axes`)."""
+    """All parameters of one actuator; SI units, which the names say (for linear axes see `quantities.axes`)."""
 
     name: str
     controller: Controller

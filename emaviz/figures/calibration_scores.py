@@ -8,6 +8,7 @@ import plotly.graph_objects as go
 
 from ema_model.comparison.result import Comparison, Region
 from ema_model.faults import NAMES
+from ema_model.quantities.titles import parameter_title
 from emaviz.figures import quantity, theme
 
 _BOUND = 3.0
@@ -35,7 +36,7 @@ def scores(comparison: Comparison) -> list[Score]:
         return []
     found = []
     for path, fitted in comparison.calibration.parameters.items():
-        name = path if path in NAMES else quantity.parameter_title(comparison.actuator.axes.path(path))
+        name = path if path in NAMES else parameter_title(comparison.actuator.axes.path(path))
         low, high = fitted.interval90
         found.append(
             Score(

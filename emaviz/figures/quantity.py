@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 
 from ema_model.comparison.residuals import Residuals
 from ema_model.comparison.result import Comparison
-from ema_model.quantities.titles import parameter_title as parameter_title
 from ema_model.recordings import SIGNALS
 
 _PREFIXED = frozenset(("rad", "m", "A", "V", "N·m", "N", "rad/s", "m/s", "s"))

@@ -16,9 +16,8 @@ from pathlib import Path
 import psutil
 from playwright.sync_api import Browser, sync_playwright
 
-sys.path.insert(0, str(Path(__file__).parents[2]))
-sys.path.insert(0, str(Path(__file__).parents[1]))
-from conftest import SOFTWARE_GL
+sys.path.insert(0, str(Path(__file__).parents[1]))  # a script finds what tests share
+from support.browser import SOFTWARE_GL
 
 from emaviz.page.app import App
 from emaviz.page.server import open_server

@@ -7,13 +7,7 @@ Every plant is drawn anew from the tolerances; recordings are the three-phase Re
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))
-
 from support.hidden_effects import ACTUATOR, SINE, recorded
 
 from ema_model.comparison import compare

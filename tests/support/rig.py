@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from support.on_page import wait_until
-
 from ema_model.actuator import load_actuator
 from emaviz.session import saved as session_file
 from emaviz.session.compare.comparing import Comparing
@@ -11,6 +9,7 @@ from emaviz.session.data_folder import DataFolder
 from emaviz.session.discover.discovering import Discovering
 from emaviz.session.saved import Part
 from emaviz.session.session import Session
+from support.on_page import wait_until
 
 
 class Rig:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ema_model.recordings.health import checks as checks
+from ema_model.recordings.health import checks
 from ema_model.recordings.health.finding import Finding, Severity
 from ema_model.recordings.measurement import Measurement
 

@@ -6,9 +6,8 @@ from typing import Any
 
 import viser
 
-from ema_model.quantities.titles import unit_of
+from ema_model.quantities.titles import parameter_title, unit_of
 from ema_model.recordings import SIGNALS
-from emaviz.figures import quantity
 from emaviz.page.page import Page
 from emaviz.session.compare.comparing import COMPARABLE, Comparing
 from emaviz.session.data_folder import ACTUATOR_SUFFIX
@@ -109,7 +108,7 @@ class AskedControls:
                 hint = (
                     f"{path}: {self._comparing.actuator.value(path):.4g} ± {tolerance.sigma:.2g} {unit_of(path)} (1 σ)"
                 )
-                box = gui.add_checkbox(quantity.parameter_title(path), path in self._comparing.free, hint=hint)
+                box = gui.add_checkbox(parameter_title(path), path in self._comparing.free, hint=hint)
                 box.on_update(lambda _, path=path, box=box: self._set_free(path, bool(box.value)))
                 self._free.append(box)
 

@@ -14,7 +14,7 @@ from ema_model.effects import Effect, find
 from ema_model.quantities.titles import in_sentence, parameter_title, unit_of
 from emaviz.figures import quantity, signature
 from emaviz.figures.quantity import number
-from emaviz.page.discover import cards as cards
+from emaviz.page.discover import cards
 from emaviz.page.page import Page
 from emaviz.session.discover.discovering import Discovering
 from emaviz.session.discover.look import Look

@@ -12,7 +12,7 @@ import viser
 
 from ema_model.commands import command
 from ema_model.discovery.result import Experiment
-from emaviz.page.discover import cards as cards
+from emaviz.page.discover import cards
 from emaviz.page.page import Page
 from emaviz.session.discover.discovering import Discovering
 from emaviz.session.discover.look import Look

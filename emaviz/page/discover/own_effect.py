@@ -15,7 +15,7 @@ from ema_model.effects.user.expression import FUNCTIONS, VARIABLES
 from ema_model.errors import InputError
 from emaviz.figures import signature
 from emaviz.figures.quantity import number as shown
-from emaviz.page.discover import cards as cards
+from emaviz.page.discover import cards
 from emaviz.page.discover.sliders import ParameterSliders
 from emaviz.page.page import Page
 from emaviz.session.discover.discovering import Discovering

@@ -15,7 +15,7 @@ from emaviz.figures import error_ladder, explained_steps, missing_curve, residua
 from emaviz.figures.discovery_tracks import Track, tracks
 from emaviz.figures.model_equation import equation
 from emaviz.figures.quantity import number
-from emaviz.page.discover import cards as cards
+from emaviz.page.discover import cards
 from emaviz.page.discover.actuator import ActuatorSwitch
 from emaviz.page.discover.effect import CONFIG, EffectView
 from emaviz.page.discover.next_test import NextTest

@@ -10,7 +10,7 @@ from typing import Any
 import viser
 
 from ema_model.challenges import Challenge
-from emaviz.page.discover import cards as cards
+from emaviz.page.discover import cards
 from emaviz.page.page import Page
 from emaviz.session.data_folder import CHALLENGE_SUFFIX
 from emaviz.session.discover.discovering import Discovering

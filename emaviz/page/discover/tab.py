@@ -11,7 +11,7 @@ import viser
 from ema_model.discovery import Candidate
 from ema_model.effects import CATALOGUE
 from emaviz.figures.quantity import number
-from emaviz.page.discover import cards as cards
+from emaviz.page.discover import cards
 from emaviz.page.discover.guide import Guide
 from emaviz.page.discover.own_effect import OwnEffect
 from emaviz.page.discover.result import DiscoveryPanel

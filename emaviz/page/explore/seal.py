@@ -7,7 +7,7 @@ from pathlib import Path
 
 import viser
 
-from emaviz.page.discover import cards as cards
+from emaviz.page.discover import cards
 from emaviz.page.page import Page
 from emaviz.session.discover.sealing import Sealing
 

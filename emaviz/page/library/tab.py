@@ -11,7 +11,7 @@ import viser
 from ema_model.effects import CATALOGUE, Effect, find
 from ema_model.quantities.titles import labelled
 from emaviz.figures.effect_signature import EffectCharts, small_picture
-from emaviz.page.discover import cards as cards
+from emaviz.page.discover import cards
 from emaviz.page.discover.effect import about
 from emaviz.page.page import Page
 from emaviz.session.library import RUNS, Felt, Library

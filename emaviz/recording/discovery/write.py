@@ -16,7 +16,8 @@ from ema_model.errors import InputError
 from emaviz.figures.candidates import ranked
 from emaviz.figures.discovery_tracks import PAUSE_S, Track, one_after_another, primary, tracks
 from emaviz.figures.theme import FLOOR_WIDTH
-from emaviz.recording import discovery_layout, discovery_text, series
+from emaviz.recording import series
+from emaviz.recording.discovery import documents, layout
 from emaviz.recording.discovery.layout import CANDIDATES, LADDER, Step
 from emaviz.recording.errors import RecordingError
 from emaviz.recording.style import GROUP_COLOURS, ITERATION, plain, series_title
@@ -44,9 +45,9 @@ def write_discovery(found: Discovery, path: str | Path, configuration: Mapping[s
     names = sorted(runs[0].measured, key=lambda name: name != primary(found)) if runs else []
     try:
         with DiscoveryWriter(path, found, names[:1]) as writer:
-            writer.config(discovery_text.configuration(found, runs, times, shifts, configuration or {}))
+            writer.config(documents.configuration(found, runs, times, shifts, configuration or {}))
             writer.properties({"discovery": as_dict(found), "shift_s": shifts})
-            writer.document("verdict", discovery_text.verdict(found))
+            writer.document("verdict", documents.verdict(found))
             writer.ladder()
             writer.candidates()
             for name in names:
@@ -133,7 +134,7 @@ class DiscoveryWriter(RecordingWriter):
         """The ranking as a table, and as bars in its order."""
         chosen = [one for one in ranked(self._found) if not one.untestable_reason]
         with self._file.lock:
-            self._text(CANDIDATES, discovery_text.candidates(self._found))
+            self._text(CANDIDATES, documents.candidates(self._found))
             if chosen:
                 at = np.arange(1, len(chosen) + 1)
                 predicted = [one.predicted_drop for one in chosen]
@@ -163,7 +164,7 @@ class DiscoveryWriter(RecordingWriter):
             for name in self._shown
             for i, rung in enumerate(self._found.ladder)
         ]
-        return discovery_layout.build(self._contents, steps)
+        return layout.build(self._contents, steps)
 
     def _static(self, path: str, value: rr.AsComponents) -> None:
         self._file.do(lambda stream: stream.log(path, value, static=True))

@@ -9,19 +9,19 @@ import sys
 HERE = """
 import sys, time
 from ema_model.actuator import load_actuator
-from ema_model.simulation import precompile as ahead
+from ema_model.simulation import precompile
 from ema_model.simulation.run import Run, simulate_monitor
 from ema_model.stacks import find_stack
 
 stack = find_stack("reduced", ["dead_time"])
-ahead.compile_ahead([stack])
-[child] = ahead._running
+precompile.compile_ahead([stack])
+[child] = precompile._running
 assert child.wait(120) == 0
 simulate_monitor(Run(duration_s=0.01), load_actuator(), effects={"dead_time": {}}, circuit="reduced")
 statistics = stack.monitor.traces.stats
 assert statistics.cache_hits and not statistics.cache_misses, statistics
-ahead.compile_ahead([stack])
-assert not ahead._running, "what the cache holds is not compiled again"
+precompile.compile_ahead([stack])
+assert not precompile._running, "what the cache holds is not compiled again"
 """
 
 

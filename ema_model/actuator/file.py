@@ -16,11 +16,11 @@ from ema_model.actuator.parameters import (
     Tolerance,
     check_stops,
     check_value,
-    number,
 )
 from ema_model.errors import InputError
 from ema_model.quantities.axes import KINDS as AXIS_KINDS
 from ema_model.quantities.axes import Axes
+from ema_model.quantities.numbers import as_number
 
 _OTHERS = ("schema", "name", "description", "axes", "model", "effects", "recordings")
 _MODEL = ("step_s", "filter_s", "torque_known")
@@ -159,11 +159,11 @@ def _number_and_tolerance(section: str, name: str, entry: Any, where: str) -> tu
         if extra or "value" not in entry:
             raise InputError(f"{where}: [{section}] {name} takes value, tolerance or sigma, free")
         value = entry["value"]
-    if not math.isfinite(number(value)):
+    if not math.isfinite(as_number(value)):
         raise InputError(f"{where}: [{section}] {name} must be a number, not {str(value)[:40]!r}")
     if isinstance(entry, dict) and ("tolerance" in entry or "sigma" in entry):
         given, scale = (entry["sigma"], 1.0) if "sigma" in entry else (entry["tolerance"], abs(value))
-        sigma = number(given) * scale
+        sigma = as_number(given) * scale
         if not 0.0 < sigma < math.inf:
             raise InputError(f"{where}: [{section}] {name}: the tolerance must be above 0 (sigma where value is 0)")
         free = entry.get("free", True)
@@ -196,7 +196,7 @@ def _axes(table: dict[str, Any], where: str) -> Axes:
 def _seconds(table: dict[str, Any], name: str, usual: float, where: str) -> float:
     for extra in set(table) - set(_MODEL):
         raise InputError(f"{where}: [model] has no {extra!r}; it has {', '.join(_MODEL)}")
-    value = number(table.get(name, usual))
+    value = as_number(table.get(name, usual))
     if not 1e-7 <= value <= 1.0:
         raise InputError(f"{where}: [model] {name} must lie between 1e-7 and 1 s, not {str(table[name])[:40]!r}")
     return value

@@ -9,6 +9,7 @@ from typing import Any
 
 from ema_model.errors import InputError
 from ema_model.quantities.axes import Axes
+from ema_model.quantities.numbers import as_number
 
 _FAR = 1e9  # rad, where an end stop is out of reach
 
@@ -200,7 +201,7 @@ def low_limit(path: str) -> float:
 
 def check_value(section: str, name: str, value: Any, where: str) -> None:
     """Raises InputError for what is no number, or not one that this parameter can have."""
-    if not math.isfinite(number(value)):
+    if not math.isfinite(as_number(value)):
         raise InputError(f"{where}: [{section}] {name} must be a number, not {str(value)[:40]!r}")
     if name in _POSITIVE and value <= 0.0:
         raise InputError(f"{where}: [{section}] {name} must be above 0, not {value!r}")
@@ -212,11 +213,3 @@ def check_stops(transmission: Transmission, where: str) -> None:
     """Raises InputError for end stops in the wrong order."""
     if not transmission.stop_low_rad < transmission.stop_high_rad:
         raise InputError(f"{where}: [transmission] stop_low_rad must be below stop_high_rad")
-
-
-def number(value: Any) -> float:
-    """The number, or NaN for what is none (or too large to be one)."""
-    try:
-        return math.nan if isinstance(value, bool | str) else float(value)
-    except (TypeError, ValueError, OverflowError):
-        return math.nan

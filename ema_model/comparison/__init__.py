@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from ema_model.comparison.compare import compare
-from ema_model.comparison.result import Compared, Comparison, Explanation, Region, SignalError
+from ema_model.comparison.explain import Explanation
+from ema_model.comparison.result import Compared, Comparison, Region, SignalError
 from ema_model.comparison.summary import as_dict
 
 __all__ = ["Compared", "Comparison", "Explanation", "Region", "SignalError", "as_dict", "compare"]

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from ema_model.comparison.cross_validation import FOLDS, Folds, Given, LeftOut, nothing_given, share_out
 from ema_model.comparison.curves import families, harmonics, orders_in, quantile_knots
 from ema_model.comparison.residuals import Residuals
-from ema_model.comparison.result import Explanation
 from ema_model.comparison.sentences import explanation_sentence
 from ema_model.quantities.axes import Axes
 from ema_model.recordings import SIGNALS
@@ -51,6 +50,24 @@ _BINS = 24
 _LEAST_WITHIN = 0.3  # of a variable's variance, within recordings
 _AT_BOUND = 0.02  # σ
 _FINALISTS = 6
+
+
+@dataclass(frozen=True, eq=False)
+class Explanation:
+    """How much of a signal's residual one variable, times a modulator, tells ahead on data it was not fitted to.
+
+    The residual is modulator × curve(variable); the modulator is 1, the current, or the sign of the speed.
+    """
+
+    signal: str
+    variable: str
+    modulator: str  # "1", "current", "sign_speed"
+    r2: float  # cross-validated share of the residual's power beyond noise and floor, at most 1
+    significant: bool
+    centres: Array  # (bins,) of the variable, in its unit (the angle from 0 to 2π)
+    curve: Array  # (bins,) mean residual over modulator, in the signal's unit (over A for the current)
+    error: Array  # (bins,) its standard error
+    sentence: str  # "The residual current repeats with the motor's angle."
 
 
 @dataclass(frozen=True, eq=False)

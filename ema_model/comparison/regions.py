@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.comparison.curves import quantile_knots
-from ema_model.comparison.explain import used_blocks
+from ema_model.comparison.explain import Explanation, used_blocks
 from ema_model.comparison.residuals import Residuals
-from ema_model.comparison.result import Explanation, Region
+from ema_model.comparison.result import Region
 from ema_model.comparison.sentences import region_sentence
 from ema_model.quantities.axes import Axes
 

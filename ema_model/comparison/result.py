@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ema_model.comparison.explain import Explanation
 from ema_model.comparison.residuals import Residuals
 
 if TYPE_CHECKING:
@@ -19,24 +20,6 @@ if TYPE_CHECKING:
     from ema_model.recordings.health.card import Health
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True, eq=False)
-class Explanation:
-    """How much of a signal's residual one variable, times a modulator, tells ahead on data it was not fitted to.
-
-    The residual is modulator × curve(variable); the modulator is 1, the current, or the sign of the speed.
-    """
-
-    signal: str
-    variable: str
-    modulator: str  # "1", "current", "sign_speed"
-    r2: float  # cross-validated share of the residual's power beyond noise and floor, at most 1
-    significant: bool
-    centres: Array  # (bins,) of the variable, in its unit (the angle from 0 to 2π)
-    curve: Array  # (bins,) mean residual over modulator, in the signal's unit (over A for the current)
-    error: Array  # (bins,) its standard error
-    sentence: str  # "The residual current repeats with the motor's angle."
 
 
 @dataclass(frozen=True, eq=False)

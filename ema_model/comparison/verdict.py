@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
-from ema_model.comparison.explain import explain, used_blocks
+from ema_model.comparison.explain import Explanation, explain, used_blocks
 from ema_model.comparison.orders import Order, residual_orders
 from ema_model.comparison.regions import worst_regions
 from ema_model.comparison.residuals import Residuals
-from ema_model.comparison.result import Explanation, Region, SignalError
+from ema_model.comparison.result import Region, SignalError
 from ema_model.comparison.sentences import order_sentence
 from ema_model.estimation import Calibration
 from ema_model.estimation.floor import CORRELATED_S

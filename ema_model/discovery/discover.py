@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ema_model.actuator import Actuator, load_actuator
-from ema_model.comparison.result import Explanation
+from ema_model.comparison.explain import Explanation
 from ema_model.discovery.harmonics import with_further_orders
-from ema_model.discovery.next_test import next_experiment
+from ema_model.discovery.next_experiment import next_experiment
 from ema_model.discovery.path import Story, begun, with_drops
 from ema_model.discovery.refit import LEAST_BIC, Trial, fitted_count, pays
 from ema_model.discovery.result import Candidate, Discovery, Experiment

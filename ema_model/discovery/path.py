@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.comparison.compare import prepared, weights_of
-from ema_model.comparison.result import Explanation
+from ema_model.comparison.explain import Explanation
 from ema_model.discovery.faults import fault_for
 from ema_model.discovery.fingerprints import Fingerprint, fingerprints, stacks_of_their_own
 from ema_model.discovery.model_fit import (

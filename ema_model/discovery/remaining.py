@@ -8,11 +8,10 @@ from functools import lru_cache
 from ema_model.comparison.assemble import residuals_of
 from ema_model.comparison.compare import known_error
 from ema_model.comparison.curves import orders_in
-from ema_model.comparison.explain import advance_of, explain, used_blocks
+from ema_model.comparison.explain import Explanation, advance_of, explain, used_blocks
 from ema_model.comparison.orders import Order
 from ema_model.comparison.orders import orders as orders_of
 from ema_model.comparison.residuals import Residuals
-from ema_model.comparison.result import Explanation
 from ema_model.comparison.verdict import ORDER_OF_PRIMARY
 from ema_model.discovery.model_fit import Data, Fit
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
-from ema_model.comparison.result import Explanation
+from ema_model.comparison.explain import Explanation
 from ema_model.estimation import Calibrated, Calibration, Floor
 from ema_model.models import Plant
 
@@ -27,6 +27,11 @@ class Candidate:
     settings: dict[str, float]
     untestable_reason: str = ""
     refitted_drop: float | None = None  # of χ², where it was refitted
+
+    @property
+    def drop(self) -> float:
+        """The fall of χ²: that of the refit, or the predicted one where there was none."""
+        return self.predicted_drop if self.refitted_drop is None else self.refitted_drop
 
 
 @dataclass(frozen=True)
@@ -97,3 +102,11 @@ class Discovery:
     curve: Added | None = None  # the torque curve that was added for what is unknown
     next_experiment: Experiment | None = None
     warnings: Sequence[str] = field(default_factory=tuple)
+
+    @property
+    def ranked(self) -> list[Candidate]:
+        """Best first: by what a refit gave, then by what was predicted; last what these recordings cannot show."""
+        return sorted(
+            self.candidates,
+            key=lambda one: (bool(one.untestable_reason), one.refitted_drop is None, -one.drop),
+        )

@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator, Tolerance
 from ema_model.comparison.curves import HIGHEST_ORDER
-from ema_model.comparison.explain import modulator_of, used_blocks
+from ema_model.comparison.explain import Explanation, modulator_of, used_blocks
 from ema_model.comparison.residuals import Residuals
-from ema_model.comparison.result import Explanation
 from ema_model.comparison.verdict import ORDER_OF_PRIMARY
 from ema_model.discovery.model_fit import Data, Fit
 from ema_model.discovery.remaining import residuals_left

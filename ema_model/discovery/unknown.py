@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ema_model.comparison.result import Explanation
+from ema_model.comparison.explain import Explanation
 from ema_model.discovery.model_fit import Data, Fit, fit
 from ema_model.discovery.refit import LEAST_BIC, Trial, pays
 from ema_model.discovery.result import Candidate

@@ -7,17 +7,40 @@ All starts' derivatives are one population of the kernel, and so are all steps w
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-
-from ema_model.identification.problem import Problem
 
 Array = NDArray[np.float64]
 
 _DAMPINGS = (1e-4, 1e-2, 1.0, 30.0)  # of one step, times the start's own
 _SMALL = 1e-3  # least fall of the cost, in units of χ², that is worth another step
 _RELATIVE = 1e-5
+
+
+class Problem(Protocol):
+    """Least squares within bounds, of many candidates x (…, count) at once; their prior is among the residuals."""
+
+    low: Array  # (count,)
+    high: Array
+
+    @property
+    def count(self) -> int:
+        """Unknowns."""
+        ...
+
+    def clip(self, x: Array) -> Array:
+        """Candidates moved into the bounds."""
+        ...
+
+    def residuals(self, x: Array) -> Array:
+        """(n, residuals) of candidates (n, count)."""
+        ...
+
+    def jacobians(self, x: Array) -> tuple[Array, Array]:
+        """The same, and their derivatives (n, residuals, count)."""
+        ...
 
 
 @dataclass(eq=False)

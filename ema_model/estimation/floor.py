@@ -26,6 +26,7 @@ from ema_model.simulation.run import Run, simulate_reference
 
 Array = NDArray[np.float64]
 
+BAND_SIGMAS = 2.0  # σ on either side: 95 of 100 blocks of a perfect model lie within
 CORRELATED_S = 0.025  # how long the model's error, and a sensor's inaccuracy, stay alike
 _STILL = 8.0  # of a position's noise, within which it stands
 _POSITIONS = ("motor_position_rad", "user_position_rad")

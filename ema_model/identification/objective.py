@@ -14,13 +14,10 @@ from ema_model.models.window import BLOCK_S, Window
 from ema_model.physics.rows import LANES
 from ema_model.recordings import Measurement
 from ema_model.simulation.pack import initial_state, monitor_rows
-from ema_model.simulation.run import Run, simulate_reference
+from ema_model.simulation.plant import FITNESSES
 from ema_model.stacks import exclusive
 
 Array = NDArray[np.float64]
-
-FITNESSES = ("filtered", "raw")
-_DEFAULT_RATE_HZ = {"filtered": 10_000.0, "raw": 100_000.0}
 
 
 class Objective(ClosedLoop):
@@ -112,16 +109,6 @@ class Objective(ClosedLoop):
 
     def _state(self, window: Window, blocks: int) -> Array:
         return initial_state(self.actuator, blocks, window.user_rad, window.speed_rad_s, window.play_rad, self.stack)
-
-
-def simulated(
-    run: Run, actuator: Actuator, k: ArrayLike, fitness: str = "filtered", effects: Mapping | None = None
-) -> Measurement:
-    """A recording of the Reference Model for identification, sampled at the fitness's own rate (10 or 100 kHz)."""
-    if fitness not in FITNESSES:
-        raise InputError(f"no fitness {fitness!r}; fitnesses are {', '.join(FITNESSES)}")
-    run = Run(run.command, run.duration_s, _DEFAULT_RATE_HZ[fitness], run.load_torque_Nm)
-    return simulate_reference(run, actuator, k, effects)
 
 
 def _alike(windows: Sequence[Window]) -> list[list[Window]]:

@@ -19,7 +19,7 @@ from ema_model.estimation.feldman_cousins import above_zero, length_of_vector
 from ema_model.identification.adequacy import Adequacy, adequacy
 from ema_model.identification.fit import Fitted
 from ema_model.identification.model_bias import TWINS
-from ema_model.identification.next_test import Suggestion, separating
+from ema_model.identification.next_experiment import Suggestion, separating
 from ema_model.identification.unknowns import ECCENTRICITY, FAULTS, GAIN, to_x
 
 Array = NDArray[np.floating]

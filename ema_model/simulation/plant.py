@@ -1,19 +1,20 @@
-"""Which model plays the plant that Explore breaks: the Reference Model, or the Monitor Model where there is none."""
+"""Which model plays the plant: the Reference Model, or the Monitor Model where there is none."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from numpy.typing import ArrayLike
 
 from ema_model.actuator import Actuator
 from ema_model.errors import InputError
-from ema_model.identification.objective import simulated
 from ema_model.recordings import Measurement
 from ema_model.simulation.run import Run, simulate_monitor, simulate_reference
 
-_RATE_HZ = {"filtered": 10_000.0, "raw": 100_000.0}  # of what is identified
+_RATE_HZ = {"filtered": 10_000.0, "raw": 100_000.0}  # of what is identified, by the fitness that it is for
+FITNESSES = tuple(_RATE_HZ)
 
 
 def can_be_explored(actuator: Actuator) -> bool:
@@ -64,14 +65,25 @@ def simulate(
     return simulate_monitor(run, actuator, k, effects, start_rad=start_rad)
 
 
+def simulated(
+    run: Run, actuator: Actuator, k: ArrayLike, fitness: str = "filtered", effects: Mapping[str, Any] | None = None
+) -> Measurement:
+    """A recording of the Reference Model for identification, sampled at the fitness's own rate (10 or 100 kHz)."""
+    if fitness not in FITNESSES:
+        raise InputError(f"no fitness {fitness!r}; fitnesses are {', '.join(FITNESSES)}")
+    return simulate_reference(_at_rate(run, fitness), actuator, k, effects)
+
+
 def to_identify(run: Run, actuator: Actuator, k: ArrayLike, fitness: str, effects: Mapping[str, Any]) -> Measurement:
     """The plant as an identification takes it, sampled at its fitness's rate; raises as `simulate`."""
     if actuator.has_reference_model:
         return simulated(run, actuator, k, fitness, effects)
     _require(actuator)
-    return simulate_monitor(
-        Run(run.command, run.duration_s, _RATE_HZ[fitness], run.load_torque_Nm), actuator, k, effects
-    )
+    return simulate_monitor(_at_rate(run, fitness), actuator, k, effects)
+
+
+def _at_rate(run: Run, fitness: str) -> Run:
+    return replace(run, sample_rate_Hz=_RATE_HZ[fitness])
 
 
 def _require(actuator: Actuator) -> None:

@@ -11,9 +11,10 @@ from ema_model import faults
 from ema_model.actuator import Actuator
 from ema_model.discovery.model_fit import with_effect
 from ema_model.errors import InputError
-from ema_model.identification.objective import FITNESSES, Objective, simulated
+from ema_model.identification.objective import Objective
 from ema_model.identification.run import ALGORITHMS, ROBUST, Identification, Progress, identify
 from ema_model.recordings import Measurement, read_measurement
+from ema_model.simulation.plant import FITNESSES, simulated
 from ema_model.simulation.sensors import Sensors
 from emaviz.cli import options, output
 

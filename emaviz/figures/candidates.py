@@ -5,19 +5,10 @@ from __future__ import annotations
 import plotly.graph_objects as go
 
 from ema_model.discovery import Discovery
-from ema_model.discovery.result import Candidate
 from emaviz.figures import theme
 from emaviz.text.discovery import effect_title
 
 PREDICTED, REFITTED = theme.MEASURED, theme.MODEL
-
-
-def ranked(found: Discovery) -> list[Candidate]:
-    """Best first: by what a refit gave, then by what was predicted; what these recordings cannot show comes last."""
-    return sorted(
-        found.candidates,
-        key=lambda one: (bool(one.untestable_reason), one.refitted_drop is None, -_drop(one)),
-    )
 
 
 def height(found: Discovery) -> int:
@@ -28,7 +19,7 @@ def height(found: Discovery) -> int:
 def figure(found: Discovery, *, dark: bool = False) -> go.Figure:
     """Bars for each candidate, the best on top; grey names are those that these recordings cannot show."""
     title = "What each effect would take away from the error"
-    shown = ranked(found)[::-1]  # a horizontal bar chart counts from the bottom
+    shown = found.ranked[::-1]  # a horizontal bar chart counts from the bottom
     if not shown:
         return theme.missing(title, "no candidates were scored", dark=dark)
     chart = theme.new(title, "Fall of χ² [-]", "", dark=dark)
@@ -71,7 +62,3 @@ def figure(found: Discovery, *, dark: bool = False) -> go.Figure:
     chart.update_yaxes(tickvals=list(range(len(shown))), ticktext=ticks, showgrid=False, nticks=0)
     chart.update_layout(barmode="group", bargap=0.3)
     return chart
-
-
-def _drop(one: Candidate) -> float:
-    return one.predicted_drop if one.refitted_drop is None else one.refitted_drop

@@ -9,7 +9,7 @@ import numpy as np
 import viser
 
 from ema_model.identification.run import ALGORITHMS as TITLES
-from emaviz.figures.colours import ALGORITHMS, MONITOR
+from emaviz.colours import ALGORITHMS, MONITOR
 from emaviz.figures.signals import AXIS, PADDING, legend
 
 _LEAST_A = 1e-9  # a logarithmic axis has no zero

@@ -8,10 +8,10 @@ from urllib.parse import quote
 import numpy as np
 import viser
 
-from emaviz.figures.colours import DIFFERENCE, MONITOR, REFERENCE
+from ema_model.simulation.with_effect import SHOWN, WithEffect
+from emaviz.colours import DIFFERENCE, MONITOR, REFERENCE
 from emaviz.figures.decimate import envelope
 from emaviz.figures.signals import CHARTS, legend, time_axis, value_axis
-from emaviz.session.library import SHOWN, Felt
 
 _POINTS, _SMALL_POINTS = 800, 160
 _WIDTH, _HEIGHT = 120, 44  # of a small picture, pixels
@@ -41,7 +41,7 @@ class EffectCharts:
             )
             self._charts.append((chart, both, change))
 
-    def show(self, felt: Felt) -> None:
+    def show(self, felt: WithEffect) -> None:
         """Draws a run."""
         time = felt.with_it.time_s
         for chart, both, change in self._charts:
@@ -64,7 +64,7 @@ def _layout(height: int) -> dict[str, Any]:
     }
 
 
-def small_picture(felt: Felt) -> str:
+def small_picture(felt: WithEffect) -> str:
     """An SVG as a data address: what changes in the signal that shows the effect most."""
     change = felt.change(felt.shows)[1]
     most = float(np.max(np.abs(change)))

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import plotly.graph_objects as go
 
-from ema_model.comparison.result import Explanation
+from ema_model.comparison.explain import Explanation
 from emaviz.figures import quantity, theme
 
 _PALE = 0.3

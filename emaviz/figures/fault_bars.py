@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from ema_model.actuator import Actuator
 from ema_model.faults import FAULTS, sentences
-from emaviz.figures.colours import DIFFERENCE, MONITOR, TRUTH
+from emaviz.colours import DIFFERENCE, MONITOR, TRUTH
 
 
 def fault_bars(

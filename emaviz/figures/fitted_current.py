@@ -10,7 +10,7 @@ import viser
 from numpy.typing import NDArray
 
 from ema_model.identification.run import ALGORITHMS as TITLES
-from emaviz.figures.colours import REFERENCE
+from emaviz.colours import REFERENCE
 from emaviz.figures.convergence import colour
 from emaviz.figures.decimate import envelope
 from emaviz.figures.signals import CURSOR, PADDING, POINTS, legend, time_axis, value_axis

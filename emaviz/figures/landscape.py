@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from ema_model.faults import FAULTS
 from ema_model.identification.landscape import Landscape, Way
 from ema_model.identification.run import ALGORITHMS as TITLES
+from emaviz.colours import TRUTH
 from emaviz.figures import theme
-from emaviz.figures.colours import TRUTH
 from emaviz.figures.convergence import colour
 
 Array = NDArray[np.floating]

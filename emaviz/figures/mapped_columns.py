@@ -8,7 +8,7 @@ from plotly.subplots import make_subplots
 
 from ema_model.errors import InputError
 from ema_model.recordings import SIGNALS, ColumnMapping, apply_mapping
-from emaviz.figures.colours import COMMAND, REFERENCE
+from emaviz.colours import COMMAND, REFERENCE
 from emaviz.figures.decimate import envelope
 
 _POINTS = 1200

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from ema_model.discovery import Discovery
 from ema_model.discovery.result import Added
 from ema_model.effects import Effect, find
-from emaviz.figures.colours import ALGORITHMS, MONITOR, TRUTH
+from emaviz.colours import ALGORITHMS, MONITOR, TRUTH
 from emaviz.text.discovery import effect_title, settings
 
 COLOURS = (MONITOR, ALGORITHMS["ssa"], ALGORITHMS["do"], TRUTH)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import plotly.graph_objects as go
 
 from ema_model.comparison.result import Comparison, Region
+from ema_model.estimation.floor import BAND_SIGMAS
 from emaviz.figures import quantity, theme
 from emaviz.figures.lines import band, line
 from emaviz.figures.region_blocks import time_ranges, within
@@ -33,7 +34,7 @@ def figure(
     time = one.time_s[inside]
     shown = quantity.of_signal(comparison, signal).scaled(one.measured[signal])
     measured, model = shown.factor * one.measured[signal][inside], shown.factor * one.model[signal][inside]
-    sigma = theme.FLOOR_WIDTH * shown.factor * one.sigma[signal][inside]
+    sigma = BAND_SIGMAS * shown.factor * one.sigma[signal][inside]
     chart = theme.new(title, *_axes(comparison, shown), dark=dark)
     x, y = band(time, model - sigma, model + sigma, theme.POINTS)
     chart.add_trace(

@@ -6,6 +6,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from ema_model.comparison.result import Comparison, Region
+from ema_model.estimation.floor import BAND_SIGMAS
 from emaviz.figures import floor_band, quantity, theme
 from emaviz.figures.binned import Binned, binned, edges_for
 from emaviz.figures.lines import scattered
@@ -117,7 +118,7 @@ def turn_ranges(low: float, high: float) -> list[tuple[float, float]]:
 def _band(chart: go.Figure, bins: Binned, axis: quantity.Quantity, shown: quantity.Quantity) -> None:
     # in steps from edge to edge: the floor is known by bin
     x = np.stack([bins.low, bins.high], axis=1).ravel() * axis.factor
-    y = np.repeat(bins.floor, 2) * shown.factor * theme.FLOOR_WIDTH
+    y = np.repeat(bins.floor, 2) * shown.factor * BAND_SIGMAS
     floor_band.outlined(chart, np.concatenate([x, x[::-1]]), np.concatenate([y, -y[::-1]]))
 
 

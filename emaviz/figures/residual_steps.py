@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import plotly.graph_objects as go
 
+from ema_model.discovery.tracks import Track
+from ema_model.estimation.floor import BAND_SIGMAS
 from ema_model.recordings import SIGNALS
 from emaviz.figures import floor_band, quantity, theme
-from emaviz.figures.discovery_tracks import Track
 from emaviz.figures.lines import line
 
 BEFORE, AFTER = theme.MODEL, theme.MEASURED
@@ -23,7 +24,7 @@ def figure(track: Track, signal: str, first: int = 0, last: int = -1, *, dark: b
     before, after = track.residual(signal, first), track.residual(signal, last)
     shown = quantity.Quantity(title, told.unit, symbol=f"Δ{told.symbol}").scaled(before)
     chart = theme.new(f"{title} (measured − model)", "Time [s]", shown.short_label, dark=dark)
-    sigma = theme.FLOOR_WIDTH * shown.factor * track.sigma[signal]
+    sigma = BAND_SIGMAS * shown.factor * track.sigma[signal]
     floor_band.below(chart, track.time_s, sigma)
     changed = len(track.models) > 1
     drawn = [(before, "without the added effects", BEFORE)] if changed else []

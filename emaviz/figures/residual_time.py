@@ -5,6 +5,7 @@ from __future__ import annotations
 import plotly.graph_objects as go
 
 from ema_model.comparison.result import Comparison, Region
+from ema_model.estimation.floor import BAND_SIGMAS
 from emaviz.figures import floor_band, quantity, theme
 from emaviz.figures.lines import line
 from emaviz.figures.region_blocks import time_ranges, within
@@ -34,7 +35,7 @@ def figure(
     time, measured = one.time_s[inside], one.measured[signal][inside]
     left = measured - one.model[signal][inside]
     shown = shown.scaled(left)
-    sigma = theme.FLOOR_WIDTH * shown.factor * one.sigma[signal][inside]
+    sigma = BAND_SIGMAS * shown.factor * one.sigma[signal][inside]
     axis = "Sample" if comparison.residuals.is_map else "Time [s]"
     chart = theme.new(f"{shown.title} (measured − model)", axis, shown.short_label, dark=dark)
     floor_band.below(chart, time, sigma)

@@ -6,7 +6,7 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from ema_model.recordings import Measurement
-from emaviz.figures.colours import COMMAND, GHOST, MONITOR, REFERENCE
+from emaviz.colours import COMMAND, GHOST, MONITOR, REFERENCE
 from emaviz.figures.lines import line
 from emaviz.figures.signals import CHARTS, at
 from emaviz.figures.theme import DARK, LIGHT

@@ -10,7 +10,7 @@ import viser
 from numpy.typing import NDArray
 
 from ema_model.recordings import Measurement
-from emaviz.figures.colours import COMMAND, DIFFERENCE, GHOST, MONITOR, PHASES, REFERENCE
+from emaviz.colours import COMMAND, DIFFERENCE, GHOST, MONITOR, PHASES, REFERENCE
 from emaviz.figures.decimate import envelope
 
 Array = NDArray[np.float64]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.faults import FAULTS, NAMES
-from emaviz.figures.colours import TRUTH
+from emaviz.colours import TRUTH
 
 Array = NDArray[np.floating]
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import plotly.graph_objects as go
 
-from emaviz.figures.colours import ALGORITHMS, COMMAND, DIFFERENCE, MONITOR, REFERENCE
+from emaviz.colours import ALGORITHMS, COMMAND, DIFFERENCE, MONITOR, REFERENCE
 
 MEASURED = REFERENCE
 MODEL = MONITOR
@@ -24,7 +24,6 @@ EDGE = "#868e96"
 SHADE = "rgba(224,49,49,0.16)"
 MARK = "#c2255c"
 POINTS = 4000  # of a trace, at most
-FLOOR_WIDTH = 2.0  # σ on either side: 95 of 100 blocks of a perfect model lie within
 FLOOR_NAME = "floor ±2σ"
 _MOST_SHADES = 150
 _FONT = "system-ui, 'Segoe UI', Helvetica, Arial, sans-serif"

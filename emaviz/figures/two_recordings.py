@@ -11,11 +11,11 @@ from plotly.subplots import make_subplots
 
 from ema_model.faults import FAULTS
 from ema_model.recordings import SIGNALS
-from emaviz.figures.colours import DIFFERENCE, MONITOR, REFERENCE
+from emaviz.colours import DIFFERENCE, MONITOR, REFERENCE
 from emaviz.figures.lines import line
 from emaviz.figures.theme import DARK, LIGHT
+from emaviz.recording.entry import Entry, as_text
 from emaviz.recording.read import IdentificationTrace, Recording
-from emaviz.session.archive import Entry, as_text
 
 FIRST, SECOND = REFERENCE, MONITOR
 _POINTS = 2000

@@ -53,7 +53,6 @@ from emaviz.session.data_folder import DataFolder
 from emaviz.session.discover.discovering import Discovering
 from emaviz.session.discover.source import COMPARED
 from emaviz.session.library import Library
-from emaviz.session.race import measured
 from emaviz.session.session import Session, Simulation
 from emaviz.session.worker import Worker
 
@@ -84,7 +83,7 @@ class App:
         self.page = Page(self.server, self.session, self.screen)
         self._docked = Docked(self.server)
         self.comparing = Comparing(self.session, data)
-        self.session.open_file = partial(measured, self.comparing)
+        self.session.open_file = self.comparing.measurement
         self.discovering = Discovering(self.session, self.comparing)
         self.scene = ActuatorScene(self.server, round(actuator.motor.pole_pairs))
         self.strip = PlaybackStrip(self.page, self.scene, lambda: self.charts.window_s, self._theme)

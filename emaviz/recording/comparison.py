@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ema_model.comparison.result import Compared, Comparison
 from ema_model.comparison.summary import as_dict
 from ema_model.errors import InputError
-from emaviz.figures.theme import FLOOR_WIDTH
+from ema_model.estimation.floor import BAND_SIGMAS
 from emaviz.recording.errors import RecordingError
 from emaviz.recording.markdown import escaped
 from emaviz.recording.style import COMPARISON, plain
@@ -102,8 +102,8 @@ def _groups(comparison: Comparison) -> dict[str, dict[str, list[Array | None]]]:
         "monitor": lambda one, name: one.model[name],
         **({"initial": lambda one, name: one.initial[name]} if calibrated else {}),
         "residual": residual,
-        "floor_high": lambda one, name: FLOOR_WIDTH * one.sigma[name],
-        "floor_low": lambda one, name: -FLOOR_WIDTH * one.sigma[name],
+        "floor_high": lambda one, name: BAND_SIGMAS * one.sigma[name],
+        "floor_low": lambda one, name: -BAND_SIGMAS * one.sigma[name],
     }
     return {
         group: {

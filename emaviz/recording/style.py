@@ -8,7 +8,7 @@ import numpy as np
 
 from ema_model.faults import FAULTS
 from ema_model.quantities.signals import SIGNALS
-from emaviz.figures import colours
+from emaviz import colours
 
 Colour = tuple[int, int, int, int]
 

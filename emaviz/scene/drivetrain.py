@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import viser
 
-from emaviz.figures.colours import REFERENCE
+from emaviz.colours import REFERENCE
 from emaviz.scene.solids import Solid, about_x, about_y, ball, block, extruded, gear_wheel, joined, thread, tube
 
 Colour = tuple[int, int, int]

@@ -13,7 +13,7 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from emaviz.figures.colours import PHASES
+from emaviz.colours import PHASES
 from emaviz.scene.solids import TURN, Solid, about_x, ball, block, joined, revolved, tube
 
 Colour = tuple[int, int, int]

@@ -2,38 +2,20 @@
 
 from __future__ import annotations
 
-import json
 import os
-from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ema_model.errors import InputError
 from ema_model.recordings.refusal import shown
+from emaviz.recording.entry import Entry
 from emaviz.session.data_folder import sanitised
 
 if TYPE_CHECKING:
     from emaviz.recording.read import Recording
 
 _ENDING = ".rrd"
-
-
-@dataclass(frozen=True)
-class Entry:
-    """One recording of the folder."""
-
-    name: str
-    at: datetime
-    size_bytes: int
-    settings: dict[str, Any] = field(default_factory=dict)  # of an identification; empty for others
-    found: dict[str, dict[str, Any]] = field(default_factory=dict)  # its answers by algorithm
-    best: str | None = None  # the algorithm to believe
-
-    @property
-    def answer(self) -> dict[str, Any] | None:
-        """The best answer: k, rmse_A, error_percent, evaluations, elapsed_s, healthy, alarms, stopped."""
-        return self.found.get(self.best or "")
 
 
 class Recorded:
@@ -126,11 +108,6 @@ def _properties(path: Path) -> dict[str, Any]:
     if not (isinstance(settings, dict) and isinstance(found, dict) and isinstance(best, str)):
         return {}
     return {"settings": settings, "found": found, "best": best}
-
-
-def as_text(value: Any) -> str:
-    """A setting as a person reads it."""
-    return value if isinstance(value, str) else json.dumps(value)
 
 
 def recovered(recordings: Path) -> list[str]:

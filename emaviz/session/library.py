@@ -6,9 +6,6 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ema_model.commands import command
 from ema_model.discovery.fingerprints import off
 from ema_model.effects import CATALOGUE, find
@@ -16,6 +13,7 @@ from ema_model.errors import InputError
 from ema_model.quantities.titles import in_sentence
 from ema_model.recordings import Measurement
 from ema_model.simulation.run import Run, simulate_monitor
+from ema_model.simulation.with_effect import WithEffect
 from emaviz.session.session import Session
 from emaviz.session.worker import Steps
 
@@ -27,43 +25,12 @@ RUNS: dict[str, Run] = {
 }
 
 
-SHOWN = ("current_A", "user_position_rad", "motor_speed_rad_s")
-_LEAST = 1e-3  # of a signal's range, rms
-
-
-@dataclass(frozen=True, eq=False)
-class Felt:
-    """What an effect does in a run."""
-
-    name: str
-    run: str
-    settings: Mapping[str, float]
-    with_it: Measurement
-    without: Measurement
-
-    def change(self, name: str) -> tuple[float, NDArray[np.float64]]:
-        """What changes in a signal, (samples,), and its rms as a share of the signal's range; 0 for next to nothing."""
-        change = self.with_it[name] - self.without[name]
-        share = float(np.sqrt(np.mean(change**2))) / (float(np.ptp(self.without[name])) or 1.0)
-        return (share if share > _LEAST else 0.0), change
-
-    @property
-    def shows(self) -> str:
-        """The signal that shows it most."""
-        return max(SHOWN, key=lambda name: self.change(name)[0])
-
-    @property
-    def visibility(self) -> float:
-        """How much of that signal's range changes, rms."""
-        return self.change(self.shows)[0]
-
-
 @dataclass
 class LibraryEvents:
     """What the screen listens to; called on the compute thread, so listeners only hand over."""
 
-    felt: list[Callable[[Felt], None]] = field(default_factory=list)  # the effect that was asked for
-    drawn: list[Callable[[Felt], None]] = field(default_factory=list)  # one of all, at its clear severity
+    felt: list[Callable[[WithEffect], None]] = field(default_factory=list)  # the effect that was asked for
+    drawn: list[Callable[[WithEffect], None]] = field(default_factory=list)  # one of all, at its clear severity
     said: list[Callable[[str], None]] = field(default_factory=list)
 
 
@@ -98,7 +65,7 @@ class Library:
         for i, effect in enumerate(CATALOGUE.values()):
             self._say(f"Running {in_sentence(effect.title)} … {i + 1} of {len(CATALOGUE)}")
             settings = effect.settings({effect.parameters[0].name: effect.severities[1]})
-            found: list[Felt] = []
+            found: list[WithEffect] = []
             for run in RUNS:
                 with suppress(InputError):  # an effect that this actuator does not stand there
                     found.append(self._felt(effect.name, settings, run))
@@ -109,7 +76,7 @@ class Library:
             yield
         self._say("")
 
-    def _felt(self, name: str, settings: Mapping[str, float], run: str) -> Felt:
+    def _felt(self, name: str, settings: Mapping[str, float], run: str) -> WithEffect:
         effect = find(name)
         stack: dict[str, dict[str, float]] = {}
         if off(effect) is not None:
@@ -125,7 +92,7 @@ class Library:
             with_it = simulate_monitor(RUNS[run], self.session.actuator, effects={**stack, name: dict(settings)})
         except FloatingPointError as error:
             raise InputError(f"{effect.title}: {error}; make it weaker") from None
-        return Felt(name, run, dict(settings), with_it, self._without[key])
+        return WithEffect(name, run, dict(settings), with_it, self._without[key])
 
     def _say(self, text: str) -> None:
         for listener in self.events.said:

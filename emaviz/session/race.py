@@ -6,7 +6,6 @@ import threading
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,13 +15,9 @@ from ema_model.faults import performance_coefficient
 from ema_model.identification.objective import Objective
 from ema_model.identification.run import Identification, Progress, steps
 from ema_model.recordings import Measurement
-from ema_model.recordings.read import read_recording
 from ema_model.simulation import plant
 from emaviz.session.settings import SLIDERS, Settings
 from emaviz.session.worker import Steps
-
-if TYPE_CHECKING:
-    from emaviz.session.compare.comparing import Comparing
 
 Array = NDArray[np.float64]
 
@@ -148,14 +143,6 @@ class Reins:
         while self.paused:
             self._go.wait(_PAUSE_S)
             yield
-
-
-def measured(comparing: Comparing, name: str) -> Measurement:
-    """A file of the data folder as a measurement of the app's actuator; as Compare has it, if it is open there."""
-    opened = comparing.opened.get(name)
-    if opened is not None and opened.measurement is not None:
-        return opened.measurement
-    return read_recording(comparing.folder.measurement(name), comparing.session.actuator)
 
 
 def target(

@@ -15,8 +15,8 @@ from ema_model.commands import COMMANDS, command
 from ema_model.effects import find
 from ema_model.errors import InputError
 from ema_model.faults import HEALTHY, physical
-from ema_model.identification.objective import FITNESSES
 from ema_model.identification.run import ALGORITHMS
+from ema_model.simulation.plant import FITNESSES
 from ema_model.simulation.run import Run
 from ema_model.simulation.sensors import Sensors
 

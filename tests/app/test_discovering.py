@@ -11,14 +11,14 @@ from support.on_page import wait_until
 from support.rig import Rig
 
 from ema_model.actuator import load_actuator
+from ema_model.discovery.tracks import tracks
 from ema_model.effects.user import user_torque
 from ema_model.errors import InputError
 from ema_model.faults import HEALTHY
-from emaviz.figures.discovery_tracks import tracks
 from emaviz.page.discover import cards as discover_cards
 from emaviz.page.discover.actuator import _SHOWN, run_of
 from emaviz.page.discover.guide import STEPS, step
-from emaviz.page.discover.next_test import as_csv
+from emaviz.page.discover.next_experiment import as_csv
 from emaviz.page.discover.reveal import agrees, reveal
 from emaviz.recording.read import read
 from emaviz.scene.motion import motion

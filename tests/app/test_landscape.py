@@ -11,7 +11,7 @@ import pytest
 from ema_model.errors import InputError
 from ema_model.faults import HEALTHY, vector
 from ema_model.identification.landscape import Landscape, Way, extent, slices, ways
-from ema_model.identification.next_test import Suggestion
+from ema_model.identification.next_experiment import Suggestion
 from emaviz.figures import landscape as figures
 from emaviz.text.identification import sure_words
 from emaviz.text.run import run_in_words

@@ -17,11 +17,12 @@ import numpy as np
 
 from ema_model import faults
 from ema_model.actuator import load_actuator
-from ema_model.identification.objective import Objective, simulated
+from ema_model.identification.objective import Objective
 from ema_model.identification.optimisers import OPTIMISERS
 from ema_model.identification.run import identify
 from ema_model.physics.rows import CURRENT, LANES
 from ema_model.simulation.pack import initial_state, monitor_rows
+from ema_model.simulation.plant import simulated
 from ema_model.simulation.run import Run, simulate_reference
 from ema_model.stacks import Stack
 

@@ -13,7 +13,7 @@ from ema_model.comparison.compare import prepared, weights_of
 from ema_model.discovery import discover
 from ema_model.discovery.fingerprints import fingerprints
 from ema_model.discovery.model_fit import fit, gather, with_effect
-from ema_model.discovery.next_test import allowed, next_experiment
+from ema_model.discovery.next_experiment import allowed, next_experiment
 from ema_model.discovery.repeatability import is_lost, with_divergence
 from ema_model.discovery.score import scored, scored_together
 from ema_model.estimation.floor import floor

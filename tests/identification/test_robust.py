@@ -15,9 +15,10 @@ from ema_model.estimation.descent import Descent
 from ema_model.estimation.feldman_cousins import above_zero, length_of_vector
 from ema_model.identification.fit import refine, setting
 from ema_model.identification.model_bias import TWINS, _spread
-from ema_model.identification.objective import Objective, simulated
+from ema_model.identification.objective import Objective
 from ema_model.identification.run import identify
 from ema_model.identification.unknowns import to_k, to_x
+from ema_model.simulation.plant import simulated
 from ema_model.simulation.run import Run, simulate_reference
 from ema_model.simulation.sensors import Sensors
 

@@ -18,8 +18,9 @@ import pytest
 from ema_model import faults
 from ema_model.actuator import Actuator, load_actuator
 from ema_model.effects import CATALOGUE
-from ema_model.identification.objective import Objective, simulated
+from ema_model.identification.objective import Objective
 from ema_model.identification.run import identify
+from ema_model.simulation.plant import simulated
 from ema_model.simulation.run import Run, simulate_reference
 from ema_model.simulation.sensors import Sensors
 

@@ -17,12 +17,12 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from ema_model.actuator.parameters import number
 from ema_model.effects.user.curve import torque_curve
 from ema_model.effects.user.expression import parse
 from ema_model.effects.user.torque import RANGE, user_torque
 from ema_model.effects.user.user_effect import UserEffect
 from ema_model.errors import InputError
+from ema_model.quantities.numbers import as_number
 
 KINDS = ("user_torque", "torque_curve")
 _NAME = re.compile(rf"({'|'.join(KINDS)})(_[A-Za-z0-9_]+)?")
@@ -93,6 +93,6 @@ def _curve(entries: Mapping[str, Any]) -> tuple[UserEffect, dict[str, Any]]:
 
 
 def _number(name: str, value: Any) -> float:
-    if not math.isfinite(number(value)):
+    if not math.isfinite(as_number(value)):
         raise InputError(f"{name} must be a number, not {str(value)[:40]!r}")
     return float(value)

@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ema_model.discovery.tracks import Track
 from ema_model.errors import InputError
 from ema_model.recordings import Measurement
-from emaviz.figures.discovery_tracks import Track
 from emaviz.page.page import Page
 
 _PLANT = "Explore's plant"

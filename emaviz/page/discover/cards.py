@@ -6,11 +6,11 @@ import html
 from collections.abc import Sequence
 
 from ema_model.discovery import Candidate
+from ema_model.discovery.snapshot import Look
 from ema_model.effects import find
 from ema_model.quantities.titles import in_sentence, parameter_title, unit_of
 from emaviz.figures import quantity
 from emaviz.figures.quantity import number
-from emaviz.session.discover.look import Look
 from emaviz.text.discovery import effect_title
 
 BOX = 'style="padding:2px 12px 6px;font-size:13px;line-height:1.45"'

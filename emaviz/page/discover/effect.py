@@ -10,6 +10,7 @@ import plotly.graph_objects as go
 import viser
 
 from ema_model.discovery import Candidate
+from ema_model.discovery.snapshot import Look
 from ema_model.effects import Effect, find
 from ema_model.quantities.titles import in_sentence, parameter_title, unit_of
 from emaviz.figures import quantity, signature
@@ -17,7 +18,6 @@ from emaviz.figures.quantity import number
 from emaviz.page.discover import cards
 from emaviz.page.page import Page
 from emaviz.session.discover.discovering import Discovering
-from emaviz.session.discover.look import Look
 from emaviz.text.discovery import effect_title
 
 CONFIG = {"displayModeBar": False, "responsive": False}

@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 import viser
 
+from ema_model.discovery.snapshot import AT_FLOOR, Look
 from emaviz.figures.quantity import number
 from emaviz.page.page import Page
 from emaviz.session.discover.discovering import Discovering
-from emaviz.session.discover.look import AT_FLOOR, Look
 from emaviz.text.discovery import effect_title
 
 STEPS = 6

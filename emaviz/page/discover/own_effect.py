@@ -10,6 +10,7 @@ from typing import Any
 import plotly.graph_objects as go
 import viser
 
+from ema_model.discovery.snapshot import Look
 from ema_model.effects.user import UserEffect, user_torque
 from ema_model.effects.user.expression import FUNCTIONS, VARIABLES
 from ema_model.errors import InputError
@@ -19,7 +20,6 @@ from emaviz.page.discover import cards
 from emaviz.page.discover.sliders import ParameterSliders
 from emaviz.page.page import Page
 from emaviz.session.discover.discovering import Discovering
-from emaviz.session.discover.look import Look
 from emaviz.session.discover.own_effect import Preview, Typed, typed
 
 _EXAMPLE = "-c*sign(omega)*sqrt(abs(omega))"

@@ -9,20 +9,20 @@ from typing import Any
 import plotly.graph_objects as go
 import viser
 
+from ema_model.discovery.snapshot import AT_FLOOR, Look
+from ema_model.discovery.tracks import Track, tracks
 from ema_model.effects import CATALOGUE
 from ema_model.recordings import SIGNALS, Measurement
 from emaviz.figures import error_ladder, explained_steps, missing_curve, residual_steps
-from emaviz.figures.discovery_tracks import Track, tracks
 from emaviz.figures.model_equation import equation
 from emaviz.figures.quantity import number
 from emaviz.page.discover import cards
 from emaviz.page.discover.actuator import ActuatorSwitch
 from emaviz.page.discover.effect import CONFIG, EffectView
-from emaviz.page.discover.next_test import NextTest
+from emaviz.page.discover.next_experiment import NextTest
 from emaviz.page.discover.reveal import reveal
 from emaviz.page.page import Page
 from emaviz.session.discover.discovering import Discovering
-from emaviz.session.discover.look import AT_FLOOR, Look
 from emaviz.text.discovery import FLOOR_NOTE, headline, sentences
 
 _RESTING = (

@@ -10,11 +10,11 @@ from typing import Any
 import viser
 
 from ema_model.challenges import Challenge
+from ema_model.discovery.snapshot import Look
 from emaviz.page.discover import cards
 from emaviz.page.page import Page
 from emaviz.session.data_folder import CHALLENGE_SUFFIX
 from emaviz.session.discover.discovering import Discovering
-from emaviz.session.discover.look import Look
 from emaviz.session.discover.source import COMPARED
 from emaviz.session.uploads import Uploads
 

@@ -9,6 +9,7 @@ from typing import Any
 import viser
 
 from ema_model.discovery import Candidate
+from ema_model.discovery.snapshot import AT_FLOOR, Look
 from ema_model.effects import CATALOGUE
 from emaviz.figures.quantity import number
 from emaviz.page.discover import cards
@@ -18,7 +19,6 @@ from emaviz.page.discover.result import DiscoveryPanel
 from emaviz.page.discover.source import SourceControls
 from emaviz.page.page import Page
 from emaviz.session.discover.discovering import Discovering
-from emaviz.session.discover.look import AT_FLOOR, Look
 from emaviz.session.uploads import Uploads
 from emaviz.text.discovery import effect_title
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import viser
 
-from emaviz.figures.colours import GHOST, MONITOR, REFERENCE
+from emaviz.colours import GHOST, MONITOR, REFERENCE
 from emaviz.figures.run_metrics import differences, metrics, table
 from emaviz.figures.signals import PHASE_SIGNALS, LivePhases, LiveSignals
 from emaviz.page.page import Page

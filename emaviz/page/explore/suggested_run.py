@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ema_model.discovery.result import Experiment
-from ema_model.identification.next_test import Suggestion
+from ema_model.identification.next_experiment import Suggestion
 from emaviz.page.explore.tab import ExplorePanel
 
 

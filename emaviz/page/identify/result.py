@@ -9,7 +9,7 @@ from typing import Any
 import viser
 
 from ema_model.faults import HEALTHY
-from ema_model.identification.next_test import Suggestion
+from ema_model.identification.next_experiment import Suggestion
 from ema_model.identification.run import ALGORITHMS
 from emaviz.figures.convergence import LiveConvergence
 from emaviz.figures.fault_bars import fault_bars

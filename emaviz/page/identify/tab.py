@@ -9,8 +9,8 @@ from typing import Any
 
 import viser
 
-from ema_model.identification.objective import FITNESSES
 from ema_model.identification.run import ALGORITHMS
+from ema_model.simulation.plant import FITNESSES
 from emaviz.figures.convergence import colour
 from emaviz.page.identify.result import IdentifyResult
 from emaviz.page.page import Page

@@ -10,11 +10,12 @@ import viser
 
 from ema_model.effects import CATALOGUE, Effect, find
 from ema_model.quantities.titles import labelled
+from ema_model.simulation.with_effect import WithEffect
 from emaviz.figures.effect_signature import EffectCharts, small_picture
 from emaviz.page.discover import cards
 from emaviz.page.discover.effect import about
 from emaviz.page.page import Page
-from emaviz.session.library import RUNS, Felt, Library
+from emaviz.session.library import RUNS, Library
 
 _CARD = (
     "height:auto!important;min-height:52px;padding:4px 130px 4px 9px;font-weight:400;font-size:12px;"
@@ -73,7 +74,7 @@ class LibraryPanel:
         self._status.content = cards.note(text) if text else ""
         self._effect.say(text)
 
-    def _drawn(self, felt: Felt) -> None:
+    def _drawn(self, felt: WithEffect) -> None:
         self._pictures[felt.name] = small_picture(felt)
         self._effect.best_runs[felt.name] = felt.run
         self._draw.color = "gray"
@@ -127,7 +128,7 @@ class EffectPage:
         self._to_front()
         self._ask()
 
-    def show(self, felt: Felt) -> None:
+    def show(self, felt: WithEffect) -> None:
         """A run of it; on the screen's thread."""
         if felt.name == self._name:
             with self._page.server.atomic():

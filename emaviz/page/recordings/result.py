@@ -10,7 +10,7 @@ import viser
 
 from emaviz.figures import two_recordings
 from emaviz.page.page import Page
-from emaviz.session.archive import Entry
+from emaviz.recording.entry import Entry
 
 _CONFIG = {"displayModeBar": False}
 _HINT = '<div style="padding:8px 12px;font-size:13px;opacity:.8">{}</div>'

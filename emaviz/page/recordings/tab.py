@@ -14,8 +14,9 @@ from emaviz.figures.convergence import colour
 from emaviz.page.identify.tab import recording_link
 from emaviz.page.page import Page
 from emaviz.page.recordings.result import RecordingsResult
+from emaviz.recording.entry import Entry, as_text
 from emaviz.recording.viewer import ViewerHost
-from emaviz.session.archive import Entry, Recorded, as_text
+from emaviz.session.archive import Recorded
 from emaviz.session.worker import Worker
 
 NONE = "–"

@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.discovery import Discovery
+from ema_model.discovery.tracks import Track
 from ema_model.effects import find
 from ema_model.quantities.titles import in_sentence
-from emaviz.figures.candidates import ranked
-from emaviz.figures.discovery_tracks import Track
 from emaviz.figures.quantity import number
 from emaviz.recording.markdown import escaped
 from emaviz.text import discovery as words
@@ -52,7 +51,7 @@ def candidates(found: Discovery) -> str:
     lines += ["Each effect alone, in the calibrated model.", ""]
     lines += ["| rank | effect | predicted fall of χ² | refitted |", "|---|---|---|---|"]
     hidden = [one for one in found.candidates if one.untestable_reason]
-    for rank, one in enumerate((one for one in ranked(found) if not one.untestable_reason), 1):
+    for rank, one in enumerate((one for one in found.ranked if not one.untestable_reason), 1):
         refitted = "" if one.refitted_drop is None else f"{one.refitted_drop:.0f}"
         lines.append(f"| {rank} | {escaped(words.effect_title(one.name))} | {one.predicted_drop:.0f} | {refitted} |")
     if hidden:

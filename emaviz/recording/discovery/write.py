@@ -12,10 +12,9 @@ import rerun.blueprint as rrb
 from numpy.typing import ArrayLike, NDArray
 
 from ema_model.discovery import Discovery, as_dict
+from ema_model.discovery.tracks import PAUSE_S, Track, one_after_another, primary, tracks
 from ema_model.errors import InputError
-from emaviz.figures.candidates import ranked
-from emaviz.figures.discovery_tracks import PAUSE_S, Track, one_after_another, primary, tracks
-from emaviz.figures.theme import FLOOR_WIDTH
+from ema_model.estimation.floor import BAND_SIGMAS
 from emaviz.recording import series
 from emaviz.recording.discovery import documents, layout
 from emaviz.recording.discovery.layout import CANDIDATES, LADDER, Step
@@ -72,8 +71,8 @@ def _write_signal(
         "measurement": joined([track.measured[name] for track, _ in known]),
         "monitor": joined([track.models[-1][name] for track, _ in known]),
         "residual": joined([track.residual(name, -1) for track, _ in known]),
-        "floor_high": FLOOR_WIDTH * sigma,
-        "floor_low": -FLOOR_WIDTH * sigma,
+        "floor_high": BAND_SIGMAS * sigma,
+        "floor_low": -BAND_SIGMAS * sigma,
     }
     gaps = [float(time[at]) + 0.5 * PAUSE_S for at in np.flatnonzero(np.diff(time) > 0.99 * PAUSE_S)]
     for group, values in groups.items():
@@ -132,7 +131,7 @@ class DiscoveryWriter(RecordingWriter):
 
     def candidates(self) -> None:
         """The ranking as a table, and as bars in its order."""
-        chosen = [one for one in ranked(self._found) if not one.untestable_reason]
+        chosen = [one for one in self._found.ranked if not one.untestable_reason]
         with self._file.lock:
             self._text(CANDIDATES, documents.candidates(self._found))
             if chosen:

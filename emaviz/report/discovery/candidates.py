@@ -31,7 +31,7 @@ class Candidates(Section[Told]):
                 "–" if one.untestable_reason else f"{one.predicted_drop:.0f}",
                 "–" if one.refitted_drop is None else f"{one.refitted_drop:.0f}".replace("-", "−"),
             ]
-            for one in candidates.ranked(found)
+            for one in found.ranked
         ]
         reasons: dict[str, list[str]] = {}
         for one in found.candidates:

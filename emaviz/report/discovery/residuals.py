@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from ema_model.discovery.tracks import Track, primary
 from ema_model.recordings import SIGNALS
 from emaviz.figures import residual_steps
-from emaviz.figures.discovery_tracks import Track, primary
 from emaviz.report.discovery.subject import Told
 from emaviz.report.markup import escape, folded, paragraph
 from emaviz.report.section import Figures, Section

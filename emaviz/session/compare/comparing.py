@@ -23,7 +23,7 @@ from ema_model.recordings import (
     read_columns,
     write_side_file,
 )
-from ema_model.recordings.read import usual_mapping
+from ema_model.recordings.read import read_recording, usual_mapping
 from ema_model.recordings.refusal import shown
 from ema_model.recordings.side_file.read import SideFile
 from emaviz.session import actuators as actuator_files
@@ -89,6 +89,13 @@ class Comparing:
     def add(self, name: str) -> None:
         """Opens a file of the data folder soon; what is wrong with it is told."""
         self._files.post(f"open {name}", lambda: self._open(name))
+
+    def measurement(self, name: str) -> Measurement:
+        """A file of the data folder as a measurement of the app's actuator; as Compare has it, if it is open here."""
+        opened = self.opened.get(name)
+        if opened is not None and opened.measurement is not None:
+            return opened.measurement
+        return read_recording(self.folder.measurement(name), self.session.actuator)
 
     def remove(self, name: str) -> None:
         """Takes a recording off the list; its file stays."""

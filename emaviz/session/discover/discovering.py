@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ema_model.discovery import Candidate, begun, walk
-from ema_model.discovery.next_test import next_experiment
+from ema_model.discovery.next_experiment import next_experiment
 from ema_model.discovery.refit import Trial
 from ema_model.discovery.result import Experiment
+from ema_model.discovery.snapshot import Look
 from ema_model.discovery.unknown import curve_for
 from ema_model.effects import CATALOGUE, find
 from ema_model.effects.user import UserEffect
@@ -16,7 +17,6 @@ from ema_model.errors import InputError
 from ema_model.quantities.titles import in_sentence
 from emaviz.session.compare.comparing import Comparing
 from emaviz.session.discover.keep import keep
-from emaviz.session.discover.look import Look
 from emaviz.session.discover.own_effect import OwnPreview
 from emaviz.session.discover.progress import Telling
 from emaviz.session.discover.record import checked, experiment_of, take_again

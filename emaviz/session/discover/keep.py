@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from ema_model.actuator import save_actuator
+from ema_model.discovery.snapshot import Look
 from emaviz.session.data_folder import DataFolder
-from emaviz.session.discover.look import Look
 
 
 def keep(look: Look, folder: DataFolder, suffix: str) -> Path:

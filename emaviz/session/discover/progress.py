@@ -6,13 +6,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from ema_model.comparison.result import Explanation
+from ema_model.comparison.explain import Explanation
 from ema_model.discovery import Candidate, Story, result_of
 from ema_model.discovery.path import Step, with_drops
 from ema_model.discovery.refit import Trial, promising
 from ema_model.discovery.result import Experiment
+from ema_model.discovery.snapshot import Assessment, Look, assessed, look_at
 from ema_model.effects import CATALOGUE
-from emaviz.session.discover.look import Assessment, Look, assessed, look_at
 from emaviz.session.discover.record import experiment_saved, steps_of
 from emaviz.session.discover.refits import Trials
 

@@ -10,10 +10,10 @@ import numpy as np
 from ema_model.discovery import Candidate, Story
 from ema_model.discovery.path import Step
 from ema_model.discovery.refit import Trial
+from ema_model.discovery.snapshot import Assessment, Look
 from ema_model.effects import find
 from ema_model.errors import InputError
 from ema_model.quantities.titles import in_sentence
-from emaviz.session.discover.look import Assessment, Look
 from emaviz.session.discover.run import Tell
 
 _MOST_FOLLOWED = 8  # times that a fit is begun anew where the one before has ended

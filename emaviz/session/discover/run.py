@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from ema_model.discovery.snapshot import Look
 from ema_model.errors import InputError
 from emaviz.session.compare.comparing import Stopped
-from emaviz.session.discover.look import Look
 from emaviz.session.events import notify
 from emaviz.session.session import Session
 from emaviz.session.worker import Steps

@@ -12,10 +12,10 @@ import viser
 
 from ema_model.commands import command
 from ema_model.discovery.result import Experiment
+from ema_model.discovery.snapshot import Look
 from emaviz.page.discover import cards
 from emaviz.page.page import Page
 from emaviz.session.discover.discovering import Discovering
-from emaviz.session.discover.look import Look
 from emaviz.text.discovery import next_experiment
 
 _RATE_HZ = 10_000.0

@@ -10,15 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.comparison.assemble import residuals_of
+from ema_model.comparison.explain import Explanation
 from ema_model.comparison.residuals import Residuals
-from ema_model.comparison.result import Explanation
 from ema_model.discovery import Candidate, Discovery, Story
 from ema_model.discovery.path import alike
 from ema_model.discovery.refit import LEAST_BIC
 from ema_model.discovery.remaining import Left
 from ema_model.discovery.result import Added
+from ema_model.discovery.tracks import primary
 from ema_model.effects import find
-from emaviz.figures.discovery_tracks import primary
 
 Array = NDArray[np.float64]
 

@@ -8,8 +8,9 @@ import plotly.graph_objects as go
 
 from ema_model.comparison.result import Comparison, Region
 from ema_model.faults import NAMES
+from ema_model.quantities.numbers import number
 from ema_model.quantities.titles import parameter_title
-from emaviz.figures import quantity, theme
+from emaviz.figures import theme
 
 _BOUND = 3.0
 
@@ -78,7 +79,7 @@ def figure(comparison: Comparison, *, highlight: Region | None = None, dark: boo
         some = [score for score in reversed(found) if score.at_bound == at_bound]
         if not some:
             continue
-        texts = [f"{quantity.number(s.value, 4)} {s.unit} (file: {quantity.number(s.nominal, 4)})" for s in some]
+        texts = [f"{number(s.value, 4)} {s.unit} (file: {number(s.nominal, 4)})" for s in some]
         chart.add_trace(
             go.Scatter(
                 x=[score.z for score in some],

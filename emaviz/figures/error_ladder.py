@@ -7,7 +7,8 @@ import math
 import plotly.graph_objects as go
 
 from ema_model.discovery import Discovery
-from emaviz.figures import quantity, theme
+from ema_model.quantities.numbers import number
+from emaviz.figures import theme
 from emaviz.text.discovery import rung_title
 
 FITTED, HELD_OUT = theme.MEASURED, theme.MODEL
@@ -34,7 +35,7 @@ def figure(found: Discovery, *, dark: bool = False) -> go.Figure:
                 name=name,
                 line={"color": colour, "width": 2.5},
                 marker={"size": 10, "symbol": symbol},
-                text=[quantity.number(value) for value in values],
+                text=[number(value) for value in values],
                 # The number of the upper line above it, of the lower one below.
                 textposition=[
                     "top center" if value > its or (value == its and name == "fitted") else "bottom center"

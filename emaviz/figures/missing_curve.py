@@ -6,9 +6,9 @@ import numpy as np
 import plotly.graph_objects as go
 
 from ema_model.discovery import Discovery
+from ema_model.quantities.numbers import Quantity
 from ema_model.recordings import SIGNALS
 from emaviz.figures import quantity, theme
-from emaviz.figures.quantity import Quantity
 
 
 def figure(found: Discovery, *, dark: bool = False) -> go.Figure:

@@ -6,6 +6,7 @@ import plotly.graph_objects as go
 
 from ema_model.comparison.result import Comparison, Region
 from ema_model.estimation.floor import BAND_SIGMAS
+from ema_model.quantities.numbers import Quantity
 from emaviz.figures import quantity, theme
 from emaviz.figures.lines import band, line
 from emaviz.figures.region_blocks import time_ranges, within
@@ -61,7 +62,7 @@ def figure(
     return chart
 
 
-def _axes(comparison: Comparison, shown: quantity.Quantity) -> tuple[str, str]:
+def _axes(comparison: Comparison, shown: Quantity) -> tuple[str, str]:
     return ("Sample" if comparison.residuals.is_map else "Time [s]"), shown.short_label
 
 

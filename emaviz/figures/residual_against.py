@@ -7,6 +7,7 @@ import plotly.graph_objects as go
 
 from ema_model.comparison.result import Comparison, Region
 from ema_model.estimation.floor import BAND_SIGMAS
+from ema_model.quantities.numbers import Quantity
 from emaviz.figures import floor_band, quantity, theme
 from emaviz.figures.binned import Binned, binned, edges_for
 from emaviz.figures.lines import scattered
@@ -92,7 +93,7 @@ def _best_modulator(comparison: Comparison, variable: str, signal: str) -> str:
 
 
 def _ranges(
-    comparison: Comparison, variable: str, signal: str, highlight: Region | None, axis: quantity.Quantity
+    comparison: Comparison, variable: str, signal: str, highlight: Region | None, axis: Quantity
 ) -> list[tuple[float, float]]:
     regions = comparison.worst_regions if highlight is None else [highlight]
     ranges = []
@@ -115,7 +116,7 @@ def turn_ranges(low: float, high: float) -> list[tuple[float, float]]:
     return [(start, end)] if end <= 360.0 + 1e-9 else [(start, 360.0), (0.0, end - 360.0)]
 
 
-def _band(chart: go.Figure, bins: Binned, axis: quantity.Quantity, shown: quantity.Quantity) -> None:
+def _band(chart: go.Figure, bins: Binned, axis: Quantity, shown: Quantity) -> None:
     # in steps from edge to edge: the floor is known by bin
     x = np.stack([bins.low, bins.high], axis=1).ravel() * axis.factor
     y = np.repeat(bins.floor, 2) * shown.factor * BAND_SIGMAS
@@ -135,9 +136,7 @@ def _points(chart: go.Figure, x: np.ndarray, y: np.ndarray, name: str, marker: d
     )
 
 
-def _mean(
-    chart: go.Figure, bins: Binned, axis: quantity.Quantity, shown: quantity.Quantity, name: str, colour: str
-) -> None:
+def _mean(chart: go.Figure, bins: Binned, axis: Quantity, shown: Quantity, name: str, colour: str) -> None:
     many = len(bins.mean) > 60
     chart.add_trace(
         go.Scatter(

@@ -7,8 +7,9 @@ import plotly.graph_objects as go
 
 from ema_model.discovery.tracks import Track
 from ema_model.estimation.floor import BAND_SIGMAS
+from ema_model.quantities.numbers import Quantity
 from ema_model.recordings import SIGNALS
-from emaviz.figures import floor_band, quantity, theme
+from emaviz.figures import floor_band, theme
 from emaviz.figures.lines import line
 
 BEFORE, AFTER = theme.MODEL, theme.MEASURED
@@ -22,7 +23,7 @@ def figure(track: Track, signal: str, first: int = 0, last: int = -1, *, dark: b
     if signal not in track.measured:
         return theme.missing(title, "not recorded here", dark=dark)
     before, after = track.residual(signal, first), track.residual(signal, last)
-    shown = quantity.Quantity(title, told.unit, symbol=f"Δ{told.symbol}").scaled(before)
+    shown = Quantity(title, told.unit, symbol=f"Δ{told.symbol}").scaled(before)
     chart = theme.new(f"{title} (measured − model)", "Time [s]", shown.short_label, dark=dark)
     sigma = BAND_SIGMAS * shown.factor * track.sigma[signal]
     floor_band.below(chart, track.time_s, sigma)

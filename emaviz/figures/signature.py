@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 from ema_model.comparison.residuals import Residuals
 from ema_model.discovery import Candidate
 from ema_model.discovery.snapshot import Look
+from ema_model.quantities.numbers import Quantity
 from ema_model.quantities.titles import in_sentence
 from ema_model.recordings import SIGNALS
 from emaviz.figures import theme
 from emaviz.figures.binned import Binned, binned, edges_for
-from emaviz.figures.quantity import Quantity, variable_title
+from emaviz.figures.quantity import variable_title
 from emaviz.text.discovery import effect_title
 
 Array = NDArray[np.float64]

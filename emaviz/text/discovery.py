@@ -12,9 +12,9 @@ from ema_model.estimation import Calibrated
 from ema_model.faults import BY_NAME, FAULTS, NAMES
 from ema_model.faults import sentences as phrases_of
 from ema_model.quantities.axes import Axes
+from ema_model.quantities.numbers import number
 from ema_model.quantities.titles import in_sentence, parameter_title
 from ema_model.recordings import SIGNALS
-from emaviz.figures.quantity import number
 from emaviz.text.run import run_in_words
 
 VERDICTS = {

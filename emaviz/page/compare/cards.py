@@ -5,9 +5,9 @@ from __future__ import annotations
 import html
 from collections.abc import Iterable, Sequence
 
+from ema_model.quantities.numbers import number
 from ema_model.recordings import SIGNALS, ColumnMapping
 from ema_model.recordings.health.card import Finding, Health
-from emaviz.figures import quantity
 from emaviz.figures.calibration_scores import Score
 from emaviz.session.opened import Opened
 
@@ -84,10 +84,10 @@ def calibration_table(scores: Sequence[Score]) -> str:
         colour = "#e03131" if score.at_bound else "inherit"
         moved = f"{round(score.z, 2) + 0.0:+.2f} σ{' at its bound' if score.at_bound else ''}"
         moved = moved.replace("-", "−")
-        interval = f"{quantity.number(score.low)} … {quantity.number(score.high)}"
+        interval = f"{number(score.low)} … {number(score.high)}"
         rows.append(
             f"<tr><td>{html.escape(score.title)}</td>"
-            f'<td style="text-align:right;white-space:nowrap">{quantity.number(score.value, 4)}</td>'
+            f'<td style="text-align:right;white-space:nowrap">{number(score.value, 4)}</td>'
             f'<td style="text-align:right;white-space:nowrap;padding-left:8px">{interval}</td>'
             f'<td style="padding-left:6px">{html.escape(score.unit)}</td>'
             f'<td style="text-align:right;white-space:nowrap;color:{colour}">{moved}</td></tr>'

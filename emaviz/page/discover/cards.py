@@ -8,9 +8,8 @@ from collections.abc import Sequence
 from ema_model.discovery import Candidate
 from ema_model.discovery.snapshot import Look
 from ema_model.effects import find
+from ema_model.quantities.numbers import Quantity, number
 from ema_model.quantities.titles import in_sentence, parameter_title, unit_of
-from emaviz.figures import quantity
-from emaviz.figures.quantity import number
 from emaviz.text.discovery import effect_title
 
 BOX = 'style="padding:2px 12px 6px;font-size:13px;line-height:1.45"'
@@ -56,7 +55,7 @@ def strength(look: Look, one: Candidate) -> str:
     effect = find(one.name)
     first = effect.parameters[0]
     value, half = one.settings[first.name], look.uncertainty(one)
-    shown = quantity.Quantity("", unit_of(first.name)).scaled([value])
+    shown = Quantity("", unit_of(first.name)).scaled([value])
     told = f"{in_sentence(parameter_title(first.name))} {number(shown.factor * value)}"
     if half is not None:
         told += f" ± {number(shown.factor * half, 2)}"

@@ -12,9 +12,9 @@ import viser
 from ema_model.discovery import Candidate
 from ema_model.discovery.snapshot import Look
 from ema_model.effects import Effect, find
+from ema_model.quantities.numbers import Quantity, number
 from ema_model.quantities.titles import in_sentence, parameter_title, unit_of
-from emaviz.figures import quantity, signature
-from emaviz.figures.quantity import number
+from emaviz.figures import signature
 from emaviz.page.discover import cards
 from emaviz.page.page import Page
 from emaviz.session.discover.discovering import Discovering
@@ -114,6 +114,6 @@ def about(effect: Effect, equation: bool = True) -> str:
 def typical(effect: Effect) -> str:
     """'Amplitude 6, 12, 24 mN·m: slight, clear, strong.'"""
     first = effect.parameters[0]
-    shown = quantity.Quantity("", unit_of(first.name)).scaled(effect.severities)
+    shown = Quantity("", unit_of(first.name)).scaled(effect.severities)
     values = ", ".join(number(shown.factor * one, 2) for one in effect.severities)
     return f"{parameter_title(first.name)} {values} {shown.unit}".rstrip() + ": slight, clear, strong"

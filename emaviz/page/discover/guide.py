@@ -7,7 +7,7 @@ from collections.abc import Callable
 import viser
 
 from ema_model.discovery.snapshot import AT_FLOOR, Look
-from emaviz.figures.quantity import number
+from ema_model.quantities.numbers import number
 from emaviz.page.page import Page
 from emaviz.session.discover.discovering import Discovering
 from emaviz.text.discovery import effect_title

@@ -14,8 +14,8 @@ from ema_model.discovery.snapshot import Look
 from ema_model.effects.user import UserEffect, user_torque
 from ema_model.effects.user.expression import FUNCTIONS, VARIABLES
 from ema_model.errors import InputError
+from ema_model.quantities.numbers import number as shown
 from emaviz.figures import signature
-from emaviz.figures.quantity import number as shown
 from emaviz.page.discover import cards
 from emaviz.page.discover.sliders import ParameterSliders
 from emaviz.page.page import Page

@@ -12,10 +12,10 @@ import viser
 from ema_model.discovery.snapshot import AT_FLOOR, Look
 from ema_model.discovery.tracks import Track, tracks
 from ema_model.effects import CATALOGUE
+from ema_model.quantities.numbers import number
 from ema_model.recordings import SIGNALS, Measurement
 from emaviz.figures import error_ladder, explained_steps, missing_curve, residual_steps
 from emaviz.figures.model_equation import equation
-from emaviz.figures.quantity import number
 from emaviz.page.discover import cards
 from emaviz.page.discover.actuator import ActuatorSwitch
 from emaviz.page.discover.effect import CONFIG, EffectView

@@ -11,7 +11,7 @@ import viser
 from ema_model.discovery import Candidate
 from ema_model.discovery.snapshot import AT_FLOOR, Look
 from ema_model.effects import CATALOGUE
-from emaviz.figures.quantity import number
+from ema_model.quantities.numbers import number
 from emaviz.page.discover import cards
 from emaviz.page.discover.guide import Guide
 from emaviz.page.discover.own_effect import OwnEffect

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from ema_model.discovery import Discovery
 from ema_model.discovery.tracks import Track
 from ema_model.effects import find
+from ema_model.quantities.numbers import number
 from ema_model.quantities.titles import in_sentence
-from emaviz.figures.quantity import number
 from emaviz.recording.markdown import escaped
 from emaviz.text import discovery as words
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from ema_model.comparison.result import Comparison
+from ema_model.quantities.numbers import number
 from ema_model.quantities.titles import in_sentence
-from emaviz.figures import calibration_scores, quantity
+from emaviz.figures import calibration_scores
 from emaviz.report.markup import bullets, paragraph, table
 from emaviz.report.section import Figures, Section
 
@@ -26,8 +27,7 @@ class CalibrationTable(Section[Comparison]):
         how = "It has converged" if fit.converged else "It has not converged: its values are not to be trusted"
         parts = [
             paragraph(
-                f"{how}; χ² per value {quantity.number(fit.chi2_per_value)} (1 is the floor), "
-                f"{fit.evaluations} evaluations.",
+                f"{how}; χ² per value {number(fit.chi2_per_value)} (1 is the floor), {fit.evaluations} evaluations.",
                 "" if fit.converged else "bad",
             )
         ]
@@ -53,7 +53,6 @@ class CalibrationTable(Section[Comparison]):
 
 
 def _table(found: list[calibration_scores.Score]) -> str:
-    number = quantity.number
     rows = [
         [
             score.title,

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ema_model.comparison.result import Comparison, SignalError
+from ema_model.quantities.numbers import number
 from emaviz.figures import quantity
 from emaviz.report.markup import escape, folded, paragraph, table
 from emaviz.report.section import Figures, Section
@@ -57,9 +58,9 @@ def _table(comparison: Comparison, errors: Mapping[str, SignalError], what: str,
             [
                 label,
                 *(shown.text(value) for value in values),
-                f"{_MARK if np.isfinite(ratio) and ratio > _STANDS_OUT else ''}{quantity.number(ratio)}",
+                f"{_MARK if np.isfinite(ratio) and ratio > _STANDS_OUT else ''}{number(ratio)}",
                 shown.text(error.mean_absolute),
-                f"{quantity.number(100.0 * error.nrmse)} %",
+                f"{number(100.0 * error.nrmse)} %",
             ]
         )
     return table(heads, rows, marked=_MARK)

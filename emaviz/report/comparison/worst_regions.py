@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ema_model.comparison.result import Comparison, Region
+from ema_model.quantities.numbers import number
 from ema_model.quantities.titles import in_sentence
 from emaviz.figures import quantity, residual_against, residual_time
 from emaviz.figures.region_blocks import time_ranges
@@ -40,7 +41,7 @@ def _card(comparison: Comparison, figures: Figures, index: int, region: Region) 
     links = (
         link(f"against-{region.variable}", f"{variable}: all of it")
         + " · "
-        + link(f"recording-{recording + 1}", f"{name}, worst at {quantity.number(time_s, 4)} s")
+        + link(f"recording-{recording + 1}", f"{name}, worst at {number(time_s, 4)} s")
     )
     return (
         f'<div class="region" id="region-{index + 1}"><h3>{index + 1}. {escape(region.sentence)}</h3>'
@@ -53,10 +54,10 @@ def _card(comparison: Comparison, figures: Figures, index: int, region: Region) 
 def _details(comparison: Comparison, region: Region) -> str:
     axis = quantity.of_variable(comparison, region.variable).scaled([region.low, region.high])
     shown = quantity.of_residual(comparison, region.signal).scaled(region.rmse)
-    low, high = (quantity.number(axis.factor * value) for value in (region.low, region.high))
+    low, high = (number(axis.factor * value) for value in (region.low, region.high))
     return (
         f"{axis.title} {low} … {high} {axis.unit}: {in_sentence(shown.title)} {shown.text(region.rmse)} rms, "
-        f"{shown.text(region.mean)} on average; {quantity.number(region.excess)} times the floor, "
+        f"{shown.text(region.mean)} on average; {number(region.excess)} times the floor, "
         f"in {np.count_nonzero(region.blocks)} of {len(region.blocks)} blocks."
     )
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from ema_model.discovery.result import Added
 from ema_model.effects import Effect, find
+from ema_model.quantities.numbers import number
 from ema_model.quantities.titles import in_sentence
-from emaviz.figures import quantity
 from emaviz.report.discovery.subject import Told
 from emaviz.report.markup import escape, paragraph, table
 from emaviz.report.section import Figures, Section
@@ -50,14 +50,13 @@ def _parameters(told: Told, one: Added) -> str:
         rows.append([meanings.get(name, ""), name, f"{setting:g}", "chosen", "–"])
     for name in one.parameters:
         fitted = fitted_of(told.found, one, name)
-        low, high = (quantity.number(edge) for edge in fitted.interval90)
-        value = quantity.number(fitted.value)
+        low, high = (number(edge) for edge in fitted.interval90)
+        value = number(fitted.value)
         rows.append([meanings.get(name, ""), name, value, f"{low} … {high}", fitted.unit or "–"])
     return table(["Parameter", "name", "value", "90 % interval", "unit"], rows, text_columns=2)
 
 
 def _fall(one: Added) -> str:
-    number = quantity.number
     text = f"The error falls from {number(one.rmse_before)} to {number(one.rmse_after)} times the floor"
     if one.holdout_before is None or one.holdout_after is None:
         return f"{text}; nothing was held out."

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from ema_model.faults import NAMES
+from ema_model.quantities.numbers import number
 from ema_model.quantities.titles import in_sentence
-from emaviz.figures import quantity
 from emaviz.report.discovery.subject import Told
 from emaviz.report.markup import bullets, paragraph, table
 from emaviz.report.section import Figures, Section
@@ -21,7 +21,7 @@ class Calibrated(Section[Told]):
 
     def body(self, subject: Told, figures: Figures) -> str:
         """Always there."""
-        fit, axes, number = subject.found.calibration, subject.found.actuator.axes, quantity.number
+        fit, axes = subject.found.calibration, subject.found.actuator.axes
 
         def named(path: str) -> str:
             return path if path in NAMES else parameter(axes, path)

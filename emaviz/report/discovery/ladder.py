@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from ema_model.quantities.numbers import Quantity, number
 from ema_model.recordings import SIGNALS
-from emaviz.figures import error_ladder, quantity
-from emaviz.figures.quantity import Quantity
+from emaviz.figures import error_ladder
 from emaviz.report.discovery.subject import Told
 from emaviz.report.markup import paragraph, table
 from emaviz.report.section import Figures, Section
@@ -29,9 +29,9 @@ class Ladder(Section[Told]):
         heads += [f"{one.title}, rms" for one in shown.values()]
         rows = []
         for rung in found.ladder:
-            row = [rung_title(rung.label, found.actuator.axes), quantity.number(rung.rmse)]
+            row = [rung_title(rung.label, found.actuator.axes), number(rung.rmse)]
             if held:
-                row.append("–" if rung.holdout_rmse is None else quantity.number(rung.holdout_rmse))
+                row.append("–" if rung.holdout_rmse is None else number(rung.holdout_rmse))
             rows.append([*row, *(one.text(rung.signals[name]) for name, one in shown.items())])
         return (
             figures.place(error_ladder.figure(found), 360, "error-ladder")

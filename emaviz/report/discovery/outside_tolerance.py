@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from emaviz.figures import quantity
+from ema_model.quantities.numbers import number
 from emaviz.report.discovery.subject import Told
 from emaviz.report.markup import paragraph, table
 from emaviz.report.section import Figures, Section
@@ -22,7 +22,7 @@ class OutsideTolerance(Section[Told]):
 
     def body(self, subject: Told, figures: Figures) -> str:
         """A table of them."""
-        found, number = subject.found, quantity.number
+        found = subject.found
         if not found.parameters_outside_tolerance:
             return ""
         rows = []

@@ -1,30 +1,23 @@
-"""The models' kernels for a stack of effects: composed, compiled and cached.
+"""The models' kernels for a stack of effects: a controller, a drive and some effects, composed and compiled.
 
-numba finds a compiled kernel again only when it stands in a file, and never notices that a function it
-inlined was edited elsewhere.  So each stack — a controller, a drive and some effects — becomes a folder of its own:
-the files of `ema_model.kernels` copied beside a generated `composition.py` that inlines the stack.  The
-folder lies under a hash of the sources that kernels are made of and of the versions that compile them: an
-edited effect is another folder, and an old kernel is never served.
+numba never notices that a function which a kernel inlined was edited elsewhere, nor that it now stands for another.
+So each stack becomes a package of its own: the modules of `ema_model.kernels` beside a generated `composition`
+that inlines the stack, under a name that tells what it is made of.  `ema_model.kernel_cache` keeps what is compiled.
 """
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import importlib
-import importlib.metadata
+import importlib.abc
 import importlib.util
 import os
-import platform
-import shutil
 import sys
-import tempfile
 import threading
-import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from functools import cache, lru_cache
-from pathlib import Path
+from functools import cache
+from importlib.machinery import ModuleSpec
 from types import ModuleType
 from typing import Any
 
@@ -34,10 +27,6 @@ from ema_model.physics.rows import LANES, PARAMETER_ROWS
 CIRCUITS = ("thesis", "reduced")  # the drives that stand for the hysteresis current loop
 DRIVES = (*CIRCUITS, "current", "voltage")
 CONTROLLERS = ("cascade", "position")
-_PACKAGE = Path(__file__).parent
-# All that a kernel may inline; `tests/model/test_stacks.py` checks that kernels import nothing else of ours.
-_COMPILED = ("stacks.py", "physics/*.py", "kernels/*.py", "effects/*.py")
-_KEPT_VERSIONS = 6  # folders of other hashes (older sources or versions) that are left in the cache
 
 
 # Where effects can act: the arguments of each place.  The first is the value that the base model, or the
@@ -76,18 +65,48 @@ class Stack:
     inverse: Any  # module: currents
 
 
+class ForkedError(RuntimeError):
+    """Kernels are asked for in a process where they would hang or abort it: forked from one that used them."""
+
+
 # Two threads in numba's `workqueue` layer at once abort the process; this lock makes that impossible.
 _one_parallel_kernel = threading.Lock()
+_used = False  # whether this process, or one that it was forked from, has begun to use kernels
+_forked = False  # whether it had begun before the fork: its threads are gone, and its locks may be held for ever
+
+
+def _begin_child() -> None:
+    global _forked
+    _forked = _used
+
+
+if hasattr(os, "register_at_fork"):  # not on Windows, which cannot fork
+    os.register_at_fork(after_in_child=_begin_child)
+
+
+def _refuse_after_fork() -> None:
+    if _forked:
+        raise ForkedError(
+            "kernels cannot run in a process forked from one that has used them; start it by multiprocessing's "
+            '"spawn" method: multiprocessing.get_context("spawn")'
+        )
 
 
 def exclusive(kernel: Callable[..., Any], *arguments: Any) -> Any:
-    """Calls a parallel kernel, one at a time in the whole process."""
+    """Calls a parallel kernel, one at a time in the whole process; ForkedError as `find_stack`."""
+    _refuse_after_fork()
     with _one_parallel_kernel:
         return kernel(*arguments)
 
 
 def find_stack(circuit: str = "reduced", effects: Iterable[str] = (), controller: str = "cascade") -> Stack:
-    """The stack of a drive, a controller, and effects by name (whose order and repetition do not matter)."""
+    """The stack of a drive, a controller, and effects by name (whose order and repetition do not matter).
+
+    InputError tells an unknown name; ForkedError a process forked from one that has used kernels.
+    """
+    global _used
+    _refuse_after_fork()
+    _used = True
     if circuit not in DRIVES:
         raise InputError(f"no circuit {circuit!r}; circuits are {', '.join(DRIVES)}")
     if controller not in CONTROLLERS:
@@ -102,15 +121,14 @@ def _stack(circuit: str, controller: str, names: tuple[str, ...]) -> Stack:
     effects = [find(name) for name in names]
     rows = PARAMETER_ROWS + tuple(f"{effect.name}.{p.name}" for effect in effects for p in effect.parameters)
     states = tuple(f"{effect.name}.{state}" for effect in effects for state in effect.states)
-    folder = _write((circuit, controller, *names), _composition(circuit, controller, effects))
-    package = _import(folder)
+    package = _import((circuit, controller, *names), _composition(circuit, controller, effects))
     return Stack(
         circuit,
         controller,
         names,
         rows,
         states,
-        *(importlib.import_module(f"{package.__name__}.{module}") for module in ("monitor", "reference", "inverse")),
+        *(importlib.import_module(f"{package}.{module}") for module in ("monitor", "reference", "inverse")),
     )
 
 
@@ -151,80 +169,38 @@ def _composition(circuit: str, controller: str, effects: Sequence[Any]) -> str:
     return "\n".join([*imports, *functions, ""])
 
 
-def _write(parts: tuple[str, ...], composition: str) -> Path:
-    """The stack's folder, written whole or not at all, as several processes may want it at once."""
-    key = hashlib.sha256("+".join(parts).encode()).hexdigest()[:16]
-    folder = cache_folder() / f"stack_{key}"
-    if not (folder / "composition.py").is_file():
-        draft = Path(tempfile.mkdtemp(prefix=".draft", dir=cache_folder()))
-        for source in (_PACKAGE / "kernels").glob("*.py"):
-            shutil.copyfile(source, draft / source.name)
-        (draft / "composition.py").write_text(composition, encoding="utf-8")
-        draft.chmod(0o700)
-        with contextlib.suppress(OSError):  # another process was first
-            draft.rename(folder)
-        shutil.rmtree(draft, ignore_errors=True)
-    return folder
+def _import(parts: tuple[str, ...], composition: str) -> str:
+    """The name of the stack's package, which tells its parts: compiled kernels are found again under it."""
+    name = f"ema_model_stack_{hashlib.sha256('+'.join(parts).encode()).hexdigest()[:16]}"
+    _compositions[name] = composition
+    importlib.import_module(name)
+    return name
 
 
-def _import(folder: Path) -> ModuleType:
-    name = f"ema_model_{folder.name}"
-    spec = importlib.util.spec_from_file_location(
-        name, folder / "__init__.py", submodule_search_locations=[str(folder)]
-    )
-    assert spec is not None and spec.loader is not None
-    package = importlib.util.module_from_spec(spec)
-    sys.modules[name] = package
-    spec.loader.exec_module(package)
-    return package
+_compositions: dict[str, str] = {}  # sources, by the name of the stack's package
 
 
-def _hash_of_sources() -> str:
-    digest = hashlib.sha256()
-    for path in sorted(path for part in _COMPILED for path in _PACKAGE.glob(part)):
-        digest.update(str(path.relative_to(_PACKAGE)).encode() + b"\0" + path.read_bytes() + b"\0")
-    for distribution in ("numba", "llvmlite", "numpy"):
-        digest.update(importlib.metadata.version(distribution).encode())
-    digest.update(f"{sys.version}{platform.machine()}".encode())
-    return digest.hexdigest()[:20]
+class _Modules(importlib.abc.MetaPathFinder, importlib.abc.Loader):
+    """Makes a stack's modules: those of `ema_model.kernels` executed anew, beside the stack's own `composition`.
+
+    Nothing of a stack but its compiled kernels is read from the cache.
+    """
+
+    def find_spec(self, fullname: str, path: Any = None, target: Any = None) -> ModuleSpec | None:
+        package, _, module = fullname.partition(".")
+        return ModuleSpec(fullname, self, is_package=not module) if package in _compositions else None
+
+    def exec_module(self, module: ModuleType) -> None:
+        package, dot, name = module.__name__.partition(".")
+        if name == "composition":
+            code = compile(_compositions[package], f"<{module.__name__}>", "exec")
+        else:
+            source = importlib.util.find_spec(f"ema_model.kernels{dot}{name}")
+            if source is None or not isinstance(source.loader, importlib.abc.InspectLoader):
+                raise ModuleNotFoundError(f"no module {name!r} of kernels", name=module.__name__)
+            code = source.loader.get_code(source.name)
+            assert code is not None
+        exec(code, vars(module))
 
 
-# Taken while the package is imported: what the kernels inline is what the files held at that time.
-_SOURCES = _hash_of_sources()
-
-
-@lru_cache(maxsize=1)
-def cache_folder() -> Path:
-    """Where this version's stacks lie: under $EMAVIZ_CACHE_DIR or the user's cache, else a temporary folder."""
-    for root in _cache_roots():
-        folder = root / "kernels" / _SOURCES
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            with tempfile.TemporaryFile(dir=folder):
-                pass
-        except OSError:
-            continue
-        os.utime(folder)
-        _prune(folder.parent)
-        return folder
-    return Path(tempfile.mkdtemp(prefix="emaviz-kernels-"))
-
-
-def _cache_roots() -> list[Path]:
-    if given := os.environ.get("EMAVIZ_CACHE_DIR"):
-        return [Path(given)]
-    if sys.platform == "win32":
-        base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
-    elif sys.platform == "darwin":
-        base = Path.home() / "Library" / "Caches"
-    else:
-        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    return [base / "emaviz"]
-
-
-def _prune(versions: Path) -> None:
-    """Drops the folders of old sources, but none that was used in the last day."""
-    others = sorted((p for p in versions.iterdir() if p.name != _SOURCES), key=lambda p: p.stat().st_mtime)
-    for old in others[: max(0, len(others) - _KEPT_VERSIONS)]:
-        if time.time() - old.stat().st_mtime > 86_400.0:
-            shutil.rmtree(old, ignore_errors=True)
+sys.meta_path.insert(0, _Modules())

@@ -13,6 +13,8 @@ from typing import Any
 
 import numba
 
+from ema_model.kept_kernels import kept
+
 # Waiting threads sleep: spinning ones would take the cores from the browser, and from a kernel next to them.
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
@@ -25,8 +27,8 @@ scalar: Callable[[Any], Any] = numba.njit(forceinline=True, **_MODEL)
 the population kernel ten times slower.
 """
 
-kernel: Callable[[Any], Any] = numba.njit(cache=True, **_MODEL)
-"""An outer kernel of one thread.  Cached, so it must live in a folder that `stacks` writes."""
+kernel: Callable[[Any], Any] = kept(numba.njit(**_MODEL))
+"""An outer kernel of one thread.  Kept in the cache, so it must live in a package that `stacks` makes."""
 
-parallel_kernel: Callable[[Any], Any] = numba.njit(parallel=True, cache=True, **_MODEL)
+parallel_kernel: Callable[[Any], Any] = kept(numba.njit(parallel=True, **_MODEL))
 """An outer kernel over blocks of lanes on all cores.  Call it through `stacks.exclusive` only."""

@@ -18,6 +18,7 @@ import numpy as np
 
 from ema_model.actuator import load_actuator
 from ema_model.faults import HEALTHY
+from ema_model.kernel_cache import cache_folder
 from ema_model.physics.rows import LANES
 from ema_model.simulation.pack import initial_state, monitor_rows
 from ema_model.stacks import Stack, exclusive, find_stack
@@ -39,14 +40,13 @@ def compile_ahead(stacks: Iterable[Stack]) -> None:
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
-            env={**os.environ, "PYTHONPATH": paths},
+            env={**os.environ, "PYTHONPATH": paths, "EMAVIZ_CACHE_DIR": str(cache_folder().parents[2])},
         )
     )
 
 
 def _is_cached(stack: Stack) -> bool:
-    compiled = Path(stack.monitor.__file__).parent / "__pycache__"
-    return any(compiled.glob("monitor.traces-*.nbc"))
+    return any(cache_folder().glob(f"{stack.monitor.__name__}.traces-*.nbc"))
 
 
 def _compile(stack: Stack) -> None:

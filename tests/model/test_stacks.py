@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import ema_model
-from ema_model import stacks
+from ema_model import kernel_cache, stacks
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
 from ema_model.effects import CATALOGUE
@@ -137,9 +137,14 @@ def file_of(module: str) -> Path:
 
 
 def test_kernels_import_nothing_of_ours_that_is_not_hashed():
-    hashed = {path for part in stacks._COMPILED for path in PACKAGE.glob(part)}
-    # These declare and find effects and stacks; no kernel inlines anything of them.
-    bookkeeping = {PACKAGE / "stacks.py", PACKAGE / "effects/__init__.py", PACKAGE / "effects/effect.py"}
+    hashed = {path for part in kernel_cache._COMPILED for path in PACKAGE.glob(part)}
+    # These declare, find and keep effects and stacks; no kernel inlines anything of them.
+    bookkeeping = {
+        PACKAGE / "stacks.py",
+        PACKAGE / "kept_kernels.py",
+        PACKAGE / "effects/__init__.py",
+        PACKAGE / "effects/effect.py",
+    }
     kernels = hashed - bookkeeping
     assert len(kernels) > 12
     for path in kernels:
@@ -182,9 +187,8 @@ def result(process: subprocess.Popen[str]) -> float:
 
 
 def kernels_in(cache: Path) -> dict[str, tuple[int, int]]:
-    """numba's cache files with size and time of change."""
-    files = [p for p in cache.rglob("*") if p.suffix in (".nbi", ".nbc")]
-    return {str(p): (p.stat().st_size, p.stat().st_mtime_ns) for p in files}
+    """The kept kernels with size and time of change."""
+    return {str(p): (p.stat().st_size, p.stat().st_mtime_ns) for p in cache.rglob("*.nbc")}
 
 
 @pytest.fixture
@@ -242,17 +246,23 @@ def test_two_processes_may_build_the_same_stack_at_once(tmp_path):
     both = [start(PROGRAM.format(effect=True), tmp_path, env) for _ in range(2)]
     values = [result(process) for process in both]
     assert values[0] == values[1] > 0.0
-    folders = list((tmp_path / "cache" / "kernels").glob("*/*"))
-    assert len([f for f in folders if f.name.startswith("stack_")]) == 1
-    assert not [f for f in folders if f.name.startswith(".draft")], "a draft was left behind"
+    [kernel] = (tmp_path / "cache" / "kernels").glob("*/*")  # and no draft
+    assert ".monitor.traces-" in kernel.name
+
+    kernel.write_bytes(kernel.read_bytes()[:-1000])
+    assert result(start(PROGRAM.format(effect=True), tmp_path, env)) == values[0], "a damaged kernel heals"
 
 
 def test_unusable_cache_folder_falls_back(tmp_path):
     blocked = tmp_path / "file"
     blocked.write_text("not a folder")
     env = environment(PACKAGE.parent, blocked, TMPDIR=str(tmp_path))
-    assert result(start(PROGRAM.format(effect=False), tmp_path, env)) > 0.0
-    assert list(tmp_path.glob("emaviz-kernels-*")), "a temporary folder takes its place"
+    process = start(PROGRAM.format(effect=False), tmp_path, env)
+    out, err = process.communicate(timeout=180)
+    assert process.returncode == 0 and "RESULT" in out
+    [line] = err.splitlines()
+    assert line.startswith("emaviz: ") and f"{blocked} cannot be written" in line
+    assert not list(tmp_path.glob("emaviz-kernels-*")), "the temporary folder in its place goes with the process"
 
 
 THREADS = """
@@ -289,6 +299,6 @@ print("RESULT 1.0")
 
 def test_parallel_kernels_from_eight_threads_do_not_abort(tmp_path):
     """numba's workqueue layer aborts the process when two threads run a parallel kernel at once."""
-    cache = stacks.cache_folder().parents[1]
+    cache = kernel_cache.cache_folder().parents[1]
     env = environment(PACKAGE.parent, cache, NUMBA_THREADING_LAYER="workqueue", NUMBA_NUM_THREADS="2")
     assert result(start(THREADS, tmp_path, env)) == 1.0

@@ -2,7 +2,7 @@
 
 numba never notices that a function which a kernel inlined was edited elsewhere, nor that it now stands for another.
 So each stack becomes a package of its own: the modules of `ema_model.kernels` beside a generated `composition`
-that inlines the stack, under a name that tells what it is made of.  `ema_model.kernel_cache` keeps what is compiled.
+that inlines the stack, under a name that tells what it is made of.  `kernel_cache` keeps what is compiled.
 """
 
 from __future__ import annotations
@@ -21,34 +21,14 @@ from importlib.machinery import ModuleSpec
 from types import ModuleType
 from typing import Any
 
+from ema_model.effects import find
+from ema_model.effects.effect import ADVANCE, PLACES
 from ema_model.errors import InputError
 from ema_model.physics.rows import LANES, PARAMETER_ROWS
 
 CIRCUITS = ("thesis", "reduced")  # the drives that stand for the hysteresis current loop
 DRIVES = (*CIRCUITS, "current", "voltage")
 CONTROLLERS = ("cascade", "position")
-
-
-# Where effects can act: the arguments of each place.  The first is the value that the base model, or the
-# effect before, has found there; an effect's function returns it changed.
-PLACES = {
-    "moving_friction": ("level", "static", "omega", "motor_torque", "load", "gear"),
-    "friction": ("torque", "omega", "active", "static", "dynamic"),
-    "electric_torque": ("torque", "theta", "omega", "current"),
-    "shaft_torque": ("torque", "theta", "omega", "current", "user", "gear", "load"),
-    "back_emf": ("emf", "omega", "current"),
-    "winding_resistance": ("resistance",),
-    "bus_voltage": ("volts", "current"),
-    "inverse_inertia": ("inverse",),
-    "user_position": ("user", "theta", "gear"),
-    "position_reading": ("user",),
-    "current_reading": ("current",),
-}
-# The arguments of an effect's `advance_states`, which returns its new states as a tuple: the step, s; angle and
-# speed at its start; the rigid transmission's output before and after; how far the user moved; what acts.
-ADVANCE = (
-    *("dt", "theta", "omega", "rigid", "rigid_next", "user_step", "gear", "load", "active", "static", "dynamic"),
-)
 
 
 @dataclass(frozen=True)
@@ -116,8 +96,6 @@ def find_stack(circuit: str = "reduced", effects: Iterable[str] = (), controller
 
 @cache
 def _stack(circuit: str, controller: str, names: tuple[str, ...]) -> Stack:
-    from ema_model.effects import find  # effects import physics, which must stand without stacks
-
     effects = [find(name) for name in names]
     rows = PARAMETER_ROWS + tuple(f"{effect.name}.{p.name}" for effect in effects for p in effect.parameters)
     states = tuple(f"{effect.name}.{state}" for effect in effects for state in effect.states)

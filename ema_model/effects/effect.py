@@ -9,6 +9,27 @@ from typing import Any
 
 from ema_model.errors import InputError
 
+# Where effects can act: the arguments of each place.  The first is the value that the base model, or the
+# effect before, has found there; an effect's function returns it changed.
+PLACES = {
+    "moving_friction": ("level", "static", "omega", "motor_torque", "load", "gear"),
+    "friction": ("torque", "omega", "active", "static", "dynamic"),
+    "electric_torque": ("torque", "theta", "omega", "current"),
+    "shaft_torque": ("torque", "theta", "omega", "current", "user", "gear", "load"),
+    "back_emf": ("emf", "omega", "current"),
+    "winding_resistance": ("resistance",),
+    "bus_voltage": ("volts", "current"),
+    "inverse_inertia": ("inverse",),
+    "user_position": ("user", "theta", "gear"),
+    "position_reading": ("user",),
+    "current_reading": ("current",),
+}
+# The arguments of an effect's `advance_states`, which returns its new states as a tuple: the step, s; angle and
+# speed at its start; the rigid transmission's output before and after; how far the user moved; what acts.
+ADVANCE = (
+    *("dt", "theta", "omega", "rigid", "rigid_next", "user_step", "gear", "load", "active", "static", "dynamic"),
+)
+
 
 @dataclass(frozen=True)
 class Parameter:
@@ -26,7 +47,7 @@ class Parameter:
 class Effect:
     """A physical effect that the base models leave out.
 
-    `places` are scalar functions named after the place where they act (`ema_model.stacks.PLACES` lists
+    `places` are scalar functions named after the place where they act (`PLACES` lists
     the places and their arguments); each takes the effect's parameters, in order, as its last arguments.
     """
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numba
 
-from ema_model.kept_kernels import kept
+from ema_model.kernel_cache.kept import kept
 
 # Waiting threads sleep: spinning ones would take the cores from the browser, and from a kernel next to them.
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")

@@ -18,7 +18,7 @@ import numpy as np
 
 from ema_model.actuator import load_actuator
 from ema_model.faults import HEALTHY
-from ema_model.kernel_cache import cache_folder
+from ema_model.kernel_cache.folder import cache_folder
 from ema_model.physics.rows import LANES
 from ema_model.simulation.pack import initial_state, monitor_rows
 from ema_model.stacks import Stack, exclusive, find_stack

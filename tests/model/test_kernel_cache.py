@@ -17,9 +17,10 @@ import numpy as np
 import pytest
 
 import ema_model.stacks
-from ema_model import kept_kernels, kernel_cache
-from ema_model.kept_kernels import kept
-from ema_model.kernel_cache import cache_folder
+from ema_model.kernel_cache import folder as kernel_cache
+from ema_model.kernel_cache import kept as kept_kernels
+from ema_model.kernel_cache.folder import cache_folder
+from ema_model.kernel_cache.kept import kept
 from ema_model.stacks import find_stack
 
 PARENT = Path(ema_model.stacks.__file__).parents[1]
@@ -249,7 +250,7 @@ def test_a_kernel_that_cannot_be_kept_runs(root, monkeypatch):
 PROCESS = """
 import sys
 import numba
-from ema_model.kept_kernels import kept
+from ema_model.kernel_cache.kept import kept
 
 @kept(numba.njit)
 def sum_of_thrice(x):

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ema_model.effects import Parameter, register
+from ema_model.effects.effect import PLACES
 from ema_model.effects.user.module import generated_module
 from ema_model.effects.user.torque import RANGE
 from ema_model.effects.user.user_effect import UserEffect
 from ema_model.errors import InputError
-from ema_model.stacks import PLACES
 
 MOST_KNOTS = 24
 _ARGUMENTS = {"theta": "theta", "omega": "omega", "user": "user", "q": "current", "load": "load"}

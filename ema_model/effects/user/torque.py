@@ -6,11 +6,11 @@ import math
 from collections.abc import Mapping
 
 from ema_model.effects import Parameter, register
+from ema_model.effects.effect import ADVANCE, PLACES
 from ema_model.effects.user.expression import VARIABLES, Expression, Node, parse
 from ema_model.effects.user.module import generated_module
 from ema_model.effects.user.user_effect import UserEffect
 from ema_model.errors import InputError
-from ema_model.stacks import ADVANCE, PLACES
 
 RANGE = (-1e3, 1e3)
 _ARGUMENTS = {"t": "time", "theta": "theta", "omega": "omega", "q": "current", "user": "user"}

@@ -24,10 +24,10 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
-_PACKAGE = Path(__file__).parent
+_PACKAGE = Path(__file__).parents[1]
 # All that a kernel may inline, and how it is composed and kept; `tests/model/test_stacks.py` checks that kernels
 # import nothing else of ours.
-_COMPILED = ("numba_options.py", "kept_kernels.py", "stacks.py", "physics/*.py", "kernels/*.py", "effects/*.py")
+_COMPILED = ("kernel_cache/kept.py", "stacks.py", "physics/*.py", "kernels/*.py", "effects/*.py")
 _KEPT_VERSIONS = 6  # folders of other hashes (older sources or versions) that are left in the cache
 _DAY_S = 86_400.0
 _DRAFT = ".draft"  # begins the name of a file that is being written

@@ -19,7 +19,7 @@ from numba.core.caching import NullCache
 from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
 
-from ema_model.kernel_cache import cache_folder, draft, only_ours, remove
+from ema_model.kernel_cache.folder import cache_folder, draft, only_ours, remove
 
 _CHECKSUM = hashlib.sha256().digest_size
 

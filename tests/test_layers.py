@@ -1,0 +1,117 @@
+"""Who may import whom: each folder only what stands below it, so that a fact is found by going down, never round.
+
+The lists are the floors of the house from the ground up; folders of one floor do not know each other.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+PROJECT = Path(__file__).parents[1]
+FLOORS = {
+    "ema_model": [
+        ["errors", "whole_file", "kernel_cache"],
+        ["quantities"],
+        ["physics"],
+        ["effects", "kernels", "commands"],
+        ["stacks", "actuator"],
+        ["faults", "recordings"],
+        ["simulation"],
+        ["models"],
+        ["estimation"],
+        ["identification", "comparison", "challenges"],
+        ["discovery"],
+    ],
+    "emaviz": [
+        ["colours", "text"],
+        ["recording"],
+        ["figures"],
+        ["report"],
+        ["session"],
+        ["scene"],
+        ["page"],
+        ["cli"],
+        ["__main__"],
+    ],
+}
+FORBIDDEN = {  # what else a package must not know
+    "ema_model": ("emaviz", "viser", "rerun", "plotly"),
+}
+
+
+def modules(package: str) -> dict[str, Path]:
+    """Every module of a package by its dotted name."""
+    found = {}
+    for path in (PROJECT / package).rglob("*.py"):
+        parts = path.relative_to(PROJECT).with_suffix("").parts
+        found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return found
+
+
+def imports(path: Path, known: dict[str, Path]) -> Iterator[tuple[int, str]]:
+    """Line and module of everything that a file imports, inside functions and for types too."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from ((node.lineno, alias.name) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            folder = ".".join(path.relative_to(PROJECT).parts[: -node.level]) if node.level else ""
+            module = ".".join(filter(None, (folder, node.module)))
+            for alias in node.names:
+                inner = f"{module}.{alias.name}"
+                yield node.lineno, inner if inner in known else module
+
+
+def room(module: str) -> str:
+    """The folder, or the loose file, of its package that a module stands in."""
+    return module.split(".")[1] if "." in module else ""
+
+
+@pytest.mark.parametrize("package", FLOORS)
+def test_each_room_stands_on_a_floor(package: str) -> None:
+    rooms = {room(name) for name in modules(package)} - {""}
+    assert rooms == {one for floor in FLOORS[package] for one in floor}
+
+
+@pytest.mark.parametrize("package", FLOORS)
+def test_no_room_imports_what_stands_beside_or_above_it(package: str) -> None:
+    floor_of = {one: level for level, floor in enumerate(FLOORS[package]) for one in floor}
+    known = modules(package)
+    wrong = []
+    for name, path in known.items():
+        here = room(name)
+        for line, module in imports(path, known):
+            there = room(module)
+            if module.split(".")[0] != package or not there or not here or there == here:
+                continue
+            if floor_of[there] >= floor_of[here]:
+                wrong.append(f"{path.relative_to(PROJECT)}:{line} imports {module}")
+    assert not wrong, "\n".join(wrong)
+
+
+@pytest.mark.parametrize("package", FORBIDDEN)
+def test_the_science_knows_no_screen(package: str) -> None:
+    known = modules(package)
+    wrong = [
+        f"{path.relative_to(PROJECT)}:{line} imports {module}"
+        for path in known.values()
+        for line, module in imports(path, known)
+        if module.split(".")[0] in FORBIDDEN[package]
+    ]
+    assert not wrong, "\n".join(wrong)
+
+
+def test_no_file_is_in_a_circle() -> None:
+    known = modules("ema_model") | modules("emaviz")
+    needs = {
+        name: {module for _, module in imports(path, known) if module in known and module != name}
+        for name, path in known.items()
+        if path.name != "__init__.py"  # a package's face hands on the names of its own files
+    }
+    while leaves := [name for name, needed in needs.items() if not needed & needs.keys()]:
+        for name in leaves:
+            del needs[name]
+    assert not needs, f"these import each other in a loop: {', '.join(sorted(needs))}"

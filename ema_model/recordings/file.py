@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 import stat
 from collections.abc import Sequence
-from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.errors import InputError
+from ema_model.limits import FILE_BYTES, megabytes
 from ema_model.recordings.checks import check_finite, check_length, check_names, check_values, choose_columns
 from ema_model.recordings.columns.mapping import ColumnMapping, apply_mapping, parse_mapping
 from ema_model.recordings.formats import format_of
@@ -27,7 +27,7 @@ def read_measurement(
     mapping: ColumnMapping | Sequence[str] | None = None,
     *,
     side: SideFile | None = None,
-    max_bytes: int = 2_000_000_000,
+    max_bytes: int = FILE_BYTES,
 ) -> Measurement:
     """The measurement in a file, its name the file's stem, its notes what was found and left aside.
 
@@ -50,10 +50,11 @@ def read_measurement(
         header = file_format.header(path, max_bytes)
         used = _merged(path, side, mapping, header)
         known, foreign = choose_columns(path, header, used, needs_time=side.kind == "run")
-        columns = file_format.read(path, known, max_bytes)
+        columns = file_format.read(path, known, max_bytes, True)
         check_length(path, next(iter(columns.arrays.values())).size)
         check_finite(path, columns.arrays, columns.place)
         signals, done = apply_mapping(columns.arrays, used)
+        columns.arrays.clear()  # copied, and large
     except OSError as error:
         raise refusal(path, f"cannot be read ({reason(error)}); check the disk and the permissions") from None
     except MemoryError:
@@ -72,7 +73,7 @@ def read_measurement(
     return measurement
 
 
-def read_columns(path: str | os.PathLike[str], *, max_bytes: int = 2_000_000_000) -> dict[str, Array]:
+def read_columns(path: str | os.PathLike[str], *, max_bytes: int = FILE_BYTES) -> dict[str, Array]:
     """The columns of numbers as they stand in the file, for a mapping step to show; others are left out.
 
     Raises InputError for a file that cannot be read as a table at all; the values are not checked.
@@ -80,25 +81,20 @@ def read_columns(path: str | os.PathLike[str], *, max_bytes: int = 2_000_000_000
     path = os.fspath(path)
     check_file(path, max_bytes)
     file_format = format_of(path)
-    columns = {}
-    problem = None
     try:
         names = [name for name in file_format.header(path, max_bytes) if name]
         check_names(path, names)
-        try:
-            return file_format.read(path, names, max_bytes).arrays
-        except InputError as error:
-            problem = error
-        for name in names:
-            with suppress(InputError):  # text, or of another shape
-                columns |= file_format.read(path, [name], max_bytes).arrays
+        if not names:
+            raise refusal(path, "has no columns")
+        # What is wrong with all of them is told as for a measurement.
+        return (
+            file_format.read(path, names, max_bytes, False).arrays
+            or file_format.read(path, names, max_bytes, True).arrays
+        )
     except OSError as error:
         raise refusal(path, f"cannot be read ({reason(error)}); check the disk and the permissions") from None
     except MemoryError:
         raise refusal(path, "does not fit into memory; split it, or keep fewer columns") from None
-    if not columns:
-        raise problem or refusal(path, "has no columns")
-    return columns
 
 
 def _merged(
@@ -136,7 +132,7 @@ def check_file(path: str, max_bytes: int) -> None:
     if status.st_size == 0:
         raise refusal(path, "is empty; a measurement of 100 samples or more is expected")
     if status.st_size > max_bytes:
-        size = f"is {status.st_size / 1e6:.6g} MB large, over the limit of {max_bytes / 1e6:g} MB"
+        size = f"is {megabytes(status.st_size)} large, over the limit of {megabytes(max_bytes)}"
         raise refusal(path, f"{size}; split it, or record fewer samples")
 
 

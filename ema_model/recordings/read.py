@@ -9,16 +9,15 @@ from pathlib import Path
 
 from ema_model.actuator import Actuator
 from ema_model.errors import InputError
+from ema_model.limits import FILE_BYTES
 from ema_model.recordings import ColumnMapping, Measurement, SideFile, parse_mapping, read_measurement
 from ema_model.recordings.file import check_file
 from ema_model.recordings.formats import format_of
 from ema_model.recordings.side_file.read import find_side_file, read_side_file
 
-_MAX_BYTES = 2_000_000_000
-
 
 def read_recording(
-    path: str | os.PathLike[str], actuator: Actuator, mapping: Sequence[str] = (), *, max_bytes: int = _MAX_BYTES
+    path: str | os.PathLike[str], actuator: Actuator, mapping: Sequence[str] = (), *, max_bytes: int = FILE_BYTES
 ) -> Measurement:
     """A recording with its columns mapped: by `mapping` (texts as of `--map`), then its side file, then the actuator's.
 

@@ -178,7 +178,7 @@ FILES = {
         "huge": (zipped(**{"current_A.npy": declared("(1000000000000,)")}), "over the limit of 10 MB"),
         "huge_field": (
             zipped(**{"x.npy": declared("(200,)", "[('duty', '<f8'), ('y', '|V900000')]")}),
-            "unpacks to 180.004 MB, over the limit of 10 MB",
+            "unpacks to 180.002 MB, over the limit of 10 MB",
         ),
         "fewer_numbers": (zipped(**{"current_A.npy": declared("(120,)")}), "not a whole .npz file"),
         "negative": (zipped(**{"current_A.npy": declared("(-120,)")}), "'current_A' is"),
@@ -255,7 +255,7 @@ def test_no_regular_file(suffix, tmp_path):
 
 def test_an_array_that_stands_twice(tmp_path):
     (tmp_path / "a.npz").write_bytes(twice("current_A.npy"))
-    assert "array 'current_A.npy' stands twice" in refused(tmp_path / "a.npz", "a.npz")
+    assert "holds 'current_A.npy', which stands twice" in refused(tmp_path / "a.npz", "a.npz")
 
 
 def test_columns_that_stand_twice_are_no_table_either(tmp_path):

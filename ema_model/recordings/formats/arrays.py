@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ema_model.errors import InputError
 from ema_model.quantities.signals import SIGNALS
-from ema_model.recordings.formats.format import Array, Columns
+from ema_model.recordings.formats.format import Array, Columns, check_size
 from ema_model.recordings.refusal import listed, refusal, shown
 
 Shape = tuple[int, ...]
@@ -50,19 +50,33 @@ def sizes(shape: Shape) -> str:
     return "×".join(str(size) for size in shape) or "a single value"
 
 
-def as_columns(path: str, arrays: Mapping[str, Any], aside: Iterable[str]) -> Columns:
-    """Vectors of one length as float64 columns; `aside` names what the file holds besides.
+def take(
+    path: str,
+    kinds: Mapping[str, Kind],
+    names: Sequence[str],
+    max_bytes: int,
+    strict: bool,
+    values: Callable[[str], NDArray[Any]],
+) -> Columns:
+    """The columns asked for as float64; `values` gives each.  Unless `strict`, only those that are columns.
 
-    Raises InputError if the lengths differ.
+    Raises InputError for what is no column, takes too much memory, or has another length than the first.
     """
+    if strict:
+        for name in names:
+            check_column(path, name, kinds[name])
+    else:
+        names = [name for name in names if is_column(kinds[name])]
+    check_size(path, sum(np.prod(kinds[name][0], dtype=float) for name in names), max_bytes)
     columns: dict[str, Array] = {}
     with np.errstate(over="ignore"):  # an infinite value is told later, with its place
-        for name, values in arrays.items():
-            # A copy of its own, aligned and of this machine's byte order.
-            columns[name] = np.array(values, np.float64).reshape(-1)
-    check_lengths(path, columns)
-    names = list(aside)
-    notes = (f"left aside, as they are no columns of numbers: {listed(names)}",) if names else ()
+        for name in names:
+            # Aligned, of this machine's byte order, and not a copy where it is so already.
+            columns[name] = np.require(values(name).reshape(-1), np.float64, ["C", "A"])
+    if strict:
+        check_lengths(path, columns)
+    aside = [name for name, kind in kinds.items() if not is_column(kind)]
+    notes = (f"left aside, as they are no columns of numbers: {listed(aside)}",) if aside else ()
     return Columns(columns, lambda row: f"sample {row + 1}", notes)
 
 
@@ -73,15 +87,3 @@ def check_lengths(path: str, columns: Mapping[str, Array]) -> None:
         if columns[name].size != columns[names[0]].size:
             found = f"{columns[name].size} values where {shown(names[0])!r} has {columns[names[0]].size}"
             raise refusal(path, f"column {shown(name)!r} has {found}; one length is expected, cut or resample it")
-
-
-def check_size(path: str, kinds: Mapping[str, Kind], names: Sequence[str], max_bytes: int) -> None:
-    """Raises InputError if the columns asked for take more than `max_bytes` in memory."""
-    size = sum(8.0 * np.prod(kinds[name][0], dtype=float) for name in names)
-    if size > max_bytes:
-        raise unpacks_to(path, size, max_bytes)
-
-
-def unpacks_to(path: str, size: float, max_bytes: int) -> InputError:
-    """The error for a file that takes too much memory: a small one may declare, or unpack to, any size."""
-    return refusal(path, f"unpacks to {size / 1e6:.6g} MB, over the limit of {max_bytes / 1e6:g} MB; split it")

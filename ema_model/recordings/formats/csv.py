@@ -1,22 +1,25 @@
 """CSV: a header line, then numbers; commas, semicolons or tabs between them.
 
-A file is read at full speed.  Only when that fails it is walked line by line, to name the bad cell.
+A file is read at full speed.  Only when that fails it is read again in blocks, and the one that fails is walked line by
+line, to name the bad cell.
 """
 
 from __future__ import annotations
 
 import codecs
 import csv
-import itertools
+import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NoReturn
+from typing import BinaryIO, NoReturn
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.csv as pc
 
-from ema_model.recordings.formats.format import Array, Columns, Format
+from ema_model.limits import LINE_BYTES, megabytes
+from ema_model.recordings.formats.format import Array, Columns, Format, check_size
 from ema_model.recordings.refusal import listed, refusal, shown
 
 _HEAD_BYTES = 65_536
@@ -39,33 +42,55 @@ def _header(path: str, max_bytes: int) -> list[str]:
     return _dialect(path).names
 
 
-def _read(path: str, names: Sequence[str], max_bytes: int) -> Columns:
-    del max_bytes  # the file's size bounds it: a number takes 8 bytes in memory and as text 2 or more
+def _read(path: str, names: Sequence[str], max_bytes: int, strict: bool) -> Columns:
     dialect = _dialect(path)
-    try:
-        with open(path, "rb") as file:
-            table = pc.read_csv(
-                file,
-                pc.ReadOptions(column_names=dialect.names, skip_rows=dialect.header_lines),
-                pc.ParseOptions(delimiter=dialect.separator),
-                pc.ConvertOptions(
-                    column_types={name: pa.float64() for name in names},
-                    include_columns=list(names),
-                    null_values=[""],
-                    decimal_point=dialect.decimal,
-                ),
-            )
-    except pa.ArrowException as error:
-        _explain(path, dialect, names, error)
-    if any(column.null_count for column in table.columns):
-        _explain(path, dialect, names, "blank cells")
+    _check_size(path, dialect, names, max_bytes)
+    table = _table(path, dialect, names)
+    if table is None:
+        if strict:
+            _explain(path, dialect, names)
+        names = _numeric(path, dialect, names)
+        if not names:
+            return Columns({}, lambda row: _place(path, dialect, row))
+        table = _table(path, dialect, names)
+    if table is None:
+        _explain(path, dialect, names)
     notes = []
     if dialect.separator != ",":
         notes.append(f"columns are separated by {_SEPARATORS[dialect.separator]}")
     if dialect.decimal != ".":
         notes.append("numbers are written with a decimal comma")
-    arrays = {name: table[name].to_numpy() for name in names}
+    columns = dict(zip(names, table.columns))
+    del table  # each column goes when it is converted
+    arrays = {name: columns.pop(name).to_numpy() for name in names}
     return Columns(arrays, lambda row: _place(path, dialect, row), tuple(notes))
+
+
+def _table(path: str, dialect: _Dialect, names: Sequence[str]) -> pa.Table | None:
+    """These columns at full speed; None if not all of them are columns of numbers."""
+    try:
+        with open(path, "rb") as file:
+            table = _parsed(file, dialect, dialect.header_lines, {name: pa.float64() for name in names}, names)
+    except pa.ArrowException:
+        return None
+    return None if any(column.null_count for column in table.columns) else table
+
+
+def _parsed(
+    file: BinaryIO | pa.NativeFile,
+    dialect: _Dialect,
+    skip: int,
+    kinds: Mapping[str, pa.DataType],
+    names: Sequence[str],
+) -> pa.Table:
+    return pc.read_csv(
+        file,
+        pc.ReadOptions(column_names=dialect.names, skip_rows=skip),
+        pc.ParseOptions(delimiter=dialect.separator),
+        pc.ConvertOptions(
+            column_types=kinds, include_columns=list(names), null_values=[""], decimal_point=dialect.decimal
+        ),
+    )
 
 
 def _write(signals: Mapping[str, Array], path: str) -> None:
@@ -111,24 +136,106 @@ def _cells(line: str, separator: str) -> list[str]:
         return line.split(separator)
 
 
-def _rows(path: str, dialect: _Dialect) -> Iterator[tuple[int, str]]:
-    """Number and text of the lines that hold a row."""
-    with open(path, encoding="utf-8-sig", errors="replace") as file:
-        for number, line in enumerate(file, 1):
-            if number > dialect.header_lines and line != "\n":
-                yield number, line.removesuffix("\n")
+def _check_size(path: str, dialect: _Dialect, names: Sequence[str], max_bytes: int) -> None:
+    """Raises InputError if the columns take more than `max_bytes` in memory."""
+    # A row takes a sign for each column at least, its separator or the line's end: most files need no counting.
+    if 8.0 * os.path.getsize(path) / len(dialect.names) * len(names) <= max_bytes:
+        return
+    rows = 0
+    with open(path, "rb") as file:
+        while piece := file.read(LINE_BYTES):
+            rows += piece.count(b"\n") + piece.count(b"\r") - piece.count(b"\r\n")
+    check_size(path, rows * len(names), max_bytes)
+
+
+def _blocks(path: str, dialect: _Dialect) -> Iterator[tuple[int, bytes]]:
+    """The lines below the header in blocks, each with its first line's number; all lines end in \\n.
+
+    Raises InputError for a line that is too long to be a row.
+    """
+    number, rest = 1, b""
+    with open(path, "rb") as file:
+        while piece := file.read(LINE_BYTES):
+            block = rest + piece
+            end = max(block.rfind(b"\n"), block.rfind(b"\r", 0, -1)) + 1  # a last \r may belong to a \n to come
+            block, rest = block[:end].replace(b"\r\n", b"\n").replace(b"\r", b"\n"), block[end:]
+            yield from _below_header(number, block, dialect)
+            number += block.count(b"\n")
+            if len(rest) > LINE_BYTES:
+                found = f"line {number} is over {megabytes(LINE_BYTES)} long"
+                raise refusal(path, f"{found}; one row of numbers per line is expected")
+        yield from _below_header(number, rest, dialect)
+
+
+def _below_header(number: int, block: bytes, dialect: _Dialect) -> Iterator[tuple[int, bytes]]:
+    """The block without the header's lines, if a row is left."""
+    header = max(dialect.header_lines + 1 - number, 0)
+    if header:
+        block = block.split(b"\n", header)[header] if block.count(b"\n") >= header else b""
+    if block.strip(b"\r\n"):
+        yield number + header, block
 
 
 def _place(path: str, dialect: _Dialect, row: int) -> str:
-    number, _ = next(itertools.islice(_rows(path, dialect), row, None), (dialect.header_lines + row + 1, ""))
-    return f"line {number}"
+    for number, block in _blocks(path, dialect):
+        ends = np.flatnonzero(np.frombuffer(block, np.uint8) == ord("\n"))
+        if len(ends) == 0 or ends[-1] != len(block) - 1:
+            ends = np.append(ends, len(block))
+        rows = np.flatnonzero(np.diff(ends, prepend=-1) > 1)  # a blank line is no row
+        if row < len(rows):
+            return f"line {number + rows[row]}"
+        row -= len(rows)
+    return "the last line"
 
 
-def _explain(path: str, dialect: _Dialect, names: Sequence[str], error: object) -> NoReturn:
+def _numeric(path: str, dialect: _Dialect, names: Sequence[str]) -> list[str]:
+    """Those of the columns that hold numbers, and no blank cell; InputError if the rows are not of one width."""
+    numeric = list(names)
+    for number, block in _blocks(path, dialect):
+        if not numeric or _problem(block, dialect, numeric) is None:
+            continue
+        try:
+            found = _parsed(pa.BufferReader(block), dialect, 0, {}, numeric)
+        except pa.ArrowException as error:
+            _explain_block(path, dialect, [], number, block, error)
+        numeric = [
+            name
+            for name, column in zip(numeric, found.columns)
+            if not column.null_count and (pa.types.is_integer(column.type) or pa.types.is_floating(column.type))
+        ]
+    return numeric
+
+
+def _problem(block: bytes, dialect: _Dialect, names: Sequence[str]) -> object:
+    """Why the columns cannot be read from these lines; None if they can."""
+    try:
+        table = _parsed(pa.BufferReader(block), dialect, 0, {name: pa.float64() for name in names}, names)
+    except pa.ArrowException as error:
+        return error
+    return "blank cells" if any(column.null_count for column in table.columns) else None
+
+
+def _explain(path: str, dialect: _Dialect, names: Sequence[str]) -> NoReturn:
     """Raise InputError for the first line that is ragged, blank or not a number where `names` ask for one."""
+    empty = True
+    for number, block in _blocks(path, dialect):
+        empty = False
+        problem = _problem(block, dialect, names)
+        if problem is not None:
+            _explain_block(path, dialect, names, number, block, problem)
+    if empty:
+        raise refusal(path, "has 0 samples under its header; 100 or more are expected")
+    raise refusal(path, "cannot be read as CSV; export it again")
+
+
+def _explain_block(
+    path: str, dialect: _Dialect, names: Sequence[str], first: int, block: bytes, problem: object
+) -> NoReturn:
     width = len(dialect.names)
     wanted = [(dialect.names.index(name), name) for name in names]
-    for number, line in _rows(path, dialect):
+    for number, line in enumerate(block.decode(errors="replace").split("\n"), first):
+        if not line:
+            continue
         cells = _cells(line, dialect.separator)
         if len(cells) != width:
             hint = "write numbers with a decimal point" if len(cells) == 2 * width else "complete or remove the line"
@@ -137,14 +244,12 @@ def _explain(path: str, dialect: _Dialect, names: Sequence[str], error: object) 
         for column, name in wanted:
             cell = cells[column].strip()
             if not cell:
-                problem = "blank; a number is expected, fill it or remove the line"
-                raise refusal(path, f"line {number}, column {name!r}: {problem}")
+                blank = "blank; a number is expected, fill it or remove the line"
+                raise refusal(path, f"line {number}, column {name!r}: {blank}")
             if not _is_number(cell, dialect.decimal):
-                problem = f"a number is expected, found {shown(cell)!r}; correct it or remove the line"
-                raise refusal(path, f"line {number}, column {name!r}: {problem}")
-    if next(_rows(path, dialect), None) is None:
-        raise refusal(path, "has 0 samples under its header; 100 or more are expected")
-    raise refusal(path, f"cannot be read as CSV ({shown(error, 80)}); export it again")
+                found = f"a number is expected, found {shown(cell)!r}; correct it or remove the line"
+                raise refusal(path, f"line {number}, column {name!r}: {found}")
+    raise refusal(path, f"cannot be read as CSV from line {first} on ({shown(problem, 80)}); export it again")
 
 
 def _is_number(cell: str, decimal: str) -> bool:

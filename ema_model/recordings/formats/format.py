@@ -8,6 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ema_model.limits import megabytes
+from ema_model.recordings.refusal import refusal
+
 Array = NDArray[np.float64]
 
 
@@ -20,17 +23,25 @@ class Columns:
     notes: tuple[str, ...] = ()
 
 
+def check_size(path: str, numbers: float, max_bytes: int) -> None:
+    """Raises InputError if so many numbers take more memory than `max_bytes`: a small file may declare any number."""
+    if 8.0 * numbers > max_bytes:
+        size = f"unpacks to {megabytes(8.0 * numbers)}, over the limit of {megabytes(max_bytes)}"
+        raise refusal(path, f"{size}; split it, or keep fewer columns")
+
+
 @dataclass(frozen=True)
 class Format:
     """One kind of file.
 
     `header` returns the columns' names, in the file's order.  `read` returns those asked for (float64, one
-    length; NaN stands for itself, a blank cell is refused).  `write` takes signals of one length and the
-    file to make.  The first two raise InputError for files that are not well formed; all may raise OSError.
+    length; NaN stands for itself, a blank cell is refused); unless `strict`, those that are columns of numbers by
+    themselves, of whatever length.  `write` takes signals of one length and the file to make.  The first two raise
+    InputError for files that are not well formed or take more than `max_bytes` in memory; all may raise OSError.
     """
 
     suffix: str
     title: str
     header: Callable[[str, int], list[str]]  # path, max_bytes in memory
-    read: Callable[[str, Sequence[str], int], Columns]  # path, names, max_bytes in memory
+    read: Callable[[str, Sequence[str], int, bool], Columns]  # path, names, max_bytes in memory, strict
     write: Callable[[Mapping[str, Array], str], None]

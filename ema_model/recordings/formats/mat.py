@@ -7,9 +7,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ema_model.recordings.formats.arrays import Kind, as_columns, check_column, check_size, column_names, is_column
+from ema_model.limits import ARRAYS, megabytes
+from ema_model.recordings.formats.arrays import Kind, column_names, take
 from ema_model.recordings.formats.format import Array, Columns, Format
-from ema_model.recordings.formats.mat5 import HEADER_BYTES, Damaged, Leaf, TooLarge, leaves
+from ema_model.recordings.formats.mat5 import HEADER_BYTES, Damaged, Leaf, TooLarge, TooMany, leaves
 from ema_model.recordings.refusal import refusal, shown
 
 
@@ -17,14 +18,9 @@ def _header(path: str, max_bytes: int) -> list[str]:
     return column_names(_kinds(_load(path, max_bytes)))
 
 
-def _read(path: str, names: Sequence[str], max_bytes: int) -> Columns:
+def _read(path: str, names: Sequence[str], max_bytes: int, strict: bool) -> Columns:
     arrays = _load(path, max_bytes)
-    kinds = _kinds(arrays)
-    for name in names:
-        check_column(path, name, kinds[name])
-    check_size(path, kinds, names, max_bytes)
-    aside = [name for name, kind in kinds.items() if not is_column(kind)]
-    return as_columns(path, {name: arrays[name].values() for name in names}, aside)
+    return take(path, _kinds(arrays), names, max_bytes, strict, lambda name: arrays.pop(name).values())
 
 
 def _write(signals: Mapping[str, Array], path: str) -> None:
@@ -54,7 +50,9 @@ def _load(path: str, max_bytes: int) -> dict[str, Leaf]:
         except Damaged as error:
             raise refusal(path, f"is not a whole .mat file ({error}); save it again") from None
         except TooLarge:
-            raise refusal(path, f"unpacks to over {max_bytes / 1e6:g} MB, which is the limit; split it") from None
+            raise refusal(path, f"unpacks to over {megabytes(max_bytes)}, which is the limit; split it") from None
+        except TooMany:
+            raise refusal(path, f"holds over {ARRAYS} arrays, which is the limit; save the columns alone") from None
     twice = [path for path, count in Counter(leaf.path for leaf in found).items() if count > 1]
     if twice:
         raise refusal(path, f"array {shown('.'.join(twice[0]))!r} stands twice; save it again with one of each name")

@@ -17,6 +17,8 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from ema_model.limits import ARRAYS
+
 HEADER_BYTES = 128
 _MATRIX, _COMPRESSED = 14, 15
 # How the elements' numbers are stored, and what MATLAB calls the array's class.
@@ -26,6 +28,8 @@ _OTHERS = {1: "cells", 3: "an object", 4: "text", 5: "a sparse matrix", 16: "a f
 _STRUCT, _OPAQUE = 2, 17
 _COMPLEX = 0x0800
 _DEEPEST = 8  # structs within structs
+_MOST_DIMENSIONS = 32
+_LONGEST_NAME = 1_000  # MATLAB's have up to 63 characters
 _CHUNK = 1 << 20
 _NO_DATA = memoryview(b"")
 
@@ -36,6 +40,10 @@ class Damaged(Exception):
 
 class TooLarge(Exception):
     """The file unpacks to more than it may."""
+
+
+class TooMany(Exception):
+    """The file holds more arrays than it may."""
 
 
 @dataclass(frozen=True)
@@ -50,52 +58,64 @@ class Leaf:
 
     def values(self) -> NDArray[np.float64]:
         """The numbers in MATLAB's order, column by column; (n,)."""
-        return np.frombuffer(self.data, self.dtype).astype(np.float64)
+        return np.frombuffer(self.data, self.dtype).astype(np.float64, copy=False)
 
 
 def leaves(file: BinaryIO, max_bytes: int) -> Iterator[Leaf]:
     """Every array in the file, structs opened.
 
-    Raises Damaged, and TooLarge where packed elements unpack to more than `max_bytes` in all: equal values
+    Raises Damaged, TooMany, and TooLarge where packed elements unpack to more than `max_bytes` in all: equal values
     pack a thousandfold, so that a small file could fill the memory.
     """
+    found = 0
+    for data, order in _elements(file, max_bytes):
+        for leaf in _matrix(data, order, (), 0):
+            found += 1
+            if found > ARRAYS:
+                raise TooMany
+            yield leaf
+
+
+def _elements(file: BinaryIO, max_bytes: int) -> Iterator[tuple[memoryview, str]]:
+    """The contents of the file's arrays, unpacked, and the order of their bytes."""
     length = file.seek(0, os.SEEK_END)
     file.seek(0)
     order = "<" if file.read(HEADER_BYTES).endswith(b"IM") else ">"
+    count = 0
     while tag := file.read(8):
+        count += 1
+        if count > ARRAYS:
+            raise TooMany
         if len(tag) < 8:
             raise Damaged("it is cut short")
         kind, size = struct.unpack(f"{order}II", tag)
+        if size > length - file.tell():  # asked first, since reading makes room for all of it
+            raise Damaged("it is cut short")
         if kind == _COMPRESSED:
             unpacked = _unpacked(file, size, max_bytes)
             max_bytes -= len(unpacked)
             kind, data, _ = _element(unpacked, order)
         else:
-            if size > length - file.tell():  # asked first, since reading makes room for all of it
-                raise Damaged("it is cut short")
             data = memoryview(file.read(size))
         if kind == _MATRIX:
-            yield from _matrix(data, order, (), 0)
+            yield data, order
 
 
 def _unpacked(file: BinaryIO, size: int, limit: int) -> memoryview:
     """An element of `size` packed bytes, unpacked."""
-    unpacker, parts, total = zlib.decompressobj(), [], 0
-    while size > 0:
-        packed = file.read(min(size, _CHUNK))
-        if not packed:
-            raise Damaged("it is cut short")
-        size -= len(packed)
+    end = file.tell() + size
+    unpacker, unpacked = zlib.decompressobj(), bytearray()
+    while not unpacker.eof and (packed := file.read(min(end - file.tell(), _CHUNK))):
         while packed:
             try:
-                parts.append(unpacker.decompress(packed, _CHUNK))
+                unpacked += unpacker.decompress(packed, _CHUNK)
             except zlib.error:
                 raise Damaged("a packed element does not unpack") from None
             packed = unpacker.unconsumed_tail
-            total += len(parts[-1])
-            if total > limit:
+            if len(unpacked) > limit:
                 raise TooLarge
-    return memoryview(b"".join(parts))
+    file.seek(end)
+    return memoryview(unpacked).toreadonly()
 
 
 def _element(view: memoryview, order: str) -> tuple[int, memoryview, memoryview]:
@@ -129,7 +149,7 @@ def _matrix(view: memoryview, order: str, above: tuple[str, ...], depth: int, fi
         yield Leaf((*above, field or _text(name)), (), other=_OTHERS[kind])
         return
     stored, raw, view = _element(view, order)
-    if stored != 5 or not len(raw) or len(raw) % 4:
+    if stored != 5 or not len(raw) or len(raw) % 4 or len(raw) > 4 * _MOST_DIMENSIONS:
         raise Damaged("an array has no shape")
     shape = struct.unpack(f"{order}{len(raw) // 4}i", raw)
     if min(shape) < 0:
@@ -162,6 +182,8 @@ def _fields(view: memoryview, order: str, path: tuple[str, ...], depth: int) -> 
     _, names, view = _element(view, order)
     if width <= 0 or len(names) % width:
         raise Damaged("a struct's fields have no names")
+    if not len(names):
+        yield Leaf(path, (1, 1), other="structs")  # counted like any other
     for start in range(0, len(names), width):
         kind, data, view = _element(view, order)
         if kind != _MATRIX:
@@ -170,4 +192,6 @@ def _fields(view: memoryview, order: str, path: tuple[str, ...], depth: int) -> 
 
 
 def _text(name: memoryview) -> str:
+    if len(name) > _LONGEST_NAME:
+        raise Damaged("a name is too long")
     return bytes(name).split(b"\0")[0].decode("utf-8", "replace")

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 import warnings
-import zipfile
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import NamedTuple
@@ -14,19 +12,14 @@ import numpy as np
 from numpy.lib import format as npy
 
 from ema_model.errors import InputError
-from ema_model.recordings.formats.arrays import (
-    Kind,
-    as_columns,
-    check_column,
-    check_size,
-    column_names,
-    is_column,
-    unpacks_to,
-)
-from ema_model.recordings.formats.format import Array, Columns, Format
+from ema_model.limits import ARRAYS
+from ema_model.recordings.formats.arrays import Kind, column_names, take
+from ema_model.recordings.formats.format import Array, Columns, Format, check_size
 from ema_model.recordings.refusal import refusal, shown
+from ema_model.safe_zip import Damaged, Member, Refused, SafeZip, opened_zip
 
-_ENCRYPTED = 0x1  # of a member's flags
+_SUFFIX = ".npy"
+_FAR_TOO_MANY = 2**62  # beyond which numpy cannot count; a header may have thousands of digits
 
 
 class _Place(NamedTuple):
@@ -39,28 +32,27 @@ class _Place(NamedTuple):
 
 
 def _header(path: str, max_bytes: int) -> list[str]:
-    del max_bytes  # only the arrays' own headers are read
-    with _opened(path) as archive:
+    with _opened(path, max_bytes) as archive:
         return column_names({name: place.kind for name, place in _contents(path, archive).items()})
 
 
-def _read(path: str, names: Sequence[str], max_bytes: int) -> Columns:
-    with _opened(path) as archive:
+def _read(path: str, names: Sequence[str], max_bytes: int, strict: bool) -> Columns:
+    with _opened(path, max_bytes) as archive:
         places = _contents(path, archive)
-        kinds = {name: place.kind for name, place in places.items()}
-        for name in names:
-            check_column(path, name, kinds[name])
-        check_size(path, kinds, names, max_bytes)
-        # A structured array is read whole, whatever its other fields hold.
-        members = {places[name].member: places[name].member_bytes for name in names}
-        if sum(members.values()) > max_bytes:
-            raise unpacks_to(path, sum(members.values()), max_bytes)
-        whole = {}
-        for member in members:
-            with archive.open(member) as file:
-                whole[member] = npy.read_array(file, allow_pickle=False)
-        arrays = {name: _field(whole[places[name].member], places[name].field) for name in names}
-    return as_columns(path, arrays, [name for name, kind in kinds.items() if not is_column(kind)])
+        whole: dict[str, np.ndarray] = {}
+
+        def values(name: str) -> np.ndarray:
+            place = places[name]
+            if place.field is None:
+                return _array(path, archive, place.member)
+            # A structured array is read whole, whatever its other fields hold.
+            if place.member not in whole:
+                whole[place.member] = _array(path, archive, place.member)
+            return whole[place.member][place.field]
+
+        members = {places[name].member: places[name].member_bytes for name in names if places[name].field is not None}
+        check_size(path, sum(members.values()) / 8, max_bytes)
+        return take(path, {name: place.kind for name, place in places.items()}, names, max_bytes, strict, values)
 
 
 def _write(signals: Mapping[str, Array], path: str) -> None:
@@ -68,52 +60,68 @@ def _write(signals: Mapping[str, Array], path: str) -> None:
         np.savez(file, allow_pickle=False, **signals)
 
 
-def _field(array: np.ndarray, field: str | None) -> np.ndarray:
-    return array if field is None else array[field]
-
-
-def _contents(path: str, archive: zipfile.ZipFile) -> dict[str, _Place]:
+def _contents(path: str, archive: SafeZip) -> dict[str, _Place]:
     """Where each column is; a field whose name another array has is called `array.field`."""
-    members = [info for info in archive.infolist() if info.filename.endswith(".npy")]
-    if any(info.flag_bits & _ENCRYPTED for info in members):
-        raise refusal(path, "is encrypted; save it again without a password")
-    twice = [name for name, count in Counter(info.filename for info in members).items() if count > 1]
-    if twice:
-        raise refusal(path, f"array {shown(twice[0])!r} stands twice; save it again with one of each name")
     contents: dict[str, _Place] = {}
     structured: list[_Place] = []
-    for info in members:
-        shape, dtype = _array_header(archive, info)
+    for member in archive.names:
+        if not member.endswith(_SUFFIX):
+            continue
+        with archive.open(member) as file, _npy(path):
+            shape, dtype = _array_header(file)
         size = math.prod(shape) * dtype.itemsize
         if dtype.names is None:
-            contents[info.filename.removesuffix(".npy")] = _Place((shape, dtype), info.filename, size, None)
+            contents[member.removesuffix(_SUFFIX)] = _Place((shape, dtype), member, size, None)
         for field in dtype.names or ():
-            structured.append(_Place((shape, dtype[field]), info.filename, size, field))
+            structured.append(_Place((shape, dtype[field]), member, size, field))
     for place in structured:
         field = str(place.field)
-        contents[field if field not in contents else f"{place.member.removesuffix('.npy')}.{field}"] = place
+        contents[field if field not in contents else f"{place.member.removesuffix(_SUFFIX)}.{field}"] = place
     return contents
 
 
-def _array_header(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> Kind:
-    with archive.open(info) as file:
-        read = npy.read_array_header_1_0 if npy.read_magic(file) == (1, 0) else npy.read_array_header_2_0
-        shape, _, dtype = read(file)
+def _array_header(file: Member) -> Kind:
+    # numpy asks its files for no more than `read`.
+    read = npy.read_array_header_1_0 if npy.read_magic(file) == (1, 0) else npy.read_array_header_2_0  # type: ignore
+    shape, _, dtype = read(file)  # type: ignore
+    if any(size >= _FAR_TOO_MANY for size in shape):
+        raise ValueError("no array is that long")
     return shape, dtype
 
 
+def _array(path: str, archive: SafeZip, member: str) -> np.ndarray:
+    with archive.open(member) as file, _npy(path):
+        return npy.read_array(file, allow_pickle=False)  # type: ignore
+
+
 @contextmanager
-def _opened(path: str) -> Iterator[zipfile.ZipFile]:
-    """The archive; what cannot be read in it becomes an InputError."""
-    with open(path, "rb") as file, warnings.catch_warnings():
+def _npy(path: str) -> Iterator[None]:
+    """Around numpy's reading of an array; what it cannot read becomes an InputError."""
+    with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of old headers, to which nobody can attend
         try:
-            with zipfile.ZipFile(file) as archive:
-                yield archive
-        except (InputError, MemoryError):
+            yield
+        except (Damaged, Refused, MemoryError):
             raise
-        except Exception as error:  # a damaged archive fails in as many ways as there are layers below
-            raise refusal(path, f"is not a whole .npz file ({shown(error, 80)}); save it again") from None
+        except Exception as error:  # the header is a Python expression, which fails in any way
+            raise _not_whole(path, error) from None
+
+
+@contextmanager
+def _opened(path: str, max_bytes: int) -> Iterator[SafeZip]:
+    """The archive; what cannot be read in it becomes an InputError."""
+    with open(path, "rb") as file:
+        try:
+            with opened_zip(file, ARRAYS, max_bytes) as archive:
+                yield archive
+        except Damaged as error:
+            raise _not_whole(path, error) from None
+        except Refused as error:
+            raise refusal(path, str(error)) from None
+
+
+def _not_whole(path: str, error: Exception) -> InputError:
+    return refusal(path, f"is not a whole .npz file ({shown(error, 80)}); save it again")
 
 
 FORMAT = Format(".npz", "NumPy", _header, _read, _write)

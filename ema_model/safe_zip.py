@@ -1,0 +1,133 @@
+"""Takes a zip apart that may mean harm: .npz files, sessions and sealed challenges are zips, and come from elsewhere.
+
+The sizes that a zip declares are only claims, some ways of packing unpack gigabytes at a time, and members may share
+their bytes.  So only stored and deflated members are taken, piece by piece, and every byte that comes out is counted.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import zipfile
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from typing import IO, BinaryIO
+
+from ema_model.limits import megabytes
+from ema_model.recordings.refusal import shown
+
+_PIECE = 1 << 20
+_DIRECTORY_BYTES = 4 << 20  # the list of members, which zipfile reads at once: each takes 46 and its name
+_ENCRYPTED = 0x1  # of a member's flags
+_OTHER_WAYS = {9: "deflate64", 12: "bzip2", 14: "LZMA", 93: "Zstandard"}
+
+
+class Damaged(Exception):
+    """No zip, or a broken one; the text says why, for a person."""
+
+
+class Refused(Exception):
+    """A zip that is not taken; the text says what it does and what to do, for a person."""
+
+
+class SafeZip:
+    """The members of a zip by name; all that is read of them, together, stays below `most_bytes`.
+
+    A name stands here as it does in the zip, and is good for nothing but to ask for the member.
+    """
+
+    def __init__(self, archive: zipfile.ZipFile, most_members: int, most_bytes: int) -> None:
+        members = [info for info in archive.infolist() if not info.is_dir()]
+        if len(members) > most_members:
+            raise Refused(f"holds {len(members)} files, over the limit of {most_members}; leave some out")
+        for info in members:
+            if info.flag_bits & _ENCRYPTED:
+                raise Refused("is encrypted; save it again without a password")
+            if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+                way = _OTHER_WAYS.get(info.compress_type, f"method {info.compress_type}")
+                raise Refused(f"holds {shown(info.filename)!r} packed by {way}; pack it by deflate, or not at all")
+        twice = [name for name, count in Counter(info.filename for info in members).items() if count > 1]
+        if twice:
+            raise Refused(f"holds {shown(twice[0])!r}, which stands twice; save it again with one of each name")
+        self._archive, self._members = archive, {info.filename: info for info in members}
+        self._most_bytes, self._read = most_bytes, 0
+
+    @property
+    def names(self) -> list[str]:
+        """All members' names, in the zip's order."""
+        return list(self._members)
+
+    @contextmanager
+    def open(self, name: str) -> Iterator[Member]:
+        """A member to read from; Damaged if there is none of that name."""
+        if name not in self._members:
+            raise Damaged(f"{shown(name)} is missing")
+        with _told():
+            file = self._archive.open(self._members[name])
+        with file:
+            yield Member(self, file)
+
+    def read(self, name: str) -> bytes:
+        """A whole member."""
+        whole = io.BytesIO()
+        self.copy(name, whole)
+        return whole.getvalue()
+
+    def copy(self, name: str, target: IO[bytes]) -> None:
+        """Writes a whole member to a file."""
+        with self.open(name) as member:
+            while piece := member.read(_PIECE):
+                target.write(piece)
+
+    def count(self, size: int) -> None:
+        """Adds to what was read."""
+        self._read += size
+        if self._read > self._most_bytes:
+            raise Refused(f"unpacks to over {megabytes(self._most_bytes)}, which is the limit; split it")
+
+
+class Member:
+    """A member of a zip, opened."""
+
+    def __init__(self, archive: SafeZip, file: IO[bytes]) -> None:
+        self._archive, self._file = archive, file
+
+    def read(self, size: int) -> bytes:
+        """Up to `size` bytes, unpacked; none at the end."""
+        with _told():
+            piece = self._file.read(size)
+        self._archive.count(len(piece))
+        return piece
+
+
+@contextmanager
+def opened_zip(file: BinaryIO, most_members: int, most_bytes: int) -> Iterator[SafeZip]:
+    """The members of a zip, which raise Damaged and Refused as this does."""
+    with ExitStack() as closing:
+        with _told():
+            archive = closing.enter_context(zipfile.ZipFile(_Sparing(file)))  # type: ignore
+            # Members that share their bytes could each be read from end to end, over and over.
+            if sum(info.compress_size for info in archive.infolist()) > os.fstat(file.fileno()).st_size:
+                raise Damaged("its members overlap")
+        yield SafeZip(archive, most_members, most_bytes)
+
+
+class _Sparing(io.BufferedReader):
+    """A file that gives no more at once than a zip's directory may have, since zipfile reads that in one piece."""
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        if size is not None and size > _DIRECTORY_BYTES:
+            raise Damaged("its directory is too large")
+        return super().read(size)
+
+
+@contextmanager
+def _told() -> Iterator[None]:
+    """Around zipfile: a damaged zip fails in as many ways as there are layers below it."""
+    try:
+        yield
+    except (Damaged, MemoryError):
+        raise
+    except Exception as error:
+        raise Damaged(f"{type(error).__name__}: {shown(error, 80)}" if str(error) else type(error).__name__) from None

@@ -18,6 +18,7 @@ TEXT_BYTES = 100_000  # an actuator file or a side file, which people write by h
 
 COLUMNS = 2_000  # of a measurement: loggers of whole cars have hundreds
 ARRAYS = 5 * COLUMNS  # of a .npz or .mat file, columns or not
+RUNS = 10_000  # of a measurement: each is looked at by itself
 LINE_BYTES = 1_000_000  # of a CSV file: a number takes up to 25
 
 

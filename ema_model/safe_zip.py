@@ -28,7 +28,7 @@ class Damaged(Exception):
 
 
 class Refused(Exception):
-    """A zip that is not taken; the text says what it does and what to do, for a person."""
+    """A zip that is not taken; the text says what it does, for a person; the reader adds what to do."""
 
 
 class SafeZip:
@@ -40,16 +40,16 @@ class SafeZip:
     def __init__(self, archive: zipfile.ZipFile, most_members: int, most_bytes: int) -> None:
         members = [info for info in archive.infolist() if not info.is_dir()]
         if len(members) > most_members:
-            raise Refused(f"holds {len(members)} files, over the limit of {most_members}; leave some out")
+            raise Refused(f"holds {len(members)} files, over the limit of {most_members}")
         for info in members:
             if info.flag_bits & _ENCRYPTED:
-                raise Refused("is encrypted; save it again without a password")
+                raise Refused("is encrypted")
             if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
                 way = _OTHER_WAYS.get(info.compress_type, f"method {info.compress_type}")
-                raise Refused(f"holds {shown(info.filename)!r} packed by {way}; pack it by deflate, or not at all")
+                raise Refused(f"holds {shown(info.filename)!r} packed by {way}, where only deflate is taken")
         twice = [name for name, count in Counter(info.filename for info in members).items() if count > 1]
         if twice:
-            raise Refused(f"holds {shown(twice[0])!r}, which stands twice; save it again with one of each name")
+            raise Refused(f"holds {shown(twice[0])!r} twice")
         self._archive, self._members = archive, {info.filename: info for info in members}
         self._most_bytes, self._read = most_bytes, 0
 
@@ -84,7 +84,7 @@ class SafeZip:
         """Adds to what was read."""
         self._read += size
         if self._read > self._most_bytes:
-            raise Refused(f"unpacks to over {megabytes(self._most_bytes)}, which is the limit; split it")
+            raise Refused(f"unpacks to over {megabytes(self._most_bytes)}, which is the limit")
 
 
 class Member:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -18,9 +17,11 @@ from ema_model.actuator.parameters import (
     check_value,
 )
 from ema_model.errors import InputError
+from ema_model.limits import TEXT_BYTES
 from ema_model.quantities.axes import KINDS as AXIS_KINDS
 from ema_model.quantities.axes import Axes
 from ema_model.quantities.numbers import as_number
+from ema_model.toml_text import toml_of
 
 _OTHERS = ("schema", "name", "description", "axes", "model", "effects", "recordings")
 _MODEL = ("step_s", "filter_s", "torque_known")
@@ -33,7 +34,8 @@ def load_actuator(path: str | Path | None = None) -> Actuator:
         return _parse(shipped("thesis.toml"), "thesis.toml")
     path = Path(path)
     try:
-        text = path.read_text(encoding="utf-8")
+        with path.open(encoding="utf-8") as file:
+            text = file.read(TEXT_BYTES + 1)
     except FileNotFoundError:
         raise InputError(f"{path}: no such actuator file") from None
     except IsADirectoryError:
@@ -53,9 +55,11 @@ def shipped(name: str) -> str:
 
 
 def _parse(text: str, where: str) -> Actuator:
+    if len(text) > TEXT_BYTES:
+        raise InputError(f"{where}: is over {TEXT_BYTES // 1000} kB large; an actuator file is expected")
     try:
-        document = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        document = toml_of(text)
+    except ValueError as error:
         raise InputError(f"{where}: not valid TOML: {error}") from None
     if document.get("schema", 1) != 1:
         raise InputError(f"{where}: schema {document['schema']!r} is not known; this version reads schema 1")

@@ -8,14 +8,12 @@ from __future__ import annotations
 
 import hashlib
 import hmac
-import io
 import json
 import os
 import re
 import secrets
 import tempfile
 import zipfile
-import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
@@ -24,7 +22,9 @@ from typing import Any
 
 from ema_model.challenges.challenge import Challenge
 from ema_model.errors import InputError
+from ema_model.limits import CHALLENGE_BYTES, megabytes
 from ema_model.recordings.refusal import shown
+from ema_model.safe_zip import Damaged, Refused, opened_zip
 from ema_model.whole_file import whole_file
 
 SUFFIX = ".challenge"
@@ -33,13 +33,9 @@ HIDDEN = "hidden"
 MOST_CHARACTERS = {"title": 80, "story": 4000}
 _HEAD, _ACTUATOR, _SEAL = "challenge.json", "actuator.toml", "seal.json"
 _RECORDING = re.compile(r"[a-z0-9_]{1,30}\.parquet")
-_MOST_BYTES = 32 * 1024 * 1024  # of the file, and of its parts unpacked
 _MOST_PARTS = 12
 _SALT_BYTES = 16
-_REFUSED = (
-    *(OSError, zipfile.BadZipFile, zlib.error, EOFError, KeyError, TypeError, ValueError, AttributeError),
-    *(NotImplementedError, RuntimeError, OverflowError, MemoryError),
-)
+_REFUSED = (OSError, Damaged, KeyError, TypeError, ValueError, AttributeError, RecursionError, OverflowError)
 
 
 def write_sealed(path: Path, head: Mapping[str, Any], parts: Mapping[str, bytes]) -> None:
@@ -85,13 +81,15 @@ def opened(one: Challenge) -> Iterator[Challenge]:
 def read_parts(path: Path) -> dict[str, bytes]:
     """All parts but the seal, which was found whole, by their names; InputError otherwise."""
     try:
-        if path.stat().st_size > _MOST_BYTES:
-            raise InputError(f"{shown(path.name)}: is too large to be a challenge ({path.stat().st_size / 1e6:.0f} MB)")
+        if path.stat().st_size > CHALLENGE_BYTES:
+            raise InputError(f"{shown(path.name)}: is too large to be a challenge ({megabytes(path.stat().st_size)})")
         parts = _unpacked(path)
         seal = json.loads(parts.pop(_SEAL))
         good = hmac.compare_digest(_digest(str(seal["salt"]), parts).encode(), str(seal["sha256"]).encode())
     except InputError:
         raise
+    except Refused as error:
+        raise InputError(f"{shown(path.name)}: {error}; ask for it anew") from None
     except _REFUSED as error:
         raise InputError(_none(path, type(error).__name__)) from None
     if not good:
@@ -100,22 +98,12 @@ def read_parts(path: Path) -> dict[str, bytes]:
 
 
 def _unpacked(path: Path) -> dict[str, bytes]:
-    """The parts of the zip; only names that a challenge has, and never more bytes than it may have."""
-    parts: dict[str, bytes] = {}
-    room = _MOST_BYTES
-    with zipfile.ZipFile(io.BytesIO(path.read_bytes())) as archive:
-        inside = archive.infolist()
-        for info in inside[: _MOST_PARTS + 1]:
-            known = info.filename in (_HEAD, _ACTUATOR, _SEAL, HIDDEN) or _RECORDING.fullmatch(info.filename)
-            if not known or info.filename in parts:
-                raise InputError(f"{shown(path.name)}: holds {shown(info.filename)!r}, which no challenge has")
-            with archive.open(info) as file:
-                content = file.read(room + 1)
-            room -= len(content)
-            if room < 0 or len(inside) > _MOST_PARTS:
-                raise InputError(f"{shown(path.name)}: unpacks to more than a challenge has; ask for it anew")
-            parts[info.filename] = content
-    return parts
+    """The parts of the zip; only names that a challenge has."""
+    with path.open("rb") as file, opened_zip(file, _MOST_PARTS, CHALLENGE_BYTES) as archive:
+        for name in archive.names:
+            if name not in (_HEAD, _ACTUATOR, _SEAL, HIDDEN) and not _RECORDING.fullmatch(name):
+                raise InputError(f"{shown(path.name)}: holds {shown(name)!r}, which no challenge has")
+        return {name: archive.read(name) for name in archive.names}
 
 
 def _challenge(path: Path, parts: Mapping[str, bytes]) -> Challenge:

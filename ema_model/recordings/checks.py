@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.errors import InputError
+from ema_model.limits import COLUMNS, RUNS
 from ema_model.quantities.signals import SIGNALS, lookalikes, looks_like_time
 from ema_model.recordings.columns.mapping import ColumnMapping
 from ema_model.recordings.measurement import Measurement
@@ -20,6 +21,7 @@ Place = Callable[[int], str]
 FEWEST_SAMPLES = 100
 LARGEST = 1e30  # absolute value, in any unit
 _SHORTEST_STEP_S = 1e-12
+_LONGEST_NAME = 1_000  # characters
 _NONE = ColumnMapping()
 
 
@@ -54,7 +56,12 @@ def choose_columns(
 
 
 def check_names(path: str, header: Sequence[str]) -> None:
-    """Raises InputError if a name stands twice."""
+    """Raises InputError if there are too many names, one is too long, or stands twice."""
+    if len(header) > COLUMNS:
+        raise refusal(path, f"has {len(header)} columns, over the limit of {COLUMNS}; keep fewer columns")
+    longest = max(map(len, header), default=0)
+    if longest > _LONGEST_NAME:
+        raise refusal(path, f"a column's name has {longest} characters, over the limit of {_LONGEST_NAME}; shorten it")
     twice = [name for name, count in Counter(header).items() if count > 1 and name]
     if twice:
         raise refusal(path, f"column {shown(twice[0])!r} stands twice in the header; rename or remove one")
@@ -73,6 +80,9 @@ def check_values(path: str, arrays: Mapping[str, Array], place: Place) -> None:
             expected = "a whole number" if name == "segment" else "0 or 1"
             for row in np.flatnonzero(~whole)[:1]:
                 raise refusal(path, f"{place(row)}, column {name!r}: {expected} is expected, found {values[row]:g}")
+    if "segment" in arrays and (runs := np.count_nonzero(np.diff(arrays["segment"])) + 1) > RUNS:
+        found = f"column 'segment' tells {runs} runs apart, over the limit of {RUNS}"
+        raise refusal(path, f"{found}; correct it, or split the file")
     time = arrays["time_s"]
     wrong = np.diff(time) < _SHORTEST_STEP_S
     if "segment" in arrays:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.errors import InputError
+from ema_model.limits import PAGE_BYTES
 from ema_model.recordings import ColumnMapping, Measurement, read_measurement, read_side_file
 from ema_model.recordings.health.card import Health, health
 from ema_model.recordings.read import read_recording
@@ -44,9 +45,9 @@ def side_file_of(path: Path, folder: DataFolder) -> SideFile | None:
 def measured(opened: Opened, actuator: Actuator, side: SideFile | None = None) -> Opened:
     """The same with what was measured and its health; without a side file, as the recording's own one says."""
     if side is None:
-        measurement = read_recording(opened.path, actuator)
+        measurement = read_recording(opened.path, actuator, max_bytes=PAGE_BYTES)
     else:
-        measurement = read_measurement(opened.path, side=side)
+        measurement = read_measurement(opened.path, side=side, max_bytes=PAGE_BYTES)
     limit: float | None = actuator.controller.current_limit_A
     if not np.isfinite(limit):  # a drive whose limit is not known
         limit = None

@@ -5,7 +5,9 @@ NAME.emaviz is a zip of `session.json` and the files under `files/`, so that it 
 
 from __future__ import annotations
 
+import filecmp
 import json
+import os
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -13,16 +15,15 @@ from pathlib import Path
 from typing import Any
 
 from ema_model.errors import InputError
+from ema_model.limits import SESSION_BYTES, SESSION_FILES, SETTINGS_BYTES
 from ema_model.recordings import side_path
 from ema_model.recordings.refusal import shown
+from ema_model.safe_zip import Damaged, Refused, SafeZip, opened_zip
 from ema_model.whole_file import whole_file
 from emaviz import __version__
 from emaviz.session.data_folder import SESSION_SUFFIX, DataFolder, sanitised
 
 SCHEMA = 1
-MOST_BYTES = 512 * 1024 * 1024  # of all files in a session, unpacked
-_MOST_JSON_BYTES = 32 * 1024 * 1024
-_MOST_FILES = 200
 _DOCUMENT, _FILES = "session.json", "files/"
 
 
@@ -62,66 +63,85 @@ def write(path: Path, parts: Mapping[str, Part], folder: DataFolder, names: Sequ
 
 
 def read(path: Path, parts: Mapping[str, Part], folder: DataFolder) -> None:
-    """Takes a session back, its files into the data folder.  InputError: no session, damaged, too large."""
+    """Takes a session back, its files into the data folder.  InputError: no session, damaged, too large.
+
+    The files are taken all or not at all.
+    """
     try:
-        with zipfile.ZipFile(path) as archive:
+        with path.open("rb") as file, opened_zip(file, SESSION_FILES, SESSION_BYTES) as archive:
             document = _document(archive, path)
-            names = _take_files(archive, document, path, folder)
-    except (
-        OSError,
-        zipfile.BadZipFile,
-        KeyError,
-        UnicodeDecodeError,
-        EOFError,
-        NotImplementedError,
-        RuntimeError,
-    ) as e:
-        raise InputError(f"{shown(path.name)}: is no session, or damaged ({type(e).__name__}); save it anew") from None
+            names = _take_files(archive, document, folder)
+    except (OSError, Damaged) as error:
+        why = error.strerror if isinstance(error, OSError) else error
+        raise InputError(f"{shown(path.name)}: is no session, or damaged ({shown(why, 80)}); save it anew") from None
+    except Refused as error:
+        raise InputError(f"{shown(path.name)}: {error}; save it anew, with fewer recordings") from None
     for name, part in parts.items():
         if name in document:
-            part.restore(document[name], names)
+            try:
+                part.restore(document[name], names)
+            except InputError:
+                raise
+            except (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError) as error:
+                told = f"its part {name!r} is damaged ({type(error).__name__}); save it anew"
+                raise InputError(f"{shown(path.name)}: {told}") from None
 
 
-def _document(archive: zipfile.ZipFile, path: Path) -> dict[str, Any]:
-    if archive.getinfo(_DOCUMENT).file_size > _MOST_JSON_BYTES:
-        raise InputError(f"{shown(path.name)}: its settings are too large to be a session's")
+def _document(archive: SafeZip, path: Path) -> dict[str, Any]:
+    with archive.open(_DOCUMENT) as file:
+        raw = file.read(SETTINGS_BYTES + 1)
+    if len(raw) > SETTINGS_BYTES:
+        raise InputError(f"{shown(path.name)}: its settings are too large to be a session's; save it anew")
     try:
-        document = json.loads(archive.read(_DOCUMENT))
-    except ValueError:
+        document = json.loads(raw)
+    except (ValueError, RecursionError):
         document = None
     if not isinstance(document, dict) or not isinstance(document.get("files", []), list):
         raise InputError(f"{shown(path.name)}: is no session of emaviz")
-    if document.get("schema") != SCHEMA:
-        raise InputError(f"{shown(path.name)}: was saved by another version (schema {document.get('schema')!r})")
+    schema = document.get("schema")
+    if schema != SCHEMA:
+        told = schema if isinstance(schema, int | str) else "unknown"
+        raise InputError(f"{shown(path.name)}: was saved by another version (schema {shown(told)})")
     return document
 
 
-def _take_files(
-    archive: zipfile.ZipFile, document: Mapping[str, Any], path: Path, folder: DataFolder
-) -> dict[str, str]:
+def _take_files(archive: SafeZip, document: Mapping[str, Any], folder: DataFolder) -> dict[str, str]:
     """Unpacks what the data folder does not have already; names now by those of then."""
-    inside = {info.filename: info for info in archive.infolist()}
-    wanted = [str(name) for name in document.get("files", [])]
-    total = sum(info.file_size for info in inside.values())
-    if len(inside) > _MOST_FILES or total > MOST_BYTES:
-        raise InputError(f"{shown(path.name)}: {len(inside)} files of {total / 1e6:.3g} MB are too much for a session")
-    names = {}
-    for name in wanted:
-        info = inside.get(_FILES + name)
-        if info is None:
-            continue
-        content = archive.read(info)
-        side = inside.get(_FILES + side_path(Path(name)).as_posix())
-        here = folder.folder / name
-        if folder.holds(here) and here.is_file() and here.read_bytes() == content:
-            names[name] = name
-            continue
-        kept = folder.place(sanitised(Path(name).name))
-        kept.write_bytes(content)
-        if side is not None and side is not info:
-            side_path(kept).write_bytes(archive.read(side))
-        names[name] = folder.name_of(kept)
+    inside = set(archive.names)
+    names: dict[str, str] = {}
+    kept: list[Path] = []
+    try:
+        for name in dict.fromkeys(str(name) for name in document.get("files", [])):
+            if _FILES + name in inside:
+                here = folder.folder / name
+                part = _unpacked(archive, _FILES + name, folder)
+                if folder.holds(here) and here.is_file() and filecmp.cmp(here, part, shallow=False):
+                    part.unlink()
+                    names[name] = name
+                    continue
+                kept.append(folder.keep(part, Path(name).name))
+                names[name] = folder.name_of(kept[-1])
+                side = _FILES + side_path(Path(name)).as_posix()
+                if side in inside and side != _FILES + name:
+                    os.replace(_unpacked(archive, side, folder), side_path(kept[-1]))
+                    kept.append(side_path(kept[-1]))
+    except BaseException:  # half a session is of no use
+        for path in kept:
+            path.unlink(missing_ok=True)
+        raise
     return names
+
+
+def _unpacked(archive: SafeZip, name: str, folder: DataFolder) -> Path:
+    """A file of the session, under a name of its own."""
+    part = folder.part()
+    try:
+        with part.open("xb") as file:
+            archive.copy(name, file)
+    except BaseException:
+        part.unlink(missing_ok=True)
+        raise
+    return part
 
 
 def free_path(folder: DataFolder, wanted: Any) -> Path:

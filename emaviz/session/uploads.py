@@ -18,10 +18,11 @@ import viser
 from viser import _messages
 
 from ema_model.errors import InputError
+from ema_model.limits import FILE_BYTES, PAGE_BYTES, megabytes
+from ema_model.recordings.formats import FORMATS
 from ema_model.recordings.refusal import shown
 from emaviz.session.data_folder import DataFolder, sanitised
 
-MOST_BYTES = 256 * 1024 * 1024
 _MOST_TRANSFERS = 20  # at once
 _SETTLE_S = 0.5  # after which the browser has drawn its own message, so that it can be taken away
 
@@ -76,7 +77,7 @@ class Uploads:
         folder: DataFolder,
         done: Callable[[Path], None],
         told: Callable[[str], None],
-        most_bytes: int = MOST_BYTES,
+        most_bytes: int = PAGE_BYTES,
     ) -> None:
         self.most_bytes = most_bytes
         self._server, self._folder, self._done, self._told = server, folder, done, told
@@ -91,6 +92,7 @@ class Uploads:
 
     def add_button(self, label: str, suffixes: str, **options: Any) -> None:
         """An upload button at this place of the page; suffixes: ".csv,.mat".  Files may also be dropped anywhere."""
+        options.setdefault("hint", f"Up to {megabytes(self.most_bytes)}")
         button = self._server.gui.add_upload_button(label, mime_type=suffixes, **options)
         self._buttons.add(button._impl.uuid)
         if len(self._buttons) == 1:
@@ -118,8 +120,11 @@ class Uploads:
         if type(size) is not int or type(parts) is not int or not 0 <= parts <= max(size, 0):
             raise InputError(f"{name}: the upload's size makes no sense; try again")
         if size > self.most_bytes:
-            limit = f"{size / 1e6:.3g} MB, over the page's limit of {self.most_bytes / 1e6:.3g} MB"
-            raise InputError(f"{name}: {limit}; put the file into {self._folder.uploads} and choose it in the list")
+            limit = f"{size / 1e6:.3g} MB, over the page's limit of {megabytes(self.most_bytes)}"
+            advice = f"put the file into {self._folder.folder} and choose it in the list"
+            if Path(name).suffix.lower() in FORMATS:
+                advice = f"split it, or use emaviz compare on the command line, which takes {megabytes(FILE_BYTES)}"
+            raise InputError(f"{name}: {limit}; {advice}")
         on_the_way = sum(transfer.bytes for transfer in self._transfers.values())
         if len(self._transfers) >= _MOST_TRANSFERS or on_the_way + size > 2 * self.most_bytes:
             raise InputError(f"{name}: too many uploads at once; try again when they are done")

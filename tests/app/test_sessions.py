@@ -139,9 +139,10 @@ def test_what_is_no_session_is_refused_in_one_line(folder, tmp_path, monkeypatch
         with pytest.raises(InputError, match=message) as told:
             session_file.read(file, {}, folder)
         assert "\n" not in str(told.value)
-    monkeypatch.setattr(session_file, "MOST_BYTES", 1000)
-    bomb = archive_with(tmp_path / "e.emaviz", {"session.json": GOOD, "files/uploads/a.csv": "0" * 5000})
-    with pytest.raises(InputError, match="too much for a session"):
+    monkeypatch.setattr(session_file, "SESSION_BYTES", 1000)
+    listing = json.dumps({"schema": 1, "files": ["uploads/a.csv"]})
+    bomb = archive_with(tmp_path / "e.emaviz", {"session.json": listing, "files/uploads/a.csv": "0" * 5000})
+    with pytest.raises(InputError, match=r"unpacks to over 0\.001 MB, which is the limit"):
         session_file.read(bomb, {}, folder)
 
 

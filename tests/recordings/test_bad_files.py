@@ -187,7 +187,7 @@ FILES = {
             zipped(zipfile.ZIP_DEFLATED, **{f"{name}.npy": npy(np.zeros(1_000_000)) for name in GOOD}),
             "unpacks to 16 MB, over the limit of 10 MB",
         ),
-        "encrypted": (encrypted(npz()), "is encrypted; save it again without a password"),
+        "encrypted": (encrypted(npz()), "is encrypted; save it again"),
         "wrong_checksum": (npz().replace(k.tobytes()[80:88], b"\0\0\0\0\0\0\0A", 1), "not a whole .npz file"),
     },
     ".mat": {
@@ -255,7 +255,7 @@ def test_no_regular_file(suffix, tmp_path):
 
 def test_an_array_that_stands_twice(tmp_path):
     (tmp_path / "a.npz").write_bytes(twice("current_A.npy"))
-    assert "holds 'current_A.npy', which stands twice" in refused(tmp_path / "a.npz", "a.npz")
+    assert "holds 'current_A.npy' twice; save it again" in refused(tmp_path / "a.npz", "a.npz")
 
 
 def test_columns_that_stand_twice_are_no_table_either(tmp_path):

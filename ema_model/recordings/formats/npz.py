@@ -117,7 +117,7 @@ def _opened(path: str, max_bytes: int) -> Iterator[SafeZip]:
         except Damaged as error:
             raise _not_whole(path, error) from None
         except Refused as error:
-            raise refusal(path, str(error)) from None
+            raise refusal(path, f"{error}; save it again as numpy.savez does, in parts if it is large") from None
 
 
 def _not_whole(path: str, error: Exception) -> InputError:

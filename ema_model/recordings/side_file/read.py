@@ -8,21 +8,21 @@ from __future__ import annotations
 import json
 import math
 import os
-import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any, Literal, cast
 
 from ema_model.errors import InputError
+from ema_model.limits import TEXT_BYTES
 from ema_model.quantities.signals import SIGNALS
 from ema_model.recordings.columns.mapping import ColumnMapping, MappedColumn, parse_mapping
 from ema_model.recordings.refusal import listed, reason, refusal, shown
+from ema_model.toml_text import toml_of
 
 Kind = Literal["run", "map"]
 Sampling = Literal["mean", "instantaneous"]
 
 _OF_A_FOLDER = "recordings.toml"
-_MOST_BYTES = 100_000
 _KEYS = ("schema", "actuator", "kind", "sampling", "segments", "window", "mapping", "sensors")
 _LARGEST = 2**53  # up to which whole numbers are exact as floats
 _NUMBERS = ("sign", "scale", "offset")
@@ -82,20 +82,18 @@ def read_side_file(path: str | os.PathLike[str]) -> SideFile:
     path = os.fspath(path)
     try:
         with open(path, "rb") as file:
-            raw = file.read(_MOST_BYTES + 1)
-        if len(raw) > _MOST_BYTES:
-            raise refusal(path, "is over 100 kB large; the side file of a recording is expected")
-        return _parsed(path, tomllib.loads(raw.decode("utf-8")))
+            raw = file.read(TEXT_BYTES + 1)
+        if len(raw) > TEXT_BYTES:
+            raise refusal(path, f"is over {TEXT_BYTES // 1000} kB large; the side file of a recording is expected")
+        return _parsed(path, toml_of(raw.decode("utf-8")))
     except InputError:
         raise
     except UnicodeDecodeError:
         raise refusal(path, "is not text in UTF-8; save it as UTF-8") from None
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise refusal(path, f"is not valid TOML: {shown(error, 120)}; correct it") from None
     except OSError as error:
         raise refusal(path, f"cannot be read ({reason(error)}); check the name and the permissions") from None
-    except ValueError:  # thousands of digits
-        raise refusal(path, "holds a number with too many digits; correct it") from None
+    except ValueError as error:
+        raise refusal(path, f"is not valid TOML: {shown(error, 120)}; correct it") from None
 
 
 def _parsed(path: str, document: dict[str, Any]) -> SideFile:

@@ -13,6 +13,7 @@ from typing import Any
 from ema_model.actuator import Actuator
 from ema_model.comparison.result import Comparison
 from ema_model.errors import InputError
+from ema_model.limits import PAGE_BYTES
 from ema_model.quantities.titles import in_sentence
 from ema_model.recordings import (
     SIGNALS,
@@ -110,7 +111,7 @@ class Comparing:
         path = self.folder.measurement(name)
         if name not in self.opened and len(self.opened) >= MOST_RECORDINGS:
             raise InputError(f"{MOST_RECORDINGS} recordings are the most to compare at once; remove one first")
-        columns = read_columns(path)
+        columns = read_columns(path, max_bytes=PAGE_BYTES)
         side = side_file_of(path, self.folder)
         refused = self._take_actuator(side) if side is not None else None
         of_actuator = usual_mapping(self.actuator, columns)

@@ -14,6 +14,7 @@ from ema_model.challenges import Challenge, challenges, folder, opened, sealed_c
 from ema_model.challenges.sealing import unseal
 from ema_model.challenges.truth import Truth, read_truth
 from ema_model.errors import InputError
+from ema_model.limits import CHALLENGE_RECORDING_BYTES
 from ema_model.recordings import Measurement
 from ema_model.recordings.read import read_recording
 from emaviz.session.compare.comparing import USUAL, Comparing
@@ -22,7 +23,6 @@ from emaviz.session.settings import number
 COMPARED = "The recordings of Compare"
 NOTHING = "no recording to fit is chosen; open one on Compare, or choose a challenge"
 _DAMAGED = "the session's part of Discover is damaged; save it anew"
-_MOST_BYTES = 64 * 1024 * 1024  # of a challenge's recording, unpacked
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ class DiscoverySource:
             with opened(self.challenge) as challenge:
                 actuator = load_actuator(challenge.actuator)
                 fitted, held = (
-                    [read_recording(file, actuator, max_bytes=_MOST_BYTES) for file in files]
+                    [read_recording(file, actuator, max_bytes=CHALLENGE_RECORDING_BYTES) for file in files]
                     for files in (challenge.training, challenge.holdout)
                 )
             return Material(fitted, held, actuator, None, recipe)

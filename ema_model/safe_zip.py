@@ -68,10 +68,14 @@ class SafeZip:
         with file:
             yield Member(self, file)
 
-    def read(self, name: str) -> bytes:
-        """A whole member."""
+    def read(self, name: str, most_bytes: int | None = None) -> bytes:
+        """A whole member, which may have a limit of its own."""
         whole = io.BytesIO()
-        self.copy(name, whole)
+        with self.open(name) as member:
+            while piece := member.read(_PIECE):
+                whole.write(piece)
+                if most_bytes is not None and whole.tell() > most_bytes:
+                    raise Refused(f"holds {shown(name)!r} of over {megabytes(most_bytes)}, which is the limit")
         return whole.getvalue()
 
     def copy(self, name: str, target: IO[bytes]) -> None:
@@ -94,9 +98,9 @@ class Member:
         self._archive, self._file = archive, file
 
     def read(self, size: int) -> bytes:
-        """Up to `size` bytes, unpacked; none at the end."""
+        """Up to `size` bytes, unpacked, and never more than a megabyte; none at the end."""
         with _told():
-            piece = self._file.read(size)
+            piece = self._file.read(min(size, _PIECE))
         self._archive.count(len(piece))
         return piece
 

@@ -88,10 +88,7 @@ def read(path: Path, parts: Mapping[str, Part], folder: DataFolder) -> None:
 
 
 def _document(archive: SafeZip, path: Path) -> dict[str, Any]:
-    with archive.open(_DOCUMENT) as file:
-        raw = file.read(SETTINGS_BYTES + 1)
-    if len(raw) > SETTINGS_BYTES:
-        raise InputError(f"{shown(path.name)}: its settings are too large to be a session's; save it anew")
+    raw = archive.read(_DOCUMENT, SETTINGS_BYTES)
     try:
         document = json.loads(raw)
     except (ValueError, RecursionError):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import math
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
@@ -19,6 +20,7 @@ from ema_model.recordings.refusal import refusal, shown
 from ema_model.safe_zip import Damaged, Member, Refused, SafeZip, opened_zip
 
 _SUFFIX = ".npy"
+_HEAD_BYTES = 20_000  # numpy takes headers of up to 10,000, but reads them to their declared end first
 _FAR_TOO_MANY = 2**62  # beyond which numpy cannot count; a header may have thousands of digits
 
 
@@ -81,9 +83,9 @@ def _contents(path: str, archive: SafeZip) -> dict[str, _Place]:
 
 
 def _array_header(file: Member) -> Kind:
-    # numpy asks its files for no more than `read`.
-    read = npy.read_array_header_1_0 if npy.read_magic(file) == (1, 0) else npy.read_array_header_2_0  # type: ignore
-    shape, _, dtype = read(file)  # type: ignore
+    head = io.BytesIO(file.read(_HEAD_BYTES))
+    read = npy.read_array_header_1_0 if npy.read_magic(head) == (1, 0) else npy.read_array_header_2_0
+    shape, _, dtype = read(head)
     if any(size >= _FAR_TOO_MANY for size in shape):
         raise ValueError("no array is that long")
     return shape, dtype
@@ -91,7 +93,7 @@ def _array_header(file: Member) -> Kind:
 
 def _array(path: str, archive: SafeZip, member: str) -> np.ndarray:
     with archive.open(member) as file, _npy(path):
-        return npy.read_array(file, allow_pickle=False)  # type: ignore
+        return npy.read_array(file, allow_pickle=False)  # type: ignore  it asks for no more than `read`
 
 
 @contextmanager

@@ -13,6 +13,7 @@ import pyarrow.parquet as pq
 
 from ema_model.limits import COLUMNS, megabytes
 from ema_model.recordings.formats.format import Array, Columns, Format, check_size
+from ema_model.recordings.formats.parquet_pages import Damaged, TooMany, unpacked_bytes
 from ema_model.recordings.refusal import refusal, shown
 
 _FOOTER_BYTES = 8_000_000
@@ -31,12 +32,14 @@ def _header(path: str, max_bytes: int) -> list[str]:
 
 def _read(path: str, names: Sequence[str], max_bytes: int, strict: bool) -> Columns:
     with _opened(path) as file:
-        kinds = {name: file.schema_arrow.field(name).type for name in names}
+        schema = file.schema_arrow
+        kinds = {name: schema.field(name).type for name in names}
         numeric = [name for name in names if _is_numeric(kinds[name])]
         if strict and len(numeric) < len(names):
             name = next(name for name in names if name not in numeric)
             raise refusal(path, f"column {name!r} holds {shown(kinds[name])}; numbers are expected, store it as double")
         check_size(path, _values(file.metadata, numeric), max_bytes)
+        check_size(path, _unpacked_bytes(path, file.metadata, numeric) / 8, max_bytes)
         table = file.read(columns=numeric)
     columns = dict(zip(numeric, table.columns))
     del table  # each column goes when it is converted
@@ -64,6 +67,17 @@ def _values(metadata: pq.FileMetaData, names: Sequence[str]) -> int:
         chunks = [group.column(j) for j in range(group.num_columns)]
         total += sum(max(c.num_values, group.num_rows) for c in chunks if c.path_in_schema in asked)
     return max(total, metadata.num_rows * len(names))
+
+
+def _unpacked_bytes(path: str, metadata: pq.FileMetaData, names: Sequence[str]) -> int:
+    with open(path, "rb") as file:
+        try:
+            return unpacked_bytes(file, metadata, names)
+        except Damaged:
+            problem = "is not a whole Parquet file (a page's header is damaged); export it again"
+            raise refusal(path, problem) from None
+        except TooMany:
+            raise refusal(path, "has far too many pages; export it again with pages of 1 MB") from None
 
 
 def _write(signals: Mapping[str, Array], path: str) -> None:

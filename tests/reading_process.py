@@ -1,0 +1,198 @@
+"""Reads files in a process of its own, which a file may fill or crash, and says what came of each.
+
+As a program: a line with a reader and a file in, a line with the outcome out.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import resource
+import select
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+_MOST_MEMORY = 10 << 30  # of address space, so that the machine survives
+_PATIENCE_S = 120.0
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a reader made of a file."""
+
+    kind: str  # "read", "refused", "uncaught", "crashed" or "hung"
+    line: str = ""  # the refusal, or the error that nobody caught
+    seconds: float = 0.0
+    grown_bytes: float = 0.0  # by which the process has grown at its peak
+
+
+class ReadingProcess:
+    """The process; a new one starts after a crash."""
+
+    def __init__(self) -> None:
+        self._process: subprocess.Popen[str] | None = None
+
+    def read(self, reader: str, path: Path, most_bytes: int) -> Outcome:
+        """What `READERS[reader]` makes of the file."""
+        process = self._process = self._process or self._started()
+        assert process.stdin and process.stdout
+        process.stdin.write(json.dumps([reader, str(path), most_bytes]) + "\n")
+        process.stdin.flush()
+        if not select.select([process.stdout], [], [], _PATIENCE_S)[0]:
+            self.close()
+            return Outcome("hung", seconds=_PATIENCE_S)
+        answer = process.stdout.readline()
+        if not answer:
+            code = process.wait()
+            self._process = None
+            return Outcome("crashed", f"the process ended with {code}")
+        return Outcome(**json.loads(answer))
+
+    def close(self) -> None:
+        """Ends the process."""
+        if self._process is not None:
+            self._process.kill()
+            self._process.communicate()
+            self._process = None
+
+    def _started(self) -> subprocess.Popen[str]:
+        command = [sys.executable, __file__]
+        return subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+        )
+
+
+def _measurement(path: Path, most_bytes: int) -> None:
+    from ema_model.errors import InputError
+    from ema_model.recordings import read_columns, read_measurement
+    from ema_model.recordings.health.card import health
+
+    refused = None
+    try:
+        measurement = read_measurement(path, max_bytes=most_bytes)
+        if measurement.samples < 100_000:  # its own time is no matter here
+            assert health(measurement).findings
+        del measurement
+    except InputError as error:
+        refused = error
+    try:
+        read_columns(path, max_bytes=most_bytes)
+    except InputError as error:
+        _checked(str(error))
+    if refused is not None:
+        raise refused
+
+
+def _side_file(path: Path, _: int) -> None:
+    from ema_model.recordings import read_side_file
+
+    read_side_file(path)
+
+
+def _actuator(path: Path, _: int) -> None:
+    from ema_model.actuator import load_actuator
+
+    load_actuator(path)
+
+
+def _session(path: Path, _: int) -> None:
+    from emaviz.session import saved as session_file
+    from emaviz.session.data_folder import DataFolder
+    from emaviz.session.saved import Part
+    from emaviz.session.settings import Settings
+
+    with tempfile.TemporaryDirectory() as folder:
+        settings = Part(dict, lambda saved, _: Settings().restore(saved))
+        try:
+            session_file.read(path, {"settings": settings}, DataFolder(Path(folder)))
+        except Exception:
+            assert not [file for file in Path(folder).rglob("*") if file.is_file()], "half a session is left"
+            raise
+
+
+def _challenge(path: Path, _: int) -> None:
+    from ema_model.actuator import load_actuator
+    from ema_model.challenges import opened, sealed_challenge
+    from ema_model.challenges.sealing import unseal
+    from ema_model.limits import CHALLENGE_RECORDING_BYTES
+    from ema_model.recordings.read import read_recording
+
+    with opened(sealed_challenge(path)) as one:
+        actuator = load_actuator(one.actuator)
+        for file in (*one.training, *one.holdout):
+            read_recording(file, actuator, max_bytes=CHALLENGE_RECORDING_BYTES)
+    unseal(path)
+
+
+def _recording(path: Path, _: int) -> None:
+    from emaviz.recording import read
+
+    read(path)
+
+
+READERS: dict[str, Callable[[Path, int], Any]] = {
+    **dict.fromkeys(("csv", "parquet", "npz", "mat", "packed mat"), _measurement),
+    "side file": _side_file,
+    "actuator": _actuator,
+    "user effects": _actuator,
+    "session": _session,
+    "challenge": _challenge,
+    "rrd": _recording,
+}
+
+
+def _checked(line: str) -> str:
+    assert line.isprintable() and len(line) < 1000, "the refusal is not one line"
+    return line
+
+
+def _outcome(reader: str, path: Path, most_bytes: int) -> Outcome:
+    from ema_model.errors import InputError
+    from emaviz.recording.errors import RecordingError
+
+    before = _memory("VmRSS", reset=True)
+    began = time.perf_counter()
+    try:
+        try:
+            READERS[reader](path, most_bytes)
+            kind, line = "read", ""
+        except (InputError, RecordingError) as error:
+            kind, line = "refused", _checked(str(error))
+    except BaseException as error:  # a panic of native code is no Exception
+        kind, line = "uncaught", f"{type(error).__name__}: {error}"[:300]
+    seconds = time.perf_counter() - began
+    return Outcome(kind, line, seconds, max(_memory("VmHWM") - before, 0.0))
+
+
+def _memory(which: str, reset: bool = False) -> float:
+    """Memory of this process now (VmRSS), or at its peak since the last reset (VmHWM), bytes."""
+    if reset:
+        import pyarrow as pa
+
+        pa.default_memory_pool().release_unused()
+        Path("/proc/self/clear_refs").write_text("5")
+    lines = Path("/proc/self/status").read_text().splitlines()
+    return next(1024.0 * int(line.split()[1]) for line in lines if line.startswith(which))
+
+
+if __name__ == "__main__":
+    resource.setrlimit(resource.RLIMIT_AS, (_MOST_MEMORY, _MOST_MEMORY))
+    for module in (
+        "ema_model.challenges.sealing",
+        "ema_model.effects",
+        "emaviz.session.saved",
+        "emaviz.session.settings",
+    ):
+        importlib.import_module(module)  # the first file shall not pay for these
+
+    answers = sys.stdout
+    sys.stdout = sys.stderr
+    for asked in sys.stdin:
+        reader, path, most_bytes = json.loads(asked)
+        print(json.dumps(vars(_outcome(reader, Path(path), most_bytes))), file=answers, flush=True)

@@ -1,0 +1,234 @@
+"""Whole files of every kind that is read, and changes of their bytes, in what a checksum or a packing covers too."""
+
+from __future__ import annotations
+
+import io
+import json
+import random
+import struct
+import zipfile
+import zlib
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from scipy.io import savemat
+
+from ema_model.actuator import load_actuator
+from ema_model.actuator.file import shipped
+from ema_model.challenges import sealed_file
+from ema_model.challenges.sealing import seal
+from ema_model.challenges.truth import Truth
+from emaviz.recording import RecordingWriter
+from emaviz.session.settings import Settings
+
+N = 120
+k = np.arange(float(N))
+COLUMNS = {"time_s": k / 1e3, "current_A": np.sin(k / 9.0), "motor_position_rad": k / 7.0, "duty": np.cos(k / 5.0)}
+TABLE = np.rec.fromarrays(list(COLUMNS.values()), names=list(COLUMNS))
+SIDE = """schema = 1
+kind = "run"
+actuator = "mine.toml"
+sampling = "mean"
+segments = [0, 1, 4]
+[window]
+from_s = 0.5
+to_s = 2.0
+[sensors]
+motor_position_noise_rad = 1e-4
+encoder_bits = 12
+[mapping]
+current_A = "I[mA]"
+time_s = { column = "t", unit = "ms", sign = 1, scale = 1.5, offset = -2 }
+"""
+EFFECTS = """
+[effects.user_torque]
+expression = "c*omega + A*sin(7*theta)"
+c = { value = -1e-4, sigma = 5e-5, low = -0.01, high = 0.0 }
+A = 0.02
+[effects.torque_curve]
+variable = "omega"
+modulator = "sign_speed"
+low = -500
+high = 500.0
+values = [-0.01, { value = -0.002, sigma = 0.005 }, -0.01]
+[[recordings.where]]
+match = "*kp100*"
+set = { "controller.position_gain_1_s" = 100.0 }
+"""
+Change = Callable[[bytes, random.Random], bytes]
+
+
+def written(write: Callable[..., object], *args: object, **kw: object) -> bytes:
+    """What `write(file, …)` writes."""
+    file = io.BytesIO()
+    write(file, *args, **kw)
+    return file.getvalue()
+
+
+def as_text(separator: str, decimal: str = ".") -> bytes:
+    rows = (separator.join(f"{value:.6g}" for value in row) for row in zip(*COLUMNS.values()))
+    return "\n".join([separator.join(COLUMNS), *(row.replace(".", decimal) for row in rows)]).encode()
+
+
+def as_parquet(**options: object) -> bytes:
+    return written(lambda file: pq.write_table(pa.table(COLUMNS), file, **options))
+
+
+def zipped(members: Mapping[str, bytes]) -> bytes:
+    def write(file: io.BytesIO) -> None:
+        with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+            for name, content in members.items():
+                archive.writestr(name, content)
+
+    return written(write)
+
+
+def session() -> bytes:
+    document = {"schema": 1, "emaviz": "0", "files": ["uploads/a.csv"], "settings": Settings().saved()}
+    parts = {"session.json": json.dumps(document).encode(), "files/uploads/a.csv": as_text(",")}
+    return zipped({**parts, "files/uploads/a.toml": SIDE.encode()})
+
+
+def challenge(folder: Path) -> bytes:
+    path = folder / "whole.challenge"
+    seal(Truth("", 7, "Hidden.", faults={"k1": 0.4}), path, "A title", "A story.", load_actuator())
+    return path.read_bytes()
+
+
+def recording(folder: Path) -> bytes:
+    path = folder / "whole.rrd"
+    with RecordingWriter(path) as writer:
+        writer.config("# Settings\n")
+        writer.properties({"seed": 7, "faults": {"k1": 0.25}})
+        writer.truth(np.full(8, 0.25))
+        writer.signals("reference", k / 1e3, {"current_A": np.sin(k)})
+        for i in range(5):
+            writer.iteration("hba", i, 1.0 / (i + 1), np.full(8, 0.1), np.full((4, 8), 0.2), np.ones(4))
+    return path.read_bytes()
+
+
+def whole(reader: str, folder: Path) -> list[bytes]:
+    """Some files that the reader takes."""
+    if reader == "csv":
+        return [as_text(","), as_text(";", ","), b"\xef\xbb\xbf" + as_text("\t")]
+    if reader == "parquet":
+        plain = as_parquet(compression="none", use_dictionary=False)
+        return [as_parquet(), plain, as_parquet(data_page_size=64)]
+    if reader == "npz":
+        table = written(np.savez, table=np.asarray(TABLE), label="x")
+        return [written(np.savez, **COLUMNS), written(np.savez_compressed, **COLUMNS), table]
+    if reader in ("mat", "packed mat"):
+        rig = {"rig": {**COLUMNS, "label": "x", "inner": {"x": k}}, "cells": np.array([k, "a"], object)}
+        return [written(savemat, arrays, do_compression=reader == "packed mat") for arrays in (COLUMNS, rig)]
+    if reader == "side file":
+        return [SIDE.encode()]
+    if reader == "actuator":
+        return [shipped("thesis.toml").encode()]
+    if reader == "user effects":
+        return [(shipped("thesis.toml") + EFFECTS).encode()]
+    return [{"session": lambda _: session(), "challenge": challenge, "rrd": recording}[reader](folder)]
+
+
+def damage(reader: str, content: bytes, rng: random.Random, folder: Path) -> bytes:
+    """The file with some bytes changed; half of the packed ones within, under a good checksum."""
+    inside = {"npz": _within_zip, "session": _within_zip, "challenge": _resealed, "packed mat": _within_mat}
+    if reader == "user effects":
+        start = content.index(b"[effects.user_torque]")
+        return content[:start] + changed(content[start:], rng)
+    if reader in inside and rng.random() < 0.5:
+        return inside[reader](content, rng, folder)
+    return changed(content, rng)
+
+
+def changed(content: bytes, rng: random.Random) -> bytes:
+    """Up to four changes: other bytes, more or fewer of them, some repeated, words and numbers that mean harm."""
+    for _ in range(rng.randint(1, 4)):
+        at = rng.randrange(len(content) + 1)
+        piece = rng.choice((rng.randbytes(rng.randint(1, 8)), rng.choice(_NASTY)))
+        end = at + len(piece)
+        kind = rng.choice(("put", "put", "insert", "cut", "drop", "repeat", "flip"))
+        if kind == "put":
+            content = content[:at] + piece + content[end:]
+        elif kind == "insert":
+            content = content[:at] + piece + content[at:]
+        elif kind == "cut":
+            content = content[:at]
+        elif kind == "drop":
+            content = content[:at] + content[end:]
+        elif kind == "repeat":
+            content = content[:at] + content[at:end] * (1 + piece[0]) + content[end:]
+        else:
+            content = content[:at] + bytes(byte ^ 1 << piece[0] % 8 for byte in content[at:end]) + content[end:]
+    return content
+
+
+_NASTY = (
+    *(
+        b"\xff\xff\xff\xff",
+        b"\xff\xff\xff\x7f",
+        b"\0\0\0\0",
+        b"\0\0\0\x80",
+        b"\n",
+        b'"',
+        b"=",
+        b"[",
+        b"{}",
+        b"[[",
+        b",",
+    ),
+    *(
+        b"nan",
+        b"1e999",
+        b"-1",
+        b"null",
+        b"true",
+        b"[]",
+        b'""',
+        b"9" * 20,
+        b"0x" + b"f" * 30,
+        b"../",
+        b"\\ud800",
+        b"-inf",
+    ),
+)
+
+
+def _within_zip(content: bytes, rng: random.Random, _: Path) -> bytes:
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+    name = rng.choice(list(members))
+    members[name] = changed(members[name], rng)
+    return zipped(members)
+
+
+def _resealed(content: bytes, rng: random.Random, folder: Path) -> bytes:
+    """Under a good seal, since whoever seals may be hostile."""
+    path = folder / "resealed.challenge"
+    path.write_bytes(content)
+    parts = sealed_file.read_parts(path)
+    head = parts.pop("challenge.json")
+    name = rng.choice([*parts, "challenge.json"])
+    if name != "challenge.json":
+        parts[name] = changed(parts[name], rng)
+        sealed_file.write_sealed(path, json.loads(head), parts)
+        return path.read_bytes()
+    try:
+        sealed_file.write_sealed(path, json.loads(changed(head, rng)), parts)
+    except (ValueError, TypeError):  # no longer JSON, or no table
+        return changed(content, rng)
+    return path.read_bytes()
+
+
+def _within_mat(content: bytes, rng: random.Random, _: Path) -> bytes:
+    """With one packed element unpacked, changed and packed again."""
+    starts, at = [], 128
+    while at < len(content):
+        starts.append(at)
+        at += 8 + struct.unpack_from("<I", content, at + 4)[0]
+    start = rng.choice(starts)
+    end = start + 8 + struct.unpack_from("<I", content, start + 4)[0]
+    packed = zlib.compress(changed(zlib.decompress(content[start + 8 : end]), rng))
+    return content[:start] + struct.pack("<II", 15, len(packed)) + packed + content[end:]

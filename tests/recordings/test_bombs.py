@@ -1,0 +1,59 @@
+"""Files that mean to fill the memory, or to take minutes: refused in one line, or read, within what is documented."""
+
+from __future__ import annotations
+
+import pytest
+from bombs import BOMBS, SLOW
+from reading_process import ReadingProcess
+
+from ema_model.limits import CHALLENGE_BYTES, FILE_BYTES, PAGE_BYTES
+
+ENDINGS = {"packed mat": ".mat", "side file": ".toml", "actuator": ".toml", "session": ".emaviz"}
+SMALL = 20_000_000  # bytes that a measurement may take here, so that the plain suite stays quick
+GROUND = 30e6  # bytes that any reading may take: libraries' buffers, modules
+MOST_SECONDS = 20.0
+
+
+@pytest.fixture(scope="module")
+def process():
+    process = ReadingProcess()
+    yield process
+    process.close()
+
+
+def most_grown(reader, limit):
+    """Three times the limit of what is read."""
+    own = {"session": PAGE_BYTES, "challenge": CHALLENGE_BYTES, "side file": 0, "actuator": 0}
+    return 3.0 * own.get(reader, limit) + GROUND
+
+
+def outcome(process, name, folder, limit):
+    """What comes of a bomb, which must be as it should but for the time."""
+    reader, write, says = BOMBS[name]
+    path = folder / f"bomb{ENDINGS.get(reader, f'.{reader}')}"
+    write(path, limit)
+    size = path.stat().st_size
+    found = process.read(reader, path, limit)
+    path.unlink()
+    print(f"{name:36} {size / 1e6:8.3f} MB {found.kind:8} {found.seconds:6.2f} s {found.grown_bytes / 1e6:7.1f} MB")
+    assert found.kind in ("refused", "read"), found
+    assert found.kind == "refused" or not says, "it is read"
+    assert says in found.line
+    assert found.grown_bytes < most_grown(reader, limit), f"it took {found.grown_bytes / 1e6:.0f} MB"
+    return found
+
+
+@pytest.mark.parametrize("name", [name for name in BOMBS if name not in SLOW])
+def test_a_bomb_takes_little_memory(process, name, tmp_path):
+    outcome(process, name, tmp_path, SMALL)
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("limit", [PAGE_BYTES, FILE_BYTES], ids=["page", "command line"])
+@pytest.mark.parametrize("name", BOMBS)
+def test_a_bomb_of_the_real_size(name, limit, tmp_path):
+    process = ReadingProcess()
+    try:
+        assert outcome(process, name, tmp_path, limit).seconds < MOST_SECONDS
+    finally:
+        process.close()

@@ -142,10 +142,11 @@ class LeftOut:
                 rest = moment - matrix[:, fixed] @ inner[:, -1]
             a, b, c = left[first, first], left[first, second], left[second, second]
             x, z = rest[first], rest[second]
+            # A pair that those before already span has nothing of its own to add: what is left of it is rounding.
+            spanned = a + c < 1e-2 * (matrix[first, first] + matrix[second, second])
             determinant = np.maximum(a * c - b * b, 1e-12 * (np.abs(a * c) + 1e-300))
-            gain = (c * x * x - 2.0 * b * x * z + a * z * z) / determinant
-            # A pair that those before already span has nothing of its own to add.
-            gain[a + c < 1e-2 * (matrix[first, first] + matrix[second, second])] = -np.inf
+            gain = (c * x * x - 2.0 * b * x * z + a * z * z) / np.where(spanned, np.inf, determinant)
+            gain[spanned] = -np.inf
             gain[picked] = -np.inf
             best = int(np.argmax(gain))
             if not np.isfinite(gain[best]):

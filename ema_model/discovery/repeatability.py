@@ -20,13 +20,15 @@ from ema_model.models import ClosedLoop
 Array = NDArray[np.float64]
 
 _APART = 5e-4  # of the inertia
+_IN_PROPORTION = 2.0 * _APART  # of a signal: what any loop's may change by
 _LOST = 0.5  # of the blocks, from which on a recording cannot be compared in time
 
 
 def with_divergence(data: Data, found: Fit) -> tuple[Data, float]:
     """The data with what such neighbours differ by in the model's floor, and the share of blocks that are lost.
 
-    A block is lost where the neighbours' currents (or positions) differ by more than the noise.
+    A block is lost where the neighbours' currents (or positions) differ by more than noise and model floor, and by more
+    than in proportion: a recording without noise would show any change.
     """
     plant = found.plant
     if not isinstance(plant, ClosedLoop):
@@ -44,7 +46,10 @@ def with_divergence(data: Data, found: Fit) -> tuple[Data, float]:
             for name in one.model
         }
         floors.append(one.beside(replace(one, model=apart)))
-        lost += [apart[name] > one.noise[name] for name in data.signals if name in apart][:1]
+        name = next((name for name in data.signals if name in apart), None)
+        if name is not None:
+            size = float(np.sqrt(np.mean(window.measured[name] ** 2)))
+            lost.append(apart[name] > np.maximum(one.sigma(name), _IN_PROPORTION * size))
     return replace(data, floors=floors), float(np.mean(np.concatenate(lost)) if lost else 0.0)
 
 

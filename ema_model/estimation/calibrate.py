@@ -101,7 +101,8 @@ def calibrate(
     fit = search.solve(start)
     x = fit.x
     chi2 = fit.chi2
-    covariance = np.linalg.inv(fit.jacobian.T @ fit.jacobian) * max(1.0, chi2)
+    root = np.linalg.inv(np.linalg.qr(fit.jacobian, mode="r"))  # JᵀJ itself rounds the prior away beside a fine floor
+    covariance = root @ root.T * max(1.0, chi2)
     if chi2 > _MISFIT:  # errors of a wrong model last
         covariance *= max(1.0, CORRELATED_S / min(one.block_s for one in floors))
     actuator, fitted_k = problem.actuator(x)
@@ -180,7 +181,9 @@ class _Search:
         from scipy.optimize import least_squares  # takes a third of a second to import
 
         least, greatest = self.problem.bounds
-        fits = []
+        # The singular values of the long Jacobian cost more than all else, but lsmr looks for its step in a plane.
+        solver = "exact" if len(least) == 1 else "lsmr"
+        fits, agree = [], len(starts) == 1
         for start in starts:
             fits.append(
                 least_squares(
@@ -193,15 +196,15 @@ class _Search:
                     ftol=5e-5,
                     loss=loss,
                     f_scale=scale,
-                    tr_solver="lsmr",  # the default's singular values of the long Jacobian cost more than all else
+                    tr_solver=solver,
                 )
             )
             fits.sort(key=lambda fit: fit.cost)
-            # "At most a hundredth apart": two minima of the same depth are one answer.
-            if len(fits) > 1 and fits[1].cost < 1.01 * fits[0].cost + 2.0:
+            # "At most a hundredth apart": two minima of the same depth are one answer, and none is deeper than nothing.
+            if fits[0].cost < 2.0 or (len(fits) > 1 and fits[1].cost < 1.01 * fits[0].cost + 2.0):
+                agree = True
                 break
         best = fits[0]
-        agree = len(starts) == 1 or fits[1].cost < 1.01 * best.cost + 2.0
         x = best.x
         fun, jacobian = self.problem.linearised(x)  # the fit's own are weighted by its loss
         chi2 = float(fun @ fun - x @ x) / self.problem.values

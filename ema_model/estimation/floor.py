@@ -22,6 +22,7 @@ from ema_model.commands.recorded import jumps
 from ema_model.faults import HEALTHY
 from ema_model.models import ClosedLoop, Plant, Stretch, Window
 from ema_model.recordings import Measurement
+from ema_model.recordings.noise import least_noise, sample_noise
 from ema_model.simulation.run import Run, simulate_reference
 
 Array = NDArray[np.float64]
@@ -83,7 +84,8 @@ def floor(
     else:
         samples = plant.recorded[window.recording]
         noise = {
-            name: known[name].get("noise", _of_runs(samples, name)) / np.sqrt(window.samples_per_block)
+            name: max(known[name].get("noise", _of_runs(samples, name)), least_noise(name))
+            / np.sqrt(window.samples_per_block)
             for name in names
         }
         assert isinstance(plant, ClosedLoop)
@@ -157,19 +159,4 @@ def repeats_of(window: Window | Stretch, noise: Mapping[str, float]) -> Array:
 def _of_runs(measurement: Measurement, name: str) -> float:
     """The noise of a signal over all its runs, of which the longest counts."""
     longest = max(measurement.runs, key=lambda run: run.stop - run.start)
-    return sample_noise(measurement[name][longest])
-
-
-def sample_noise(values: Array) -> float:
-    """White noise and quantisation of a signal, rms, from its third differences (which a smooth motion lacks).
-
-    The median of their size is blind to steps and reversals; a signal that hardly ever changes gives the
-    step of its quantisation, s/√12.
-    """
-    third = np.diff(values, 3)
-    robust = 1.4826 * float(np.median(np.abs(third))) / np.sqrt(20.0)  # 1 + 9 + 9 + 1
-    steps = np.abs(np.diff(values))
-    steps = steps[steps > 1e-12 * (1.0 + np.max(np.abs(values)))]
-    repeated = len(steps) < 0.9 * (len(values) - 1)  # held values are the mark of quantisation
-    quantum = float(np.min(steps)) / np.sqrt(12.0) if repeated and len(steps) else 0.0
-    return max(robust, quantum, 1e-12)
+    return sample_noise(measurement[name][longest], name)

@@ -51,12 +51,14 @@ def separating(found: Fitted, covariance: Array, names: Sequence[str]) -> Sugges
     columns = sorted({c for name in names for c in _columns(name)})
     best: Suggestion | None = None
     before = np.sqrt(np.diag(covariance)[columns])
+    known = np.linalg.inv(np.linalg.cholesky(covariance))  # rows: kᵀ rowsᵀ rows k is what the recordings tell
     for name, settings, duration in _COMMANDS:
-        information = _information(found, Run(command(name, settings), duration))
-        if information is None:
+        told = _information(found, Run(command(name, settings), duration))
+        if told is None:
             continue
-        after = np.linalg.inv(np.linalg.inv(covariance) + information)
-        gain = float(np.max(before / np.sqrt(np.diag(after)[columns])))
+        root = np.linalg.inv(np.linalg.qr(np.concatenate([known, told]), mode="r"))
+        after = np.linalg.norm(root, axis=1)[columns]
+        gain = float(np.max(before / after))
         if gain > 1.3 and (best is None or gain > best.gain):
             best = Suggestion(name, settings, duration, gain)
     return best
@@ -67,7 +69,7 @@ def _columns(name: str) -> tuple[int, ...]:
 
 
 def _information(found: Fitted, run: Run) -> Array | None:
-    """Inverse covariance (8, 8) of k that such a recording would bring, its rig's unknowns integrated out."""
+    """What such a recording would tell of k, its rig's unknowns integrated out: (8, 8), a root of the information."""
     problem = found.problem
     plant = problem.plant
     try:
@@ -89,9 +91,6 @@ def _information(found: Fitted, run: Run) -> Array | None:
     x = np.zeros(own_problem.count)
     x[:FAULTS] = found.x[:FAULTS]
     _, slopes = own_problem.jacobians(x[None, :])
-    hessian = slopes[0].T @ slopes[0]
-    rest = slice(FAULTS, None)
-    if own_problem.count == FAULTS:
-        return hessian
-    mixed = np.linalg.solve(hessian[rest, rest], hessian[rest, :FAULTS])
-    return hessian[:FAULTS, :FAULTS] - hessian[:FAULTS, rest] @ mixed
+    # The faults last: what is left of them beside the rig's unknowns; normal equations would round it away.
+    ordered = np.concatenate([slopes[0][:, FAULTS:], slopes[0][:, :FAULTS]], axis=1)
+    return np.asarray(np.linalg.qr(ordered, mode="r"))[-FAULTS:, -FAULTS:]

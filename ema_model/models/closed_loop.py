@@ -12,6 +12,7 @@ from ema_model.actuator import Actuator
 from ema_model.effects import find
 from ema_model.errors import InputError
 from ema_model.faults import HEALTHY
+from ema_model.models.sampling import check_steps, on_even_grid
 from ema_model.models.window import BLOCK_S, Window, cut
 from ema_model.physics.rows import LANES
 from ema_model.recordings import Measurement
@@ -44,8 +45,9 @@ class ClosedLoop:
         self.effects = {name: find(name).settings(dict(given)) for name, given in (effects or {}).items()}
         self.stack = stack_for(actuator, self.effects, circuit)
         self.recorded = list(measurements)  # before they were put on an even grid
-        self.measurements = [m if m.is_uniform else m.resampled(m.sample_period_s) for m in measurements]
+        self.measurements = [on_even_grid(m) for m in measurements]
         chosen = stretches or [None] * len(self.measurements)
+        check_steps(self.measurements, chosen, actuator)
         self.windows = [
             window
             for i, (m, parts) in enumerate(zip(self.measurements, chosen))

@@ -19,9 +19,11 @@ from ema_model.effects import find
 from ema_model.errors import InputError
 from ema_model.faults import HEALTHY
 from ema_model.models.motion import Motion, motion_of
+from ema_model.models.sampling import check_period, on_even_grid
 from ema_model.models.window import CONTEXT
 from ema_model.physics.rows import LANES
 from ema_model.recordings import Measurement
+from ema_model.recordings.noise import sample_noise
 from ema_model.simulation.pack import monitor_rows, stack_for
 from ema_model.stacks import exclusive
 
@@ -85,7 +87,7 @@ class InverseDynamics:
         self.effects = {name: find(name).settings(dict(given)) for name, given in (effects or {}).items()}
         self.stack = stack_for(actuator, self.effects)
         self.recorded = list(measurements)  # before they were put on an even grid
-        self.measurements = [m if m.is_uniform or m.is_map else _even(m) for m in measurements]
+        self.measurements = [m if m.is_map else on_even_grid(m) for m in measurements]
         chosen = stretches or [None] * len(self.measurements)
         self.windows = [
             stretch
@@ -142,10 +144,6 @@ class InverseDynamics:
         return currents
 
 
-def _even(measurement: Measurement) -> Measurement:
-    return measurement.resampled(measurement.sample_period_s)
-
-
 def _stretches(
     measurement: Measurement, actuator: Actuator, *, recording: int, parts: list[slice] | None
 ) -> list[Stretch]:
@@ -155,6 +153,8 @@ def _stretches(
         raise InputError(f"{measurement.name}: nothing to compare; current_A or motor_torque_Nm is needed")
     values = {path: value for rule in actuator.rules_for(measurement.name) for path, value in rule.values.items()}
     period = measurement.sample_period_s
+    if not measurement.is_map:
+        check_period(measurement, actuator.filter_s)
     size = 1 if measurement.is_map else max(1, round(actuator.filter_s / _BLOCKS_PER_FILTER / period))
     found = []
     runs = [slice(0, measurement.samples)] if measurement.is_map else parts or measurement.runs
@@ -193,7 +193,7 @@ def _stretches(
                 still=still,
                 measured={target: means(motion.filtered(raw))},
                 context=context,
-                noise={target: _noise(raw, motion.kernel, size)},
+                noise={target: _noise(raw, target, motion.kernel, size)},
                 moving=moving,
                 samples_per_block=size,
                 period_s=period,
@@ -217,11 +217,9 @@ def _step_of(position: Array) -> float:
     return float(np.quantile(steps, 0.01)) if steps.size else 0.0
 
 
-def _noise(raw: Array, kernel: Array, size: int) -> float:
+def _noise(raw: Array, signal: str, kernel: Array, size: int) -> float:
     """White noise of the raw signal after the filter and the mean over a block, rms."""
-    third = np.diff(raw, 3)
-    white = 1.4826 * float(np.median(np.abs(third))) / np.sqrt(20.0) if third.size else 0.0
-    return white * float(np.sqrt(np.sum(np.convolve(kernel, np.full(size, 1.0 / size)) ** 2)))
+    return sample_noise(raw, signal) * float(np.sqrt(np.sum(np.convolve(kernel, np.full(size, 1.0 / size)) ** 2)))
 
 
 def _each(value: ArrayLike) -> Array:

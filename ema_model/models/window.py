@@ -111,8 +111,8 @@ def cut(
             )
         )
     if not windows:
-        short = f"{measurement.duration_s:g} s are too short to compare"
-        raise InputError(f"{measurement.name}: {short}; {10 * samples * period:g} s are needed")
+        short = f"{measurement.duration_s:g} s are too short to compare; {10 * samples * period:g} s are needed"
+        raise InputError(f"{measurement.name}: {short}; check the unit of time_s")
     return windows
 
 

@@ -24,6 +24,8 @@ Effects = Mapping[str, Mapping[str, float]]
 MONITOR_STEP_S = 1e-5
 REFERENCE_SUBSTEPS = 10  # of the Reference Model in one step of the Monitor Model
 _LONGEST_S = 600.0
+SLOWEST_HZ, FASTEST_HZ = 100.0, 1e6  # sampling
+MOST_STEPS = 60_000_000  # of the Monitor Model in one run: its longest at its usual step
 
 
 @dataclass(frozen=True)
@@ -42,8 +44,9 @@ class Run:
     def __post_init__(self) -> None:
         if not 1e-3 <= self.duration_s <= _LONGEST_S:
             raise InputError(f"the duration must lie between 0.001 and {_LONGEST_S:g} s, not {self.duration_s:g}")
-        if not 100.0 <= self.sample_rate_Hz <= 1e6:
-            raise InputError(f"the sample rate must lie between 100 and 1000000 Hz, not {self.sample_rate_Hz:g}")
+        if not SLOWEST_HZ <= self.sample_rate_Hz <= FASTEST_HZ:
+            limits = f"{SLOWEST_HZ:.0f} and {FASTEST_HZ:.0f} Hz"
+            raise InputError(f"the sample rate must lie between {limits}, not {self.sample_rate_Hz:g}")
         if not abs(self.load_torque_Nm) <= 1e6:
             raise InputError(f"the load torque must be a number of N·m up to 1e6, not {self.load_torque_Nm:g}")
         if self.duration_s * self.sample_rate_Hz < 1.0:
@@ -63,6 +66,18 @@ class Run:
 def steps_per_sample(period_s: float, step_s: float = MONITOR_STEP_S) -> int:
     """Monitor steps in a sampling period: as many as keep them at `step_s` or just below."""
     return max(1, int(np.ceil(period_s / step_s - 1e-6)))
+
+
+def _steps_per_sample(run: Run, step_s: float) -> int:
+    """The same for a run; InputError where it is too long for steps that short."""
+    period = steps_per_sample(1.0 / run.sample_rate_Hz, step_s)
+    if run.samples * period > MOST_STEPS:
+        steps = f"{run.samples * period:.2g} steps of the model of {1.0 / run.sample_rate_Hz / period:g} s"
+        raise InputError(
+            f"{run.duration_s:g} s at {run.sample_rate_Hz:g} Hz are {steps}, and at most {MOST_STEPS:g} are simulated; "
+            "take a shorter duration or a lower sample rate"
+        )
+    return period
 
 
 def simulate_reference(
@@ -88,7 +103,7 @@ def simulate_reference(
             f"{actuator.name}: the reference model is of a cascade with a hysteresis inverter; use the monitor model"
         )
     stack = stack_for(actuator, effects)
-    period = steps_per_sample(1.0 / run.sample_rate_Hz)
+    period = _steps_per_sample(run, MONITOR_STEP_S)
     dt = 1.0 / run.sample_rate_Hz / period
     times = np.arange(run.samples * period + 1) * dt
     demand = run.command.at(times)
@@ -130,7 +145,7 @@ def simulate_monitor(
     if actuator.controller.kind == "unknown":
         raise InputError(f"{actuator.name}: its controller is not known, so that no command can be simulated")
     stack = stack_for(actuator, effects, circuit)
-    period = steps_per_sample(1.0 / run.sample_rate_Hz, actuator.step_s)
+    period = _steps_per_sample(run, actuator.step_s)
     dt = 1.0 / run.sample_rate_Hz / period
     demand = run.command.at(np.arange(run.samples * period + 1) * dt)
     start = float(demand[0]) if start_rad is None else start_rad

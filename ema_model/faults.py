@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from types import SimpleNamespace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ema_model.actuator import Actuator
 from ema_model.errors import InputError
 from ema_model.quantities.titles import in_sentence
+
+if TYPE_CHECKING:
+    from ema_model.actuator import Actuator
 
 _LEAST_TURNS = 0.02  # less, and the three-phase model diverges when two phases are shorted
 
@@ -109,6 +112,15 @@ def vector(settings: dict[str, float]) -> NDArray[np.float64]:
             raise InputError(f"fault {name} = {value:g} is outside 0 … 1")
         k[NAMES.index(name)] = value
     return k
+
+
+def named(k: ArrayLike) -> dict[str, float]:
+    """The inverse of `vector`: the components of one k that are not healthy; k7, an angle, only beside a k6."""
+    inside = zip(NAMES, np.clip(k, 0.0, 1.0))
+    found = {name: float(value) for name, value in inside if value != BY_NAME[name].healthy}
+    if "k6" not in found:
+        found.pop("k7", None)
+    return found
 
 
 def error_percent(k: ArrayLike, truth: ArrayLike, *, wrap: bool = False) -> float:

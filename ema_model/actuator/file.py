@@ -18,12 +18,13 @@ from ema_model.actuator.parameters import (
 )
 from ema_model.errors import InputError
 from ema_model.limits import TEXT_BYTES
+from ema_model.faults import vector
 from ema_model.quantities.axes import KINDS as AXIS_KINDS
 from ema_model.quantities.axes import Axes
 from ema_model.quantities.numbers import as_number
 from ema_model.toml_text import toml_of
 
-_OTHERS = ("schema", "name", "description", "axes", "model", "effects", "recordings")
+_OTHERS = ("schema", "name", "description", "axes", "model", "effects", "faults", "recordings")
 _MODEL = ("step_s", "filter_s", "torque_known")
 _RECORDING_KINDS = ("run", "map")
 
@@ -86,6 +87,7 @@ def _parse(text: str, where: str) -> Actuator:
         description=str(document.get("description", "")),
         tolerances=tolerances,
         effects=_effects(tables["effects"], axes, tolerances, where),
+        faults=_faults(tables["faults"], where),
         axes=axes,
         step_s=_seconds(tables["model"], "step_s", 1e-5, where),
         torque_known=_flag(tables["model"], "torque_known", where),
@@ -147,6 +149,19 @@ def _effects(
         except InputError as error:
             raise InputError(f"{where}: {inside} {error}") from None
     return effects
+
+
+def _faults(given: dict[str, Any], where: str) -> dict[str, float]:
+    """The known faults k1 … k8, each a number in 0 … 1."""
+    for name, value in given.items():
+        if not math.isfinite(number(value)):
+            raise InputError(f"{where}: [faults] {name} must be a number, not {str(value)[:40]!r}")
+    faults = {name: float(value) for name, value in given.items()}
+    try:
+        vector(faults)
+    except InputError as error:
+        raise InputError(f"{where}: [faults] {error}") from None
+    return faults
 
 
 def _entry(section: str, name: str, entry: Any, where: str) -> tuple[float, Tolerance | None]:

@@ -7,7 +7,11 @@ from dataclasses import dataclass, field, fields, replace
 from fnmatch import fnmatchcase
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ema_model.errors import InputError
+from ema_model.faults import vector
 from ema_model.quantities.axes import Axes
 from ema_model.quantities.numbers import as_number
 
@@ -117,7 +121,12 @@ _ANY_SIGN = {"rotor_offset_rad", "current_bias_A", "stop_low_rad", "stop_high_ra
 
 @dataclass(frozen=True)
 class Actuator:
-    """All parameters of one actuator; SI units, which the names say (for linear axes see `quantities.axes`)."""
+    """All parameters of one actuator; SI units, which the names say (for linear axes see `quantities.axes`).
+
+    Its faults are the known state of this unit: what simulates it (a run, a comparison, a discovery) starts from
+    them unless it is told another k.  An identification does not: its k counts from the healthy actuator, so that a
+    worn unit is found worn, whatever its file says.
+    """
 
     name: str
     controller: Controller
@@ -128,6 +137,7 @@ class Actuator:
     tolerances: dict[str, Tolerance] = field(default_factory=dict)  # by "section.parameter"
     description: str = ""
     effects: dict[str, dict[str, float]] = field(default_factory=dict)  # that belong to its model
+    faults: dict[str, float] = field(default_factory=dict)  # k1 … k8 that are known; the others are healthy
     axes: Axes = field(default_factory=Axes)
     step_s: float = 1e-5  # of the Monitor Model
     filter_s: float = 12e-3  # half width over which a measured motion is differentiated, for inverse dynamics
@@ -139,6 +149,11 @@ class Actuator:
     def has_reference_model(self) -> bool:
         """Whether it is the kind that the three-phase Reference Model describes."""
         return self.controller.kind == "cascade" and self.inverter.kind == "hysteresis"
+
+    @property
+    def k(self) -> NDArray[np.float64]:
+        """The known faults with the healthy ones, (8,)."""
+        return vector(self.faults)
 
     def circuit(self, preferred: str = "reduced") -> str:
         """The Monitor Model's drive; `preferred` is the circuit for the hysteresis current loop."""

@@ -18,7 +18,10 @@ if TYPE_CHECKING:
 
 
 def save_actuator(actuator: Actuator, path: str | os.PathLike[str]) -> None:
-    """Writes all parameters, tolerances and effects, whole or not at all; InputError if the file cannot be written."""
+    """Writes all parameters, tolerances, effects and faults, whole or not at all.
+
+    Raises InputError if the file cannot be written.
+    """
     target = Path(path)
     if target.suffix != ".toml":
         raise InputError(f"{target}: the name of an actuator file must end in .toml")
@@ -47,6 +50,8 @@ def as_toml(actuator: Actuator) -> str:
             if math.isfinite(value):
                 lines.append(_entry(actuator, f"{section}.{name}", axes.parameter(name), value))
     lines += _effects(actuator)
+    if actuator.faults:
+        lines += ["", "[faults]", *(f"{name} = {float(value)!r}" for name, value in actuator.faults.items())]
     if actuator.mapping or actuator.rules:
         lines += ["", "[recordings]", f"mapping = [{', '.join(_text(text) for text in actuator.mapping)}]"]
     for rule in actuator.rules:

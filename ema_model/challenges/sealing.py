@@ -11,7 +11,7 @@ import json
 import tempfile
 import zlib
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 from ema_model.actuator import Actuator, save_actuator
@@ -52,7 +52,7 @@ def seal(
     parts = {HIDDEN: _packed(truth)}
     with tempfile.TemporaryDirectory(prefix="emaviz-sealing-") as name:
         folder = Path(name)
-        save_actuator(actuator, folder / "actuator.toml")
+        save_actuator(replace(actuator, faults={}), folder / "actuator.toml")  # those that are known are hidden, too
         try:
             for i, (run, recording) in enumerate(recorded(truth, actuator, sensors, load_torque_Nm), 1):
                 on_progress(f"recorded {i} of {len(RUNS)}")

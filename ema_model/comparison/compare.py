@@ -19,7 +19,7 @@ from ema_model.estimation import Calibration, Floor, floor
 from ema_model.estimation import calibrate as fit
 from ema_model.estimation.calibrate import SIGNALS
 from ema_model.estimation.floor import twin_error
-from ema_model.faults import HEALTHY
+from ema_model.faults import named
 from ema_model.models import ClosedLoop, Plant, Stretch, Window, plant_for
 from ema_model.models.stretches import evaluation_stretches, fit_stretches
 from ema_model.recordings import Measurement
@@ -36,7 +36,7 @@ def compare(
     measurements: Sequence[Measurement],
     actuator: Actuator | None = None,
     *,
-    k: ArrayLike = HEALTHY,
+    k: ArrayLike | None = None,
     effects: Mapping[str, Mapping[str, float]] | None = None,
     calibrate: bool = True,
     free: Sequence[str] | None = None,
@@ -45,9 +45,9 @@ def compare(
 ) -> Comparison:
     """The recordings of one actuator beside its model.
 
-    k: the actuator's faults, where known; effects: besides the actuator's own.  free: parameters to calibrate
-    in place of those that the actuator's file leaves free; signals: to fit, in place of current and positions, with
-    weights where it is a mapping (1 is what the signal's floor says).
+    k: the actuator's faults, in place of its file's; effects: besides the actuator's own.
+    free: parameters to calibrate in place of those that the actuator's file leaves free; signals: to fit, in place of
+    current and positions, with weights where it is a mapping (1 is what the signal's floor says).
     on_progress is told what goes on, and may raise to stop.
     Raises InputError for recordings that cannot be compared.
     """
@@ -60,23 +60,23 @@ def compare(
         health(m, current_limit_A=_finite(actuator.controller.current_limit_A), pole_pairs=actuator.motor.pole_pairs)
         for m in recordings
     ]
-    actuator = replace(actuator, effects=_with_settings(actuator, effects))
+    faults = actuator.faults if k is None else named(k)
+    actuator = replace(actuator, effects=_with_settings(actuator, effects), faults=faults)
     wanted = weights_of(signals, actuator)
     tell("measuring the model's floor")
     fitted = plant_for(recordings, actuator, stretches=fit_stretches(recordings, actuator))
     sensors = [_stated(m, actuator) for m in measurements]
-    floors = [floor(fitted, window, k, sensors[window.recording]) for window in fitted.windows]
+    floors = [floor(fitted, window, stated=sensors[window.recording]) for window in fitted.windows]
     tell("calibrating" if calibrate else "simulating")
     calibration = fit(
         fitted,
         floors,
         free=free if calibrate else (),
-        k=k,
         signals=wanted,
         on_progress=lambda evaluations: tell(f"calibrating: {evaluations} simulations"),
     )
     tell("looking where it fails")
-    plant, floors, before, after = _everywhere(recordings, fitted, floors, calibration, actuator, k)
+    plant, floors, before, after = _everywhere(recordings, fitted, floors, calibration, actuator)
     known = [known_error(plant, window, calibration) if plant is fitted else {} for window in plant.windows]
     residuals = residuals_of(
         plant, floors, after, known, calibration.actuator, calibration if plant is fitted else None
@@ -160,7 +160,6 @@ def _everywhere(
     floors: list[Floor],
     calibration: Calibration,
     actuator: Actuator,
-    k: ArrayLike,
 ) -> tuple[Plant, list[Floor], list[dict[str, Array]], list[dict[str, Array]]]:
     """The whole recordings, where the fit took only parts of them."""
     if fit_stretches(measurements, actuator) is None:
@@ -171,7 +170,7 @@ def _everywhere(
     for window in plant.windows:
         i = started.get(window.first)
         for target, model, faults, start in (
-            (before, actuator, k, (0.0, 0.0)),
+            (before, actuator, actuator.k, (0.0, 0.0)),
             (after, calibration.actuator, calibration.k, calibration.start_of(i)),
         ):
             signals: Any = plant.signals  # each plant knows its own windows

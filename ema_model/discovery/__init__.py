@@ -6,6 +6,7 @@ from ema_model.discovery.discover import discover, result_of, settings_of, walk
 from ema_model.discovery.path import Story, begun
 from ema_model.discovery.result import Added, Candidate, Discovery, Experiment, Rung
 from ema_model.discovery.summary import as_dict
+from ema_model.discovery.verify import Verified, verified
 
 __all__ = [
     "Added",
@@ -14,10 +15,12 @@ __all__ = [
     "Experiment",
     "Rung",
     "Story",
+    "Verified",
     "as_dict",
     "begun",
     "discover",
     "result_of",
     "settings_of",
+    "verified",
     "walk",
 ]

@@ -187,6 +187,8 @@ def result_of(
         actuator=calibration.actuator,
         plant=story.current.plant,
         floors=story.data.floors,
+        data=story.data,
+        held=story.held,
         unknown=unknown,
         curve=next((one for one in story.added if one.name not in CATALOGUE), None),
         next_experiment=experiment,

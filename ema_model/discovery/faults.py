@@ -19,7 +19,8 @@ from ema_model.discovery.result import Candidate
 from ema_model.discovery.score import amounts_of, movable
 from ema_model.discovery.unknown import TEETH
 from ema_model.estimation.problem import unknown_of
-from ema_model.faults import HEALTHY, NAMES
+from ema_model.faults import NAMES
+from ema_model.identification.unknowns import to_k, to_x
 
 Array = NDArray[np.float64]
 
@@ -73,48 +74,41 @@ def fault_for(
 def _scores(data: Data, current: Fit) -> list[_Scored]:
     """Each fault at the strength that suits best, beyond what the parameters can do; the most telling first."""
     left = [names for names in _FAULTS if names[0] not in current.faults]
-    k = current.calibration.k
-    lanes, tried = [k], []
+    known = to_x(current.calibration.k)
+    lanes, tried = [known], []
     for names in left:
         for size in _SIZES:
-            own = [_with(k, names[0], size, phase) for phase in ((0.0, 0.25) if len(names) == 2 else (0.0,))]
-            tried.append((names, size, range(len(lanes), len(lanes) + len(own))))
-            lanes += own
+            # From where a fault is known to be almost whole, it can only be less.
+            step = size if known[NAMES.index(names[0])] + size <= 1.0 else -size
+            tried.append((names, step, range(len(lanes), len(lanes) + len(names))))
+            for name in names:
+                lanes.append(known.copy())
+                lanes[-1][NAMES.index(name)] += step
+    k = to_k(np.stack(lanes))
     shown = [
-        current.plant.signals(window, current.calibration.actuator, np.stack(lanes), *current.calibration.start_of(i))  # pyright: ignore[reportArgumentType]
+        current.plant.signals(window, current.calibration.actuator, k, *current.calibration.start_of(i))  # pyright: ignore[reportArgumentType]
         for i, window in enumerate(current.plant.windows)
     ]
     signals = np.nan_to_num(data.over_floor(current.plant, shown))
     jacobian, gram = movable(current)
     best: dict[tuple[str, ...], _Scored] = {}
-    for names, size, its in tried:
-        one = _at(names, size, *amounts_of(current, (signals[its] - signals[0]).T, jacobian, gram))
+    for names, step, its in tried:
+        one = _at(known, names, step, *amounts_of(current, (signals[its] - signals[0]).T, jacobian, gram))
         if names not in best or one.drop > best[names].drop:
             best[names] = one
     return sorted(best.values(), key=lambda one: -one.drop)
 
 
-def _at(names: tuple[str, ...], size: float, amounts: Array, energy: Array, toward: Array) -> _Scored:
-    """The fault at these multiples of what its columns were made with, as far as k may go."""
-    healthy = float(HEALTHY[NAMES.index(names[0])])
-    length = math.hypot(*amounts)
-    if len(names) == 2:
-        amounts = amounts * min(1.0, 1.0 / (size * length + 1e-300))
-        phase = (0.5 + math.atan2(amounts[1], amounts[0]) / (2.0 * math.pi)) % 1.0
-        k = {names[0]: size * math.hypot(*amounts), names[1]: phase}
-    else:
-        amounts = np.clip(amounts, -healthy / size, (1.0 - healthy) / size)
-        k = {names[0]: healthy + size * float(amounts[0])}
+def _at(known: Array, names: tuple[str, ...], step: float, amounts: Array, energy: Array, toward: Array) -> _Scored:
+    """The fault at these multiples of what its columns were made with, beyond what is known, as far as k may go."""
+    at = [NAMES.index(name) for name in names]
+    there = known[at] + step * amounts
+    there = there / max(1.0, math.hypot(*there)) if len(names) == 2 else np.clip(there, 0.0, 1.0)
+    amounts = (there - known[at]) / step
+    x = known.copy()
+    x[at] = there
+    k = {name: float(to_k(x)[i]) for name, i in zip(names, at)}
     return _Scored(names, k, float(2.0 * amounts @ toward - amounts @ energy @ amounts))
-
-
-def _with(k: Array, name: str, size: float, turned: float) -> Array:
-    """k with one fault more; the eccentricity's phase turned by a share of a turn."""
-    changed = k.copy()
-    changed[NAMES.index(name)] += size
-    if turned:
-        changed[NAMES.index("k7")] = (float(HEALTHY[NAMES.index("k7")]) + turned) % 1.0
-    return changed
 
 
 def _refitted(data: Data, current: Fit, one: _Scored, tell: Callable[[str], None]) -> Trial:

@@ -144,9 +144,14 @@ def holdout_error(data: Data, found: Fit) -> float:
 
 @lru_cache(maxsize=8)  # a trial is judged by it, and its step of the ladder shows it
 def holdout_fit(data: Data, found: Fit) -> tuple[float, dict[str, float]]:
-    """`floor_ratio` of recordings that were not fitted, and `rms_by_signal`; only their starts are fitted."""
-    plant = data.plant(found.calibration.actuator)
-    calibration = calibrate(plant, data.floors, free=(), k=found.calibration.k, signals=data.signals)
+    """`floor_ratio` of recordings that were not fitted, and `rms_by_signal`."""
+    return resimulated(data, found.calibration.actuator)
+
+
+def resimulated(data: Data, actuator: Actuator) -> tuple[float, dict[str, float]]:
+    """`floor_ratio` and `rms_by_signal` of recordings of which only the starts are fitted."""
+    plant = data.plant(actuator)
+    calibration = calibrate(plant, data.floors, free=(), signals=data.signals)
     ratio = floor_ratio(data, plant, calibration.signals)
     return ratio if math.isfinite(ratio) else math.inf, rms_by_signal(data, plant, calibration.signals)
 

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.comparison.explain import Explanation
+from ema_model.comparison.result import Explanation
+from ema_model.discovery.model_fit import Data
 from ema_model.estimation import Calibrated, Calibration, Floor
 from ema_model.models import Plant
 
@@ -97,6 +99,8 @@ class Discovery:
     actuator: Actuator  # with the effects, as calibrated
     plant: Plant  # the recordings as they were fitted: windows with their blocks
     floors: Sequence[Floor]  # of its windows
+    data: Data  # what was fitted
+    held: Data | None = None  # and what was held out
     faults: Mapping[str, Calibrated] = field(default_factory=dict)  # k1 … k8 in the last model
     unknown: Explanation | None = None
     curve: Added | None = None  # the torque curve that was added for what is unknown

@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 from ema_model.actuator import Actuator
 from ema_model.estimation.floor import CORRELATED_S, Floor
 from ema_model.estimation.problem import BOUND, Problem, Unknown
-from ema_model.faults import HEALTHY
 from ema_model.models import Plant
 from ema_model.quantities.axes import Axes
 from ema_model.quantities.titles import unit_of
@@ -46,7 +45,7 @@ class Calibration:
     converged: bool
     parameters: dict[str, Calibrated]  # "section.parameter", k1…k8
     starts: dict[str, Calibrated]  # of the windows: "turned 0" and "play 0", rad at the motor
-    actuator: Actuator  # with the fitted values
+    actuator: Actuator  # with the fitted values, and with k for its faults
     k: Array  # (8,)
     residual: Array  # (values,), model − measurement over the floor that weights the fit
     chi2_per_value: float  # of the signals over the floor they are weighted by
@@ -81,7 +80,7 @@ def calibrate(
     floors: Sequence[Floor],
     *,
     free: Sequence[str] | None = None,
-    k: ArrayLike = HEALTHY,
+    k: ArrayLike | None = None,
     signals: Mapping[str, float] | None = None,
     start: Mapping[str, float] | None = None,
     on_progress: Callable[[int], None] | None = None,
@@ -89,6 +88,7 @@ def calibrate(
     """Fits the free parameters ("section.name", "effects.name.parameter", or k1…k8), and each window's start.
 
     signals: those to fit, with weights; without it, current and positions as their floors say.
+    k: that do not move; without it, the actuator's own.
     free: what may move; without it, every parameter that the actuator's file leaves free.
     Two starts or more; the best is kept, and the fit has converged when it ended before its limit and two agree.
     start: x by name, from an earlier fit, from which alone this one begins.
@@ -96,7 +96,8 @@ def calibrate(
     Raises InputError for a parameter that does not exist or has no tolerance.
     """
     chosen = default_free(plant.actuator) if free is None else tuple(free)
-    problem = Problem(plant, floors, chosen, k, signals or dict.fromkeys(SIGNALS, 1.0))
+    weights = signals or dict.fromkeys(SIGNALS, 1.0)
+    problem = Problem(plant, floors, chosen, plant.actuator.k if k is None else k, weights)
     search = _Search(problem, on_progress)
     fit = search.solve(start)
     x = fit.x

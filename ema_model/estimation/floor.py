@@ -19,7 +19,6 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter1d
 from ema_model.actuator import Actuator
 from ema_model.commands import Recorded
 from ema_model.commands.recorded import jumps
-from ema_model.faults import HEALTHY
 from ema_model.models import ClosedLoop, Plant, Stretch, Window
 from ema_model.recordings import Measurement
 from ema_model.recordings.noise import least_noise, sample_noise
@@ -68,14 +67,15 @@ class Floor:
 def floor(
     plant: Plant,
     window: Window | Stretch,
-    k: ArrayLike = HEALTHY,
+    k: ArrayLike | None = None,
     stated: Mapping[str, Mapping[str, float]] | None = None,
 ) -> Floor:
     """The floor of one window of a plant.
 
-    k: where the twins are run (normally healthy); stated: what is known of the sensors, by signal: "noise" (white,
-    rms per sample) in place of the estimate, "accuracy" (slow, rms) besides it.
+    k: where the twins are run; without it, at the actuator's own.  stated: what is known of the sensors, by signal:
+    "noise" (white, rms per sample) in place of the estimate, "accuracy" (slow, rms) besides it.
     """
+    k = plant.actuator.k if k is None else k
     names = [name for name in _SIGNALS if name in window.measured]
     known = {name: (stated or {}).get(name, {}) for name in names}
     if isinstance(window, Stretch):
@@ -97,7 +97,7 @@ def floor(
     return Floor(noise, slow, repeats_of(window, noise), window.block_s)
 
 
-def twin_error(plant: ClosedLoop, window: Window, actuator: Actuator, k: ArrayLike = HEALTHY) -> dict[str, Array]:
+def twin_error(plant: ClosedLoop, window: Window, actuator: Actuator, k: ArrayLike) -> dict[str, Array]:
     """Reference Model less Monitor Model under the window's command and mean load, by signal, (blocks,) each."""
     count = len(window.command)
     window = replace(window, load=np.full(count, window.load.mean()))

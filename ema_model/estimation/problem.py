@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ from ema_model.actuator.parameters import low_limit
 from ema_model.effects import find
 from ema_model.errors import InputError
 from ema_model.estimation.floor import Floor
-from ema_model.faults import HEALTHY, NAMES
+from ema_model.faults import NAMES, named
 from ema_model.models import Plant
 
 Array = NDArray[np.float64]
@@ -112,8 +112,8 @@ class Problem:
     def actuator(self, x: Array) -> tuple[Actuator, Array]:
         """The actuator and k (8,) at one x."""
         k, _, _ = self._apply(x[None, :])
-        named = {u.name: float(u.nominal + u.sigma * v) for u, v in zip(self.unknowns, x) if "." in u.name}
-        return self.plant.actuator.varied(named), k[0]
+        values = {u.name: float(u.nominal + u.sigma * v) for u, v in zip(self.unknowns, x) if "." in u.name}
+        return replace(self.plant.actuator.varied(values), faults=named(k[0])), k[0]
 
     def _residuals(self, x: Array) -> Array:
         parts = [
@@ -146,7 +146,7 @@ def unknown_of(actuator: Actuator, name: str) -> Unknown:
     Raises InputError for one without a tolerance, since nothing says how far it may go.
     """
     if name in NAMES:
-        nominal = float(HEALTHY[NAMES.index(name)])
+        nominal = float(actuator.k[NAMES.index(name)])
         return Unknown(name, nominal, _K_SIGMA, -nominal / _K_SIGMA, (1.0 - nominal) / _K_SIGMA)
     if name not in actuator.tolerances:
         known = ", ".join(actuator.tolerances)

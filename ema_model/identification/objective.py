@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,7 +25,8 @@ class Objective(ClosedLoop):
     """Root-mean-square error of I_3eq, A, for a population of k, over one recording or several.
 
     `filtered` compares means over 0.5 ms, which removes the chopping ripple that no low-fidelity model
-    can follow; `raw` compares every sample, as the thesis does.
+    can follow; `raw` compares every sample, as the thesis does.  k counts from the healthy actuator, whatever faults
+    its file knows of.
     """
 
     def __init__(
@@ -39,7 +41,11 @@ class Objective(ClosedLoop):
         if fitness not in FITNESSES:
             raise InputError(f"no fitness {fitness!r}; fitnesses are {', '.join(FITNESSES)}")
         super().__init__(
-            measurements, actuator, effects=effects, circuit=circuit, block_s=BLOCK_S if fitness == "filtered" else 0.0
+            measurements,
+            replace(actuator, faults={}),
+            effects=effects,
+            circuit=circuit,
+            block_s=BLOCK_S if fitness == "filtered" else 0.0,
         )
         for measurement in self.measurements:
             measurement.require("current_A")

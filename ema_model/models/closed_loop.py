@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 from ema_model.actuator import Actuator
 from ema_model.effects import find
 from ema_model.errors import InputError
-from ema_model.faults import HEALTHY
 from ema_model.models.sampling import check_steps, on_even_grid
 from ema_model.models.window import BLOCK_S, Window, cut
 from ema_model.physics.rows import LANES
@@ -58,18 +57,18 @@ class ClosedLoop:
         self,
         window: Window,
         actuator: Actuator | None = None,
-        k: ArrayLike = HEALTHY,
+        k: ArrayLike | None = None,
         turned_rad: ArrayLike = 0.0,
         play_rad: ArrayLike = 0.0,
         effects: Mapping[str, Mapping[str, Any]] | None = None,
     ) -> dict[str, Array]:
         """All of `COMPARED` for one window, as its sensors would show them: k (n, 8) → (n, blocks) each.
 
-        The parameters of `actuator` and effects, turned_rad (the motor's angle at the start, rad, beyond the
-        measured one) and play_rad (the same for its place in the play) may be arrays (n,).
+        k: without it, the actuator's own.  The parameters of `actuator` and effects, turned_rad (the motor's angle at
+        the start, rad, beyond the measured one) and play_rad (the same for its place in the play) may be arrays (n,).
         """
-        k = np.atleast_2d(np.asarray(k, dtype=float))
         actuator = (actuator or self.actuator).varied(window.values)
+        k = np.atleast_2d(np.asarray(actuator.k if k is None else k, dtype=float))
         rows = monitor_rows(actuator, k, self.stack, self.effects if effects is None else effects)
         tau = actuator.transmission.gear_ratio
         state = initial_state(

@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike, NDArray
 from ema_model.actuator import Actuator
 from ema_model.effects import find
 from ema_model.errors import InputError
-from ema_model.faults import HEALTHY
 from ema_model.models.motion import Motion, motion_of
 from ema_model.models.sampling import check_period, on_even_grid
 from ema_model.models.window import CONTEXT
@@ -99,17 +98,17 @@ class InverseDynamics:
         self,
         window: Stretch,
         actuator: Actuator | None = None,
-        k: ArrayLike = HEALTHY,
+        k: ArrayLike | None = None,
         turned_rad: ArrayLike = 0.0,
         play_rad: ArrayLike = 0.0,
         effects: Mapping[str, Mapping[str, Any]] | None = None,
     ) -> dict[str, Array]:
         """The current (A) or torque (N·m) that the motion needs, k (n, 8) → (n, blocks); friction's k1 alone counts.
 
-        Parameters may be arrays (n,); the angles at the start mean nothing here.
+        k: without it, the actuator's own.  Parameters may be arrays (n,); the angles at the start mean nothing here.
         """
-        k = np.atleast_2d(np.asarray(k, dtype=float))
         actuator = (actuator or self.actuator).varied(window.values)
+        k = np.atleast_2d(np.asarray(actuator.k if k is None else k, dtype=float))
         rows = monitor_rows(actuator, k, self.stack, self.effects if effects is None else effects)
         # Effects see the angle as it was read; the acceleration's own part has passed the filter already.
         static = self._currents(rows, len(k), window, np.zeros_like(window.position))

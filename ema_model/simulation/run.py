@@ -12,7 +12,6 @@ from ema_model.actuator import Actuator
 from ema_model.commands import Command, command
 from ema_model.effects import find
 from ema_model.errors import InputError
-from ema_model.faults import HEALTHY
 from ema_model.physics.rows import LANES
 from ema_model.recordings import Measurement
 from ema_model.simulation.pack import initial_reference_state, initial_state, monitor_rows, reference_rows, stack_for
@@ -83,7 +82,7 @@ def _steps_per_sample(run: Run, step_s: float) -> int:
 def simulate_reference(
     run: Run,
     actuator: Actuator,
-    k: ArrayLike = HEALTHY,
+    k: ArrayLike | None = None,
     effects: Effects | None = None,
     *,
     start_rad: float | None = None,
@@ -93,8 +92,8 @@ def simulate_reference(
 ) -> Measurement:
     """The three-phase Reference Model's signals; with `voltages`, also the legs' (V, against the bus's middle).
 
-    It starts at start_rad, a user's angle, or where the command starts; with a motor speed, and at a place in
-    the play (rad at the motor), both 0 unless given.
+    k: without it, the actuator's own.  It starts at start_rad, a user's angle, or where the command starts; with a
+    motor speed, and at a place in the play (rad at the motor), both 0 unless given.
     Raises InputError for settings of effects that do not exist, FloatingPointError if the model diverges.
     """
     effects = {name: find(name).settings(dict(given)) for name, given in (effects or {}).items()}
@@ -112,7 +111,7 @@ def simulate_reference(
     result = np.empty((run.samples, 11))
     stack.reference.run(
         initial_reference_state(actuator, start, start_speed_rad_s, start_play_rad, stack),
-        reference_rows(actuator, k, stack, effects),
+        reference_rows(actuator, actuator.k if k is None else k, stack, effects),
         demand,
         load,
         period,
@@ -134,7 +133,7 @@ def simulate_reference(
 def simulate_monitor(
     run: Run,
     actuator: Actuator,
-    k: ArrayLike = HEALTHY,
+    k: ArrayLike | None = None,
     effects: Effects | None = None,
     circuit: str = "reduced",
     *,
@@ -153,7 +152,7 @@ def simulate_monitor(
     exclusive(
         stack.monitor.traces,
         initial_state(actuator, 1, start, stack=stack),
-        monitor_rows(actuator, k, stack, effects),
+        monitor_rows(actuator, actuator.k if k is None else k, stack, effects),
         demand,
         np.full_like(demand, run.load_torque_Nm),
         np.ones_like(demand),

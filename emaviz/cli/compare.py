@@ -63,7 +63,7 @@ def run(arguments: argparse.Namespace) -> int:
         result = compare(
             measurements,
             actuator,
-            k=options.faults_of(arguments),
+            k=options.faults_of(arguments, actuator.faults),
             effects=options.effects_of(arguments),
             calibrate=arguments.calibrate,
             free=arguments.free,

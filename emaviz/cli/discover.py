@@ -6,12 +6,13 @@ import argparse
 from pathlib import Path
 
 from ema_model.actuator import save_actuator
-from ema_model.discovery import Discovery, as_dict, discover
+from ema_model.comparison.summary import plain
+from ema_model.discovery import Discovery, as_dict, discover, verified
 from ema_model.effects import find
 from ema_model.errors import InputError
 from ema_model.recordings.read import read_recording
 from emaviz.cli import options, output
-from emaviz.text.discovery import VERDICTS, faults, next_experiment, settings
+from emaviz.text.discovery import VERDICTS, faults, next_experiment, settings, verification
 
 HELP = "find the physical effects that the model lacks, and add them"
 _CURRENT_ONLY = ("current_A",)
@@ -63,12 +64,21 @@ def run(arguments: argparse.Namespace) -> int:
             most_effects=arguments.max_effects,
             on_progress=progress.show,
         )
+        told, document = text(found), as_dict(found)
+        if arguments.save_actuator:
+            save_actuator(found.actuator, arguments.save_actuator)
+            progress.show("simulating the saved model")
+            saved = verified(found, arguments.save_actuator)
+            told += f"\n\nsaved {arguments.save_actuator}, {verification(found, saved)}"
+            document["saved_actuator"] = {
+                "file": arguments.save_actuator,
+                "verified_rmse": saved.rmse,
+                "verified_holdout_rmse": saved.holdout_rmse,
+            }
     finally:
         progress.done()
-    if arguments.save_actuator:
-        save_actuator(found.actuator, arguments.save_actuator)
-    output.write_json(arguments.json, as_dict(found), arguments.seed, output.configuration(arguments))
-    print(text(found))
+    output.write_json(arguments.json, plain(document), arguments.seed, output.configuration(arguments))
+    print(told)
     _write(found, arguments)
     return 0
 

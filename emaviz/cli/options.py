@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -78,9 +79,9 @@ def actuator_of(arguments: argparse.Namespace) -> Actuator:
     return load_actuator(arguments.actuator)
 
 
-def faults_of(arguments: argparse.Namespace) -> Any:
-    """k (8,) from --fault."""
-    return faults.vector(dict(_pair(text, "--fault") for text in arguments.fault))
+def faults_of(arguments: argparse.Namespace, known: Mapping[str, float] | None = None) -> Any:
+    """k (8,) from --fault, before what is known of the unit."""
+    return faults.vector({**(known or {}), **dict(_pair(text, "--fault") for text in arguments.fault)})
 
 
 def effects_of(arguments: argparse.Namespace) -> dict[str, dict[str, float]]:

@@ -36,7 +36,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Simulates, records with the sensors' accuracy, writes."""
     check_target(Path(arguments.out))
     actuator = options.actuator_of(arguments)
-    k, effects = options.faults_of(arguments), options.effects_of(arguments)
+    k, effects = options.faults_of(arguments, actuator.faults), options.effects_of(arguments)
     asked = options.run_of(arguments, arguments.sample_rate)
     sensors = Sensors(arguments.noise_current, arguments.encoder_bits)
     try:

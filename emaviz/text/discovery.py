@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ema_model.discovery import Discovery
+from ema_model.discovery import Discovery, Verified
 from ema_model.discovery.result import Added, Rung
 from ema_model.effects import find
 from ema_model.errors import InputError
@@ -69,6 +69,17 @@ def sentences(found: Discovery) -> list[str]:
     if found.curve is not None:
         told.append(f"A torque curve stands in for it, with which the error falls from {_times(first, last)}.")
     return told
+
+
+def verification(found: Discovery, saved: Verified) -> str:
+    """'verified: 0.69 × the floor', and plainly so if the saved model is worse than the one that was found."""
+    held = "" if saved.holdout_rmse is None else f", {number(saved.holdout_rmse)} × on what was not fitted"
+    text = f"verified: {number(saved.rmse)} × the floor{held}"
+    if not saved.is_worse:
+        return text
+    last = found.ladder[-1]
+    then = "" if last.holdout_rmse is None else f" and {number(last.holdout_rmse)} ×"
+    return f"{text}, which is worse than the {number(last.rmse)} ×{then} of the ladder: the file is not the whole model"
 
 
 def next_experiment(found: Discovery) -> list[str]:

@@ -8,6 +8,7 @@ import pytest
 from support.on_page import wait_until
 from support.rig import Rig
 
+from ema_model.actuator import load_actuator
 from ema_model.challenges.truth import Truth
 from ema_model.errors import InputError
 from emaviz.page.discover.result import answer
@@ -47,6 +48,16 @@ def test_start_takes_the_fault_into_the_model(worn):
     assert "k2 backlash" in faults(look.found)["k2"] and "µrad" in faults(look.found)["k2"]
     assert any("k2 backlash" in text for text in sentences(look.found))
     assert "#2b8a3e" in answer(look), "at the floor"
+
+
+def test_the_improved_model_is_kept_with_its_fault_and_verified(worn):
+    told = []
+    worn.events.verified.append(lambda path, text: told.append((path, text)))
+    worn.keep(".toml")
+    wait_until(lambda: told)
+    [(path, text)] = told
+    assert load_actuator(path).faults == {"k2": worn.look.found.faults["k2"].value}
+    assert text.startswith("verified: ") and "× the floor" in text and "worse" not in text
 
 
 def test_reveal_holds_the_faults_against_the_truth(worn):

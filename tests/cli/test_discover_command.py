@@ -34,6 +34,10 @@ def test_effect_is_found_and_the_model_saved(rig, tmp_path, capsys):
     assert [one["name"] for one in result["effects"]] == ["cogging_torque"]
     assert result["ladder"][-1]["holdout_rmse"] < result["ladder"][0]["holdout_rmse"]
     assert load_actuator(better).effects["cogging_torque"]["order"] == 12.0
+    saved, last = result["saved_actuator"], result["ladder"][-1]
+    assert saved["file"] == str(better) and saved["verified_rmse"] == pytest.approx(last["rmse"], rel=0.01)
+    assert saved["verified_holdout_rmse"] == pytest.approx(last["holdout_rmse"], rel=0.01)
+    assert f"saved {better}, verified: " in printed and "worse" not in printed
     assert main(["compare", str(rig / "chirp.csv"), "--actuator", str(better), "--json", str(out)]) == 0
     assert json.loads(out.read_text())["adequate"] is True
 

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from ema_model.actuator import load_actuator, save_actuator
+from ema_model.effects.user import torque_curve, user_torque
 from ema_model.errors import InputError
+from ema_model.faults import vector
 
 SHIPPED = sorted((Path(__file__).parents[2] / "assets" / "actuators").glob("*.toml"))
 LINEAR = """
@@ -50,6 +54,41 @@ def test_mixed_axes_and_effects_come_back(tmp_path):
     text = (tmp_path / "again.toml").read_text(encoding="utf-8")
     assert "backlash_m" in text and "gain_1_m" in text and "stiffness_N_m" in text
     assert load_actuator(tmp_path / "again.toml") == actuator
+
+
+def test_faults_come_back_beside_effects_of_ones_own(tmp_path):
+    curve = torque_curve(np.array([0.1, -0.2, 0.05, 0.1]), 0.0, 1.0, "omega", "1")
+    torque = user_torque("c*sin(3*theta)")
+    effects = {one.name: {parameter.name: parameter.default for parameter in one.parameters} for one in (curve, torque)}
+    faults = {"k1": 0.3, "k6": 0.1 + 0.2, "k7": 0.75, "k8": 0.0}
+    actuator = replace(load_actuator(), faults=faults, effects=effects)
+    save_actuator(actuator, tmp_path / "again.toml")
+    again = load_actuator(tmp_path / "again.toml")
+    assert again == actuator and list(again.effects) == list(effects)
+    assert np.array_equal(again.k, vector(faults))
+
+
+@pytest.mark.parametrize(
+    "line, says",
+    [
+        ("k9 = 0.1", "[faults] no fault 'k9'; faults are k1 … k8"),
+        ("k1 = 1.5", "[faults] fault k1 = 1.5 is outside 0 … 1"),
+        ("k1 = -0.1", "[faults] fault k1 = -0.1 is outside 0 … 1"),
+        ("k1 = nan", "[faults] k1 must be a number, not 'nan'"),
+        ('k1 = "much"', "[faults] k1 must be a number, not 'much'"),
+        ("k1 = true", "[faults] k1 must be a number, not 'True'"),
+        ("k1 = { value = 0.1 }", "[faults] k1 must be a number"),
+    ],
+)
+def test_a_mistake_in_the_faults_is_one_clear_line(tmp_path, line, says):
+    path = tmp_path / "screw.toml"
+    path.write_text(f"{LINEAR}\n[faults]\n{line}\n", encoding="utf-8")
+    with pytest.raises(InputError) as error:
+        load_actuator(path)
+    assert says in str(error.value) and "\n" not in str(error.value)
+    path.write_text(f"faults = 3\n{LINEAR}", encoding="utf-8")
+    with pytest.raises(InputError, match=r"\[faults\] must be a table"):
+        load_actuator(path)
 
 
 def test_a_place_that_cannot_be_written_is_one_line(tmp_path):

@@ -28,7 +28,9 @@ class DiscoveryKeep:
             button = gui.add_button(label, icon=icon, hint=hint)
             button.on_click(lambda event, suffix=suffix: self._ask(event.client, suffix))
         self._links = gui.add_html("")
-        discovering.events.kept.append(lambda path: page.screen.post(f"kept {path.suffix}", lambda: self._kept(path)))
+        events = discovering.events
+        events.kept.append(lambda path: page.screen.post(f"kept {path.suffix}", lambda: self._kept(path)))
+        events.verified.append(lambda path, text: page.screen.post("verified", lambda: self._name(path, text)))
 
     def _ask(self, client: viser.ClientHandle | None, suffix: str) -> None:
         self._asked = client
@@ -38,7 +40,11 @@ class DiscoveryKeep:
         if path.suffix == ".rrd":
             self._links.content = recording_link(self._viewer, path)
             return
-        name = html.escape(self._discovering.folder.name_of(path))
-        self._links.content = f'<div style="padding:2px 10px;font-size:13px">Also kept in the data folder: {name}</div>'
+        self._name(path, "simulating it again …" if path.suffix == ".toml" else "")
         if self._asked is not None:
             self._asked.send_file_download(path.name, path.read_bytes(), save_immediately=True)
+
+    def _name(self, path: Path, text: str) -> None:
+        """Where a file is kept, and what is to be said of it."""
+        name = html.escape(", ".join(filter(None, (self._discovering.folder.name_of(path), text))))
+        self._links.content = f'<div style="padding:2px 10px;font-size:13px">Also kept in the data folder: {name}</div>'

@@ -34,7 +34,8 @@ class ExplorePanel:
         self.start = StartHere(page)
         with gui.add_folder("Faults of the plant"):
             gui.add_html(LONG_LABELS)
-            self._preset = gui.add_dropdown("Preset", (*PRESETS, CUSTOM), initial_value="healthy")
+            known = name_of(page.session.settings.k)
+            self._preset = gui.add_dropdown("Preset", (*PRESETS, CUSTOM), initial_value=known)
             self._sliders = [self._fault(i) for i in range(len(FAULTS))]
             reset = gui.add_button("Reset to healthy", icon=viser.Icon.HEART)
             reset.on_click(lambda _: self.set_faults(HEALTHY))
@@ -126,9 +127,9 @@ class ExplorePanel:
         self.monitor.value = next(name for name in MONITORS if name == monitor)
 
     def _fault(self, index: int) -> Any:
-        fault = FAULTS[index]
+        fault, value = FAULTS[index], float(self._page.session.settings.k[index])
         slider = self._page.server.gui.add_slider(
-            self._label(index), 0.0, 1.0, 0.005, fault.healthy, hint=f"{fault.name}: {fault.title}, 0 … 1"
+            self._label(index), 0.0, 1.0, 0.005, value, hint=f"{fault.name}: {fault.title}, 0 … 1"
         )
         slider.on_update(lambda event: event.client and self._slide(index))
         return slider

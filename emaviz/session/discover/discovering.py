@@ -7,6 +7,8 @@ from typing import Any
 
 from ema_model.discovery import Candidate, begun, walk
 from ema_model.discovery.next_experiment import next_experiment
+from ema_model.discovery import Candidate, begun, verified, walk
+from ema_model.discovery.next_test import next_experiment
 from ema_model.discovery.refit import Trial
 from ema_model.discovery.result import Experiment
 from ema_model.discovery.snapshot import Look
@@ -27,6 +29,7 @@ from emaviz.session.discover.source import NOTHING, DiscoverySource, files_of
 from emaviz.session.events import notify
 from emaviz.session.session import Session
 from emaviz.session.worker import Worker
+from emaviz.text.discovery import verification
 
 
 class Discovering:
@@ -304,4 +307,8 @@ class Discovering:
     def _keep(self, suffix: str) -> None:
         if self.look is None:
             raise InputError("nothing is discovered yet; press Start first")
-        notify(self.events.kept, keep(self.look, self.folder, suffix))
+        found = self.look.found
+        path = keep(self.look, self.folder, suffix)
+        notify(self.events.kept, path)
+        if suffix == ".toml":
+            notify(self.events.verified, path, verification(found, verified(found, path)))

@@ -37,6 +37,7 @@ class DiscoverEvents:
     previewed: list[Callable[[Any], None]] = field(default_factory=list)  # `discovery_own.Preview`
     unpreviewed: list[Callable[[str], None]] = field(default_factory=list)  # why a torque has no preview
     kept: list[Callable[[Path], None]] = field(default_factory=list)  # a report, a recording, a model
+    verified: list[Callable[[Path, str], None]] = field(default_factory=list)  # a kept model, and how good it is
 
 
 class DiscoveryRun:

@@ -7,8 +7,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import numpy as np
-
 from ema_model.actuator import Actuator
 from ema_model.challenges.make import SENSORS
 from ema_model.challenges.sealed_file import SUFFIX
@@ -16,7 +14,7 @@ from ema_model.challenges.sealing import seal
 from ema_model.challenges.truth import Truth
 from ema_model.effects import find
 from ema_model.errors import InputError
-from ema_model.faults import HEALTHY, NAMES, sentences
+from ema_model.faults import NAMES, named, sentences
 from ema_model.quantities.titles import in_sentence
 from ema_model.simulation.sensors import Sensors
 from emaviz.session.data_folder import DataFolder, sanitised
@@ -75,9 +73,7 @@ class Sealing:
 def truth_of(settings: Settings, actuator: Actuator, seed: int) -> Truth:
     """What the settings hide in the plant: its effects, and the faults that are not healthy."""
     k, told = settings.k, []
-    faults = {name: float(k[i]) for i, name in enumerate(NAMES) if not np.isclose(k[i], HEALTHY[i])}
-    if "k6" not in faults:
-        faults.pop("k7", None)  # where the gap would be thinnest
+    faults = named(k)
     for name, given in settings.effects.items():
         order = f" of order {given['order']:g}" if "order" in given else ""
         told.append(f"{in_sentence(find(name).title)}{order}")

@@ -1,0 +1,99 @@
+"""The improved model survives its file: faults, effects and curves are read back, and the error with them."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from functools import cache
+
+import pytest
+
+from ema_model.actuator import load_actuator, save_actuator
+from ema_model.commands import command
+from ema_model.comparison import compare
+from ema_model.discovery import discover, verified
+from ema_model.faults import vector
+from ema_model.simulation.run import Run, simulate_reference
+from ema_model.simulation.sensors import Sensors
+from emaviz.text.discovery import verification
+
+ACTUATOR = load_actuator()
+RIG = Sensors(current_noise_A=0.3, encoder_bits=12)
+FAULT, HIDDEN = {"k1": 0.3}, {"cogging_torque": {"amplitude_Nm": 0.02, "order": 12.0}}
+CHIRP = Run(command("chirp"), 0.4)
+SINE = Run(command("sine", {"amplitude_rad": 0.03, "frequency_Hz": 3.0}), 0.4)
+UNSEEN = Run(command("sine", {"amplitude_rad": 0.02, "frequency_Hz": 5.0}), 0.3)
+
+
+def recorded(run, effects, seed=0, faults=FAULT):
+    return RIG.record(simulate_reference(run, ACTUATOR, vector(faults), effects), seed)
+
+
+@cache
+def recordings():
+    return tuple(recorded(run, HIDDEN, seed) for seed, run in enumerate((CHIRP, SINE, UNSEEN)))
+
+
+@cache
+def improved():
+    *fitted, unseen = recordings()
+    found = discover(fitted, ACTUATOR, holdout=[unseen], candidates=("cogging_torque",), most_effects=1)
+    assert list(found.faults) == ["k1"] and [one.name for one in found.effects] == ["cogging_torque"]
+    return found
+
+
+@pytest.fixture
+def saved(tmp_path):
+    save_actuator(improved().actuator, tmp_path / "better.toml")
+    return tmp_path / "better.toml"
+
+
+def test_the_saved_model_reaches_the_last_rung_of_the_ladder(saved):
+    found, again = improved(), load_actuator(saved)
+    assert again.faults == {"k1": pytest.approx(0.3, abs=0.03)} and again == found.actuator
+    last = found.ladder[-1]
+    compared = compare(recordings()[:2], again, calibrate=False)
+    assert compared.adequate
+    for name, error in compared.signals.items():
+        if name in last.signals:
+            assert error.rmse == pytest.approx(last.signals[name], rel=0.02)
+    unseen = compare(recordings()[2:], again, calibrate=False)
+    assert unseen.signals["current_A"].rmse == pytest.approx(last.holdout_signals["current_A"], rel=0.02)
+
+
+def test_the_saved_model_is_verified_in_units_of_the_floor(saved):
+    found = improved()
+    told = verified(found, saved)
+    assert told.rmse == pytest.approx(found.ladder[-1].rmse, rel=0.01) and not told.is_worse
+    assert told.holdout_rmse == pytest.approx(found.ladder[-1].holdout_rmse, rel=0.01)
+    said = verification(found, told)
+    assert re.fullmatch(r"verified: [\d.]+ × the floor, [\d.]+ × on what was not fitted", said)
+
+
+def test_a_file_that_lost_a_part_of_the_model_is_told(tmp_path):
+    found = improved()
+    save_actuator(replace(found.actuator, faults={}), tmp_path / "lost.toml")
+    told = verified(found, tmp_path / "lost.toml")
+    assert told.is_worse and told.rmse > 1.2 * found.ladder[-1].rmse
+    assert "which is worse than the" in verification(found, told)
+
+
+def test_known_faults_are_where_runs_comparisons_and_discoveries_start():
+    worn = replace(ACTUATOR, faults=FAULT)
+    recording = recorded(CHIRP, {})
+    own = simulate_reference(CHIRP, worn)
+    assert (own["current_A"] == simulate_reference(CHIRP, ACTUATOR, vector(FAULT))["current_A"]).all()
+    assert (own["current_A"] != simulate_reference(CHIRP, ACTUATOR)["current_A"]).any()
+    assert compare([recording], worn, calibrate=False).adequate
+    assert not compare([recording], worn, k=vector({}), calibrate=False).adequate
+    found = discover([recording], worn, candidates=("cogging_torque",))
+    assert not found.faults and found.verdict == "adequate" and found.ladder[0].rmse < 1.1
+    assert found.actuator.faults == FAULT, "what is known stays in the model"
+
+
+def test_a_fault_that_went_on_is_found_from_where_it_is_known():
+    worn = replace(ACTUATOR, faults={"k6": 0.2, "k7": 0.7})
+    found = discover([recorded(CHIRP, {}, faults={"k6": 0.35, "k7": 0.7})], worn, candidates=("cogging_torque",))
+    assert set(found.faults) == {"k6", "k7"} and found.faults["k6"].initial == 0.2
+    assert found.actuator.faults["k6"] == pytest.approx(0.35, abs=0.04)
+    assert found.actuator.faults["k7"] == pytest.approx(0.7, abs=0.04)

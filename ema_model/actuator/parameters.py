@@ -22,7 +22,8 @@ _FAR = 1e9  # rad, where an end stop is out of reach
 class Controller:
     """Control electronics.
 
-    cascade: position and speed loop (T 3.2.3).  position: a position loop alone, whose output is a share of
+    cascade: position and PID speed loop (T 3.2.3; `ema_model.physics.controller`).  With a hysteresis inverter it is
+    the thesis's, whose integral is held at standstill.  position: a position loop alone, whose output is a share of
     what the drive can give.  unknown: recordings are held against inverse dynamics.
     """
 
@@ -154,6 +155,11 @@ class Actuator:
     def k(self) -> NDArray[np.float64]:
         """The known faults with the healthy ones, (8,)."""
         return vector(self.faults)
+
+    @property
+    def current_limit_A(self) -> Any:
+        """The most current, A, that controller and drive allow; (n,) where one of them is."""
+        return np.minimum(self.controller.current_limit_A, self.inverter.current_limit_A)
 
     def circuit(self, preferred: str = "reduced") -> str:
         """The Monitor Model's drive; `preferred` is the circuit for the hysteresis current loop."""

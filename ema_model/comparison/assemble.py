@@ -78,7 +78,7 @@ def _adjustable(residuals: Residuals, calibration: Calibration) -> dict[str, Adj
 def _saturated(signals: dict[str, Array], actuator: Actuator) -> NDArray[np.bool_]:
     """Blocks in which the current stands at its limit, or a hysteresis loop has no voltage left to follow it."""
     current, speed = signals["current_A"], signals.get("motor_speed_rad_s")
-    saturated = np.abs(current) >= _NEAR_LIMIT * actuator.controller.current_limit_A
+    saturated = np.abs(current) >= _NEAR_LIMIT * actuator.current_limit_A
     if speed is not None and actuator.has_reference_model:
         circuit = reduced_circuit(actuator)
         emf = actuator.motor.torque_constant_Nm_A * speed

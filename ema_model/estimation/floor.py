@@ -116,6 +116,7 @@ def twin_error(plant: ClosedLoop, window: Window, actuator: Actuator, k: ArrayLi
         start_rad=window.user_rad,
         start_speed_rad_s=window.speed_rad_s,
         start_play_rad=window.play_rad,
+        start_integral_Nm=float(window.integral_Nm(actuator, k)),
     )
     monitor = plant.signals(window, actuator, k)
     return {

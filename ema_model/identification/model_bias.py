@@ -105,6 +105,7 @@ def _errors(problem: Problem, x: Array, place: int) -> dict[str, Array]:
             start_rad=window.user_rad + start["turned"] * actuator.transmission.gear_ratio,
             start_speed_rad_s=window.speed_rad_s,
             start_play_rad=window.play_rad + start["play"],
+            start_integral_Nm=float(window.integral_Nm(actuator, to_k(one), start["turned"], start["play"])),
         )
         sensors = actuator.sensors
         for name in names:

@@ -60,7 +60,7 @@ class Objective(ClosedLoop):
         rows = monitor_rows(self.actuator, k, self.stack, self.effects)
         total = np.zeros(len(rows) * LANES)
         for group in self._groups:
-            states = np.stack([self._state(window, len(rows)) for window in group.windows])
+            states = np.stack([self._state(window, k, self.actuator) for window in group.windows])
             result = np.empty((len(group.windows), len(rows), LANES))
             exclusive(
                 self.stack.monitor.squared_errors,
@@ -89,13 +89,14 @@ class Objective(ClosedLoop):
         The parameters of `actuator` may be arrays (n,), one value for each individual.
         """
         k = np.atleast_2d(np.asarray(k, dtype=float))
-        rows = monitor_rows(actuator or self.actuator, k, self.stack, self.effects)
+        actuator = actuator or self.actuator
+        rows = monitor_rows(actuator, k, self.stack, self.effects)
         parts = []
         for window in self.windows:
             result = np.empty((len(rows), window.blocks, 4, LANES))
             exclusive(
                 self.stack.monitor.traces,
-                self._state(window, len(rows)),
+                self._state(window, k, actuator),
                 rows,
                 window.command,
                 window.load,
@@ -113,8 +114,16 @@ class Objective(ClosedLoop):
         sensors = self.actuator.sensors
         return (window.measured["current_A"] - sensors.current_bias_A) / sensors.current_gain
 
-    def _state(self, window: Window, blocks: int) -> Array:
-        return initial_state(self.actuator, blocks, window.user_rad, window.speed_rad_s, window.play_rad, self.stack)
+    def _state(self, window: Window, k: Array, actuator: Actuator) -> Array:
+        return initial_state(
+            self.actuator,
+            -(-len(k) // LANES),
+            window.user_rad,
+            window.speed_rad_s,
+            window.play_rad,
+            self.stack,
+            window.integral_Nm(actuator, k),
+        )
 
 
 def _alike(windows: Sequence[Window]) -> list[list[Window]]:

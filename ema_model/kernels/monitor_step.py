@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ema_model.physics.backlash import advance_play
+from ema_model.physics.controller import advance_speed_loop
 from ema_model.physics.elementary import clamp, rotate
 from ema_model.physics.friction import advance_rotor, borello_friction
 from ema_model.physics.jit import scalar
@@ -13,6 +14,7 @@ from ema_model.physics.rows import (
     COS_ROTOR,
     CURRENT,
     CURRENT_PER_TORQUE,
+    DERIVATIVE_GAIN,
     DYNAMIC_FRICTION,
     EMF_CONSTANT,
     FLUX_0,
@@ -26,6 +28,10 @@ from ema_model.physics.rows import (
     FLUX_8,
     GEAR_RATIO,
     HALF_PLAY,
+    INTEGRAL,
+    INTEGRAL_GAIN,
+    INTEGRATOR_REST,
+    INTEGRATOR_WINDOW,
     INVERSE_INDUCTANCE,
     INVERSE_INERTIA,
     LANES,
@@ -34,9 +40,11 @@ from ema_model.physics.rows import (
     PLAY,
     POLE_PAIRS,
     POSITION_GAIN,
+    REMEMBERED,
     RESISTANCE,
     SIN_ELECTRICAL,
     SIN_ROTOR,
+    SPEED_ERROR,
     SPEED_GAIN,
     SPEED_LIMIT,
     STATE_ROWS,
@@ -71,6 +79,42 @@ FIRST = len(STATE_ROWS)  # row of the effects' own states
 
 
 @scalar
+def speed_loop_remembers(p):
+    """Whether the speed loop of any lane has an integral or a derivative action."""
+    for i in range(LANES):
+        if p[INTEGRAL_GAIN * LANES + i] != 0.0 or p[DERIVATIVE_GAIN * LANES + i] != 0.0:
+            return True
+    return False
+
+
+@scalar
+def advance_memory(s, p, i, command, supply, dt):
+    """What the speed loop of lane i remembers, for the step that `advance` is about to take; off, it forgets."""
+    gear = p[GEAR_RATIO * LANES + i]
+    user = user_position(gear * s[PLAY * LANES + i], s[THETA * LANES + i], gear, s, FIRST, p, i)
+    remembered, integral, error = advance_speed_loop(
+        command,
+        position_reading(user, s, FIRST, p, i),
+        s[OMEGA * LANES + i],
+        s[INTEGRAL * LANES + i],
+        s[SPEED_ERROR * LANES + i],
+        p[POSITION_GAIN * LANES + i],
+        p[SPEED_LIMIT * LANES + i],
+        p[SPEED_GAIN * LANES + i],
+        p[INTEGRAL_GAIN * LANES + i],
+        p[DERIVATIVE_GAIN * LANES + i],
+        p[INTEGRATOR_WINDOW * LANES + i],
+        p[INTEGRATOR_REST * LANES + i],
+        p[CURRENT_PER_TORQUE * LANES + i],
+        p[OUTPUT_LIMIT * LANES + i],
+        dt,
+    )
+    s[REMEMBERED * LANES + i] = remembered
+    s[INTEGRAL * LANES + i] = integral if supply > 0.0 else 0.0
+    s[SPEED_ERROR * LANES + i] = error
+
+
+@scalar
 def advance(s, p, i, command, load, supply, dt):
     """Advances lane i of the state s (rows of `STATE_ROWS`) by dt, s, under a command, rad, and a load, N·m.
 
@@ -92,6 +136,7 @@ def advance(s, p, i, command, load, supply, dt):
         command,
         position_reading(user, s, FIRST, p, i),
         omega,
+        s[REMEMBERED * LANES + i],
         p[POSITION_GAIN * LANES + i],
         p[SPEED_LIMIT * LANES + i],
         p[SPEED_GAIN * LANES + i],

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ema_model.physics.backlash import advance_play
-from ema_model.physics.controller import advance_integral, current_reference, speed_reference
+from ema_model.physics.controller import advance_speed_loop
 from ema_model.physics.elementary import clamp, rotate
 from ema_model.physics.friction import advance_rotor, borello_friction
 from ema_model.physics.inverter import relay
@@ -32,7 +32,9 @@ from ema_model.physics.rows import (
     GEAR_RATIO,
     HALF_PLAY,
     HYSTERESIS,
+    INTEGRAL,
     INTEGRAL_GAIN,
+    INTEGRATOR_REST,
     INTEGRATOR_WINDOW,
     INVERSE_INDUCTANCE,
     INVERSE_INERTIA,
@@ -46,6 +48,7 @@ from ema_model.physics.rows import (
     RESISTANCE,
     SIN_ELECTRICAL,
     SIN_ROTOR,
+    SPEED_ERROR,
     SPEED_GAIN,
     SPEED_LIMIT,
     STATIC_FRICTION,
@@ -65,6 +68,7 @@ from .composition import (
     advance_states,
     back_emf,
     bus_voltage,
+    control,
     current_reading,
     electric_torque,
     friction,
@@ -99,9 +103,7 @@ def run(state, p, command, load, period, substeps, dt, result):
     current_b = state[CURRENT_B * LANES]
     current_c = state[CURRENT_C * LANES]
     leg_a, leg_b, leg_c = 1.0, 1.0, 1.0
-    integral, speed_error = 0.0, 0.0
-    first = True
-    rate = 1.0 / dt
+    integral, speed_error = state[INTEGRAL * LANES], state[SPEED_ERROR * LANES]
 
     tau = p[GEAR_RATIO * LANES]
     limit = p[OUTPUT_LIMIT * LANES]
@@ -143,26 +145,33 @@ def run(state, p, command, load, period, substeps, dt, result):
                 rigid = tau * play
                 user = user_position(rigid, theta, tau, s, FIRST, p, 0)
                 told = position_reading(user, s, FIRST, p, 0)
-                position_error = demand - told
-                omega_ref = speed_reference(demand, told, p[POSITION_GAIN * LANES], p[SPEED_LIMIT * LANES])
-                previous = speed_error
-                speed_error = omega_ref - omega
-                slope = 0.0 if first else (speed_error - previous) * rate
-                first = False
-                torque_ref = (
-                    p[SPEED_GAIN * LANES] * speed_error
-                    + p[INTEGRAL_GAIN * LANES] * integral
-                    + p[DERIVATIVE_GAIN * LANES] * slope
-                )
-                current_ref = current_reference(torque_ref, p[CURRENT_PER_TORQUE * LANES], limit)
-                integral = advance_integral(
+                remembered, integral, speed_error = advance_speed_loop(
+                    demand,
+                    told,
+                    omega,
                     integral,
                     speed_error,
-                    position_error,
-                    omega,
-                    abs(current_ref) >= limit,
+                    p[POSITION_GAIN * LANES],
+                    p[SPEED_LIMIT * LANES],
+                    p[SPEED_GAIN * LANES],
+                    p[INTEGRAL_GAIN * LANES],
+                    p[DERIVATIVE_GAIN * LANES],
                     p[INTEGRATOR_WINDOW * LANES],
+                    p[INTEGRATOR_REST * LANES],
+                    p[CURRENT_PER_TORQUE * LANES],
+                    limit,
                     dt,
+                )
+                current_ref = control(
+                    demand,
+                    told,
+                    omega,
+                    remembered,
+                    p[POSITION_GAIN * LANES],
+                    p[SPEED_LIMIT * LANES],
+                    p[SPEED_GAIN * LANES],
+                    p[CURRENT_PER_TORQUE * LANES],
+                    limit,
                 )
 
                 amplitude = -(2.0 / 3.0) * current_ref

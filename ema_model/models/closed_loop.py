@@ -78,6 +78,7 @@ class ClosedLoop:
             window.speed_rad_s,
             window.play_rad + np.asarray(play_rad),
             self.stack,
+            window.integral_Nm(actuator, k, turned_rad, play_rad),
         )
         lanes = np.empty((4, len(k), window.blocks))
         steps = window.steps_per_block

@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.commands.recorded import between
 from ema_model.errors import InputError
 from ema_model.recordings import Measurement
+from ema_model.simulation.pack import integral_at_start
 from ema_model.simulation.run import steps_per_sample
 
 Array = NDArray[np.float64]
@@ -40,7 +41,20 @@ class Window:
     user_rad: float  # where it starts: the motor's angle as a user's, rad
     speed_rad_s: float
     play_rad: float  # place in the play, rad at the motor
+    current_A: float  # that the drive wanted
     values: dict[str, float] = field(default_factory=dict)  # of the actuator, in this recording alone
+
+    def integral_Nm(
+        self, actuator: Actuator, k: ArrayLike, turned_rad: ArrayLike = 0.0, play_rad: ArrayLike = 0.0
+    ) -> Array:
+        """The integral action of the speed loop at the start, for k (n, 8) or (8,): `integral_at_start`.
+
+        turned_rad, play_rad: the start beyond what was measured of it, rad at the motor.
+        """
+        away = (np.asarray(turned_rad) + self.play_rad + np.asarray(play_rad)) * actuator.transmission.gear_ratio
+        return integral_at_start(
+            actuator, k, float(self.command[0]), self.user_rad + away, self.speed_rad_s, self.current_A
+        )
 
     @property
     def blocks(self) -> int:
@@ -90,6 +104,7 @@ def cut(
 
         inputs = _inputs(measurement, actuator, run, blocks * samples * steps, step_s)
         user, speed, play = _start(measurement, actuator, run.start)
+        current = _current(measurement, actuator, run.start, speed)
         windows.append(
             Window(
                 name=measurement.name,
@@ -107,6 +122,7 @@ def cut(
                 user_rad=user,
                 speed_rad_s=speed,
                 play_rad=play,
+                current_A=current,
                 values=values,
             )
         )
@@ -144,6 +160,23 @@ def _start(measurement: Measurement, actuator: Actuator, at: int) -> tuple[float
     if motor is None:
         return at_user, 0.0 if speed is None else float(speed[at]), 0.0
     # A rig's speed is often the encoder's difference, far too coarse for one sample.
-    near = slice(max(0, at - _SLOPE_SAMPLES), at + _SLOPE_SAMPLES)
+    near = _near(at)
     omega = 0.0 if at == 0 else float(np.polyfit(measurement.time_s[near], motor[near], 1)[0])
     return float(motor[at]) * tau, omega, 0.0 if user is None else at_user / tau - float(motor[at])
+
+
+def _current(measurement: Measurement, actuator: Actuator, at: int, speed: float) -> float:
+    """The current at a sample, A, as measured; else what load, drag and friction take at that speed."""
+    current = measurement.get("current_A")
+    if current is not None:
+        near = slice(0, 1) if at == 0 else _near(at)  # nothing is known of what was before a recording
+        return float((current[near].mean() - actuator.sensors.current_bias_A) / actuator.sensors.current_gain)
+    load = measurement.get("load_torque_Nm")
+    pull = 0.0 if load is None else actuator.transmission.gear_ratio * float(load[at])
+    motor = actuator.motor
+    drag = motor.viscous_friction_Nms_rad * speed + motor.dynamic_friction_Nm * np.sign(speed)
+    return float(pull + drag) / motor.torque_constant_Nm_A
+
+
+def _near(at: int) -> slice:
+    return slice(max(0, at - _SLOPE_SAMPLES), at + _SLOPE_SAMPLES)

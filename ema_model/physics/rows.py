@@ -16,6 +16,7 @@ PARAMETER_ROWS = (
     "integral_gain",  # K_I, N·m/rad
     "derivative_gain",  # K_D, N·m·s²/rad
     "integrator_window",  # rad at the user
+    "integrator_rest",  # rad/s, at which speed and below the integral is held; below 0 never
     "current_per_torque",  # A/(N·m)
     "output_limit",  # of the controller: A, or for a voltage drive a share of the bus
     # inverter and motor
@@ -52,6 +53,7 @@ PARAMETER_ROWS = (
     INTEGRAL_GAIN,
     DERIVATIVE_GAIN,
     INTEGRATOR_WINDOW,
+    INTEGRATOR_REST,
     CURRENT_PER_TORQUE,
     OUTPUT_LIMIT,
     BUS_VOLTAGE,
@@ -97,8 +99,23 @@ STATE_ROWS = (
     "sin_electrical",
     "cos_electrical",  # the RM's of θ_e = N_p times that, the MM's of 2θ_e
     "current",  # equivalent current I_3eq, A
+    "integral",  # K_I ∫e dt of the speed loop, N·m
+    "speed_error",  # e of the step before, rad/s; NaN before the first
+    "remembered",  # K_I ∫e dt + K_D de/dt of this step, N·m
 )
-THETA, OMEGA, PLAY, SIN_ROTOR, COS_ROTOR, SIN_ELECTRICAL, COS_ELECTRICAL, CURRENT = range(len(STATE_ROWS))
+(
+    THETA,
+    OMEGA,
+    PLAY,
+    SIN_ROTOR,
+    COS_ROTOR,
+    SIN_ELECTRICAL,
+    COS_ELECTRICAL,
+    CURRENT,
+    INTEGRAL,
+    SPEED_ERROR,
+    REMEMBERED,
+) = range(len(STATE_ROWS))
 
 REFERENCE_STATE_ROWS = (
     *STATE_ROWS,
@@ -108,8 +125,6 @@ REFERENCE_STATE_ROWS = (
     "leg_a",
     "leg_b",
     "leg_c",  # ±1, the relay of each leg
-    "integral",  # rad, of the speed error
-    "speed_error",  # rad/s, of the step before
     "motor_torque",  # N·m
 )
 (
@@ -119,7 +134,5 @@ REFERENCE_STATE_ROWS = (
     LEG_A,
     LEG_B,
     LEG_C,
-    INTEGRAL,
-    SPEED_ERROR,
     MOTOR_TORQUE,
 ) = range(len(STATE_ROWS), len(REFERENCE_STATE_ROWS))

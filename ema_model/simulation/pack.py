@@ -96,14 +96,16 @@ def initial_state(
     speed_rad_s: ArrayLike = 0.0,
     play: ArrayLike = 0.0,
     stack: Stack | None = None,
+    integral_Nm: ArrayLike = 0.0,
 ) -> Array:
     """State of the Monitor Model at the start, (blocks, rows·LANES); the states of the stack's effects are 0.
 
     user_rad: where the motor stands, as a user's angle; speed_rad_s: the motor's; play: where the user
-    stands within the backlash, rad at the motor, 0 in the middle.
+    stands within the backlash, rad at the motor, 0 in the middle; integral_Nm: what the speed loop's integral action
+    has come to (see `integral_at_start`).
     """
     rows = STATE_ROWS + (stack.states if stack else ())
-    return _state(actuator, blocks, rows, 2.0 * actuator.motor.pole_pairs, user_rad, speed_rad_s, play)
+    return _state(actuator, blocks, rows, 2.0 * actuator.motor.pole_pairs, user_rad, speed_rad_s, play, integral_Nm)
 
 
 def initial_reference_state(
@@ -112,10 +114,38 @@ def initial_reference_state(
     speed_rad_s: float = 0.0,
     play: float = 0.0,
     stack: Stack | None = None,
+    integral_Nm: float = 0.0,
 ) -> Array:
     """The same for the Reference Model, (rows·LANES,)."""
     rows = REFERENCE_STATE_ROWS + (stack.states if stack else ())
-    return _state(actuator, 1, rows, actuator.motor.pole_pairs, user_rad, speed_rad_s, play)[0]
+    return _state(actuator, 1, rows, actuator.motor.pole_pairs, user_rad, speed_rad_s, play, integral_Nm)[0]
+
+
+def integral_at_start(
+    actuator: Actuator,
+    k: ArrayLike,
+    command_rad: float,
+    user_rad: ArrayLike,
+    speed_rad_s: ArrayLike,
+    current_A: ArrayLike,
+) -> Array:
+    """K_I ∫e dt, N·m, of a speed loop that is caught at work: what makes it ask for the current that flows.
+
+    k_t I − K_P (ω_ref − ω), within the torque of the current's limit, for k (n, 8) or (8,) → (n,) or (); 0 without an
+    integral action.  It is the bumpless start of Åström and Hägglund (Advanced PID Control, 3.5), and steady state
+    where the recording begins in steady state.
+    """
+    controller = actuator.controller
+    integral_gain = np.asarray(controller.integral_gain_Nm_rad, dtype=float)
+    if not np.any(integral_gain > 0.0):
+        return np.zeros(())
+    gain = controller.position_gain_1_s * faults.physical(k).gain_factor
+    limit = np.asarray(controller.speed_limit_rad_s, dtype=float)
+    most = controller.torque_constant_Nm_A * np.asarray(actuator.current_limit_A)
+    with np.errstate(invalid="ignore"):  # a k that is no number is one lane's matter
+        error = np.clip(gain * (command_rad - np.asarray(user_rad)), -limit, limit) - np.asarray(speed_rad_s)
+        torque = controller.torque_constant_Nm_A * np.asarray(current_A) - controller.speed_gain_Nms_rad * error
+    return np.where(integral_gain > 0.0, np.clip(torque, -most, most), 0.0)
 
 
 def _state(
@@ -126,6 +156,7 @@ def _state(
     user_rad: ArrayLike,
     speed_rad_s: ArrayLike,
     play: ArrayLike,
+    integral_Nm: ArrayLike,
 ) -> Array:
     transmission = actuator.transmission
     held = np.clip(np.asarray(user_rad, dtype=float), transmission.stop_low_rad, transmission.stop_high_rad)
@@ -139,6 +170,8 @@ def _state(
         "cos_rotor": np.cos(rotor),
         "sin_electrical": np.sin(electrical * rotor),
         "cos_electrical": np.cos(electrical * rotor),
+        "integral": integral_Nm,
+        "speed_error": np.nan,  # none yet
     }
     state = np.zeros((blocks, len(rows), LANES))
     for name, value in values.items():
@@ -150,10 +183,10 @@ def _shared_rows(actuator: Actuator, fault: faults.PhysicalFaults) -> dict[str, 
     controller, motor, transmission = actuator.controller, actuator.motor, actuator.transmission
     tau = transmission.gear_ratio
     if controller.kind == "position":
-        full = actuator.inverter.current_limit_A if actuator.inverter.kind == "current" else 1.0
+        full = actuator.current_limit_A if actuator.inverter.kind == "current" else 1.0
         gain, limit = controller.gain_1_rad, controller.output_limit * full
     else:
-        gain, limit = controller.position_gain_1_s, controller.current_limit_A
+        gain, limit = controller.position_gain_1_s, actuator.current_limit_A
     return {
         "position_gain": gain * fault.gain_factor,
         "speed_limit": controller.speed_limit_rad_s,
@@ -161,6 +194,8 @@ def _shared_rows(actuator: Actuator, fault: faults.PhysicalFaults) -> dict[str, 
         "integral_gain": controller.integral_gain_Nm_rad,
         "derivative_gain": controller.derivative_gain_Nms2_rad,
         "integrator_window": controller.integrator_window_rad,
+        # The thesis's PID, which the hysteresis drive belongs to, holds its integral at standstill; others do not.
+        "integrator_rest": 0.0 if actuator.inverter.kind == "hysteresis" else -1.0,
         "bus_voltage": actuator.inverter.bus_voltage_V,
         "current_per_torque": 1.0 / controller.torque_constant_Nm_A,
         "output_limit": limit,

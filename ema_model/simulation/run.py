@@ -88,12 +88,13 @@ def simulate_reference(
     start_rad: float | None = None,
     start_speed_rad_s: float = 0.0,
     start_play_rad: float = 0.0,
+    start_integral_Nm: float = 0.0,
     voltages: bool = False,
 ) -> Measurement:
     """The three-phase Reference Model's signals; with `voltages`, also the legs' (V, against the bus's middle).
 
     k: without it, the actuator's own.  It starts at start_rad, a user's angle, or where the command starts; with a
-    motor speed, and at a place in the play (rad at the motor), both 0 unless given.
+    motor speed, at a place in the play (rad at the motor), and with a speed loop's integral action, all 0 unless given.
     Raises InputError for settings of effects that do not exist, FloatingPointError if the model diverges.
     """
     effects = {name: find(name).settings(dict(given)) for name, given in (effects or {}).items()}
@@ -110,7 +111,7 @@ def simulate_reference(
     start = float(demand[0]) if start_rad is None else start_rad
     result = np.empty((run.samples, 11))
     stack.reference.run(
-        initial_reference_state(actuator, start, start_speed_rad_s, start_play_rad, stack),
+        initial_reference_state(actuator, start, start_speed_rad_s, start_play_rad, stack, start_integral_Nm),
         reference_rows(actuator, actuator.k if k is None else k, stack, effects),
         demand,
         load,

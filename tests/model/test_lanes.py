@@ -98,6 +98,26 @@ def test_effects_parameters_may_differ_by_lane():
         np.testing.assert_array_equal(rows[0].reshape(-1, LANES)[:, i], alone[0].reshape(-1, LANES)[:, 0])
 
 
+@each_circuit
+def test_gains_may_differ_by_lane(recording, circuit):
+    """A speed loop that remembers nothing stands beside those that do, and each is a single run, bit for bit."""
+    gains = {
+        "controller.integral_gain_Nm_rad": np.array([0.0, 3.0, 0.0, 8.0]),
+        "controller.derivative_gain_Nms2_rad": np.array([0.0, 0.0, 1e-7, 2e-7]),
+    }
+    k = population(4, seed=6)
+    objective = Objective([recording], ACTUATOR, circuit=circuit)
+    together = objective.currents(k, ACTUATOR.varied(gains))
+    assert len({float(current[-1]) for current in together}) == 4
+    for i in range(4):
+        one = ACTUATOR.with_values({path: values[i] for path, values in gains.items()})
+        np.testing.assert_array_equal(together[i], objective.currents(k[i], one)[0])
+        alone = Objective([recording], one, circuit=circuit)
+        rms = np.sqrt(np.mean((together[i] - objective.target) ** 2))
+        assert alone(k[i])[0] == pytest.approx(rms, rel=1e-9)
+    np.testing.assert_array_equal(together[0], objective.currents(k[0])[0])
+
+
 def test_recordings_add_up_as_a_quadrature():
     truth = vector({"k1": 0.4})
     parts = [

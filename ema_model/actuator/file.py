@@ -16,6 +16,7 @@ from ema_model.actuator.parameters import (
     check_stops,
     check_value,
 )
+from ema_model.actuator.unread import check_all_is_read, unread
 from ema_model.errors import InputError
 from ema_model.limits import TEXT_BYTES
 from ema_model.faults import vector
@@ -82,7 +83,7 @@ def _parse(text: str, where: str) -> Actuator:
     tolerances: dict[str, Tolerance] = {}
     sections = {section: _section(section, tables[section], kinds, axes, tolerances, where) for section in SECTIONS}
     check_stops(sections["transmission"], where)
-    return Actuator(
+    actuator = Actuator(
         name=str(document.get("name", Path(where).stem)),
         description=str(document.get("description", "")),
         tolerances=tolerances,
@@ -96,6 +97,8 @@ def _parse(text: str, where: str) -> Actuator:
         rules=_rules(tables["recordings"], axes, where),
         **sections,
     )
+    check_all_is_read(actuator, where)
+    return actuator
 
 
 def _section(
@@ -103,8 +106,13 @@ def _section(
 ) -> Any:
     needed, optional = layout(section, kinds)
     inside = {axes.parameter(name): name for name in (*needed, *optional)}
+    reasons = unread(kinds["controller"], kinds["inverter"])
+    why = {axes.path(path).partition(".")[2]: reason for path, reason in reasons.items() if path.startswith(section)}
     for extra in set(given) - set(inside) - ({"kind"} if section in KINDS else set()):
-        raise InputError(f"{where}: [{section}] has no parameter {extra!r}; it has {', '.join(inside) or 'none'}")
+        reason = f": {why[extra]}" if extra in why else ""
+        raise InputError(
+            f"{where}: [{section}] has no parameter {extra!r}{reason}; it has {', '.join(inside) or 'none'}"
+        )
     values: dict[str, Any] = {"kind": kinds[section]} if section in KINDS else {}
     for shown, name in inside.items():
         if shown in given:

@@ -174,6 +174,8 @@ class Actuator:
 
     def with_values(self, values: dict[str, float]) -> Actuator:
         """A copy with some "section.parameter" changed; InputError for an impossible value."""
+        from ema_model.actuator.unread import check_value_is_read  # which needs what stands here
+
         changed = self
         for path, value in values.items():
             section, _, name = path.partition(".")
@@ -183,6 +185,7 @@ class Actuator:
             if section not in SECTIONS or name not in numbers(section):
                 raise InputError(f"no actuator parameter {path!r}; write it as section.name, e.g. motor.inertia_kgm2")
             check_value(section, name, value, "actuator")
+            check_value_is_read(changed, path, value, "actuator")
             changed = changed.varied({path: float(value)})
         check_stops(changed.transmission, "actuator")
         return changed

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from ema_model.actuator.layout import KINDS, layout
 from ema_model.actuator.parameters import SECTIONS, Actuator
+from ema_model.actuator.unread import unread
 from ema_model.errors import InputError
 from ema_model.whole_file import whole_file
 
@@ -36,6 +37,7 @@ def as_toml(actuator: Actuator) -> str:
     """The file's text."""
     axes = actuator.axes
     kinds = {"controller": actuator.controller.kind, "inverter": actuator.inverter.kind}
+    silent = unread(**kinds)
     lines = ["schema = 1", f"name = {_text(actuator.name)}", f"description = {_text(actuator.description)}"]
     lines += ["", "[axes]", f"motor = {_text(axes.motor)}", f"user = {_text(axes.user)}"]
     lines += ["", "[model]", f"step_s = {actuator.step_s!r}", f"filter_s = {actuator.filter_s!r}"]
@@ -47,7 +49,7 @@ def as_toml(actuator: Actuator) -> str:
         needed, optional = layout(section, kinds)
         for name in (*needed, *optional):
             value = float(getattr(getattr(actuator, section), name))
-            if math.isfinite(value):
+            if math.isfinite(value) and f"{section}.{name}" not in silent:
                 lines.append(_entry(actuator, f"{section}.{name}", axes.parameter(name), value))
     lines += _effects(actuator)
     if actuator.faults:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -57,10 +58,11 @@ class Objective(ClosedLoop):
     def __call__(self, k: ArrayLike) -> Array:
         """RMSE, A, of each individual: k (n, 8) → (n,); infinite where the model diverges."""
         k = np.atleast_2d(np.asarray(k, dtype=float))
-        rows = monitor_rows(self.actuator, k, self.stack, self.effects)
-        total = np.zeros(len(rows) * LANES)
+        total = np.zeros(-(-len(k) // LANES) * LANES)
         for group in self._groups:
-            states = np.stack([self._state(window, k, self.actuator) for window in group.windows])
+            actuator = self.actuator.varied(group.windows[0].values)
+            rows = monitor_rows(actuator, k, self.stack, self.effects)
+            states = np.stack([self._state(window, k, actuator) for window in group.windows])
             result = np.empty((len(group.windows), len(rows), LANES))
             exclusive(
                 self.stack.monitor.squared_errors,
@@ -89,14 +91,14 @@ class Objective(ClosedLoop):
         The parameters of `actuator` may be arrays (n,), one value for each individual.
         """
         k = np.atleast_2d(np.asarray(k, dtype=float))
-        actuator = actuator or self.actuator
-        rows = monitor_rows(actuator, k, self.stack, self.effects)
         parts = []
         for window in self.windows:
+            one = (actuator or self.actuator).varied(window.values)
+            rows = monitor_rows(one, k, self.stack, self.effects)
             result = np.empty((len(rows), window.blocks, 4, LANES))
             exclusive(
                 self.stack.monitor.traces,
-                self._state(window, k, actuator),
+                self._state(window, k, one),
                 rows,
                 window.command,
                 window.load,
@@ -111,12 +113,12 @@ class Objective(ClosedLoop):
 
     def _target(self, window: Window) -> Array:
         """The window's equivalent current, A, (blocks,), the sensor's gain and bias taken off."""
-        sensors = self.actuator.sensors
+        sensors = self.actuator.varied(window.values).sensors
         return (window.measured["current_A"] - sensors.current_bias_A) / sensors.current_gain
 
     def _state(self, window: Window, k: Array, actuator: Actuator) -> Array:
         return initial_state(
-            self.actuator,
+            actuator,
             -(-len(k) // LANES),
             window.user_rad,
             window.speed_rad_s,
@@ -127,15 +129,17 @@ class Objective(ClosedLoop):
 
 
 def _alike(windows: Sequence[Window]) -> list[list[Window]]:
-    """Windows grouped by their sampling, so that one kernel call serves each group."""
-    groups: dict[tuple[int, float], list[Window]] = {}
+    """Windows grouped by their sampling and own values, so that one kernel call serves each group."""
+    groups: dict[Any, list[Window]] = {}
     for window in windows:
-        groups.setdefault((window.steps_per_block, round(window.step_s, 12)), []).append(window)
+        groups.setdefault(
+            (window.steps_per_block, round(window.step_s, 12), *sorted(window.values.items())), []
+        ).append(window)
     return list(groups.values())
 
 
 class _Group:
-    """Windows of one sampling, laid one after another."""
+    """Windows of one sampling and one actuator, laid one after another."""
 
     def __init__(self, windows: list[Window], targets: list[Array]) -> None:
         self.windows = windows

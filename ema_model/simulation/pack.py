@@ -56,12 +56,14 @@ def monitor_rows(actuator: Actuator, k: ArrayLike, stack: Stack, effects: Effect
         ratio = circuit.voltage_V / inverter.bus_voltage_V
     else:  # without a voltage limit, or with the bus as it is
         resistance, inductance, ratio = motor.resistance_Ohm, motor.inductance_H, 1.0
+    # The thesis's Monitor Model leaves it out (T 3.3).
+    drag_of_user = 0.0 if inverter.kind == "hysteresis" else actuator.transmission.viscous_friction_Nms_rad
     values = _shared_rows(actuator, fault) | {
         "voltage_ratio": ratio,
         "resistance": resistance,
         "inverse_inductance": 1.0 / inductance,
         "emf_constant": motor.torque_constant_Nm_A,
-        "viscous": motor.viscous_friction_Nms_rad,
+        "viscous": motor.viscous_friction_Nms_rad + drag_of_user,
     }
     harmonics = flux_harmonics(fault.turns, fault.eccentricity, fault.phase_rad)
     values |= {f"flux_{i}": harmonics[i] for i in range(9)}

@@ -40,12 +40,8 @@ WHERE = {
     "transmission.stop_low_rad": (BACK, {}, -0.02),
     "transmission.backlash_rad": (CHIRP, {}, 2e-4),
 }
-# The Monitor Model leaves these out by design (T 3.3): its controller is proportional, its inverter ideal, and
-# its drag the motor's alone.
+# The Monitor Model leaves these out by design (T 3.3): its inverter is ideal, and its drag the motor's alone.
 ONLY_REFERENCE = {
-    "controller.integral_gain_Nm_rad": "the Monitor Model's speed loop is proportional",
-    "controller.derivative_gain_Nms2_rad": "the Monitor Model's speed loop is proportional",
-    "controller.integrator_window_rad": "the Monitor Model has no integrator",
     "inverter.hysteresis_band_A": "the Monitor Model has no hysteresis relays",
     "transmission.viscous_friction_Nms_rad": "the Monitor Model's drag is the motor's alone",
 }

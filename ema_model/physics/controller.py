@@ -72,7 +72,7 @@ def advance_integral(integral, gain, speed_error, position_error, omega, wanted,
     """The integral action K_I ∫(ω_ref − ω) dt after a step, N·m.
 
     Conditional integration against wind-up: the integral is held while the wanted current is at its limit, A, or
-    beyond, and the error would drive it further (Åström and Hägglund, Advanced PID Control, ISA 2006, 3.5).  An error
+    beyond, and the error would drive it further (Åström and Hägglund, Advanced PID Control, ISA 2006).  An error
     of the other sign unwinds it at once, where the thesis's bare "deactivated in saturation" keeps what has piled up.
     It is held, too, where the position error exceeds the window, rad, and at the speed `rest`, rad/s, and below it:
     0 is the thesis's PID, which stops integrating at standstill (T 3.2.3); −1 never does, as drives usually are.

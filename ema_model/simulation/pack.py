@@ -134,7 +134,7 @@ def integral_at_start(
     """K_I ∫e dt, N·m, of a speed loop that is caught at work: what makes it ask for the current that flows.
 
     k_t I − K_P (ω_ref − ω), within the torque of the current's limit, for k (n, 8) or (8,) → (n,) or (); 0 without an
-    integral action.  It is the bumpless start of Åström and Hägglund (Advanced PID Control, 3.5), and steady state
+    integral action.  It is the bumpless start of Åström and Hägglund (Advanced PID Control, ISA 2006), and steady state
     where the recording begins in steady state.
     """
     controller = actuator.controller

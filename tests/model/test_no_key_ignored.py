@@ -126,10 +126,11 @@ RECORDINGS = recordings()
 
 def said(actuator, circuit: str) -> list[np.ndarray]:
     """All signals of the model that recordings of this actuator are held against, healthy and faulty."""
-    if actuator.controller.kind == "unknown":
-        plant = InverseDynamics(RECORDINGS, actuator)
-    else:
-        plant = ClosedLoop(RECORDINGS, actuator, circuit=circuit or "reduced")
+    plant: Any = (  # each knows its own windows
+        InverseDynamics(RECORDINGS, actuator)
+        if actuator.controller.kind == "unknown"
+        else ClosedLoop(RECORDINGS, actuator, circuit=circuit or "reduced")
+    )
     k = np.stack([HEALTHY, FAULTY])
     return [values for window in plant.windows for values in plant.signals(window, k=k).values()]
 

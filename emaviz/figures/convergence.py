@@ -11,6 +11,7 @@ import viser
 from ema_model.identification.run import ALGORITHMS as TITLES
 from emaviz.colours import ALGORITHMS, MONITOR
 from emaviz.figures.signals import AXIS, PADDING, legend
+from emaviz.page_text import add_html
 
 _LEAST_A = 1e-9  # a logarithmic axis has no zero
 
@@ -22,7 +23,7 @@ class LiveConvergence:
         axes: Any = ({**AXIS, "label": "iteration", "size": 30}, {**AXIS, "label": "best rmse [A]", "size": 56})
         self._algorithms: tuple[str, ...] = ()
         self._iterations = 150
-        self._legend: Any = gui.add_html("")
+        self._legend: Any = add_html(gui)
         self._handle: Any = gui.add_uplot(
             data=(np.array([0.0, 1.0]), np.array([1.0, 1.0])),
             series=({"label": "iteration"}, _line("")),

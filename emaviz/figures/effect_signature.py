@@ -12,6 +12,8 @@ from ema_model.simulation.with_effect import SHOWN, WithEffect
 from emaviz.colours import DIFFERENCE, MONITOR, REFERENCE
 from emaviz.figures.decimate import envelope
 from emaviz.figures.signals import CHARTS, legend, time_axis, value_axis
+from emaviz.page_text import add_html
+from emaviz.session.library import SHOWN, Felt
 
 _POINTS, _SMALL_POINTS = 800, 160
 _WIDTH, _HEIGHT = 120, 44  # of a small picture, pixels
@@ -22,7 +24,7 @@ class EffectCharts:
 
     def __init__(self, gui: viser.GuiApi, height: int = 118) -> None:
         empty = np.array([0.0, 1.0])
-        gui.add_html(legend((REFERENCE, "without"), (MONITOR, "with the effect"), (DIFFERENCE, "difference, below")))
+        add_html(gui, legend((REFERENCE, "without"), (MONITOR, "with the effect"), (DIFFERENCE, "difference, below")))
         self._charts: list[tuple[Any, Any, Any]] = []
         for chart in (one for one in CHARTS if one.signal in SHOWN):
             both = gui.add_uplot(

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import html
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ema_model.actuator import Actuator
 from ema_model.faults import FAULTS, sentences
 from emaviz.colours import DIFFERENCE, MONITOR, TRUTH
+from emaviz.figures.colours import DIFFERENCE, MONITOR, TRUTH
+from emaviz.page_text import Html, html, joined
 
 
 def fault_bars(
@@ -18,7 +18,7 @@ def fault_bars(
     truth: ArrayLike | None = None,
     interval90: ArrayLike | None = None,
     alarms: tuple[str, ...] = (),
-) -> str:
+) -> Html:
     """A row for each k: name, bar in [0, 1], green tick at the truth, grey whisker for the interval, meaning."""
     k = np.asarray(k, dtype=float)
     rows = []
@@ -30,26 +30,41 @@ def fault_bars(
         if truth is not None:
             marks.append(_box(np.asarray(truth)[i] - 0.004, 0.008, 0, 16, TRUTH, 1.0))
         rows.append(
-            "<tr>"
-            f'<td style="white-space:nowrap;padding:1px 6px 1px 0"><b>{fault.name}</b> {html.escape(fault.title)}</td>'
-            '<td style="width:34%"><div style="position:relative;height:16px;background:#8686862e;border-radius:3px">'
-            f"{''.join(marks)}</div></td>"
-            f'<td style="text-align:right;padding:0 6px;font-variant-numeric:tabular-nums">{k[i]:.3f}</td>'
-            f'<td style="white-space:nowrap;font-size:11px;opacity:.8">{html.escape(phrase)}</td>'
-            "</tr>"
+            html(
+                "<tr>"
+                '<td style="white-space:nowrap;padding:1px 6px 1px 0"><b>{}</b> {}</td>'
+                '<td style="width:34%"><div style="position:relative;height:16px;background:#8686862e;'
+                'border-radius:3px">{}</div></td>'
+                '<td style="text-align:right;padding:0 6px;font-variant-numeric:tabular-nums">{:.3f}</td>'
+                '<td style="white-space:nowrap;font-size:11px;opacity:.8">{}</td>'
+                "</tr>",
+                fault.name,
+                fault.title,
+                joined(marks),
+                k[i],
+                phrase,
+            )
         )
-    legend = f'<span style="color:{MONITOR}">■</span> identified'
-    legend += f' &nbsp;<span style="color:{TRUTH}">▮</span> truth' if truth is not None else ""
-    legend += " &nbsp;━ 90 % interval" if interval90 is not None else ""
-    return (
+    legend = html('<span style="color:{}">■</span> identified', MONITOR)
+    legend += html(' &nbsp;<span style="color:{}">▮</span> truth', TRUTH) if truth is not None else ""
+    legend += html(" &nbsp;━ 90 % interval") if interval90 is not None else ""
+    return html(
         '<div style="padding:0 8px;font-size:12px"><table style="width:100%;border-collapse:collapse">'
-        f'{"".join(rows)}</table><div style="opacity:.7;font-size:11px;padding-top:4px">{legend}</div></div>'
+        '{}</table><div style="opacity:.7;font-size:11px;padding-top:4px">{}</div></div>',
+        joined(rows),
+        legend,
     )
 
 
-def _box(left: float, width: float, top: int, height: int, colour: str, opacity: float) -> str:
+def _box(left: float, width: float, top: int, height: int, colour: str, opacity: float) -> Html:
     left, width = float(np.clip(left, 0.0, 1.0)), float(np.clip(width, 0.0, 1.0))
-    return (
-        f'<div style="position:absolute;left:{100 * left:.2f}%;width:{100 * min(width, 1 - left):.2f}%;top:{top}px;'
-        f'height:{height}px;background:{colour};opacity:{opacity};border-radius:2px"></div>'
+    return html(
+        '<div style="position:absolute;left:{:.2f}%;width:{:.2f}%;top:{}px;'
+        'height:{}px;background:{};opacity:{};border-radius:2px"></div>',
+        100 * left,
+        100 * min(width, 1 - left),
+        top,
+        height,
+        colour,
+        opacity,
     )

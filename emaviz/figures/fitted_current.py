@@ -14,6 +14,7 @@ from emaviz.colours import REFERENCE
 from emaviz.figures.convergence import colour
 from emaviz.figures.decimate import envelope
 from emaviz.figures.signals import CURSOR, PADDING, POINTS, legend, time_axis, value_axis
+from emaviz.page_text import add_html
 
 Array = NDArray[np.float64]
 
@@ -24,7 +25,7 @@ class LiveFit:
     def __init__(self, gui: viser.GuiApi, height: int = 150) -> None:
         empty = np.array([0.0, 1.0])
         self._algorithms: tuple[str, ...] = ()
-        self._legend: Any = gui.add_html("")
+        self._legend: Any = add_html(gui)
         common: Any = {
             "scales": {"x": {"time": False}, "y": {"auto": True}},
             "legend": {"show": False},

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import html
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ema_model.identification.run import ALGORITHMS as TITLES
 from emaviz.figures.convergence import colour
+from emaviz.page_text import Html, html, joined
 
 _MISSING = "–"
-_NUMBER = 'style="text-align:right;padding:1px 4px"'
+_NUMBER = Html('style="text-align:right;padding:1px 4px"')
 
 
 @dataclass(frozen=True)
@@ -32,12 +32,12 @@ class Row:
     stopped: bool = False
 
 
-def table(rows: Sequence[Row]) -> str:
+def table(rows: Sequence[Row]) -> Html:
     """HTML, the newest race first."""
     if not rows:
-        return '<div style="padding:6px 12px;opacity:.7">Nothing has been identified yet.</div>'
+        return html('<div style="padding:6px 12px;opacity:.7">Nothing has been identified yet.</div>')
     heads = ("", "Err [%]", "rmse [A]", "time [s]", "simulations", "PC [%]")
-    head = "".join(f"<th {_NUMBER}>{name}</th>" for name in heads)
+    head = joined(html("<th {}>{}</th>", _NUMBER, name) for name in heads)
     body = []
     for race in sorted({row.race for row in rows}, reverse=True):
         mine = [row for row in rows if row.race == race]
@@ -46,19 +46,21 @@ def table(rows: Sequence[Row]) -> str:
             f"{race}: {first.source} · population {first.population}, {first.iterations} iterations, "
             f"{first.fitness}, seed {first.seed}"
         )
-        body.append(f'<tr><td colspan="6" style="padding-top:8px;opacity:.75">{html.escape(said)}</td></tr>')
+        body.append(html('<tr><td colspan="6" style="padding-top:8px;opacity:.75">{}</td></tr>', said))
         body += [_row(row) for row in mine]
-    return (
+    return html(
         '<div style="padding:4px 10px;font-size:12.5px;font-variant-numeric:tabular-nums">'
-        f'<table style="width:100%;border-collapse:collapse"><tr>{head}</tr>{"".join(body)}</table>'
+        '<table style="width:100%;border-collapse:collapse"><tr>{}</tr>{}</table>'
         '<div style="font-size:11px;opacity:.7;padding-top:8px">Err: T 5.2, where the truth is known. Time: of the '
         "optimiser alone. PC: the performance coefficient of the thesis (T 5.4), 100 (1 − Err·t / Σ Err·t) over the "
-        "optimisers of one race; higher is better.</div></div>"
+        "optimisers of one race; higher is better.</div></div>",
+        head,
+        joined(body),
     )
 
 
-def _row(row: Row) -> str:
-    name = f'<b style="color:{colour(row.algorithm)}">{html.escape(TITLES.get(row.algorithm, row.algorithm))}</b>'
+def _row(row: Row) -> Html:
+    name = html('<b style="color:{}">{}</b>', colour(row.algorithm), TITLES.get(row.algorithm, row.algorithm))
     cells = (
         _MISSING if row.error_percent is None else f"{row.error_percent:.2f}",
         f"{row.rmse_A:.4f}",
@@ -67,4 +69,6 @@ def _row(row: Row) -> str:
         _MISSING if row.performance is None else f"{row.performance:.1f}",
     )
     stopped = " (stopped)" if row.stopped else ""
-    return f"<tr><td>{name}{stopped}</td>{''.join(f'<td {_NUMBER}>{cell}</td>' for cell in cells)}</tr>"
+    return html(
+        "<tr><td>{}{}</td>{}</tr>", name, stopped, joined(html("<td {}>{}</td>", _NUMBER, cell) for cell in cells)
+    )

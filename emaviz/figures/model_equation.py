@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import re
 from collections.abc import Sequence
 
@@ -10,6 +9,8 @@ from ema_model.discovery import Discovery
 from ema_model.discovery.result import Added
 from ema_model.effects import Effect, find
 from emaviz.colours import ALGORITHMS, MONITOR, TRUTH
+from emaviz.figures.colours import ALGORITHMS, MONITOR, TRUTH
+from emaviz.page_text import Html, html, joined
 from emaviz.text.discovery import effect_title, settings
 
 COLOURS = (MONITOR, ALGORITHMS["ssa"], ALGORITHMS["do"], TRUTH)
@@ -36,9 +37,9 @@ _OF_PLACE = {
 }
 
 
-def equation(found: Discovery, added: Sequence[Added]) -> str:
+def equation(found: Discovery, added: Sequence[Added]) -> Html:
     """The lines that added effects change, each with its terms and their fitted values; "" without an effect."""
-    by_line: dict[str, list[str]] = {}
+    by_line: dict[str, list[Html]] = {}
     for i, one in enumerate(added):
         effect = find(one.key)
         values = ", ".join(f"{_symbol(effect, name)}{text}" for name, text in settings(found, one).items())
@@ -46,17 +47,23 @@ def equation(found: Discovery, added: Sequence[Added]) -> str:
             values = f"{len(effect.parameters)} knots, fitted"
         colour = COLOURS[i % len(COLOURS)]
         by_line.setdefault(_line(effect), []).append(
-            f'<div style="padding-left:14px;color:{colour}"><b>{html.escape(effect_title(one.name))}:</b> '
-            f'<span style="font-family:serif;font-size:15px">{html.escape(effect.equation)}</span>'
-            f'<div style="font-size:12px;opacity:.85">{html.escape(values)}</div></div>'
+            html(
+                '<div style="padding-left:14px;color:{}"><b>{}:</b> '
+                '<span style="font-family:serif;font-size:15px">{}</span>'
+                '<div style="font-size:12px;opacity:.85">{}</div></div>',
+                colour,
+                effect_title(one.name),
+                effect.equation,
+                values,
+            )
         )
     rows = []
     for line, base in _LINES.items():
         if line in by_line or line == "motion":
-            extra = "".join(by_line.get(line, []))
-            more = ' <span style="opacity:.65">and</span>' if extra else ""
-            rows.append(f'<div style="font-family:serif;font-size:15px">{html.escape(base)}{more}</div>{extra}')
-    return "".join(rows) if added else ""
+            extra = joined(by_line.get(line, []))
+            more = html(' <span style="opacity:.65">and</span>') if extra else ""
+            rows.append(html('<div style="font-family:serif;font-size:15px">{}{}</div>{}', base, more, extra))
+    return joined(rows if added else [])
 
 
 def _line(effect: Effect) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 
 from ema_model.recordings import Measurement
 from emaviz.figures.signals import CHARTS
+from emaviz.page_text import Html, html, joined
 
 _MISSING = "–"
 
@@ -75,29 +76,35 @@ def differences(reference: Measurement, monitor: Measurement) -> dict[str, tuple
 
 def table(
     runs: Mapping[str, Mapping[str, float]], errors: Mapping[str, Mapping[str, tuple[float, str]]], colours: list[str]
-) -> str:
+) -> Html:
     """HTML: the metrics of each run, and below the differences of each pair of runs."""
     right = "text-align:right;font-weight:600"
-    heads = "".join(f'<th style="{right};color:{colour}">{name}</th>' for name, colour in zip(runs, colours))
-    rows = "".join(
-        f"<tr><td>{metric.name} [{metric.unit}]</td>"
-        + "".join(f'<td style="text-align:right">{_shown(run[metric.name])}</td>' for run in runs.values())
-        + "</tr>"
+    heads = joined(html('<th style="{};color:{}">{}</th>', right, colour, name) for name, colour in zip(runs, colours))
+    rows = joined(
+        html("<tr><td>{} [{}]</td>", metric.name, metric.unit)
+        + joined(html('<td style="text-align:right">{}</td>', _shown(run[metric.name])) for run in runs.values())
+        + html("</tr>")
         for metric in METRICS
     )
-    heads_below = "".join(f'<th style="{right}">{name}</th>' for name in errors)
+    heads_below = joined(html('<th style="{}">{}</th>', right, name) for name in errors)
     first = next(iter(errors.values()))
-    rows_below = "".join(
-        f"<tr><td>{title} [{unit}]</td>"
-        + "".join(f'<td style="text-align:right">{_shown(error[title][0])}</td>' for error in errors.values())
-        + "</tr>"
+    rows_below = joined(
+        html("<tr><td>{} [{}]</td>", title, unit)
+        + joined(html('<td style="text-align:right">{}</td>', _shown(error[title][0])) for error in errors.values())
+        + html("</tr>")
         for title, (_, unit) in first.items()
     )
-    style = 'style="width:100%;border-collapse:collapse;font-variant-numeric:tabular-nums;line-height:1.7"'
-    return (
-        f'<div style="padding:4px 12px;font-size:13px"><table {style}><tr><th></th>{heads}</tr>{rows}</table>'
+    style = Html('style="width:100%;border-collapse:collapse;font-variant-numeric:tabular-nums;line-height:1.7"')
+    return html(
+        '<div style="padding:4px 12px;font-size:13px"><table {}><tr><th></th>{}</tr>{}</table>'
         '<div style="margin-top:14px;font-weight:600">RMSE over the whole run</div>'
-        f"<table {style}><tr><th></th>{heads_below}</tr>{rows_below}</table></div>"
+        "<table {}><tr><th></th>{}</tr>{}</table></div>",
+        style,
+        heads,
+        rows,
+        style,
+        heads_below,
+        rows_below,
     )
 
 

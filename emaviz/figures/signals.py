@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ema_model.recordings import Measurement
 from emaviz.colours import COMMAND, DIFFERENCE, GHOST, MONITOR, PHASES, REFERENCE
 from emaviz.figures.decimate import envelope
+from emaviz.page_text import Html, add_html, html, joined
 
 Array = NDArray[np.float64]
 POINTS = 800  # of a line, at most
@@ -41,16 +42,13 @@ CHARTS = (
 PHASE_SIGNALS = ("phase_a_current_A", "phase_b_current_A", "phase_c_current_A")
 
 
-def legend(*names: tuple[str, str]) -> str:
+def legend(*names: tuple[str, str]) -> Html:
     """Colours and names, in a line."""
-    return (
-        '<div style="font-size:12px;padding:0 10px;line-height:1.5">'
-        + " &nbsp; ".join(
-            f'<span style="white-space:nowrap"><span style="color:{colour}">━</span> {name}</span>'
-            for colour, name in names
-        )
-        + "</div>"
+    lines = (
+        html('<span style="white-space:nowrap"><span style="color:{}">━</span> {}</span>', colour, name)
+        for colour, name in names
     )
+    return html('<div style="font-size:12px;padding:0 10px;line-height:1.5">{}</div>', joined(lines, " &nbsp; "))
 
 
 class LiveSignals:
@@ -58,14 +56,15 @@ class LiveSignals:
 
     def __init__(self, gui: viser.GuiApi, height: int = 132) -> None:
         empty = np.array([0.0, 1.0])
-        gui.add_html(
+        add_html(
+            gui,
             legend(
                 (REFERENCE, "plant"),
                 (MONITOR, "monitor"),
                 (DIFFERENCE, "monitor − plant, right axis"),
                 (COMMAND, "command"),
                 (GHOST, "frozen"),
-            )
+            ),
         )
         self._charts: list[tuple[SignalChart, Any]] = []
         for chart in CHARTS:
@@ -110,7 +109,7 @@ class LivePhases:
 
     def __init__(self, gui: viser.GuiApi, height: int = 250) -> None:
         empty = np.array([0.0, 1.0])
-        gui.add_html(legend(*((colour, f"phase {name}, plant") for colour, name in zip(PHASES, "ABC"))))
+        add_html(gui, legend(*((colour, f"phase {name}, plant") for colour, name in zip(PHASES, "ABC"))))
         common = {
             "scales": {"x": {"time": False}, "y": {"auto": True}},
             "legend": {"show": False},
@@ -125,7 +124,7 @@ class LivePhases:
             height=height,
             **common,  # type: ignore[arg-type]
         )
-        gui.add_html(legend((REFERENCE, "I₃eq of the phases, plant"), (MONITOR, "monitor"), (GHOST, "frozen")))
+        add_html(gui, legend((REFERENCE, "I₃eq of the phases, plant"), (MONITOR, "monitor"), (GHOST, "frozen")))
         self._equivalent: Any = gui.add_uplot(
             data=(empty,) * 4,
             series=(

@@ -49,7 +49,7 @@ def figure(look: Look, one: Candidate, *, dark: bool = False) -> go.Figure:
             x=axis.factor * own.centre,
             y=shown.factor * own.mean,
             mode="lines",
-            name=f"what {in_sentence(effect_title(one.name))} would change",
+            name=_legend(one),
             line={"color": SIGNATURE, "width": 2.5},
             hovertemplate="%{y:.3g}",
         )
@@ -58,6 +58,10 @@ def figure(look: Look, one: Candidate, *, dark: bool = False) -> go.Figure:
     if variable == "motor_angle":
         chart.update_xaxes(range=[0.0, axis.factor * edges[-1]])
     return chart
+
+
+def _legend(one: Candidate) -> str:
+    return theme.plain(f"what {in_sentence(effect_title(one.name))} would change")
 
 
 def _over_time(look: Look, one: Candidate, title: str, signal: str, change: Array, dark: bool) -> go.Figure:
@@ -74,7 +78,7 @@ def _over_time(look: Look, one: Candidate, title: str, signal: str, change: Arra
     chart = theme.new(title, "Time [s], where it would show most", shown.label, dark=dark)
     for name, line, style in (
         ("measured − model", values, {"color": theme.MEASURED, "width": 1}),
-        (f"what {in_sentence(effect_title(one.name))} would change", change[part], {"color": SIGNATURE, "width": 2.5}),
+        (_legend(one), change[part], {"color": SIGNATURE, "width": 2.5}),
     ):
         chart.add_trace(
             go.Scatter(x=residuals.time_s[part], y=shown.factor * line, mode="lines", name=name, line=style)

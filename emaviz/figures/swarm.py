@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -11,6 +10,8 @@ from numpy.typing import NDArray
 
 from ema_model.faults import FAULTS, NAMES
 from emaviz.colours import TRUTH
+from emaviz.figures.colours import TRUTH
+from emaviz.page_text import Html, escape, unescaped
 
 Array = NDArray[np.floating]
 
@@ -30,7 +31,7 @@ class Swarm:
     best: Array  # (8,)
 
 
-def plane(swarms: Sequence[Swarm], x: int, y: int, truth: Array | None = None, trails: Sequence[Array] = ()) -> str:
+def plane(swarms: Sequence[Swarm], x: int, y: int, truth: Array | None = None, trails: Sequence[Array] = ()) -> Html:
     """Candidates as points over k number x and y (0 … 7); ringed: the best; cross: the truth.
 
     trails: for each swarm the way of its best, (m, 8).
@@ -69,7 +70,7 @@ def plane(swarms: Sequence[Swarm], x: int, y: int, truth: Array | None = None, t
     return _picture(parts, _PLANE_HEIGHT)
 
 
-def lines(swarms: Sequence[Swarm], truth: Array | None = None) -> str:
+def lines(swarms: Sequence[Swarm], truth: Array | None = None) -> Html:
     """Candidates as lines across eight upright axes, 0 below and 1 above; bold: the best; green: the truth."""
     low = _LINES_HEIGHT - _BOTTOM - 8
     xs = np.linspace(_LEFT, _WIDTH - _RIGHT - 12, len(NAMES))
@@ -110,11 +111,12 @@ def _grid(right: float, low: float) -> str:
 
 
 def _text(x: float, y: float, text: str, anchor: str, more: str = "") -> str:
-    return f'<text x="{x:.0f}" y="{y:.0f}" text-anchor="{anchor}" {_INK} {more}>{html.escape(text)}</text>'
+    return f'<text x="{x:.0f}" y="{y:.0f}" text-anchor="{anchor}" {_INK} {more}>{escape(text)}</text>'
 
 
-def _picture(parts: Sequence[str], height: int) -> str:
-    return (
+def _picture(parts: Sequence[str], height: int) -> Html:
+    """Parts: drawn from numbers and colours of ours, and from `_text`."""
+    return unescaped(
         f'<div style="padding:0 6px"><svg viewBox="0 0 {_WIDTH} {height}" width="100%" font-size="11" '
         f'font-family="system-ui,sans-serif">{"".join(parts)}</svg></div>'
     )

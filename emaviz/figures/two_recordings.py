@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import html
-
 import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
@@ -15,6 +13,8 @@ from emaviz.colours import DIFFERENCE, MONITOR, REFERENCE
 from emaviz.figures.lines import line
 from emaviz.figures.theme import DARK, LIGHT
 from emaviz.recording.entry import Entry, as_text
+from emaviz.figures.theme import DARK, LIGHT, plain
+from emaviz.page_text import Html, html, joined
 from emaviz.recording.read import IdentificationTrace, Recording
 
 FIRST, SECOND = REFERENCE, MONITOR
@@ -45,7 +45,7 @@ def figure(first: Recording, second: Recording, signal: str, *, dark: bool = Fal
         if residual is not None:
             _add(drawn, 2, residual.time_s, residual.values, f"{name} residual", colour, "solid", 1.2)
         for place, (algorithm, trace) in enumerate(recording.identification.items()):
-            _add_search(drawn, trace, f"{name} {algorithm}", colour, _DASHES[place % len(_DASHES)])
+            _add_search(drawn, trace, plain(f"{name} {algorithm}"), colour, _DASHES[place % len(_DASHES)])
     title, unit = SIGNALS[signal].title, SIGNALS[signal].unit or "-"
     drawn.update_yaxes(title_text=f"{title}<br>[{unit}]", row=1, col=1)
     drawn.update_yaxes(title_text=f"residual<br>[{unit}]", row=2, col=1)
@@ -60,18 +60,18 @@ def figure(first: Recording, second: Recording, signal: str, *, dark: bool = Fal
     return drawn
 
 
-def table(first: Entry, second: Entry) -> str:
+def table(first: Entry, second: Entry) -> Html:
     """HTML: where settings differ, the results, and each k of the best answers."""
     rows = [_row("", _named("A", FIRST), _named("B", SECOND))]
     names = [n for n in dict.fromkeys([*first.settings, *second.settings])]
     for name in names:
         a, b = (as_text(one.settings.get(name, "–")) for one in (first, second))
         if a != b:
-            rows.append(_row(name, html.escape(a), html.escape(b)))
+            rows.append(_row(name, a, b))
     if not any(first.settings.get(n) != second.settings.get(n) for n in names) and names:
         rows.append(_row("settings", "the same", "the same"))
     answers = (first.answer, second.answer)
-    rows.append(_row("algorithm", *(html.escape(one.best or "–") for one in (first, second))))
+    rows.append(_row("algorithm", *(one.best or "–" for one in (first, second))))
     for title, key, form in (
         ("Err [%]", "error_percent", ".2f"),
         ("rmse [A]", "rmse_A", ".4f"),
@@ -84,11 +84,12 @@ def table(first: Entry, second: Entry) -> str:
         cells = ["–" if value is None else f"{value:.3f}" for value in values]
         known = [value for value in values if value is not None]
         apart = len(known) == 2 and abs(known[0] - known[1]) > 0.02
-        mark = f' style="color:{DIFFERENCE};font-weight:600"' if apart else ""
-        rows.append(_row(fault.label, *(f"<span{mark}>{cell}</span>" for cell in cells)))
-    return (
+        mark = html(' style="color:{};font-weight:600"', DIFFERENCE) if apart else ""
+        rows.append(_row(fault.label, *(html("<span{}>{}</span>", mark, cell) for cell in cells)))
+    return html(
         '<div style="padding:4px 10px;font-size:12.5px;font-variant-numeric:tabular-nums">'
-        f'<table style="width:100%;border-collapse:collapse">{"".join(rows)}</table></div>'
+        '<table style="width:100%;border-collapse:collapse">{}</table></div>',
+        joined(rows),
     )
 
 
@@ -111,8 +112,8 @@ def _add_search(drawn: go.Figure, trace: IdentificationTrace, name: str, colour:
     )
 
 
-def _named(name: str, colour: str) -> str:
-    return f'<span style="color:{colour}">{name}</span>'
+def _named(name: str, colour: str) -> Html:
+    return html('<span style="color:{}">{}</span>', colour, name)
 
 
 def _number(answer: dict | None, key: str, form: str) -> str:
@@ -120,7 +121,7 @@ def _number(answer: dict | None, key: str, form: str) -> str:
     return "–" if value is None else f"{value:{form}}"
 
 
-def _row(name: str, a: str, b: str) -> str:
+def _row(name: str, a: str, b: str) -> Html:
     cell = "td" if name else "th"
-    right = 'style="text-align:right;padding:1px 4px;overflow-wrap:anywhere"'
-    return f"<tr><td>{html.escape(name)}</td><{cell} {right}>{a}</{cell}><{cell} {right}>{b}</{cell}></tr>"
+    right = Html('style="text-align:right;padding:1px 4px;overflow-wrap:anywhere"')
+    return html("<tr><td>{}</td><{} {}>{}</{}><{} {}>{}</{}></tr>", name, cell, right, a, cell, cell, right, b, cell)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import html
 import sys
 import threading
 import time
@@ -44,6 +43,7 @@ from emaviz.page.recordings.result import RecordingsResult
 from emaviz.page.recordings.sessions import SessionControls, parts
 from emaviz.page.recordings.tab import RecordingsPanel
 from emaviz.page.server import LOOPBACK, open_server
+from emaviz.page_text import add_html, html, said
 from emaviz.recording.viewer import ViewerHost
 from emaviz.scene.actuator import ActuatorScene
 from emaviz.scene.playback import Playback
@@ -102,7 +102,7 @@ class App:
         for path in given:
             self.comparing.add(data.name_of(path))
         for line in recovered(recordings):
-            self.explore.status.content = line
+            self.explore.status.content = said(line)
         if no_viewer:
             self.server.on_client_connect(lambda _: self.page.notify("The Rerun viewer cannot be shown", no_viewer))
 
@@ -153,7 +153,7 @@ class App:
         ]
         if compare_first:
             builders.insert(0, builders.pop(2))
-        gui.add_html(TABS)
+        add_html(gui, TABS)
         tabs = gui.add_tab_group()
         for build in builders:
             build(tabs)
@@ -183,7 +183,7 @@ class App:
     def _build_explore(self, tabs: viser.GuiTabGroupHandle) -> None:
         with tabs.add_tab("Explore", viser.Icon.ADJUSTMENTS):
             if text := plant.note(self.session.actuator):
-                self.server.gui.add_html(f'<div style="{_NOTE}">{html.escape(text)}</div>')
+                add_html(self.server.gui, html('<div style="{}">{}</div>', _NOTE, text))
             self.explore = ExplorePanel(self.page)
             SealControls(self.page, self.discovering.sealing)
 
@@ -259,7 +259,7 @@ class App:
             self._docked.bring(self.signals_panel)
 
     def _status(self, text: str) -> None:
-        self.explore.status.content = text
+        self.explore.status.content = said(text)
 
     def _told(self, title: str, text: str) -> None:
         self.page.notify(title, text)

@@ -10,6 +10,7 @@ import viser
 from emaviz.page.page import Page
 from emaviz.page.style import STRIP, caption, figures, play_head
 from emaviz.page.style import page as style
+from emaviz.page_text import add_html
 from emaviz.scene.actuator import ActuatorScene
 from emaviz.scene.playback import SPEEDS, Playback
 
@@ -32,7 +33,7 @@ class PlaybackStrip:
         gui = page.server.gui
         self._panel = gui.add_panel()
         with self._panel.add_tab("Playback", viser.Icon.PLAYER_PLAY):
-            gui.add_html(STRIP + style())
+            add_html(gui, STRIP + style())
             self._play = gui.add_button("Pause", icon=viser.Icon.PLAYER_PAUSE)
             self._speed = gui.add_dropdown("Speed", tuple(SPEEDS), initial_value="1 : 10")
             self._moment = gui.add_slider("Moment [s]", 0.0, self._duration_s, _SLOWEST_STEP_S, 0.0)
@@ -40,9 +41,9 @@ class PlaybackStrip:
             self._labels = gui.add_checkbox("Labels", False)
             self._dark = gui.add_checkbox("Dark", False)
             self._view = gui.add_button("Reset view", icon=viser.Icon.FOCUS_CENTERED, color="gray")
-            self._head = gui.add_html("")
-            self._figures = gui.add_html("")
-            self._caption = gui.add_html("")
+            self._head = add_html(gui)
+            self._figures = add_html(gui)
+            self._caption = add_html(gui)
         self._panel.float(x=0, y=-1, width=480)
 
     def connect(self, playback: Playback) -> None:

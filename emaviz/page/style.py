@@ -6,24 +6,25 @@ play-head stays away; nothing else depends on them.
 
 from __future__ import annotations
 
-import html
-
 from emaviz.figures.theme import DARK, MARK
+from emaviz.page_text import Html, html, unescaped
 
-STRIP = '<div class="emaviz-strip"></div>'  # stands in the panel that becomes the strip
-TIME_CHARTS = '<div class="emaviz-time"></div>'  # stands beside charts over time
-LONG_LABELS = '<div class="emaviz-long"></div>'  # stands beside controls with long labels
+STRIP = Html('<div class="emaviz-strip"></div>')  # stands in the panel that becomes the strip
+TIME_CHARTS = Html('<div class="emaviz-time"></div>')  # stands beside charts over time
+LONG_LABELS = Html('<div class="emaviz-long"></div>')  # stands beside controls with long labels
 # stands before the upload button that takes dropped files, which is not to be seen
-DROP = '<div class="emaviz-drop"></div><style>div:has(> .emaviz-drop),div:has(> .emaviz-drop)+div{display:none}</style>'
-WIDE_MODAL = "<style>.mantine-Modal-root{--modal-size:min(960px,92vw)!important}</style>"
+DROP = Html(
+    '<div class="emaviz-drop"></div><style>div:has(> .emaviz-drop),div:has(> .emaviz-drop)+div{display:none}</style>'
+)
+WIDE_MODAL = Html("<style>.mantine-Modal-root{--modal-size:min(960px,92vw)!important}</style>")
 STRIP_HEIGHT_PX = 68
 _ROW_PX = 48
 _LABEL = "> div > .mantine-Flex-root > div:first-child"
 
 
-def page() -> str:
+def page() -> Html:
     """What holds for the whole page."""
-    return (
+    return unescaped(
         "<style>"
         # all tabs of the main panel in one line
         "[data-dock-region=left] [data-dock-tab]{padding-left:7px!important;padding-right:7px!important}"
@@ -32,7 +33,7 @@ def page() -> str:
     )
 
 
-def _strip() -> str:
+def _strip() -> Html:
     """Lays the panel that holds `STRIP` along the bottom of the page, and ends everything else above it."""
     panel = "[data-floating-window]:has(.emaviz-strip)"
     row = f"{panel} div:has(> div > .emaviz-strip)"
@@ -53,30 +54,31 @@ def _strip() -> str:
         f"{row} > div:nth-of-type(4){{flex:1 1 auto}}"
         f"{row} > div:nth-of-type(5){{width:200px}}"
     )
-    return f"<style>@media (min-width: 900px){{{rules}}}</style>"
+    return unescaped(f"<style>@media (min-width: 900px){{{rules}}}</style>")
 
 
-def caption(text: str) -> str:
+def caption(text: str) -> Html:
     """A line of small print at the bottom of the strip."""
-    place = "position:fixed;left:18px;bottom:4px"
-    return f'<div style="{place};font-size:12px;opacity:.7;white-space:nowrap">{html.escape(text)}</div>'
+    return html(
+        '<div style="position:fixed;left:18px;bottom:4px;font-size:12px;opacity:.7;white-space:nowrap">{}</div>', text
+    )
 
 
-def play_head(share: float | None) -> str:
+def play_head(share: float | None) -> Html:
     """An upright line in every chart over time, at a share of its width; None for none."""
     if share is None or not 0.0 <= share <= 1.0:
-        return ""
-    return (
+        return Html()
+    return unescaped(
         "<style>div:has(> div > .emaviz-time) .u-over::after{content:'';position:absolute;top:0;bottom:0;"
         f"left:{100.0 * share:.2f}%;width:1.5px;background:{MARK};pointer-events:none}}</style>"
     )
 
 
-def figures(dark: bool) -> str:
+def figures(dark: bool) -> Html:
     """Text of figures that were drawn for a light page, legible on a dark one."""
     if not dark:
-        return ""
-    return (
+        return Html()
+    return unescaped(
         f"<style>.js-plotly-plot .main-svg text{{fill:{DARK.ink}!important}}.u-title{{color:{DARK.ink}}}"
         ".mantine-Paper-root>.mantine-ActionIcon-root{background:rgba(0,0,0,.4)!important}</style>"
     )

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import html
-
 from ema_model.faults import FAULTS
 from ema_model.identification.run import Identification
 from ema_model.quantities.titles import in_sentence
+from emaviz.page_text import Html, html, joined
 from emaviz.text.run import run_in_words
 
-_BOX = 'style="padding:4px 12px;font-size:13px;line-height:1.45"'
+_BOX = Html('style="padding:4px 12px;font-size:13px;line-height:1.45"')
 _GOOD, _BAD, _WARNING = "#2b8a3e", "#e03131", "#e8590c"
 
 
@@ -21,10 +20,10 @@ def verdict(answer: Identification) -> str:
     return "healthy" if sure.healthy else f"not healthy: {', '.join(sure.alarms) or 'no single k stands out'}"
 
 
-def sure_words(answer: Identification | None) -> str:
+def sure_words(answer: Identification | None) -> Html:
     """HTML below the bars; empty while a search runs."""
     if answer is None:
-        return ""
+        return Html()
     sure = answer.uncertainty
     lines = []
     if not sure.adequate:
@@ -44,14 +43,14 @@ def sure_words(answer: Identification | None) -> str:
     if run := sure.separated_by:
         lines.append(_line(_WARNING, "What would tell more", run_in_words(run.command, run.settings, run.duration_s)))
     if not answer.polished:
-        lines.append(f"<div {_BOX}><span style='opacity:.7'>The intervals are those of a fit from here; the answer of "
-                     "the search alone may lie at their edge.</span></div>")  # fmt: skip
-    return "".join(lines)
+        told = "The intervals are those of a fit from here; the answer of the search alone may lie at their edge."
+        lines.append(html("<div {}><span style='opacity:.7'>{}</span></div>", _BOX, told))
+    return joined(lines)
 
 
 def _named(name: str) -> str:
     return next(f"{fault.name} ({in_sentence(fault.title)})" for fault in FAULTS if fault.name == name)
 
 
-def _line(colour: str, head: str, text: str) -> str:
-    return f'<div {_BOX}><b style="color:{colour}">{html.escape(head)}</b>: {html.escape(text)}</div>'
+def _line(colour: str, head: str, text: str) -> Html:
+    return html('<div {}><b style="color:{}">{}</b>: {}</div>', _BOX, colour, head, text)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import html
 from pathlib import Path
 
 import viser
 
 from emaviz.page.identify.tab import recording_link
 from emaviz.page.page import Page
+from emaviz.page_text import add_html, html
 from emaviz.recording.viewer import ViewerHost
 from emaviz.session.compare.comparing import Comparing
 
@@ -22,7 +22,7 @@ class KeepControls:
         gui = page.server.gui
         report = gui.add_button("Save report", icon=viser.Icon.FILE_TEXT, hint="One HTML file that opens offline")
         record = gui.add_button("Record", icon=viser.Icon.DEVICE_FLOPPY, hint="An .rrd file for the Rerun viewer")
-        self._links = gui.add_html("")
+        self._links = add_html(gui)
 
         def save(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
             self._asked = event.client
@@ -36,7 +36,9 @@ class KeepControls:
         if path.suffix == ".rrd":
             self._links.content = recording_link(self._viewer, path)
             return
-        name = html.escape(self._comparing.folder.name_of(path))
-        self._links.content = f'<div style="padding:2px 10px;font-size:13px">Also kept in the data folder: {name}</div>'
+        name = self._comparing.folder.name_of(path)
+        self._links.content = html(
+            '<div style="padding:2px 10px;font-size:13px">Also kept in the data folder: {}</div>', name
+        )
         if self._asked is not None:
             self._asked.send_file_download(path.name, path.read_bytes(), save_immediately=True)

@@ -13,6 +13,7 @@ from ema_model.quantities.units import known_units
 from ema_model.recordings import SIGNALS, ColumnMapping, MappedColumn
 from emaviz.page.compare.cards import mapping_table
 from emaviz.page.page import Page
+from emaviz.page_text import add_html
 from emaviz.session.compare.comparing import Comparing
 from emaviz.session.opened import Opened
 
@@ -29,7 +30,7 @@ class MappingStep:
         gui = page.server.gui
         self.folder = gui.add_folder("Columns", visible=False)
         with self.folder:
-            self._table = gui.add_html("")
+            self._table = add_html(gui)
             self._column = gui.add_dropdown("Column", [NOT_USED])
             titles = [NOT_USED, *(_title(name) for name in SIGNALS)]
             self._signal = gui.add_dropdown("is", titles)

@@ -23,6 +23,7 @@ from emaviz.figures import (
 )
 from emaviz.page.compare.cards import calibration_table
 from emaviz.page.page import Page
+from emaviz.page_text import add_html
 
 _CONFIG = {"displayModeBar": False}
 _EMPTY = "–"
@@ -78,7 +79,7 @@ class ComparePlots:
             self._why = [self._add(lambda v: explained.figure(v.comparison, highlight=v.region), 0.7)]
         with tabs.add_tab("Fit", viser.Icon.TARGET):
             self._fit = [self._add(lambda v: calibration_scores.figure(v.comparison), 0.8)]
-            self._numbers = gui.add_html("")
+            self._numbers = add_html(gui)
         self._signal.on_update(lambda event: event.client and self._post([*self._time, *self._against, *self._turn]))
         self._variable.on_update(lambda event: event.client and self._post(self._against))
 

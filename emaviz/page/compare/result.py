@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 from collections.abc import Callable
 from typing import Any
 
@@ -14,9 +13,10 @@ from ema_model.recordings import SIGNALS
 from emaviz.figures import mapped_columns
 from emaviz.page.compare.plots import ComparePlots, View
 from emaviz.page.page import Page
+from emaviz.page_text import Html, add_html, html, joined, unescaped
 from emaviz.session.opened import Opened
 
-_BOX = 'style="padding:2px 12px 6px;font-size:13px;line-height:1.45"'
+_BOX = Html('style="padding:2px 12px 6px;font-size:13px;line-height:1.45"')
 _CARD = "height:auto!important;min-height:2em;padding:4px 8px;font-weight:400;font-size:13px;"
 _RESTING = (
     "background:rgba(134,142,150,.13)!important;color:inherit!important;border-left:3px solid rgba(134,142,150,.5);"
@@ -45,12 +45,12 @@ class ResultPanel:
         self._preview: Any = None
         self._buttons: list[Any] = []
         gui = page.server.gui
-        self._headline = gui.add_html(f"<div {_BOX}>Nothing is compared yet: upload a recording.</div>")
+        self._headline = add_html(gui, html("<div {}>Nothing is compared yet: upload a recording.</div>", _BOX))
         self._place = gui.add_folder("Preview of the columns", visible=False)
         self._answer = gui.add_folder("Where the model fails", visible=False)
         with self._answer:
-            self._hint = gui.add_html("")
-            self._style = gui.add_html("")
+            self._hint = add_html(gui)
+            self._style = add_html(gui)
         self._plots_folder = gui.add_folder("Plots", visible=False)
         with self._plots_folder:
             self._recording = gui.add_dropdown("Recording", ["–"], visible=False)
@@ -72,7 +72,7 @@ class ResultPanel:
                 self._preview = self._page.server.gui.add_plotly(figure, config=_CONFIG, aspect=aspect)
         else:
             self._preview.figure, self._preview.aspect = figure, aspect
-        self._headline.content = f"<div {_BOX}><b>{html.escape(opened.path.name)}</b>, as its columns are read</div>"
+        self._headline.content = html("<div {}><b>{}</b>, as its columns are read</div>", _BOX, opened.path.name)
         self._place.visible = True
         self._show_answer(False)
         self._to_front()
@@ -123,7 +123,7 @@ class ResultPanel:
         self._buttons = []
         found = len(comparison.worst_regions)
         text = "Click one: the plots and the actuator go there." if found else "No region stands out of the floor."
-        self._hint.content = f'<div {_BOX}><span style="opacity:.65">{text}</span></div>'
+        self._hint.content = html('<div {}><span style="opacity:.65">{}</span></div>', _BOX, text)
         with self._answer:
             for i, region in enumerate(comparison.worst_regions):
                 button = self._page.server.gui.add_button(
@@ -141,7 +141,7 @@ class ResultPanel:
             colours = _CHOSEN if i == chosen else _RESTING
             rules.append(f"{one}{{{_CARD}{colours}}}{one} .mantine-Button-inner{{justify-content:flex-start}}")
             rules.append(f"{one} .mantine-Button-label{{white-space:normal;text-align:left;line-height:1.3}}")
-        self._style.content = f"<style>{''.join(rules)}</style>"
+        self._style.content = unescaped(f"<style>{''.join(rules)}</style>")
 
     def _fit_playhead(self, recording: int, time_s: float | None = None) -> None:
         assert self._comparison is not None
@@ -179,7 +179,7 @@ def worst_moment(comparison: Comparison, region: Region) -> tuple[int, float]:
     return int(residuals.recording[at]), float(residuals.time_s[at])
 
 
-def headline(comparison: Comparison) -> str:
+def headline(comparison: Comparison) -> Html:
     """The sentences and, for each signal, error against floor."""
     first, *others = comparison.sentences or ("",)
     regions = {region.sentence for region in comparison.worst_regions}  # which stand in their own list
@@ -191,24 +191,40 @@ def headline(comparison: Comparison) -> str:
         ratio = error.rmse / error.noise_floor if error.noise_floor > 0.0 else np.inf
         shade = "#2b8a3e" if ratio < 1.2 else "#e8590c" if ratio < 2.0 else "#e03131"
         before = (
-            f'<td style="text-align:right;opacity:.65">{scale * error.rmse_initial:.3g}</td>'
+            html('<td style="text-align:right;opacity:.65">{:.3g}</td>', scale * error.rmse_initial)
             if comparison.calibration is not None
             else ""
         )
         rows.append(
-            f'<tr><td>{html.escape(signal.title)} [{unit}]</td>{before}<td style="text-align:right">'
-            f'{scale * error.rmse:.3g}</td><td style="text-align:right">{scale * error.noise_floor:.3g}</td>'
-            f'<td style="text-align:right;color:{shade}"><b>{ratio:.2f} ×</b></td></tr>'
+            html(
+                '<tr><td>{} [{}]</td>{}<td style="text-align:right">'
+                '{:.3g}</td><td style="text-align:right">{:.3g}</td>'
+                '<td style="text-align:right;color:{}"><b>{:.2f} ×</b></td></tr>',
+                signal.title,
+                unit,
+                before,
+                scale * error.rmse,
+                scale * error.noise_floor,
+                shade,
+                ratio,
+            )
         )
     heads = ["", *(["before"] if comparison.calibration is not None else []), "error", "floor", "error / floor"]
-    head = "".join(f'<th style="text-align:right;font-weight:400;opacity:.65">{text}</th>' for text in heads)
-    warnings = "".join(f'<div style="color:#e8590c">▲ {html.escape(text)}</div>' for text in comparison.warnings)
+    head = joined(html('<th style="text-align:right;font-weight:400;opacity:.65">{}</th>', text) for text in heads)
+    warnings = joined(html('<div style="color:#e8590c">▲ {}</div>', text) for text in comparison.warnings)
     large = f"font-size:16px;font-weight:600;color:{colour};padding:4px 0"
-    return (
-        f'<div {_BOX}><div style="{large}">{html.escape(first)}</div>'
-        f"{''.join(f'<div>{html.escape(text)}</div>' for text in others if text not in regions)}{warnings}"
+    return html(
+        '<div {}><div style="{}">{}</div>'
+        "{}{}"
         '<table style="width:100%;border-collapse:collapse;margin-top:6px;font-variant-numeric:tabular-nums">'
-        f"<tr>{head}</tr>{''.join(rows)}</table></div>"
+        "<tr>{}</tr>{}</table></div>",
+        _BOX,
+        large,
+        first,
+        joined(html("<div>{}</div>", text) for text in others if text not in regions),
+        warnings,
+        head,
+        joined(rows),
     )
 
 

@@ -16,6 +16,7 @@ from emaviz.page.compare.options import AskedControls
 from emaviz.page.compare.result import ResultPanel
 from emaviz.page.page import Page
 from emaviz.page.style import DROP
+from emaviz.page_text import Html, add_html, said
 from emaviz.session.actuators import UPLOADED
 from emaviz.session.compare.comparing import Comparing
 from emaviz.session.data_folder import ACTUATOR_SUFFIX, CHALLENGE_SUFFIX, SESSION_SUFFIX
@@ -41,17 +42,17 @@ class ComparePanel:
         self._choice = gui.add_dropdown("Data folder", [_NONE])
         add = gui.add_button("Add this file", icon=viser.Icon.PLUS, color="gray")
         with gui.add_folder("Recordings"):
-            self._list = gui.add_html(recordings_list([]))
+            self._list = add_html(gui, recordings_list([]))
             self._which = gui.add_dropdown("Shown", [_NONE], visible=False)
             self._columns = gui.add_button("Columns…", icon=viser.Icon.TABLE, color="gray", visible=False)
             self._remove = gui.add_button("Remove", icon=viser.Icon.X, color="gray", visible=False)
         self._mapping = MappingStep(page, comparing, result.preview)
         self._start = gui.add_button("Compare", icon=viser.Icon.ARROWS_DIFF, disabled=True)
         self._stop = gui.add_button("Stop", icon=viser.Icon.PLAYER_STOP, color="red", disabled=True)
-        self._status = gui.add_markdown("")
+        self._status = add_html(gui)
         self._health_folder = gui.add_folder("Data health", visible=False)
         with self._health_folder:
-            self._health = gui.add_html("")
+            self._health = add_html(gui)
         self.asked = AskedControls(page, comparing, self.uploads)
         add.on_click(lambda _: self._add())
         self._which.on_update(lambda event: event.client and self._post_show(str(self._which.value)))
@@ -69,7 +70,7 @@ class ComparePanel:
 
     def add_drop(self) -> None:
         """An unseen upload button here, outside all tabs: a tab's own is there only once that tab was opened."""
-        self._page.server.gui.add_html(DROP)
+        add_html(self._page.server.gui, DROP)
         self.uploads.add_button("Drop", ",".join((*FORMATS, ACTUATOR_SUFFIX, SESSION_SUFFIX, CHALLENGE_SUFFIX)))
 
     def refresh_files(self) -> None:
@@ -110,7 +111,7 @@ class ComparePanel:
     def _opened(self, opened: Opened) -> None:
         self._show(opened.name)
         if opened.measurement is None:
-            self._say("Check which column is which signal, then press **Use these columns**.")
+            self._say(Html("Check which column is which signal, then press <b>Use these columns</b>."))
             return
         if self._comparing.comparison is None:
             self._result.preview(opened)
@@ -173,7 +174,7 @@ class ComparePanel:
             self._page.notify("One at a time", "An identification is running; stop it first.", "yellow")
 
     def _say(self, text: str) -> None:
-        self._status.content = text
+        self._status.content = said(text)
 
     def _compared(self, comparison: Comparison, elapsed_s: float) -> None:
         self._free()

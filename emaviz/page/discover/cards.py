@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 from collections.abc import Sequence
 
 from ema_model.discovery import Candidate
@@ -10,10 +9,14 @@ from ema_model.discovery.snapshot import Look
 from ema_model.effects import find
 from ema_model.quantities.numbers import Quantity, number
 from ema_model.quantities.titles import in_sentence, parameter_title, unit_of
+from emaviz.figures import quantity
+from emaviz.figures.quantity import number
+from emaviz.page_text import Html, html, unescaped
+from emaviz.session.discover.look import Look
 from emaviz.text.discovery import effect_title
 
-BOX = 'style="padding:2px 12px 6px;font-size:13px;line-height:1.45"'
-DIM = 'style="opacity:.65"'
+BOX = Html('style="padding:2px 12px 6px;font-size:13px;line-height:1.45"')
+DIM = Html('style="opacity:.65"')
 _CARD = (
     "height:auto!important;min-height:2em;padding:5px 9px;font-weight:400;font-size:12.5px;"
     "background-color:rgba(134,142,150,.10)!important;color:inherit!important;"
@@ -24,7 +27,7 @@ _BAR = "rgba(240,140,0,.28)"
 
 
 # Six tabs of the main panel in one line; it stands above them, as a tab's own content is there only once it was seen.
-TABS = (
+TABS = Html(
     "<style>[data-dock-region=left] [data-dock-tab]{padding-left:6px!important;padding-right:6px!important}"
     "[data-dock-region=left] [data-dock-tab] > div:has(svg){display:none!important}"
     "div:has(> .emaviz-tabs){display:none}</style><div class=emaviz-tabs></div>"
@@ -71,7 +74,7 @@ def confidence(one: Candidate) -> str:
     return f"{word} (χ² −{drop:.0f})"
 
 
-def style(look: Look | None, shown: Sequence[tuple[str, Candidate | None]], opened: str | None) -> str:
+def style(look: Look | None, shown: Sequence[tuple[str, Candidate | None]], opened: str | None) -> Html:
     """viser's buttons have one line and one colour; these become cards.  shown: (the button's id, its candidate)."""
     rules = []
     for uuid, one in shown:
@@ -86,9 +89,9 @@ def style(look: Look | None, shown: Sequence[tuple[str, Candidate | None]], open
         rules.append(f"{button} .mantine-Button-inner{{justify-content:flex-start}}")
         rules.append(f"{button} .mantine-Button-label{{{_LABEL}}}{button} .mantine-Button-label::first-line")
         rules.append("{font-weight:600;font-size:13.5px}")
-    return f"<style>{''.join(rules)}</style>"
+    return unescaped(f"<style>{''.join(rules)}</style>")
 
 
-def note(text: str) -> str:
+def note(text: str) -> Html:
     """A line of small print."""
-    return f"<div {BOX}><span {DIM}>{html.escape(text)}</span></div>"
+    return html("<div {}><span {}>{}</span></div>", BOX, DIM, text)

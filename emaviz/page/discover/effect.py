@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 from collections.abc import Callable
 from typing import Any
 
@@ -17,6 +16,7 @@ from ema_model.quantities.titles import in_sentence, parameter_title, unit_of
 from emaviz.figures import signature
 from emaviz.page.discover import cards
 from emaviz.page.page import Page
+from emaviz.page_text import Html, add_html, html, joined
 from emaviz.session.discover.discovering import Discovering
 from emaviz.text.discovery import effect_title
 
@@ -34,10 +34,10 @@ class EffectView:
         gui = page.server.gui
         self._folder = gui.add_folder("Candidate", visible=False)
         with self._folder:
-            self._head = gui.add_html("")
+            self._head = add_html(gui)
             self._add = gui.add_button("Add it to the model", icon=viser.Icon.PLUS)
             self._plot: Any = gui.add_plotly(go.Figure(), config=CONFIG, aspect=0.52, visible=False)
-            self._text = gui.add_html("")
+            self._text = add_html(gui)
             self._close = gui.add_button("Close", icon=viser.Icon.X, color="gray")
 
     def connect(self, ask: Callable[[Callable[[], bool]], None], close: Callable[[], None]) -> None:
@@ -77,38 +77,46 @@ class EffectView:
             self._plot.figure = signature.figure(look, one)
 
 
-def head(look: Look, one: Candidate) -> str:
+def head(look: Look, one: Candidate) -> Html:
     """What adding it is expected to do."""
     if one.untestable_reason:
         why = one.untestable_reason[:1].upper() + one.untestable_reason[1:]
-        return f'<div {cards.BOX}><span style="color:#e8590c">▲ {html.escape(why)}.</span></div>'
+        return html('<div {}><span style="color:#e8590c">▲ {}.</span></div>', cards.BOX, why)
     if not look.is_worth(one):
-        return f"<div {cards.BOX}>Nothing speaks for it: it would take away no more than chance does.</div>"
-    lines = [
-        f"The error would fall from <b>{number(look.rmse)}</b> to about "
-        f"<b>{number(look.predicted_rmse(one))} times the floor</b> ({100.0 * look.share(one):.0f} % of it).",
-        f"Suggested: {html.escape(cards.strength(look, one))}; the refit finds it for good.",
+        return html("<div {}>Nothing speaks for it: it would take away no more than chance does.</div>", cards.BOX)
+    lines: list[str] = [
+        html(
+            "The error would fall from <b>{}</b> to about <b>{} times the floor</b> ({:.0f} % of it).",
+            number(look.rmse),
+            number(look.predicted_rmse(one)),
+            100.0 * look.share(one),
+        ),
+        f"Suggested: {cards.strength(look, one)}; the refit finds it for good.",
     ]
     same = look.assessment.alike.get(one.name, ()) if look.assessment else ()
     if same:
         names = ", ".join(in_sentence(effect_title(name)) for name in same)
-        lines.append(f'<span style="color:#e8590c">▲ These recordings cannot tell it from {html.escape(names)}.</span>')
-    return f"<div {cards.BOX}>{'<br>'.join(lines)}</div>"
+        lines.append(html('<span style="color:#e8590c">▲ These recordings cannot tell it from {}.</span>', names))
+    return html("<div {}>{}</div>", cards.BOX, joined(lines, "<br>"))
 
 
-def about(effect: Effect, equation: bool = True) -> str:
+def about(effect: Effect, equation: bool = True) -> Html:
     """Equation (unless it stands elsewhere), cause, typical size, where it shows, what it is mistaken for."""
     rows = [("Why", effect.explanation), ("Typical", typical(effect)), ("Shows", effect.shows)]
     if effect.mistaken_for:
         rows.append(("Mistaken for", effect.mistaken_for))
     rows.append(("Source", effect.source))
-    table = "".join(
-        f'<tr><td style="opacity:.65;vertical-align:top;padding-right:8px;white-space:nowrap">{title}</td>'
-        f"<td>{html.escape(text)}</td></tr>"
+    table = joined(
+        html(
+            '<tr><td style="opacity:.65;vertical-align:top;padding-right:8px;white-space:nowrap">{}</td>'
+            "<td>{}</td></tr>",
+            title,
+            text,
+        )
         for title, text in rows
     )
-    written = f'<div style="font-family:serif;font-size:17px;padding:4px 0 6px">{html.escape(effect.equation)}</div>'
-    return f"<div {cards.BOX}>{written if equation else ''}<table>{table}</table></div>"
+    written = html('<div style="font-family:serif;font-size:17px;padding:4px 0 6px">{}</div>', effect.equation)
+    return html("<div {}>{}<table>{}</table></div>", cards.BOX, written if equation else "", table)
 
 
 def typical(effect: Effect) -> str:

@@ -9,42 +9,49 @@ import viser
 from ema_model.discovery.snapshot import AT_FLOOR, Look
 from ema_model.quantities.numbers import number
 from emaviz.page.page import Page
+from emaviz.page_text import Html, add_html, html, said
 from emaviz.session.discover.discovering import Discovering
 from emaviz.text.discovery import effect_title
 
 STEPS = 6
 
 
-def step(look: Look | None, running: bool, opened: str | None, revealed: bool) -> tuple[int, str]:
+def step(look: Look | None, running: bool, opened: str | None, revealed: bool) -> tuple[int, Html]:
     """The number of the step, 1 … STEPS, and what to do."""
     if look is None and not running:
-        return 1, "Read the challenge's story below. Then press **Start**: the model is calibrated to the recordings."
+        return 1, Html(
+            "Read the challenge's story below. Then press <b>Start</b>: the model is calibrated to the recordings."
+        )
     if look is None or look.assessment is None:
-        return 2, (
+        return 2, Html(
             "The model's parameters move within their tolerances until it fits as well as it can; then every effect "
             "of the library is held against what is left. This takes some seconds."
         )
     if not look.added and opened is None:
-        return 3, (
-            f"Even calibrated, the error is **{number(look.rmse)} times the floor**: physics is missing. "
-            "Click the **first card** below: its bar is the share of the error that it would take away."
+        return 3, html(
+            "Even calibrated, the error is <b>{} times the floor</b>: physics is missing. "
+            "Click the <b>first card</b> below: its bar is the share of the error that it would take away.",
+            number(look.rmse),
         )
     if not look.added:
         name = effect_title(opened or "")
-        return 4, (
-            f"On the right, {name.lower()} would follow the orange line, and the blue points are what the model lacks. "
-            "Where the two lie together, this is it. Press **Add it to the model**."
+        return 4, html(
+            "On the right, {} would follow the orange line, and the blue points are what the model lacks. "
+            "Where the two lie together, this is it. Press <b>Add it to the model</b>.",
+            name.lower(),
         )
     if look.rmse > AT_FLOOR:
-        return 5, "The ladder fell, but not to the floor. Take the step back with **Undo**, or add the next card."
-    if not revealed:
-        return 5, (
-            "The ladder on the right has fallen **to the floor**, on the recording that was not fitted as well. "
-            "Press **Reveal the truth** on the right to compare."
+        return 5, Html(
+            "The ladder fell, but not to the floor. Take the step back with <b>Undo</b>, or add the next card."
         )
-    return 6, (
+    if not revealed:
+        return 5, Html(
+            "The ladder on the right has fallen <b>to the floor</b>, on the recording that was not fitted as well. "
+            "Press <b>Reveal the truth</b> on the right to compare."
+        )
+    return 6, Html(
         "That is the whole story: see where a model fails, learn what is missing, add it, watch the error fall. "
-        "Choose the next challenge, or open recordings of your own on **Compare**."
+        "Choose the next challenge, or open recordings of your own on <b>Compare</b>."
     )
 
 
@@ -59,7 +66,7 @@ class Guide:
         self._offer = gui.add_button("Guided first challenge", icon=viser.Icon.SCHOOL, hint="About three minutes")
         self._folder = gui.add_folder("Guide", visible=False)
         with self._folder:
-            self._text = gui.add_markdown("")
+            self._text = add_html(gui)
             end = gui.add_button("Leave the guide", icon=viser.Icon.X, color="gray")
         self._offer.on_click(lambda _: page.screen.post("guide", self._start))
         end.on_click(lambda _: page.screen.post("guide", self._end))
@@ -77,7 +84,7 @@ class Guide:
         if self._on:
             look, opened = self._last
             at, text = step(look, self._discovering.running, opened, self._discovering.source.revealed)
-            line = f"**Step {at} of {STEPS}.** {text}"
+            line = said(html("<b>Step {} of {}.</b> {}", at, STEPS, text))
             if self._text.content != line:
                 self._text.content = line
 

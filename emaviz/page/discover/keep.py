@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import html
 from pathlib import Path
 
 import viser
 
 from emaviz.page.identify.tab import recording_link
 from emaviz.page.page import Page
+from emaviz.page_text import add_html, html
 from emaviz.recording.viewer import ViewerHost
 from emaviz.session.discover.discovering import Discovering
 
@@ -27,7 +27,7 @@ class DiscoveryKeep:
         ):
             button = gui.add_button(label, icon=icon, hint=hint)
             button.on_click(lambda event, suffix=suffix: self._ask(event.client, suffix))
-        self._links = gui.add_html("")
+        self._links = add_html(gui)
         events = discovering.events
         events.kept.append(lambda path: page.screen.post(f"kept {path.suffix}", lambda: self._kept(path)))
         events.verified.append(lambda path, text: page.screen.post("verified", lambda: self._name(path, text)))
@@ -46,5 +46,7 @@ class DiscoveryKeep:
 
     def _name(self, path: Path, text: str) -> None:
         """Where a file is kept, and what is to be said of it."""
-        name = html.escape(", ".join(filter(None, (self._discovering.folder.name_of(path), text))))
-        self._links.content = f'<div style="padding:2px 10px;font-size:13px">Also kept in the data folder: {name}</div>'
+        name = ", ".join(filter(None, (self._discovering.folder.name_of(path), text)))
+        self._links.content = html(
+            '<div style="padding:2px 10px;font-size:13px">Also kept in the data folder: {}</div>', name
+        )

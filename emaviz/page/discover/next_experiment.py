@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import io
 from collections.abc import Callable
 from typing import Any
@@ -15,6 +14,7 @@ from ema_model.discovery.result import Experiment
 from ema_model.discovery.snapshot import Look
 from emaviz.page.discover import cards
 from emaviz.page.page import Page
+from emaviz.page_text import add_html, html, joined
 from emaviz.session.discover.discovering import Discovering
 from emaviz.text.discovery import next_experiment
 
@@ -30,7 +30,7 @@ class NextTest:
         gui = page.server.gui
         self._folder = gui.add_folder("Try this test next", visible=False)
         with self._folder:
-            self._text = gui.add_html(cards.note(_ASK))
+            self._text = add_html(gui, cards.note(_ASK))
             self._find = gui.add_button("Find the best test", icon=viser.Icon.FLASK)
             self._load = gui.add_button("Load it into Explore", icon=viser.Icon.ADJUSTMENTS, visible=False)
             self._csv = gui.add_button(
@@ -55,8 +55,8 @@ class NextTest:
         self._load.visible = self._csv.visible = bool(told)
         self._find.color = "gray" if told else None
         if told:
-            more = "".join(f"<div>{html.escape(text)}</div>" for text in told[1:])
-            self._text.content = f"<div {cards.BOX}><b>{html.escape(told[0])}</b>{more}</div>"
+            more = joined(html("<div>{}</div>", text) for text in told[1:])
+            self._text.content = html("<div {}><b>{}</b>{}</div>", cards.BOX, told[0], more)
         else:
             self._text.content = cards.note(_ASK)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import threading
 from collections.abc import Callable
 from typing import Any
@@ -19,6 +18,7 @@ from emaviz.figures import signature
 from emaviz.page.discover import cards
 from emaviz.page.discover.sliders import ParameterSliders
 from emaviz.page.page import Page
+from emaviz.page_text import Html, add_html, html, joined
 from emaviz.session.discover.discovering import Discovering
 from emaviz.session.discover.own_effect import Preview, Typed, typed
 
@@ -39,11 +39,11 @@ class OwnEffect:
         gui = page.server.gui
         self._folder = gui.add_folder("Your own effect", visible=False, expand_by_default=False)
         with self._folder:
-            gui.add_html(_help())
+            add_html(gui, _help())
             self._text = gui.add_text("T [N·m] =", "", hint=f"For example {_EXAMPLE}")
-            self._checked = gui.add_html("")
+            self._checked = add_html(gui)
             self._sliders = ParameterSliders(page, self._preview)
-            self._said = gui.add_html("")
+            self._said = add_html(gui)
             self._plot: Any = gui.add_plotly(go.Figure(), config=_CONFIG, aspect=0.7, visible=False)
             self._add = gui.add_button("Fit it in the model", icon=viser.Icon.PLUS, disabled=True)
             self._curve = gui.add_button(
@@ -92,8 +92,9 @@ class OwnEffect:
         """Reads the text as it stands; on the screen's thread."""
         self._typed = typed(str(self._text.value))
         colour = "#2b8a3e" if self._typed.expression else "#e03131"
-        line = html.escape(self._typed.line)
-        self._checked.content = f'<div {cards.BOX}><span style="color:{colour}">{line}</span></div>'
+        self._checked.content = html(
+            '<div {}><span style="color:{}">{}</span></div>', cards.BOX, colour, self._typed.line
+        )
         self._sliders.list(self._typed.expression.parameters if self._typed.expression else ())
         self._hide("")
         self._enable()
@@ -131,23 +132,24 @@ class OwnEffect:
             self._plot.figure = signature.figure(found.look, found.candidate)
             self._plot.visible = True
             change = f"{shown(found.look.rmse)} → ≈ {shown(found.rmse)} × floor"
-            self._said.content = f"<div {cards.BOX}>With these values, before any fit: error {change}.</div>"
+            self._said.content = html("<div {}>With these values, before any fit: error {}.</div>", cards.BOX, change)
 
     def _hide(self, why: str) -> None:
         self._plot.visible = False
-        self._said.content = (
-            f'<div {cards.BOX}><span style="color:#e8590c">{html.escape(why)}</span></div>' if why else ""
-        )
+        self._said.content = html('<div {}><span style="color:#e8590c">{}</span></div>', cards.BOX, why) if why else ""
 
     def _begin(self) -> bool:
         return self._discovering.add_own(self._effect(), self._sliders.values)
 
 
-def _help() -> str:
-    rows = "".join(f"<div><code>{name}</code> {html.escape(meaning)}</div>" for name, meaning in VARIABLES.items())
+def _help() -> Html:
+    rows = joined(html("<div><code>{}</code> {}</div>", name, meaning) for name, meaning in VARIABLES.items())
     functions = ", ".join(FUNCTIONS)
-    return (
-        f"<div {cards.BOX}>A torque at the motor's shaft, in N·m; positive drives it on. Every other name is a "
-        f'parameter, and is fitted.<details><summary style="cursor:pointer">What can be used</summary>{rows}'
-        f"<div><code>pi</code>, + − * / ** and {functions}</div></details></div>"
+    return html(
+        "<div {}>A torque at the motor's shaft, in N·m; positive drives it on. Every other name is a "
+        'parameter, and is fitted.<details><summary style="cursor:pointer">What can be used</summary>{}'
+        "<div><code>pi</code>, + − * / ** and {}</div></details></div>",
+        cards.BOX,
+        rows,
+        functions,
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 from collections.abc import Callable
 from typing import Any
 
@@ -22,10 +21,11 @@ from emaviz.page.discover.effect import CONFIG, EffectView
 from emaviz.page.discover.next_experiment import NextTest
 from emaviz.page.discover.reveal import reveal
 from emaviz.page.page import Page
+from emaviz.page_text import Html, add_html, html, joined
 from emaviz.session.discover.discovering import Discovering
 from emaviz.text.discovery import FLOOR_NOTE, headline, sentences
 
-_RESTING = (
+_RESTING = Html(
     "Choose recordings on the left, and press <b>Start</b>: the model is calibrated, and what it leaves is held "
     "against every effect of the library."
 )
@@ -50,16 +50,16 @@ class DiscoveryPanel:
         self._look: Look | None = None
         self._titles: dict[str, str] = {}
         gui = page.server.gui
-        self._headline = gui.add_html(f"<div {cards.BOX}>{_RESTING}</div>")
+        self._headline = add_html(gui, html("<div {}>{}</div>", cards.BOX, _RESTING))
         self._ladder: Any = gui.add_plotly(go.Figure(), config=CONFIG, aspect=0.5, visible=False)
         self._effect = EffectView(page, discovering)
         self._truth_folder = gui.add_folder("The challenge's truth", visible=False)
         with self._truth_folder:
             self._reveal = gui.add_button("Reveal the truth", icon=viser.Icon.EYE, color="gray")
-            self._truth = gui.add_html("")
+            self._truth = add_html(gui)
         self._model_folder = gui.add_folder("The improved model", visible=False)
         with self._model_folder:
-            self._equation = gui.add_html("")
+            self._equation = add_html(gui)
         self._before_folder = gui.add_folder("Before and after", visible=False)
         with self._before_folder:
             self._recording = gui.add_dropdown("Recording", ["–"])
@@ -107,12 +107,12 @@ class DiscoveryPanel:
         if not self._discovering.source.revealed:
             self._truth.content = ""
         if look is None:
-            self._headline.content = f"<div {cards.BOX}>{_RESTING}</div>"
+            self._headline.content = html("<div {}>{}</div>", cards.BOX, _RESTING)
             return
         found = look.found
         self._headline.content = answer(look)
         self._ladder.figure = error_ladder.figure(found)
-        self._equation.content = f"<div {cards.BOX}>{equation(found, look.added)}</div>"
+        self._equation.content = html("<div {}>{}</div>", cards.BOX, equation(found, look.added))
         named = all(one.name in CATALOGUE for one in look.added)
         self._left_folder.label = "What is left" if named else "What had no name"
         if self._left_folder.visible:
@@ -162,7 +162,7 @@ class DiscoveryPanel:
                 tell()
 
 
-def answer(look: Look) -> str:
+def answer(look: Look) -> Html:
     """The verdict in words, its warnings, and what 1 means."""
     found = look.found
     done = look.rmse <= AT_FLOOR
@@ -175,11 +175,16 @@ def answer(look: Look) -> str:
     else:
         first, others = headline(found), sentences(found)
     colour = "#2b8a3e" if done else "#e03131"
-    warnings = "".join(f'<div style="color:#e8590c">▲ {html.escape(text)}</div>' for text in found.warnings)
-    note = html.escape(FLOOR_NOTE, quote=True)
-    return (
-        f'<div {cards.BOX}><div style="font-size:16px;font-weight:600;color:{colour};padding:2px 0">'
-        f"{html.escape(first)}</div>{''.join(f'<div>{html.escape(text)}</div>' for text in others)}{warnings}"
-        f'<div style="opacity:.65;font-size:12px" title="{note}">The floor is what noise and the model\'s own limits '
-        f"leave: 1 on the ladder.</div></div>"
+    warnings = joined(html('<div style="color:#e8590c">▲ {}</div>', text) for text in found.warnings)
+    return html(
+        '<div {}><div style="font-size:16px;font-weight:600;color:{};padding:2px 0">'
+        "{}</div>{}{}"
+        '<div style="opacity:.65;font-size:12px" title="{}">The floor is what noise and the model\'s own limits '
+        "leave: 1 on the ladder.</div></div>",
+        cards.BOX,
+        colour,
+        first,
+        joined(html("<div>{}</div>", text) for text in others),
+        warnings,
+        FLOOR_NOTE,
     )

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import html
-
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -15,6 +13,7 @@ from ema_model.faults import BY_NAME, NAMES, sentences
 from ema_model.quantities.numbers import Quantity, number
 from ema_model.quantities.titles import in_sentence, parameter_title, unit_of
 from emaviz.page.discover.cards import BOX
+from emaviz.page_text import Html, html, joined
 from emaviz.text.discovery import effect_title, fitted_of, value
 
 _GOOD, _BAD = "#2b8a3e", "#e03131"
@@ -43,7 +42,7 @@ def _invented(truth: Truth, found: Discovery) -> list[str]:
     return [name for name in found.faults if name not in truth.faults and name != "k7"]
 
 
-def _fault(fault: str, k: ArrayLike, found: Discovery) -> str:
+def _fault(fault: str, k: ArrayLike, found: Discovery) -> Html:
     index = NAMES.index(fault)
     what = f"{in_sentence(BY_NAME[fault].title)} fault: {sentences(k, found.plant.actuator)[index]}"
     if fault in found.faults:
@@ -55,7 +54,7 @@ def _fault(fault: str, k: ArrayLike, found: Discovery) -> str:
     return _row(good, what, "its parameter is outside its tolerance" if good else "not found; try Identify")
 
 
-def reveal(truth: Truth, found: Discovery, added: tuple[Added, ...]) -> str:
+def reveal(truth: Truth, found: Discovery, added: tuple[Added, ...]) -> Html:
     """The truth in words, then effect by effect."""
     good = agrees(truth, found, added)
     verdict = "Your answer agrees." if good else "Your answer differs."
@@ -80,11 +79,11 @@ def reveal(truth: Truth, found: Discovery, added: tuple[Added, ...]) -> str:
             rows.append(_row(False, in_sentence(effect_title(one.name)), why))
     if not rows:
         rows.append(_row(True, "nothing is hidden", "and you added nothing"))
-    head = f'<div style="font-size:16px;font-weight:600;color:{_GOOD if good else _BAD}">{verdict}</div>'
-    return f"<div {BOX}>{head}<div>{html.escape(truth.answer)}</div>{''.join(rows)}</div>"
+    head = html('<div style="font-size:16px;font-weight:600;color:{}">{}</div>', _GOOD if good else _BAD, verdict)
+    return html("<div {}>{}<div>{}</div>{}</div>", BOX, head, truth.answer, joined(rows))
 
 
-def _effect(name: str, given: dict[str, float], found: Discovery, added: tuple[Added, ...]) -> str:
+def _effect(name: str, given: dict[str, float], found: Discovery, added: tuple[Added, ...]) -> Html:
     title = in_sentence(effect_title(name))
     order = given.get("order")
     own = [one for one in added if one.name == name]
@@ -107,9 +106,12 @@ def _effect(name: str, given: dict[str, float], found: Discovery, added: tuple[A
     return _row(near and (order is None or one.chosen.get("order") == order), title, told)
 
 
-def _row(good: bool | None, what: str, how: str) -> str:
+def _row(good: bool | None, what: str, how: str) -> Html:
     mark, colour = ("•", "inherit") if good is None else ("✓", _GOOD) if good else ("✗", _BAD)
-    return (
-        f'<div style="padding-top:3px"><span style="color:{colour}"><b>{mark}</b></span> '
-        f"<b>{html.escape(what[:1].upper() + what[1:])}</b>: {html.escape(how)}</div>"
+    return html(
+        '<div style="padding-top:3px"><span style="color:{}"><b>{}</b></span> <b>{}</b>: {}</div>',
+        colour,
+        mark,
+        what[:1].upper() + what[1:],
+        how,
     )

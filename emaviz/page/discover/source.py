@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ from ema_model.challenges import Challenge
 from ema_model.discovery.snapshot import Look
 from emaviz.page.discover import cards
 from emaviz.page.page import Page
+from emaviz.page_text import Html, add_html, html
 from emaviz.session.data_folder import CHALLENGE_SUFFIX
 from emaviz.session.discover.discovering import Discovering
 from emaviz.session.discover.source import COMPARED
@@ -46,7 +46,7 @@ class SourceControls:
         gui, post = page.server.gui, page.screen.post
         self._source = gui.add_dropdown("Recordings", tuple(self._names), hint="Of Compare, or of a challenge")
         uploads.add_button("Open a sealed challenge", CHALLENGE_SUFFIX, icon=viser.Icon.LOCK_OPEN, color="gray")
-        self._about = gui.add_html("")
+        self._about = add_html(gui)
         self._held = gui.add_folder("Hold out, to judge by", visible=False, expand_by_default=False)
         self._boxes: list[Any] = []
         self._source.on_update(lambda event: event.client and post("source", self._take))
@@ -135,12 +135,13 @@ class SourceControls:
         self._shown()
 
 
-def about(challenge: Challenge, folded: bool) -> str:
+def about(challenge: Challenge, folded: bool) -> Html:
     """Title, story and recordings; folded once they are read, as the cards want their place."""
-    title, story = html.escape(challenge.title), html.escape(challenge.story)
     files = f"Fitted: {', '.join(p.stem for p in challenge.training)}. "
     files += f"Held out: {', '.join(p.stem for p in challenge.holdout)}."
-    told = f"<b>{title}.</b> {story}<div {cards.DIM}>{html.escape(files)}</div>"
+    told = html("<b>{}.</b> {}<div {}>{}</div>", challenge.title, challenge.story, cards.DIM, files)
     if folded:
-        told = f'<details><summary style="cursor:pointer"><b>{title}</b>: the story</summary>{told}</details>'
-    return f"<div {cards.BOX}>{told}</div>"
+        told = html(
+            '<details><summary style="cursor:pointer"><b>{}</b>: the story</summary>{}</details>', challenge.title, told
+        )
+    return html("<div {}>{}</div>", cards.BOX, told)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 from collections.abc import Callable
 from typing import Any
 
@@ -18,6 +17,7 @@ from emaviz.page.discover.own_effect import OwnEffect
 from emaviz.page.discover.result import DiscoveryPanel
 from emaviz.page.discover.source import SourceControls
 from emaviz.page.page import Page
+from emaviz.page_text import add_html, html
 from emaviz.session.discover.discovering import Discovering
 from emaviz.session.uploads import Uploads
 from emaviz.text.discovery import effect_title
@@ -39,15 +39,15 @@ class DiscoverPanel:
         self._start = gui.add_button("Start", icon=viser.Icon.PLAYER_PLAY)
         self._stop = gui.add_button("Stop", icon=viser.Icon.PLAYER_STOP, color="red", visible=False)
         self._bar = gui.add_progress_bar(100.0, animated=True, visible=False)
-        self._status = gui.add_html("")
+        self._status = add_html(gui)
         self._cards_folder = gui.add_folder("What may be missing", visible=False)
         with self._cards_folder:
-            self._style = gui.add_html("")
-            self._hint = gui.add_html("")
+            self._style = add_html(gui)
+            self._hint = add_html(gui)
             self._worth = [self._slot() for _ in range(8)]
         self._steps = gui.add_folder("The model so far", visible=False)
         with self._steps:
-            self._model = gui.add_html("")
+            self._model = add_html(gui)
             self._removes = [
                 gui.add_button("Remove", icon=viser.Icon.X, color="gray", visible=False) for _ in range(_MOST_ADDED)
             ]
@@ -138,7 +138,7 @@ class DiscoverPanel:
             self._say_plain(f"{self._title}{said} … {seconds:.0f} s")
 
     def _say_plain(self, text: str) -> None:
-        self._status.content = f"<div {cards.BOX}>{html.escape(text)}</div>"
+        self._status.content = html("<div {}>{}</div>", cards.BOX, text)
 
     def _stopping(self) -> None:
         self._discovering.stop()
@@ -181,9 +181,12 @@ class DiscoverPanel:
         if look is not None:
             last = look.found.ladder[-1]
             held = "" if last.holdout_rmse is None else f", held out {number(last.holdout_rmse)} ×"
-            self._model.content = (
-                f"<div {cards.BOX}>Error: <b>{number(last.rmse)} × the floor</b>{held}"
-                f"{', with ' + str(len(added)) + ' added' if added else ', calibrated'}.</div>"
+            self._model.content = html(
+                "<div {}>Error: <b>{} × the floor</b>{}{}.</div>",
+                cards.BOX,
+                number(last.rmse),
+                held,
+                ", with " + str(len(added)) + " added" if added else ", calibrated",
             )
 
     def _slot(self) -> Any:

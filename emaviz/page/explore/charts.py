@@ -12,6 +12,7 @@ from emaviz.figures.run_metrics import differences, metrics, table
 from emaviz.figures.signals import PHASE_SIGNALS, LivePhases, LiveSignals
 from emaviz.page.page import Page
 from emaviz.page.style import TIME_CHARTS
+from emaviz.page_text import add_html
 from emaviz.session.session import Simulation
 from emaviz.session.worker import Worker
 
@@ -26,7 +27,7 @@ class ChartsPanel:
         self._window = (0.0, 1.0)  # shares of the run
         gui = page.server.gui
         with panel.add_tab("Signals", viser.Icon.CHART_LINE):
-            gui.add_html(TIME_CHARTS)
+            add_html(gui, TIME_CHARTS)
             # Above the charts, which fill the panel.
             self._freeze = gui.add_button(
                 "Freeze this run", icon=viser.Icon.SNOWFLAKE, color="gray", hint="Keeps it as a dashed line"
@@ -37,10 +38,10 @@ class ChartsPanel:
                 "Shown [%]", 0, 100, 1, (0, 100), min_range=1, hint="Of the run; zooms all charts, in full resolution"
             )
         with panel.add_tab("Phases", viser.Icon.WAVE_SINE):
-            gui.add_html(TIME_CHARTS)
+            add_html(gui, TIME_CHARTS)
             self._phases = LivePhases(gui)
         with panel.add_tab("Metrics", viser.Icon.TABLE):
-            self._table: Any = gui.add_html("")
+            self._table: Any = add_html(gui)
         with panel.add_tab("Export", viser.Icon.DOWNLOAD):
             export()
         self._range.on_update(lambda _: page.screen.post("window", self._zoom))

@@ -13,6 +13,7 @@ from ema_model.recordings import write_measurement
 from emaviz.figures import run_signals
 from emaviz.page.page import Page
 from emaviz.page.style import WIDE_MODAL
+from emaviz.page_text import add_html
 from emaviz.scene.actuator import ActuatorScene
 from emaviz.scene.playback import Playback
 from emaviz.session.session import Simulation
@@ -79,7 +80,7 @@ class ExportControls:
         saved = {"format": "png", "filename": _NAME, "width": 1200, "height": 1000, "scale": 2}
         modal = client.gui.add_modal("Plot")
         with modal:
-            client.gui.add_html(WIDE_MODAL)
+            add_html(client.gui, WIDE_MODAL)
             client.gui.add_plotly(
                 figure,
                 config={"displayModeBar": True, "displaylogo": False, "toImageButtonOptions": saved},

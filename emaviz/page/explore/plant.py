@@ -10,6 +10,7 @@ import viser
 from ema_model.effects import CATALOGUE, find
 from ema_model.quantities.titles import labelled
 from emaviz.page.page import Page
+from emaviz.page_text import Html, add_html, html, said
 
 _NONE = "–"
 
@@ -51,13 +52,16 @@ class PlantControls:
             )
         self._folder = gui.add_folder("Hidden effects", expand_by_default=False)
         with self._folder:
-            gui.add_html(
-                '<div style="font-size:12px;opacity:.75;padding:0 10px">They act in the plant only, so the monitor '
-                "fails where they matter. The first use of each combination is compiled, which takes seconds.</div>"
+            add_html(
+                gui,
+                Html(
+                    '<div style="font-size:12px;opacity:.75;padding:0 10px">They act in the plant only, so the monitor '
+                    "fails where they matter. The first use of each combination is compiled, which takes seconds.</div>"
+                ),
             )
             self._titles = {effect.title: name for name, effect in CATALOGUE.items()}
             self._choice = gui.add_dropdown("Effect", (_NONE, *self._titles), initial_value=_NONE)
-            self._about = gui.add_markdown("", visible=False)
+            self._about = add_html(gui, visible=False)
             self._add = gui.add_button("Hide it in the plant", icon=viser.Icon.PLUS, color="gray", disabled=True)
         self._shown: dict[str, Any] = {}
         self._choice.on_update(lambda event: event.client and page.screen.post("effect", self._chosen))
@@ -69,7 +73,7 @@ class PlantControls:
         self._about.visible = name is not None
         if name is not None:
             effect = CATALOGUE[name]
-            self._about.content = f"{effect.explanation}\n\n*Shows:* {effect.shows}"
+            self._about.content = said(html("{}<br><i>Shows:</i> {}", effect.explanation, effect.shows))
 
     def _hide(self) -> None:
         name = self._titles.get(str(self._choice.value))

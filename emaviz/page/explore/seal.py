@@ -9,6 +9,7 @@ import viser
 
 from emaviz.page.discover import cards
 from emaviz.page.page import Page
+from emaviz.page_text import add_html
 from emaviz.session.discover.sealing import Sealing
 
 _TEXT = (
@@ -29,7 +30,7 @@ class SealControls:
         self._button = gui.add_button(
             "Seal as a challenge…", icon=viser.Icon.LOCK, color="gray", hint="One file for a colleague to solve"
         )
-        self._status = gui.add_html("")
+        self._status = add_html(gui)
         self._button.on_click(lambda event: self._ask(event.client))
         events = sealing.events
         events.said.append(lambda text: page.screen.post("sealing", lambda: self._say(text)))

@@ -18,6 +18,7 @@ from emaviz.page.explore.plant import PlantControls
 from emaviz.page.explore.presets import CUSTOM, PRESETS, name_of
 from emaviz.page.page import Page
 from emaviz.page.style import LONG_LABELS
+from emaviz.page_text import add_html, said
 from emaviz.session.settings import MONITORS
 
 _DECIMALS = 6  # that a command's settings may have
@@ -30,10 +31,10 @@ class ExplorePanel:
         self._page = page
         self._reads: list[tuple[Any, Callable[[], Any]]] = []  # controls, and what the session holds for them
         gui = page.server.gui
-        self.status = gui.add_markdown("Starting…")
+        self.status = add_html(gui, said("Starting…"))
         self.start = StartHere(page)
         with gui.add_folder("Faults of the plant"):
-            gui.add_html(LONG_LABELS)
+            add_html(gui, LONG_LABELS)
             known = name_of(page.session.settings.k)
             self._preset = gui.add_dropdown("Preset", (*PRESETS, CUSTOM), initial_value=known)
             self._sliders = [self._fault(i) for i in range(len(FAULTS))]

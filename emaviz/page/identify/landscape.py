@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 from collections.abc import Mapping
 from typing import Any
 
@@ -16,6 +15,7 @@ from ema_model.identification.run import ALGORITHMS
 from emaviz.figures import landscape as drawn
 from emaviz.page.identify.swarm import telling
 from emaviz.page.page import Page
+from emaviz.page_text import Html, add_html, html, joined
 from emaviz.session.race import Race
 from emaviz.session.worker import Steps, Worker
 
@@ -23,7 +23,7 @@ _BEST = "the answer"
 _WHOLE, _CLOSE = "all of 0 … 1", "close to it"
 _NAMES = tuple(fault.label for fault in FAULTS)
 _CONFIG = {"displayModeBar": False, "responsive": False}
-_BOX = 'style="padding:2px 12px;font-size:12.5px;line-height:1.45"'
+_BOX = Html('style="padding:2px 12px;font-size:12.5px;line-height:1.45"')
 
 
 class LandscapeView:
@@ -44,9 +44,9 @@ class LandscapeView:
         self._draw = gui.add_button("Draw the landscape", icon=viser.Icon.MAP_2, disabled=True)
         self._halt = gui.add_button("Stop drawing", icon=viser.Icon.PLAYER_STOP, color="red", visible=False)
         self._bar = gui.add_progress_bar(0.0, visible=False)
-        self._said = gui.add_html(_note("Once something is identified, its cost over two k can be drawn here."))
+        self._said = add_html(gui, _note("Once something is identified, its cost over two k can be drawn here."))
         self._place = gui.add_folder("Map", visible=False)
-        self._words = gui.add_html("")
+        self._words = add_html(gui)
         for entry in (self._x, self._y):
             entry.on_update(lambda event: event.client and self._chosen())
         self._draw.on_click(lambda _: page.screen.post("landscape", self._begin))
@@ -156,7 +156,7 @@ class LandscapeView:
         range_ = f" From {known.min():.3g} to {known.max():.3g} A." if len(known) else ""
         self._said.content = _note(f"{stopped}Held: {held}.{range_}")
         said = drawn.sentences(self._ways)
-        self._words.content = "".join(f"<div {_BOX}>{html.escape(line)}</div>" for line in said)
+        self._words.content = joined(html("<div {}>{}</div>", _BOX, line) for line in said)
 
     def _busy(self, busy: bool) -> None:
         with self._page.server.atomic():
@@ -169,5 +169,5 @@ def ends(race: Race) -> dict[str, np.ndarray]:
     return {name: track.last.k for name, track in race.tracks.items() if track.last is not None}
 
 
-def _note(text: str) -> str:
-    return f"<div {_BOX}>{html.escape(text)}</div>"
+def _note(text: str) -> Html:
+    return html("<div {}>{}</div>", _BOX, text)

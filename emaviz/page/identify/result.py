@@ -18,6 +18,7 @@ from emaviz.figures.identified_table import Row, table
 from emaviz.page.identify.landscape import LandscapeView
 from emaviz.page.identify.swarm import SwarmView
 from emaviz.page.page import Page
+from emaviz.page_text import add_html
 from emaviz.session.race import Race
 from emaviz.session.worker import Worker
 from emaviz.text.identification import sure_words
@@ -47,8 +48,8 @@ class IdentifyResult:
             self._swarm = SwarmView(page)
         with panel.add_tab("Answer", viser.Icon.TARGET_ARROW):
             self._whose = gui.add_dropdown("Whose", (_BEST, *ALGORITHMS.values()))
-            self._bars = gui.add_html(fault_bars(HEALTHY, page.session.actuator))
-            self._sure = gui.add_html("")
+            self._bars = add_html(gui, fault_bars(HEALTHY, page.session.actuator))
+            self._sure = add_html(gui)
             self._try = gui.add_button(
                 "Set that command in Explore",
                 icon=viser.Icon.ADJUSTMENTS,
@@ -60,7 +61,7 @@ class IdentifyResult:
         with panel.add_tab("Landscape", viser.Icon.MAP_2):
             self._landscape = LandscapeView(page, slow)
         with panel.add_tab("Runs", viser.Icon.TABLE):
-            self._table = gui.add_html(table([]))
+            self._table = add_html(gui, table([]))
             clear = gui.add_button("Clear the table", icon=viser.Icon.ERASER, color="gray")
         self._try.on_click(lambda _: page.screen.post("separating", self._try_separating))
         self._whose.on_update(lambda _: slow.post("answer", self._draw_answer))

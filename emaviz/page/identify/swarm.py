@@ -8,6 +8,7 @@ from ema_model.faults import FAULTS, HEALTHY
 from emaviz.figures import swarm
 from emaviz.figures.convergence import colour
 from emaviz.page.page import Page
+from emaviz.page_text import add_html
 from emaviz.session.race import Frame, Race, Track
 
 _PLANE, _LINES = "points over two k", "lines across all k"
@@ -25,7 +26,7 @@ class SwarmView:
         self._kind = gui.add_dropdown("Swarm as", (_PLANE, _LINES))
         self._x = gui.add_dropdown("Across", _NAMES, initial_value=_NAMES[0])
         self._y = gui.add_dropdown("Upwards", _NAMES, initial_value=_NAMES[5])
-        self._picture = gui.add_html(swarm.plane([], 0, 5))
+        self._picture = add_html(gui, swarm.plane([], 0, 5))
         self._iteration = gui.add_slider("Iteration", 0, 150, 1, 150, disabled=True, hint="Looks back once it is over")
         for entry in (self._kind, self._iteration):
             entry.on_update(lambda event: event.client and page.screen.post("swarm view", self._changed))

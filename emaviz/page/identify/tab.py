@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ from ema_model.simulation.plant import FITNESSES
 from emaviz.figures.convergence import colour
 from emaviz.page.identify.result import IdentifyResult
 from emaviz.page.page import Page
+from emaviz.page_text import Html, add_html, html, joined
 from emaviz.recording.viewer import ViewerHost
 from emaviz.session.compare.comparing import Comparing
 from emaviz.session.race import Race
@@ -54,8 +54,8 @@ class IdentifyPanel:
         self._pause = gui.add_button("Pause the search", icon=viser.Icon.PLAYER_PAUSE, color="gray", disabled=True)
         self._stop = gui.add_button("Stop", icon=viser.Icon.PLAYER_STOP, color="red", disabled=True)
         self._progress = gui.add_progress_bar(0.0)
-        self._text = gui.add_html(_line("Finds the faults from the current alone."))
-        self._link = gui.add_html("")
+        self._text = add_html(gui, _line("Finds the faults from the current alone."))
+        self._link = add_html(gui)
         self._watch = gui.add_button(
             "Watch it in Rerun, here",
             icon=viser.Icon.EYE,
@@ -181,12 +181,12 @@ class IdentifyPanel:
             if not track.rmse:
                 continue
             at = "done" if track.answer else f"iteration {len(track.rmse) - 1} of {track.iterations}"
-            lines.append(_line(f"{_title(name)} · {at} · rmse {track.rmse[-1]:.4f} A"))
+            lines.append(_line(html("{} · {} · rmse {:.4f} A", _title(name), at, track.rmse[-1])))
         if race.growing is not None and race is not self._race:
             self._link.content = recording_link(self._viewer, race.growing, "Watch it live ↗")
             self._watch.visible = self._viewer is not None
         self._race = race
-        self._text.content = "".join(lines)
+        self._text.content = joined(lines)
 
     def _draw_answer(self, race: Race) -> None:
         self._progress.value = 100.0
@@ -198,12 +198,20 @@ class IdentifyPanel:
             star = "★ " if best is not None and len(race.tracks) > 1 and answer is best.answer else ""
             lines.append(
                 _line(
-                    f"{star}{_title(answer.algorithm)} · {stopped}{error}rmse {answer.rmse:.4f} A · "
-                    f"{answer.evaluations} simulations in {answer.elapsed_s:.2f} s · "
-                    f"<b>{html.escape(verdict(answer))}</b>"
+                    html(
+                        "{}{} · {}{}rmse {:.4f} A · {} simulations in {:.2f} s · <b>{}</b>",
+                        star,
+                        _title(answer.algorithm),
+                        stopped,
+                        error,
+                        answer.rmse,
+                        answer.evaluations,
+                        answer.elapsed_s,
+                        verdict(answer),
+                    )
                 )
             )
-        self._text.content = "".join(lines)
+        self._text.content = joined(lines)
         self._race = race
         self._missing.visible = best is not None and best.answer is not None and not best.answer.uncertainty.adequate
         self._result.finished(race)
@@ -211,21 +219,21 @@ class IdentifyPanel:
             self._link.content = recording_link(self._viewer, race.path)
 
 
-def recording_link(viewer: ViewerHost | None, path: Path, text: str = "") -> str:
+def recording_link(viewer: ViewerHost | None, path: Path, text: str = "") -> Html:
     """A link that opens a recording in the Rerun viewer, or its name where there is none."""
-    name = html.escape(path.name)
     if viewer is None:
-        return f'<div style="padding:2px 10px;font-size:13px">{name}</div>'
-    url: Any = html.escape(viewer.url_of(path.name), quote=True)
-    return (
-        f'<div style="padding:2px 10px;font-size:13px;overflow-wrap:anywhere"><a href="{url}" target="_blank" '
-        f'rel="noopener">{text or f"Open {name} in Rerun ↗"}</a></div>'
+        return html('<div style="padding:2px 10px;font-size:13px">{}</div>', path.name)
+    return html(
+        '<div style="padding:2px 10px;font-size:13px;overflow-wrap:anywhere"><a href="{}" target="_blank" '
+        'rel="noopener">{}</a></div>',
+        viewer.url_of(path.name),
+        text or f"Open {path.name} in Rerun ↗",
     )
 
 
-def _title(name: str) -> str:
-    return f'<b style="color:{colour(name)}">{html.escape(ALGORITHMS.get(name, name))}</b>'
+def _title(name: str) -> Html:
+    return html('<b style="color:{}">{}</b>', colour(name), ALGORITHMS.get(name, name))
 
 
-def _line(inner: str) -> str:
-    return f'<div style="padding:1px 10px;font-size:13px;line-height:1.4">{inner}</div>'
+def _line(inner: str) -> Html:
+    return html('<div style="padding:1px 10px;font-size:13px;line-height:1.4">{}</div>', inner)

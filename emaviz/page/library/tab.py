@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 from collections.abc import Callable
 from typing import Any
 
@@ -16,6 +15,8 @@ from emaviz.page.discover import cards
 from emaviz.page.discover.effect import about
 from emaviz.page.page import Page
 from emaviz.session.library import RUNS, Library
+from emaviz.page_text import add_html, html, unescaped
+from emaviz.session.library import RUNS, Felt, Library
 
 _CARD = (
     "height:auto!important;min-height:52px;padding:4px 130px 4px 9px;font-weight:400;font-size:12px;"
@@ -37,10 +38,10 @@ class LibraryPanel:
             icon=viser.Icon.PHOTO,
             hint="Each where it shows most; the first time, the library is compiled, which takes some seconds",
         )
-        self._status = gui.add_html("")
-        self._style = gui.add_html("")
+        self._status = add_html(gui)
+        self._style = add_html(gui)
         self._cards = {name: self._card(effect) for name, effect in CATALOGUE.items()}
-        self._none = gui.add_html(cards.note("No effect of the library has this."), visible=False)
+        self._none = add_html(gui, cards.note("No effect of the library has this."), visible=False)
         self._draw_style()
         self._search.on_update(lambda event: event.client and page.screen.post("search", self._filter))
         self._draw.on_click(lambda _: self._run_all())
@@ -91,7 +92,7 @@ class LibraryPanel:
             rules.append(f"{one}{{{_CARD}{picture}}}{one} .mantine-Button-inner{{justify-content:flex-start}}")
             rules.append(f"{one} .mantine-Button-label{{{_LABEL}}}{one} .mantine-Button-label::first-line")
             rules.append("{font-weight:600;font-size:13.5px}")
-        self._style.content = f"<style>{''.join(rules)}</style>"
+        self._style.content = unescaped(f"<style>{''.join(rules)}</style>")
 
 
 class EffectPage:
@@ -103,11 +104,11 @@ class EffectPage:
         self.best_runs: dict[str, str] = {}  # by effect, where it shows most
         self._sliders: dict[str, Any] = {}
         gui = page.server.gui
-        self._title = gui.add_html(cards.note("Choose an effect on the left."))
-        self._text = gui.add_html("")
+        self._title = add_html(gui, cards.note("Choose an effect on the left."))
+        self._text = add_html(gui)
         self._run = gui.add_dropdown("Run", tuple(RUNS))
         self._place = gui.add_folder("What each parameter does")
-        self._status = gui.add_html("")
+        self._status = add_html(gui)
         self._charts = EffectCharts(gui)
         self._run.on_update(lambda event: event.client and self._ask())
 
@@ -115,9 +116,12 @@ class EffectPage:
         """Shows an effect, and runs it; on the screen's thread."""
         effect = find(name)
         self._name = name
-        self._title.content = (
-            f'<div {cards.BOX}><span style="font-size:17px;font-weight:600">{html.escape(effect.title)}</span>'
-            f'<span style="font-family:serif;font-size:16px;float:right">{html.escape(effect.equation)}</span></div>'
+        self._title.content = html(
+            '<div {}><span style="font-size:17px;font-weight:600">{}</span>'
+            '<span style="font-family:serif;font-size:16px;float:right">{}</span></div>',
+            cards.BOX,
+            effect.title,
+            effect.equation,
         )
         self._text.content = about(effect, equation=False)
         self._run.value = next(run for run in RUNS if run == self.best_runs.get(name, self._run.value))

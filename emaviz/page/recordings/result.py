@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 from collections.abc import Callable
 from typing import Any
 
@@ -11,9 +10,10 @@ import viser
 from emaviz.figures import two_recordings
 from emaviz.page.page import Page
 from emaviz.recording.entry import Entry
+from emaviz.page_text import Html, add_html, html
+from emaviz.session.archive import Entry
 
 _CONFIG = {"displayModeBar": False}
-_HINT = '<div style="padding:8px 12px;font-size:13px;opacity:.8">{}</div>'
 
 
 class RecordingsResult:
@@ -29,31 +29,33 @@ class RecordingsResult:
         self._tab = panel.add_tab("Rerun", viser.Icon.PLAYER_PLAY)
         gui = page.server.gui
         with self._tab:
-            self._frame = gui.add_html(_HINT.format("Open a recording on the left."))
+            self._frame = add_html(gui, _hint("Open a recording on the left."))
             self._close = gui.add_button("Close the viewer", icon=viser.Icon.X, color="gray", visible=False)
         with panel.add_tab("Two recordings", viser.Icon.ARROWS_DIFF):
-            self._names = gui.add_html(_HINT.format("Choose two on the left."))
+            self._names = add_html(gui, _hint("Choose two on the left."))
             self._signal: Any = gui.add_dropdown("Signal", ("current_A",), visible=False)
             self._place = gui.add_folder("Signals and search", visible=False)
-            self._table = gui.add_html("")
+            self._table = add_html(gui)
         self._close.on_click(lambda _: page.screen.post("viewer", self.close_viewer))
         self._signal.on_update(lambda event: event.client and page.screen.post("two", self._draw))
 
     def open(self, url: str, name: str) -> None:
         """The viewer with a recording, in the page."""
         self._to_front()
-        source = html.escape(url, quote=True)
-        self._frame.content = (
-            f'<div style="padding:0 10px 4px;font-size:12px;overflow-wrap:anywhere"><b>{html.escape(name)}</b> · '
-            f'<a href="{source}" target="_blank" rel="noopener">in a tab of its own ↗</a></div>'
-            f'<iframe class="emaviz-rerun" src="{source}" title="Rerun viewer" '
-            'style="width:100%;height:calc(100vh - 240px);border:0"></iframe>'
+        self._frame.content = html(
+            '<div style="padding:0 10px 4px;font-size:12px;overflow-wrap:anywhere"><b>{}</b> · '
+            '<a href="{}" target="_blank" rel="noopener">in a tab of its own ↗</a></div>'
+            '<iframe class="emaviz-rerun" src="{}" title="Rerun viewer" '
+            'style="width:100%;height:calc(100vh - 240px);border:0"></iframe>',
+            name,
+            url,
+            url,
         )
         self._close.visible = True
 
     def close_viewer(self) -> None:
         """Takes the viewer off the page, which frees its memory."""
-        self._frame.content = _HINT.format("Open a recording on the left.")
+        self._frame.content = _hint("Open a recording on the left.")
         self._close.visible = False
 
     def compare(self, first: tuple[Entry, Any], second: tuple[Entry, Any]) -> None:
@@ -63,9 +65,14 @@ class RecordingsResult:
         self._signal.options = names
         self._signal.value = "current_A" if "current_A" in names else names[0]
         self._signal.visible = self._place.visible = True
-        self._names.content = _HINT.format(
-            f'<b style="color:{two_recordings.FIRST}">A</b> {html.escape(first[0].name)}<br>'
-            f'<b style="color:{two_recordings.SECOND}">B</b> {html.escape(second[0].name)}'
+        self._names.content = _hint(
+            html(
+                '<b style="color:{}">A</b> {}<br><b style="color:{}">B</b> {}',
+                two_recordings.FIRST,
+                first[0].name,
+                two_recordings.SECOND,
+                second[0].name,
+            )
         )
         self._draw()
         self._table.content = two_recordings.table(first[0], second[0])
@@ -81,3 +88,7 @@ class RecordingsResult:
                 self._plot = self._page.server.gui.add_plotly(figure, config=_CONFIG, aspect=0.85)
         else:
             self._plot.figure = figure
+
+
+def _hint(text: str) -> Html:
+    return html('<div style="padding:8px 12px;font-size:13px;opacity:.8">{}</div>', text)

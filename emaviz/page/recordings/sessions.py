@@ -19,6 +19,7 @@ from emaviz.page.identify.result import IdentifyResult
 from emaviz.page.identify.tab import IdentifyPanel
 from emaviz.page.page import Page
 from emaviz.page.playback import PlaybackStrip
+from emaviz.page_text import add_html, html
 from emaviz.session import saved as session_file
 from emaviz.session.actuators import UPLOADED
 from emaviz.session.compare.comparing import Comparing
@@ -111,9 +112,13 @@ class SessionControls:
             save = gui.add_button("Save session", icon=viser.Icon.DEVICE_FLOPPY, hint="To the data folder, and here")
             self._choice: Any = gui.add_dropdown("Saved", (_NONE,))
             self._load = gui.add_button("Load session", icon=viser.Icon.FOLDER_OPEN, color="gray", disabled=True)
-            gui.add_html(
-                f'<div style="font-size:12px;opacity:.75;padding:0 10px">A {SESSION_SUFFIX} file from elsewhere: drop '
-                "it anywhere on the page.</div>"
+            add_html(
+                gui,
+                html(
+                    '<div style="font-size:12px;opacity:.75;padding:0 10px">A {} file from elsewhere: drop '
+                    "it anywhere on the page.</div>",
+                    SESSION_SUFFIX,
+                ),
             )
         save.on_click(lambda event: self._post("save session", lambda: self._save(event.client)))
         self._load.on_click(lambda _: self._load_named(str(self._choice.value)))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 from collections.abc import Callable
 from typing import Any
 
@@ -15,13 +14,14 @@ from emaviz.page.identify.tab import recording_link
 from emaviz.page.page import Page
 from emaviz.page.recordings.result import RecordingsResult
 from emaviz.recording.entry import Entry, as_text
+from emaviz.page_text import Html, add_html, html, joined, said
 from emaviz.recording.viewer import ViewerHost
 from emaviz.session.archive import Recorded
 from emaviz.session.worker import Worker
 
 NONE = "–"
 _SHOWN = 25
-_BOX = 'style="padding:2px 10px;font-size:12.5px;line-height:1.45"'
+_BOX = Html('style="padding:2px 10px;font-size:12.5px;line-height:1.45"')
 
 
 class RecordingsPanel:
@@ -35,9 +35,9 @@ class RecordingsPanel:
         self._by_hand = False  # chosen; else the newest is shown
         gui = page.server.gui
         self._choice: Any = gui.add_dropdown("Recording", (NONE,))
-        self._card = gui.add_html(_empty("None yet: identify something, or record a comparison."))
+        self._card = add_html(gui, _empty("None yet: identify something, or record a comparison."))
         self._open = gui.add_button("Open in Rerun, here", icon=viser.Icon.PLAYER_PLAY, disabled=True)
-        self._link = gui.add_html("")
+        self._link = add_html(gui)
         with gui.add_folder("Compare two"):
             self._other: Any = gui.add_dropdown("With", (NONE,))
             self._compare = gui.add_button("On the same axes", icon=viser.Icon.ARROWS_DIFF, disabled=True)
@@ -46,7 +46,7 @@ class RecordingsPanel:
             self._rename = gui.add_button("Rename", icon=viser.Icon.PENCIL, color="gray", disabled=True)
             self._delete = gui.add_button("Delete…", icon=viser.Icon.TRASH, color="red", disabled=True)
         with gui.add_folder("All, newest first"):
-            self._list = gui.add_html("")
+            self._list = add_html(gui)
             again = gui.add_button("Read the folder again", icon=viser.Icon.REFRESH, color="gray")
         self._choice.on_update(lambda event: event.client and self._post(self._take_choice))
         self._open.on_click(lambda _: self._post(self._open_chosen))
@@ -76,7 +76,7 @@ class RecordingsPanel:
             self._choice.options = self._other.options = names or [NONE]
         self._choice.value, self._other.value = chosen, other
         entries = self._entries(names[:_SHOWN])
-        more = f"<div {_BOX}>… and {len(names) - _SHOWN} more</div>" if len(names) > _SHOWN else ""
+        more = html("<div {}>… and {} more</div>", _BOX, len(names) - _SHOWN) if len(names) > _SHOWN else ""
         self._list.content = _listed(entries) + more
         self._show_chosen()
 
@@ -130,7 +130,7 @@ class RecordingsPanel:
         name = str(self._choice.value)
         modal = client.gui.add_modal("Delete this recording?")
         with modal:
-            client.gui.add_markdown(f"`{name}` is removed from the disk.")
+            add_html(client.gui, said(html("<b>{}</b> is removed from the disk.", name)))
             yes = client.gui.add_button("Delete it", icon=viser.Icon.TRASH, color="red")
             no = client.gui.add_button("Keep it", color="gray")
 
@@ -154,22 +154,33 @@ class RecordingsPanel:
         self._files.post(job.__qualname__, checked)
 
 
-def _card(entry: Entry) -> str:
+def _card(entry: Entry) -> Html:
     """Settings and results of one recording."""
     size = f"{entry.at:%Y-%m-%d %H:%M:%S} · {entry.size_bytes / 1e6:.1f} MB"
     if not entry.found:
-        return f"<div {_BOX}>{size}<br>A recording without an identification's result.</div>"
-    results = "".join(
-        f'<div><b style="color:{colour(name)}">{html.escape(ALGORITHMS.get(name, name))}</b> '
-        f"{_result(answer)}{' ★' if name == entry.best and len(entry.found) > 1 else ''}</div>"
+        return html("<div {}>{}<br>A recording without an identification's result.</div>", _BOX, size)
+    results = joined(
+        html(
+            '<div><b style="color:{}">{}</b> {}{}</div>',
+            colour(name),
+            ALGORITHMS.get(name, name),
+            _result(answer),
+            " ★" if name == entry.best and len(entry.found) > 1 else "",
+        )
         for name, answer in entry.found.items()
     )
-    settings = " · ".join(
-        f"{html.escape(name)} <b>{html.escape(as_text(value))}</b>"
+    settings = [
+        html("{} <b>{}</b>", name, as_text(value))
         for name, value in entry.settings.items()
         if value not in ("", "none", None)
+    ]
+    return html(
+        '<div {}>{}{}<div style="opacity:.75;font-size:11.5px">{}</div></div>',
+        _BOX,
+        size,
+        results,
+        joined(settings, " · "),
     )
-    return f'<div {_BOX}>{size}{results}<div style="opacity:.75;font-size:11.5px">{settings}</div></div>'
 
 
 def _result(answer: dict[str, Any]) -> str:
@@ -177,10 +188,10 @@ def _result(answer: dict[str, Any]) -> str:
     alarms = ", ".join(answer.get("alarms", ())) or "no single k stands out"
     verdict = "healthy" if answer.get("healthy") else f"not healthy: {alarms}"
     stopped = " · stopped" if answer.get("stopped") else ""
-    return html.escape(f"{error}rmse {answer['rmse_A']:.4f} A · {answer['elapsed_s']:.1f} s · {verdict}{stopped}")
+    return f"{error}rmse {answer['rmse_A']:.4f} A · {answer['elapsed_s']:.1f} s · {verdict}{stopped}"
 
 
-def _listed(entries: list[Entry]) -> str:
+def _listed(entries: list[Entry]) -> Html:
     if not entries:
         return _empty("None yet.")
     rows = []
@@ -188,14 +199,16 @@ def _listed(entries: list[Entry]) -> str:
         answer = entry.answer
         error = "" if not answer or answer.get("error_percent") is None else f"{answer['error_percent']:.2f} %"
         rmse = "" if not answer else f"{answer['rmse_A']:.3f} A"
-        cells = "".join(f'<td style="text-align:right;padding-left:6px">{cell}</td>' for cell in (error, rmse))
-        rows.append(f'<tr><td style="overflow-wrap:anywhere">{html.escape(entry.name)}</td>{cells}</tr>')
-    return (
-        f'<div {_BOX}><table style="width:100%;border-collapse:collapse;font-variant-numeric:tabular-nums">'
-        f'<tr><td></td><th style="text-align:right">Err</th><th style="text-align:right">rmse</th></tr>{"".join(rows)}'
-        "</table></div>"
+        cells = joined(html('<td style="text-align:right;padding-left:6px">{}</td>', cell) for cell in (error, rmse))
+        rows.append(html('<tr><td style="overflow-wrap:anywhere">{}</td>{}</tr>', entry.name, cells))
+    return html(
+        '<div {}><table style="width:100%;border-collapse:collapse;font-variant-numeric:tabular-nums">'
+        '<tr><td></td><th style="text-align:right">Err</th><th style="text-align:right">rmse</th></tr>{}'
+        "</table></div>",
+        _BOX,
+        joined(rows),
     )
 
 
-def _empty(text: str) -> str:
-    return f"<div {_BOX}>{html.escape(text)}</div>"
+def _empty(text: str) -> Html:
+    return html("<div {}>{}</div>", _BOX, text)

@@ -1,0 +1,95 @@
+"""Text on the page: what comes from files and people is shown as it is, and never becomes markup.
+
+A name of a file, a column or an actuator, an expression, an error that quotes them: all are plain text.  `html` puts
+them into a template of ours, escaped.  `add_html` is the one place from which the page gets HTML: what was not made by
+`html` is plain text to it, and shown letter by letter.  Markdown on the page is for texts of our own alone, as its
+renderer takes HTML and turns bare addresses into links.
+"""
+
+from __future__ import annotations
+
+import string
+from collections.abc import Iterable
+from html import escape as _escape
+from typing import TYPE_CHECKING, Any, LiteralString
+
+if TYPE_CHECKING:
+    import viser
+
+
+class Html(str):
+    """Text that is HTML already: literals of ours, and what the functions below return.  Foreign text never is."""
+
+    __slots__ = ()
+
+    def __new__(cls, literal: LiteralString = "") -> Html:
+        return str.__new__(cls, literal)
+
+    def __add__(self, other: str) -> Html:
+        return unescaped(str.__add__(self, escape(other)))
+
+    def __radd__(self, other: str) -> Html:
+        return unescaped(str.__add__(escape(other), self))
+
+
+def unescaped(text: str) -> Html:
+    """Text that is taken for HTML as it is: for style sheets and drawings, made of numbers and colours of ours."""
+    return str.__new__(Html, text)
+
+
+def escape(value: object) -> Html:
+    """As HTML shows it, in an element or in a quoted attribute; HTML stays what it is."""
+    return value if isinstance(value, Html) else unescaped(_escape(str(value), quote=True))
+
+
+def html(template: LiteralString, *values: object, **named: object) -> Html:
+    """A template as of `str.format`, its values escaped; only a literal can be one, so no name gets into it."""
+    return unescaped(_ESCAPING.vformat(template, values, named))
+
+
+def joined(parts: Iterable[str], between: LiteralString = "") -> Html:
+    """Pieces one after another, escaped where they are plain text."""
+    return unescaped(between.join(escape(part) for part in parts))
+
+
+def add_html(gui: viser.GuiApi, content: str = "", *, visible: bool = True) -> HtmlPiece:
+    """A piece of the page; plain text is shown as it is."""
+    return HtmlPiece(gui.add_html(escape(content), visible=visible))
+
+
+class HtmlPiece:
+    """A piece of the page that can be written anew."""
+
+    def __init__(self, handle: viser.GuiHtmlHandle) -> None:
+        self._handle: Any = handle
+
+    @property
+    def content(self) -> Html:
+        """What it shows.  Plain text that is set is escaped."""
+        return unescaped(self._handle.content)
+
+    @content.setter
+    def content(self, content: str) -> None:
+        self._handle.content = escape(content)
+
+    @property
+    def visible(self) -> bool:
+        """Whether it is seen."""
+        return self._handle.visible
+
+    @visible.setter
+    def visible(self, visible: bool) -> None:
+        self._handle.visible = visible
+
+
+def said(text: str) -> Html:
+    """A line or more in the page's ordinary size, as below a button; nothing for no text."""
+    return html('<div style="padding:0 12px 10px;font-size:14px;line-height:1.55">{}</div>', text) if text else Html()
+
+
+class _Escaping(string.Formatter):
+    def format_field(self, value: Any, format_spec: str) -> str:
+        return escape(value if isinstance(value, Html) and not format_spec else format(value, format_spec))
+
+
+_ESCAPING = _Escaping()

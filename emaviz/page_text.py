@@ -54,7 +54,7 @@ def joined(parts: Iterable[str], between: LiteralString = "") -> Html:
 
 def add_html(gui: viser.GuiApi, content: str = "", *, visible: bool = True) -> HtmlPiece:
     """A piece of the page; plain text is shown as it is."""
-    return HtmlPiece(gui.add_html(escape(content), visible=visible))
+    return HtmlPiece(gui.add_html(_sent(content), visible=visible))
 
 
 class HtmlPiece:
@@ -70,7 +70,7 @@ class HtmlPiece:
 
     @content.setter
     def content(self, content: str) -> None:
-        self._handle.content = escape(content)
+        self._handle.content = _sent(content)
 
     @property
     def visible(self) -> bool:
@@ -85,6 +85,11 @@ class HtmlPiece:
 def said(text: str) -> Html:
     """A line or more in the page's ordinary size, as below a button; nothing for no text."""
     return html('<div style="padding:0 12px 10px;font-size:14px;line-height:1.55">{}</div>', text) if text else Html()
+
+
+def _sent(content: str) -> str:
+    """What goes to the browser, which viser packs only as a `str` and no kind of it."""
+    return str(escape(content))
 
 
 class _Escaping(string.Formatter):

@@ -74,6 +74,7 @@ def on_the_page(app, prop="content"):
 def check(app, *names):
     """All of the names are seen, and nothing of them is markup."""
     wait_until(lambda: all(any(name in markup.unescape(text) for text in on_the_page(app)) for name in names), 20.0)
+    assert {type(text) for text in on_the_page(app)} == {str}, "viser can send no other"
     assert not [text for text in on_the_page(app) if any(sign in text for sign in RAW)]
     assert not [text for text in on_the_page(app, "_markdown") if any(name in text for name in hostile.NAMES)]
 

@@ -9,9 +9,16 @@ HELP = "the app in the browser (also without a command)"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """FILE…, --host, --port, --open, --data-dir, --actuator."""
+    """FILE…, --host, --allow-host, --port, --open, --data-dir, --actuator."""
     parser.add_argument("files", nargs="*", metavar="FILE", help="recordings to open")
     parser.add_argument("--host", default="127.0.0.1", help="address to listen on; the default is this machine only")
+    parser.add_argument(
+        "--allow-host",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="name or address by which other machines ask for the page, for a --host they reach; repeatable",
+    )
     parser.add_argument("--port", type=int, default=8080)
     parser.add_argument("--open", action=argparse.BooleanOptionalAction, default=True, help="open the browser")
     parser.add_argument("--data-dir", type=Path, default=Path("emaviz-data"), metavar="DIR", help="recordings, uploads")

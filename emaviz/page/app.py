@@ -44,9 +44,11 @@ from emaviz.page.recordings.sessions import SessionControls, parts
 from emaviz.page.recordings.tab import RecordingsPanel
 from emaviz.page.server import LOOPBACK, open_server
 from emaviz.page_text import add_html, html, said
+from emaviz.page.server import open_server
 from emaviz.recording.viewer import ViewerHost
 from emaviz.scene.actuator import ActuatorScene
 from emaviz.scene.playback import Playback
+from emaviz.server.door import Door
 from emaviz.session.archive import Recorded, recovered
 from emaviz.session.compare.comparing import Comparing
 from emaviz.session.data_folder import DataFolder
@@ -66,15 +68,26 @@ class App:
     """One page on one address; `close` ends its threads and servers."""
 
     def __init__(
-        self, host: str, port: int, folder: Path, actuator_file: str | None = None, files: Sequence[Path] = ()
+        self,
+        host: str,
+        port: int,
+        folder: Path,
+        actuator_file: str | None = None,
+        files: Sequence[Path] = (),
+        allow_hosts: Sequence[str] = (),
     ) -> None:
-        """files: recordings to open on Compare, which is then the first tab.  InputError: one of them is none."""
+        """files: recordings to open on Compare, which is then the first tab.  InputError: one of them is none.
+
+        allow_hosts: names by which other machines may ask for the page (InputError: none, but host is no loopback).
+        """
         started = time.perf_counter()
+        self.door = Door(host, allow_hosts)
         actuator = load_actuator(actuator_file)
         data = DataFolder(folder)
         given = [data.take_in(file) for file in files]
         recordings = data.recordings
-        self.server = open_server(host, port)
+        self.viewer: ViewerHost | None = None
+        self.server = open_server(host, port, self.door, lambda: self.viewer.address if self.viewer else None)
         self.viewer, no_viewer = _viewer(recordings)
         self.session = Session(actuator, recordings)
         self.screen = Worker("emaviz-screen", self._on_screen_error, rest_s=_FASTEST_REDRAW_S)
@@ -225,7 +238,7 @@ class App:
     @property
     def address(self) -> str:
         """Where the page is."""
-        return f"http://{self.server.get_host()}:{self.server.get_port()}"
+        return self.door.address(self.server.get_port())
 
     def wait_for_first_picture(self, timeout_s: float) -> bool:
         """Whether the first simulation was drawn within that time."""
@@ -271,12 +284,14 @@ class App:
 def serve(arguments: argparse.Namespace) -> int:
     """Runs the app until interrupted (the command line's `gui`)."""
     files = [Path(file) for file in arguments.files]
-    app = App(arguments.host, arguments.port, arguments.data_dir, arguments.actuator, files)
-    print(f"emaviz is at {app.address}  (Ctrl-C ends it)", flush=True)
-    if arguments.host not in LOOPBACK:
-        print("It is open to the network: whoever reaches this address can use it.", file=sys.stderr)
+    app = App(arguments.host, arguments.port, arguments.data_dir, arguments.actuator, files, arguments.allow_host)
+    port = app.server.get_port()
+    print(f"emaviz is at {app.door.entry(port)}  (Ctrl-C ends it)", flush=True)
+    if app.door.token:
+        print("It is open to the network: whoever has this address, with its token, can use it.", file=sys.stderr)
+        print("The Rerun viewer is not: recordings are shown in browsers on this machine only.", file=sys.stderr)
     if arguments.open:
-        webbrowser.open(app.address)
+        webbrowser.open(app.door.entry(port, here=True))
     if app.wait_for_first_picture(120.0):
         print(f"first picture after {app.first_picture_s:.1f} s", flush=True)
     try:

@@ -1,55 +1,70 @@
 """The page's server, closed to everyone but this page.
 
 viser answers any Host and Origin, so that a web page elsewhere could drive the app; moves to the next port
-when one is taken; and lets a client open a public tunnel.  Here all three are refused.
+when one is taken; lets a client open a public tunnel; and believes whatever a browser says.  Here all four are refused.
 """
 
 from __future__ import annotations
 
+import asyncio
+import concurrent.futures
 import http
 import inspect
 import socket
 import threading
 from collections.abc import Awaitable, Callable
 from typing import Any
-from urllib.parse import urlsplit
 
 import viser
 import websockets.asyncio.server
+from websockets.asyncio.server import ServerConnection
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
 from ema_model.errors import InputError
+from emaviz.server.complaints import Complaints
+from emaviz.server.door import Door
+from emaviz.server.gate import Gate
+from emaviz.server.messages import LARGEST_FRAME
+from emaviz.server.policy import protect
 
-LOOPBACK = ("127.0.0.1", "localhost", "::1")
-# All that the client needs is in its own page; blob: and data: are its workers, textures and saved files.
-_POLICY = (
-    "default-src 'self' 'unsafe-inline' 'unsafe-eval' blob: data:; "
-    "connect-src 'self' blob: data: ws: http://127.0.0.1:* http://localhost:*; "
-    "frame-src 'self' http://127.0.0.1:*; frame-ancestors 'self'; object-src 'none'"
-)
 _opening = threading.Lock()
 
 
-def open_server(host: str, port: int) -> viser.ViserServer:
-    """A viser server on exactly this address; InputError if it cannot be had."""
+def open_server(
+    host: str, port: int, door: Door | None = None, viewer: Callable[[], str | None] = lambda: None
+) -> viser.ViserServer:
+    """A viser server on exactly this address; InputError if it cannot be had.
+
+    door: who gets an answer, by default this machine alone; viewer: the address of the Rerun viewer, which the page
+    may show, once there is one.
+    """
+    door = Door(host) if door is None else door
     _check_free(host, port)
+    complain = Complaints()
+    opened: concurrent.futures.Future[viser.ViserServer] = concurrent.futures.Future()
     with _opening:  # viser takes no hook, so its `serve` is wrapped while this server starts
         plain = websockets.asyncio.server.serve
-        allowed = _allowed_names(host)
 
         def guarded(handler: Any, *arguments: Any, process_request: Any = None, **options: Any) -> Any:
-            return plain(handler, *arguments, process_request=_guard(process_request, allowed), **options)
+            options |= {"max_size": LARGEST_FRAME, "logger": complain.log()}
+            guard = _guard(process_request, door, viewer)
+            return plain(_listening(handler, opened, complain), *arguments, process_request=guard, **options)
 
         websockets.asyncio.server.serve = guarded  # type: ignore[assignment]
         try:
             server = viser.ViserServer(host=host, port=port, label="emaviz", verbose=False)
+        except BaseException:
+            opened.cancel()
+            raise
         finally:
             websockets.asyncio.server.serve = plain
     if port and server.get_port() != port:
+        opened.cancel()
         server.stop()
         raise InputError(f"port {port} is in use; choose another with --port, or 0 for any free one")
     server.request_share_url = lambda *_, **__: None  # type: ignore[method-assign]
+    opened.set_result(server)
     return server
 
 
@@ -71,33 +86,47 @@ def _check_free(host: str, port: int) -> None:
         raise InputError(f"--host {host}: cannot listen there ({error.strerror})") from None
 
 
-def _allowed_names(host: str) -> frozenset[str] | None:
-    """Names under which a browser may ask; None (any) when the user opens the server to a network."""
-    return frozenset((*LOOPBACK, host)) if host in LOOPBACK else None
+def _listening(
+    handler: Callable[[ServerConnection], Awaitable[None]],
+    opened: concurrent.futures.Future[viser.ViserServer],
+    complain: Complaints,
+) -> Callable[[ServerConnection], Awaitable[None]]:
+    """viser's handler of a connection, which hears only what the gate lets through."""
+    expected = f"viser-v{viser.__version__}"
+
+    async def listen(connection: ServerConnection) -> None:
+        if connection.subprotocol != expected:  # a tab left open by another version of viser reads this, and says it
+            complain(f"a page of another version was turned away: {connection.subprotocol or 'it names none'}")
+            await connection.close(1002, f"Version mismatch. Server: {viser.__version__}; reload the page")
+            return
+        server = await asyncio.wrap_future(opened)  # a tab left open is here before the server is complete
+        connection.recv = Gate(server, connection, complain).recv  # type: ignore[method-assign]
+        await handler(connection)
+
+    return listen
 
 
 def _guard(
-    inner: Callable[..., Any] | None, allowed: frozenset[str] | None
+    inner: Callable[..., Any] | None, door: Door, viewer: Callable[[], str | None]
 ) -> Callable[..., Awaitable[Response | None]]:
-    async def process_request(connection: Any, request: Request) -> Response | None:
-        host = request.headers.get("Host", "")
-        origin = request.headers.get("Origin")
-        if allowed is not None and urlsplit(f"//{host}").hostname not in allowed:
-            return _refusal("this server answers to its own address only")
-        if origin is not None and urlsplit(origin).netloc != host:
-            return _refusal("requests from other pages are refused")
+    async def process_request(connection: ServerConnection, request: Request) -> Response | None:
+        port = connection.local_address[1]
+        refusal = door.refusal(request.path, request.headers, port)
+        if refusal is not None:
+            return _refused(refusal)
         response = None if inner is None else inner(connection, request)
         if inspect.isawaitable(response):
             response = await response
         if response is not None:
-            response.headers["Content-Security-Policy"] = _POLICY
-            response.headers["X-Content-Type-Options"] = "nosniff"
+            protect(response.headers, door.asked(request.headers) or "", viewer())
+            if door.token and door.brings_token(request.path):
+                response.headers["Set-Cookie"] = door.cookie(port)
         return response
 
     return process_request
 
 
-def _refusal(reason: str) -> Response:
+def _refused(reason: str) -> Response:
     body = f"Refused: {reason}.\n".encode()
     headers = Headers({"Content-Type": "text/plain", "Content-Length": str(len(body)), "Connection": "close"})
     return Response(http.HTTPStatus.FORBIDDEN, "Forbidden", headers, body)

@@ -1,0 +1,48 @@
+"""The inside of viser 1.1 that guarding it needs, all of it here."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import viser
+from viser import _messages
+
+
+class Inside:
+    """What a server knows of its pages and controls."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        self._server = server
+
+    def client(self, connection: Any) -> int | None:
+        """The number of the page on this websocket, while it is open."""
+        return next(
+            (one for one, plug in list(self._server._websock_server._live_connections.items()) if plug is connection),
+            None,
+        )
+
+    def control(self, client: int | None, uuid: str) -> Any:
+        """The control that this page shows under this id, or None."""
+        found = (gui._gui_input_handle_from_uuid.get(uuid) for gui in self._guis(client))
+        return next((one for one in found if one is not None and not one._impl.removed), None)
+
+    def has_form(self, client: int | None, uuid: str) -> bool:
+        """Whether this page shows such a form."""
+        found = (gui._container_handle_from_uuid.get(uuid) for gui in self._guis(client))
+        return any(isinstance(one, viser.GuiFormHandle) for one in found)
+
+    def has_node(self, client: int | None, name: str) -> bool:
+        """Whether this page's scene has such a node."""
+        page = self._server.get_clients().get(client) if client is not None else None
+        scenes = [self._server.scene] + ([page.scene] if page else [])
+        return any(scene._handle_from_node_name.get(name) is not None for scene in scenes)
+
+    def send_value(self, client: int | None, control: Any) -> None:
+        """Tells one page what a control's value is."""
+        state = self._server._websock_server._client_state_from_id.get(-1 if client is None else client)
+        if state is not None and not control._impl.is_button:
+            state.message_buffer.push(_messages.GuiUpdateMessage(control._impl.uuid, {"value": control.value}))
+
+    def _guis(self, client: int | None) -> list[Any]:
+        page = self._server.get_clients().get(client) if client is not None else None
+        return [self._server.gui] + ([page.gui] if page else [])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 import threading
 from contextlib import suppress
 from typing import Any
@@ -30,13 +31,15 @@ CAMERA = {
 class RawPage:
     """One connection; `values` and `props` hold what the server says of every control, by its id."""
 
-    def __init__(self, port: int, camera: bool = True) -> None:
+    def __init__(self, port: int, camera: bool = True, host: str = "127.0.0.1", token: str = "") -> None:
+        """host: the name in its address bar; camera: whether it counts as a page, as a browser's does at once."""
         self.values: dict[str, Any] = {}
         self.said: list[dict[str, Any]] = []  # other messages of the server that tests look at
         self.drawn, self.closed = threading.Event(), threading.Event()
         self._plug = connect(
-            f"ws://127.0.0.1:{port}",
-            origin=Origin(f"http://127.0.0.1:{port}"),
+            f"ws://{host}:{port}/?token={token}",
+            sock=socket.create_connection(("127.0.0.1", port), timeout=10.0),
+            origin=Origin(f"http://{host}:{port}"),
             subprotocols=[Subprotocol(f"viser-v{viser.__version__}")],
             compression=None,
             max_size=None,

@@ -49,6 +49,7 @@ from emaviz.recording.viewer import ViewerHost
 from emaviz.scene.actuator import ActuatorScene
 from emaviz.scene.playback import Playback
 from emaviz.server.door import Door
+from emaviz.server.viser_private import Inside
 from emaviz.session.archive import Recorded, recovered
 from emaviz.session.compare.comparing import Comparing
 from emaviz.session.data_folder import DataFolder
@@ -61,6 +62,7 @@ from emaviz.session.worker import Worker
 _FASTEST_REDRAW_S = 0.04
 _SLOW_REDRAW_S = 0.3  # of what nobody watches while dragging
 _NOTE = "padding:6px 12px;font-size:13px;line-height:1.45;border-left:3px solid #e8590c"
+_NOT_FROM_ELSEWHERE = "It answers on the machine that runs emaviz only, to a page opened there as localhost"
 _BRAND = (47, 111, 222)
 
 
@@ -118,6 +120,8 @@ class App:
             self.explore.status.content = said(line)
         if no_viewer:
             self.server.on_client_connect(lambda _: self.page.notify("The Rerun viewer cannot be shown", no_viewer))
+        elif self.door.token:
+            self.server.on_client_connect(self._greet)
 
     def _build(self, recordings: Path, compare_first: bool) -> None:
         gui = self.server.gui
@@ -277,6 +281,10 @@ class App:
     def _told(self, title: str, text: str) -> None:
         self.page.notify(title, text)
 
+    def _greet(self, client: viser.ClientHandle) -> None:
+        if not self.door.asked_here(Inside(self.server).headers(client.client_id)):
+            client.add_notification("The Rerun viewer cannot be shown", f"{_NOT_FROM_ELSEWHERE}.", color="yellow")
+
     def _on_screen_error(self, error: BaseException) -> None:
         traceback.print_exception(error)
 
@@ -289,7 +297,7 @@ def serve(arguments: argparse.Namespace) -> int:
     print(f"emaviz is at {app.door.entry(port)}  (Ctrl-C ends it)", flush=True)
     if app.door.token:
         print("It is open to the network: whoever has this address, with its token, can use it.", file=sys.stderr)
-        print("The Rerun viewer is not: recordings are shown in browsers on this machine only.", file=sys.stderr)
+        print(f"The Rerun viewer is not. {_NOT_FROM_ELSEWHERE}.", file=sys.stderr)
     if arguments.open:
         webbrowser.open(app.door.entry(port, here=True))
     if app.wait_for_first_picture(120.0):

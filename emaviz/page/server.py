@@ -118,7 +118,8 @@ def _guard(
         if inspect.isawaitable(response):
             response = await response
         if response is not None:
-            protect(response.headers, door.asked(request.headers) or "", viewer())
+            shown = viewer() if door.asked_here(request.headers) else None
+            protect(response.headers, door.asked(request.headers) or "", shown)
             if door.token and door.brings_token(request.path):
                 response.headers["Set-Cookie"] = door.cookie(port)
         return response

@@ -58,6 +58,11 @@ class Door:
             return None
         return _netloc(*found)
 
+    def asked_here(self, headers: Headers) -> bool:
+        """Whether the browser asked by a name of the loopback, so that it reaches what else listens there."""
+        host = self.asked(headers)
+        return host is not None and is_loopback(host.rpartition(":")[0])
+
     def refusal(self, path: str, headers: Headers, port: int) -> str | None:
         """Why this request gets no answer, or None; path: with its query, port: of this server."""
         if self.asked(headers) is None:

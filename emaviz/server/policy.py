@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from websockets.datastructures import Headers
 
-from emaviz.server.door import is_loopback
-
 # All that viser's client needs is in its own page; blob: and data: are its workers, textures and saved files.
 _PAGE = "default-src 'self' 'unsafe-inline' 'unsafe-eval' blob: data:"
 _REST = "frame-ancestors 'self'; object-src 'none'; base-uri 'none'; form-action 'none'"
@@ -14,11 +12,11 @@ _REST = "frame-ancestors 'self'; object-src 'none'; base-uri 'none'; form-action
 def protect(headers: Headers, host: str, viewer: str | None) -> None:
     """Adds the page's policy to an answer.
 
-    host: name and port by which the browser asked; viewer: the Rerun viewer's address, which only this machine reaches.
+    host: name and port by which the browser asked; viewer: the address of the Rerun viewer, if it reaches that.
     """
     # Not every browser takes ws: for 'self', and a policy has no way to write an IPv6 address.
     websocket = "" if host.startswith("[") else f" ws://{host}"
-    frame = f" {viewer}" if viewer and is_loopback(host.rpartition(":")[0]) else ""
+    frame = f" {viewer}" if viewer else ""
     headers["Content-Security-Policy"] = (
         f"{_PAGE}; connect-src 'self' blob: data:{websocket}; frame-src 'self'{frame}; {_REST}"
     )

@@ -6,6 +6,7 @@ from typing import Any
 
 import viser
 from viser import _messages
+from websockets.datastructures import Headers
 
 
 class Inside:
@@ -20,6 +21,11 @@ class Inside:
             (one for one, plug in list(self._server._websock_server._live_connections.items()) if plug is connection),
             None,
         )
+
+    def headers(self, client: int) -> Headers:
+        """With which this page's websocket was asked for."""
+        plug = self._server._websock_server._live_connections.get(client)
+        return plug.request.headers if plug is not None and plug.request is not None else Headers()
 
     def control(self, client: int | None, uuid: str) -> Any:
         """The control that this page shows under this id, or None."""

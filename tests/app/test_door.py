@@ -7,9 +7,12 @@ import urllib.request
 
 import pytest
 import viser
+from raw_page import RawPage
+from support.on_page import wait_until
 
 from ema_model.errors import InputError
 from emaviz.cli import main
+from emaviz.page.app import App
 from emaviz.page.server import open_server
 from emaviz.server.door import Door, is_loopback
 
@@ -180,3 +183,19 @@ def test_a_name_that_is_none_is_refused(name):
     with pytest.raises(InputError, match="--allow-host") as told:
         Door("0.0.0.0", [name])
     assert "\n" not in str(told.value)
+
+
+def test_a_page_from_elsewhere_is_told_that_the_viewer_is_not_for_it(tmp_path):
+    app = App("127.0.0.1", 0, tmp_path, allow_hosts=["rig.example.org"])
+    port, token = app.server.get_port(), app.door.token
+    try:
+        with (
+            RawPage(port, host="rig.example.org", token=token) as there,
+            RawPage(port, host="localhost", token=token) as here,
+        ):
+            assert there.drawn.wait(20.0) and here.drawn.wait(20.0)
+            wait_until(lambda: there.told() and len(app.server.get_clients()) == 2, 20.0)
+            assert [told for told in there.told() if "machine that runs emaviz" in told]
+            assert not [told for told in here.told() if "machine that runs emaviz" in told]
+    finally:
+        app.close()

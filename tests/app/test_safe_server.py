@@ -5,11 +5,10 @@ from __future__ import annotations
 import http.client
 
 import pytest
-from websockets.datastructures import Headers
 
 from ema_model.errors import InputError
 from emaviz.page.server import open_server
-from emaviz.server.policy import protect
+from emaviz.server.door import Door
 
 
 @pytest.fixture(scope="module")
@@ -19,9 +18,9 @@ def server():
     server.stop()
 
 
-def ask(server, **headers):
+def ask(server, path="/", **headers):
     connection = http.client.HTTPConnection("127.0.0.1", server.get_port(), timeout=10)
-    connection.request("GET", "/", headers=headers)
+    connection.request("GET", path, headers=headers)
     response = connection.getresponse()
     body = response.read()
     connection.close()
@@ -54,12 +53,17 @@ def test_the_page_may_speak_to_its_own_server_and_show_the_viewer_only():
 
 
 def test_a_page_from_elsewhere_frames_nothing_of_its_own_machine():
-    headers = Headers()
-    protect(headers, "rig.example.org:80", "http://127.0.0.1:4711")
-    assert "127.0.0.1" not in headers["Content-Security-Policy"]
-    protect(seen := Headers(), "[::1]:8080", "http://127.0.0.1:4711")
-    assert "[" not in seen["Content-Security-Policy"], "which knows no IPv6 addresses"
-    assert "http://127.0.0.1:4711" in seen["Content-Security-Policy"]
+    door = Door("127.0.0.1", ["rig.example.org"])
+    server = open_server("127.0.0.1", 0, door, lambda: "http://127.0.0.1:4711")
+    try:
+        policy = directives(ask(server, f"/?token={door.token}", Host="rig.example.org")[0])
+        assert policy["frame-src"] == {"'self'"} and "ws://rig.example.org:80" in policy["connect-src"]
+        policy = directives(ask(server, f"/?token={door.token}", Host="[::1]:8080")[0])
+        assert policy["frame-src"] == {"'self'", "http://127.0.0.1:4711"}
+        assert policy["connect-src"] == {"'self'", "blob:", "data:"}, "a policy knows no IPv6 addresses"
+        assert ask(server, Host="rig.example.org")[0].status == 403
+    finally:
+        server.stop()
 
 
 def test_it_listens_on_the_loopback_only(server):

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from numbers import Integral
 from typing import Any
 
 import viser
@@ -71,7 +72,7 @@ def _several(control: Any, value: Any, bounds: _Bounds, precision: int) -> tuple
 def _number(value: Any, kind: type, low: float | None, high: float | None, precision: int) -> int | float:
     if type(value) not in (int, float) or not abs(value) < math.inf:
         raise Refused("it takes a number")
-    if kind is int:
+    if issubclass(kind, Integral):  # numpy's too
         if value != int(value):
             raise Refused("it takes a whole number", may_go_on=True)
         value, rounding = int(value), 0.0
@@ -83,13 +84,9 @@ def _number(value: Any, kind: type, low: float | None, high: float | None, preci
         raise Refused(f"{_plain(value)} is below {_plain(low)}", may_go_on=True)
     if high is not None and value > high + rounding:
         raise Refused(f"{_plain(value)} is above {_plain(high)}", may_go_on=True)
-    try:
-        value = kind(value)
-    except OverflowError:
-        raise Refused("it takes a number") from None
-    if low is not None and value < low:
-        return kind(low)
-    return kind(high) if high is not None and value > high else value
+    if low is not None:
+        value = max(value, low)
+    return kind(value if high is None else min(value, high))
 
 
 def _plain(number: float) -> str:

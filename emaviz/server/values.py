@@ -69,10 +69,13 @@ def _several(control: Any, value: Any, bounds: _Bounds, precision: int) -> tuple
     )
 
 
-def _number(value: Any, kind: Any, low: float | None, high: float | None, precision: int) -> int | float:
+def _number(
+    value: Any, kind: type[int] | type[float], low: float | None, high: float | None, precision: int
+) -> int | float:
     if type(value) not in (int, float) or not abs(value) < math.inf:
         raise Refused("it takes a number")
-    if issubclass(kind, Integral):  # numpy's too
+    whole = bool(issubclass(kind, Integral))  # numpy's too
+    if whole:
         if value != int(value):
             raise Refused("it takes a whole number", may_go_on=True)
         value, rounding = int(value), 0.0

@@ -69,9 +69,7 @@ def _several(control: Any, value: Any, bounds: _Bounds, precision: int) -> tuple
     )
 
 
-def _number(
-    value: Any, kind: type[int] | type[float], low: float | None, high: float | None, precision: int
-) -> int | float:
+def _number(value: Any, kind: type, low: float | None, high: float | None, precision: int) -> int | float:
     if type(value) not in (int, float) or not abs(value) < math.inf:
         raise Refused("it takes a number")
     whole = bool(issubclass(kind, Integral))  # numpy's too

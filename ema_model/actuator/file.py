@@ -24,25 +24,22 @@ from ema_model.quantities.axes import KINDS as AXIS_KINDS
 from ema_model.quantities.axes import Axes
 from ema_model.quantities.numbers import as_number
 from ema_model.toml_text import toml_of
+from ema_model.recordings.user_file import open_user_file
 
 _OTHERS = ("schema", "name", "description", "axes", "model", "effects", "faults", "recordings")
 _MODEL = ("step_s", "filter_s", "torque_known")
 _RECORDING_KINDS = ("run", "map")
+_MOST_BYTES = 10_000_000
 
 
 def load_actuator(path: str | Path | None = None) -> Actuator:
     """The actuator of a TOML file, or the thesis's own without one; InputError tells what is wrong in it."""
     if path is None:
         return _parse(shipped("thesis.toml"), "thesis.toml")
-    path = Path(path)
     try:
-        with path.open(encoding="utf-8") as file:
-            text = file.read(TEXT_BYTES + 1)
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such actuator file") from None
-    except IsADirectoryError:
-        raise InputError(f"{path}: is a folder; an actuator file (.toml) is expected") from None
-    except (OSError, UnicodeDecodeError, ValueError) as error:
+        with open_user_file(path, "an actuator file (.toml)", TEXT_BYTES) as file:
+            text = file.read().decode("utf-8")
+    except (OSError, UnicodeDecodeError) as error:
         why = getattr(error, "strerror", None) or "not UTF-8"
         raise InputError(f"{path}: cannot be read as text ({why})") from None
     return _parse(text, str(path))
@@ -57,12 +54,19 @@ def shipped(name: str) -> str:
 
 
 def _parse(text: str, where: str) -> Actuator:
-    if len(text) > TEXT_BYTES:
-        raise InputError(f"{where}: is over {TEXT_BYTES // 1000} kB large; an actuator file is expected")
     try:
         document = toml_of(text)
     except ValueError as error:
         raise InputError(f"{where}: not valid TOML: {error}") from None
+    try:
+        return _actuator(document, where)
+    except InputError:
+        raise
+    except ValueError:  # of a number with thousands of digits, read or shown
+        raise InputError(f"{where}: holds a number with too many digits; correct it") from None
+
+
+def _actuator(document: dict[str, Any], where: str) -> Actuator:
     if document.get("schema", 1) != 1:
         raise InputError(f"{where}: schema {document['schema']!r} is not known; this version reads schema 1")
     unknown = set(document) - set(SECTIONS) - set(_OTHERS)

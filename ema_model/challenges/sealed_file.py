@@ -25,6 +25,7 @@ from ema_model.errors import InputError
 from ema_model.limits import CHALLENGE_BYTES, megabytes
 from ema_model.recordings.refusal import shown
 from ema_model.safe_zip import Damaged, Refused, opened_zip
+from ema_model.recordings.user_file import check_user_file
 from ema_model.whole_file import whole_file
 
 SUFFIX = ".challenge"
@@ -80,6 +81,7 @@ def opened(one: Challenge) -> Iterator[Challenge]:
 
 def read_parts(path: Path) -> dict[str, bytes]:
     """All parts but the seal, which was found whole, by their names; InputError otherwise."""
+    check_user_file(path, "a sealed challenge")
     try:
         if path.stat().st_size > CHALLENGE_BYTES:
             raise InputError(f"{shown(path.name)}: is too large to be a challenge ({megabytes(path.stat().st_size)})")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import stat
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -18,6 +17,7 @@ from ema_model.recordings.formats import format_of
 from ema_model.recordings.measurement import Measurement
 from ema_model.recordings.refusal import listed, reason, refusal, shown
 from ema_model.recordings.side_file.read import SideFile, find_side_file, read_side_file
+from ema_model.recordings.user_file import check_user_file
 
 Array = NDArray[np.float64]
 
@@ -119,16 +119,7 @@ def _merged(
 
 def check_file(path: str, max_bytes: int) -> None:
     """Raises InputError for what is no file, an empty or too large a one."""
-    try:
-        status = os.stat(path)
-    except (FileNotFoundError, NotADirectoryError):
-        raise refusal(path, "no such file; check the name and the folder") from None
-    except (OSError, ValueError) as error:
-        raise refusal(path, f"cannot be read ({reason(error)}); check the name and the permissions") from None
-    if stat.S_ISDIR(status.st_mode):
-        raise refusal(path, "is a folder; the file of a measurement is expected")
-    if not stat.S_ISREG(status.st_mode):
-        raise refusal(path, "is not a regular file; the file of a measurement is expected")
+    status = check_user_file(path, "the file of a measurement")
     if status.st_size == 0:
         raise refusal(path, "is empty; a measurement of 100 samples or more is expected")
     if status.st_size > max_bytes:

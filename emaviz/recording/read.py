@@ -11,8 +11,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
+from ema_model.recordings.user_file import open_user_file
 from numpy.typing import NDArray
 
+from ema_model.errors import InputError
 from emaviz.recording import binary
 from emaviz.recording.errors import RecordingError
 from emaviz.recording.style import GROUPS, ITERATION, K_NAMES, PROPERTIES, SIM_TIME
@@ -64,13 +66,11 @@ class Recording:
 def check(path: str | Path) -> Path:
     """The path, if there is a file that starts like a recording; RecordingError with one line otherwise."""
     path = Path(path)
-    if path.is_dir():
-        raise RecordingError(f"{path}: is a folder; the name of a .rrd file is needed")
     try:
-        with path.open("rb") as file:
+        with open_user_file(path, "a .rrd file") as file:
             start = file.read(4)
-    except FileNotFoundError:
-        raise RecordingError(f"{path}: no such file") from None
+    except InputError as error:
+        raise RecordingError(str(error)) from None
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read: {error.strerror}") from error
     if not start.startswith(_MAGIC):

@@ -14,6 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ema_model.recordings.user_file import check_user_file
+
 from ema_model.errors import InputError
 from ema_model.limits import SESSION_BYTES, SESSION_FILES, SETTINGS_BYTES
 from ema_model.recordings import side_path
@@ -67,6 +69,7 @@ def read(path: Path, parts: Mapping[str, Part], folder: DataFolder) -> None:
 
     The files are taken all or not at all.
     """
+    check_user_file(path, "a session")
     try:
         with path.open("rb") as file, opened_zip(file, SESSION_FILES, SESSION_BYTES) as archive:
             document = _document(archive, path)

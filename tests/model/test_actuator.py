@@ -149,8 +149,24 @@ def test_wrong_entry_is_refused(tmp_path, entry):
         load_actuator(written(tmp_path, RESISTANCE, f"resistance_Ohm = {entry}"))
 
 
+@pytest.mark.parametrize("number", ["9" * 5000, "0x" + "f" * 5000])
+def test_numbers_of_thousands_of_digits_are_one_line(tmp_path, number):
+    for text in (f"[motor]\nresistance_Ohm = {number}", f"schema = {number}", f"[model]\nstep_s = {number}"):
+        (tmp_path / "a.toml").write_text(text)
+        with pytest.raises(InputError, match=r"digits|must|lacks") as told:
+            load_actuator(tmp_path / "a.toml")
+        assert len(str(told.value)) < 300 and "\n" not in str(told.value)
+
+
+def test_an_actuator_file_of_300_MB_is_not_read(tmp_path):
+    with open(tmp_path / "a.toml", "wb") as file:
+        file.truncate(300_000_000)
+    with pytest.raises(InputError, match="is 300 MB large, over the limit of 10 MB"):
+        load_actuator(tmp_path / "a.toml")
+
+
 def test_unreadable_files(tmp_path):
-    with pytest.raises(InputError, match="no such actuator file"):
+    with pytest.raises(InputError, match="no such file"):
         load_actuator(tmp_path / "none.toml")
     with pytest.raises(InputError, match="is a folder"):
         load_actuator(tmp_path)

@@ -167,7 +167,7 @@ def sides(actuator):
 SIDE_FILES = {
     "no_toml": ("actuator = ", "is not valid TOML"),
     "binary": (b"\xff\xfe\x00", "is not text in UTF-8"),
-    "too_large": ("# " + "x" * 200_000, "is over 100 kB large"),
+    "too_large": ("# " + "x" * 200_000, "over the limit of 0.1 MB"),
     "deep": ("x = " + "[" * 20_000, "is not valid TOML"),
     "many_digits": ("schema = " + "9" * 5000, "too many digits"),
     "many_hexadecimal_digits": ("schema = 0x" + "f" * 5000, "too many digits"),

@@ -18,11 +18,12 @@ from ema_model.quantities.signals import SIGNALS
 from ema_model.recordings.columns.mapping import ColumnMapping, MappedColumn, parse_mapping
 from ema_model.recordings.refusal import listed, reason, refusal, shown
 from ema_model.toml_text import toml_of
+from ema_model.recordings.user_file import open_user_file
 
 Kind = Literal["run", "map"]
 Sampling = Literal["mean", "instantaneous"]
 
-_OF_A_FOLDER = "recordings.toml"
+OF_A_FOLDER = "recordings.toml"
 _KEYS = ("schema", "actuator", "kind", "sampling", "segments", "window", "mapping", "sensors")
 _LARGEST = 2**53  # up to which whole numbers are exact as floats
 _NUMBERS = ("sign", "scale", "offset")
@@ -74,18 +75,16 @@ def side_path(path: str | os.PathLike[str]) -> Path:
 def find_side_file(path: str | os.PathLike[str]) -> Path | None:
     """The side file that a recording uses: its own, else its folder's `recordings.toml`, else none."""
     own = side_path(path)
-    return next((side for side in (own, own.with_name(_OF_A_FOLDER)) if side.is_file()), None)
+    # Whatever else has the name, a pipe as well, is for `read_side_file` to refuse.
+    return next((side for side in (own, own.with_name(OF_A_FOLDER)) if side.exists() and not side.is_dir()), None)
 
 
 def read_side_file(path: str | os.PathLike[str]) -> SideFile:
     """The side file itself; raises InputError, one line, for whatever is wrong in it."""
     path = os.fspath(path)
     try:
-        with open(path, "rb") as file:
-            raw = file.read(TEXT_BYTES + 1)
-        if len(raw) > TEXT_BYTES:
-            raise refusal(path, f"is over {TEXT_BYTES // 1000} kB large; the side file of a recording is expected")
-        return _parsed(path, toml_of(raw.decode("utf-8")))
+        with open_user_file(path, "the side file of a recording", TEXT_BYTES) as file:
+            return _parsed(path, toml_of(file.read().decode("utf-8")))
     except InputError:
         raise
     except UnicodeDecodeError:

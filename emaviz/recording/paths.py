@@ -7,8 +7,9 @@ import os
 import shutil
 from pathlib import Path
 
+from ema_model.file_lock import FileLock
+from ema_model.whole_file import lock_path
 from emaviz.recording.errors import RecordingError
-from emaviz.recording.lock import FileLock
 
 MIN_FREE_BYTES = 200_000_000
 
@@ -16,11 +17,6 @@ MIN_FREE_BYTES = 200_000_000
 def part_of(target: Path) -> Path:
     """NAME.rrd.part: where NAME.rrd grows until it is whole."""
     return target.with_name(target.name + ".part")
-
-
-def lock_of(part: Path) -> Path:
-    """NAME.rrd.part.lock: locked as long as the writer of the part lives."""
-    return part.with_name(part.name + ".lock")
 
 
 def free_name(folder: Path, stem: str, ending: str) -> Path:
@@ -59,7 +55,7 @@ def claim(target: Path, min_free_bytes: int) -> FileLock:
         )
     part = part_of(target)
     try:
-        lock = FileLock.acquire(lock_of(part))
+        lock = FileLock.acquire(lock_path(part))
     except OSError as error:
         raise RecordingError(f"{folder}: cannot record there: {error.strerror}") from error
     if lock is None:

@@ -8,17 +8,21 @@ from __future__ import annotations
 import filecmp
 import os
 import re
-import secrets
 import shutil
+from collections.abc import Iterator
 from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
 
+from ema_model.recordings.user_file import check_user_file
+
 from ema_model.challenges.sealed_file import SUFFIX as CHALLENGE_SUFFIX
 from ema_model.errors import InputError
+from ema_model.file_lock import FileLock
 from ema_model.recordings import side_path
 from ema_model.recordings.formats import FORMATS
 from ema_model.recordings.refusal import shown
+from ema_model.whole_file import new_draft, remove_abandoned, whole_file
 
 ACTUATOR_SUFFIX = ".toml"
 SESSION_SUFFIX = ".emaviz"
@@ -42,6 +46,9 @@ class DataFolder:
             except OSError as error:
                 raise InputError(f"--data-dir {folder}: {made.name} cannot be made ({error.strerror})") from None
         self.folder = folder.resolve()
+        self._receiving: dict[Path, FileLock] = {}
+        for at, _ in _walked(self.folder):
+            remove_abandoned(at)
 
     def measurements(self) -> list[str]:
         """Names of the files that may hold measurements, relative to the folder, the newest first."""
@@ -117,7 +124,15 @@ class DataFolder:
         """A new file in `uploads` for a transfer on its way; `measurements` leaves it out."""
         if not self.holds(self.uploads):
             raise InputError("the data folder's uploads leads out of it; replace the link by a folder")
-        return self.uploads / f".{secrets.token_hex(8)}.part"
+        for gone in [path for path in self._receiving if not path.exists()]:
+            self._receiving.pop(gone).release()
+        try:
+            path, lock = new_draft(self.uploads)
+        except OSError as error:
+            raise InputError(f"{self.uploads}: cannot be written ({error.strerror}); check the disk") from None
+        if lock is not None:
+            self._receiving[path] = lock
+        return path
 
     def keep(self, part: Path, filename: str) -> Path:
         """Gives a finished transfer its name; returns where it is.  The part is gone in any case."""
@@ -129,12 +144,13 @@ class DataFolder:
         finally:
             with suppress(OSError):
                 part.unlink()
+            if lock := self._receiving.pop(part, None):
+                lock.release()
         return path
 
     def take_in(self, given: Path) -> Path:
         """Copies a file that the command line names, and its side file, into `uploads`; one inside stays."""
-        if not given.is_file():
-            raise InputError(f"{shown(given, 300)}: no such file; check the name and the folder")
+        check_user_file(given, "the file of a measurement")
         if self.holds(given):
             return given.resolve()
         for known in self.uploads.glob(f"{Path(sanitised(given.name)).stem}*{given.suffix.lower()}"):
@@ -142,9 +158,11 @@ class DataFolder:
                 return known.resolve()  # of an earlier start
         try:
             path = self.place(given.name)
-            shutil.copyfile(given, path)
             if side_path(given).is_file():
-                shutil.copyfile(side_path(given), side_path(path))
+                with whole_file(side_path(path)) as draft:
+                    shutil.copyfile(side_path(given), draft)
+            with whole_file(path) as draft:
+                shutil.copyfile(given, draft)
         except OSError as error:
             raise InputError(f"{shown(given, 300)}: cannot be copied into the data folder ({error.strerror})") from None
         return path.resolve()
@@ -181,16 +199,22 @@ class DataFolder:
 
     def _files(self, folder: Path, suffixes: tuple[str, ...]) -> list[str]:
         found: list[tuple[float, str]] = []
-        for at, folders, names in os.walk(folder):
-            depth = len(Path(at).relative_to(folder).parts)
-            folders[:] = [f for f in sorted(folders) if not f.startswith(".") and depth + 1 < _DEEPEST]
+        for at, names in _walked(folder):
             for name in names:
-                path = Path(at) / name
+                path = at / name
                 hidden = name.startswith(".") or path.suffix.lower() not in suffixes
                 if not hidden and path.is_file() and self.holds(path):
                     with suppress(OSError):
                         found.append((-path.stat().st_mtime, path.relative_to(self.folder).as_posix()))
         return [name for _, name in sorted(found)[:_MOST_LISTED]]
+
+
+def _walked(folder: Path) -> Iterator[tuple[Path, list[str]]]:
+    """The folder and those below it that are looked into, each with the names in it."""
+    for at, folders, names in os.walk(folder):
+        depth = len(Path(at).relative_to(folder).parts)
+        folders[:] = [f for f in sorted(folders) if not f.startswith(".") and depth + 1 < _DEEPEST]
+        yield Path(at), names
 
 
 def sanitised(filename: str) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 
@@ -35,9 +36,13 @@ class FileLock:
         """Removes the file and unlocks; a second call does nothing."""
         if self._descriptor < 0:
             return
-        self.path.unlink(missing_ok=True)
-        os.close(self._descriptor)
-        self._descriptor = -1
+        descriptor, self._descriptor = self._descriptor, -1
+        if sys.platform == "win32":  # where no open file can be removed
+            os.close(descriptor)
+        with suppress(OSError):
+            self.path.unlink(missing_ok=True)
+        if sys.platform != "win32":
+            os.close(descriptor)
 
 
 def _is_file_at(descriptor: int, path: Path) -> bool:

@@ -1,15 +1,20 @@
-"""Repairs what runs that were killed left behind."""
+"""Repairs recordings that runs left behind when they were killed."""
 
 from __future__ import annotations
 
 import os
+import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
+from ema_model.recordings.user_file import check_user_file
+
+from ema_model.errors import InputError
+from ema_model.file_lock import FileLock
+from ema_model.whole_file import lock_path, whole_file
 from emaviz.recording.blueprint import Algorithm, Contents, build
 from emaviz.recording.errors import RecordingError
-from emaviz.recording.lock import FileLock
-from emaviz.recording.paths import free_name, lock_of
+from emaviz.recording.paths import free_name
 from emaviz.recording.read import Recording, read, repair
 from emaviz.recording.style import APPLICATION
 
@@ -43,9 +48,9 @@ def recover(folder: str | Path) -> list[Recovered]:
     if not folder.is_dir():
         raise RecordingError(f"{folder}: no such folder")
     found = []
-    for part in sorted(folder.glob(f"*{_ENDING}")):
+    for part in sorted(path for path in folder.glob(f"*{_ENDING}") if path.is_file()):
         try:
-            lock = FileLock.acquire(lock_of(part))
+            lock = FileLock.acquire(lock_path(part))
         except OSError as error:
             found.append(Recovered(part, part, f"{part.name}: cannot be recovered: {error.strerror}"))
             continue
@@ -61,25 +66,70 @@ def recover(folder: str | Path) -> list[Recovered]:
     return found
 
 
+def recover_part(part: Path, target: Path, *, replace: bool = False) -> None:
+    """Makes the whole recording `target` of one that was cut off, which then goes.
+
+    RecordingError, and all stays as it was: the part is still being written, nothing in it can be read, the target
+    exists (unless `replace`) or cannot be written.
+    """
+    _check_part(part)
+    if target.suffix != ".rrd":
+        raise RecordingError(f"{target}: the name of a recording must end in .rrd")
+    if target.exists() and not replace:
+        raise RecordingError(f"{target}: exists already; name another file with --out, or replace it with --force")
+    try:
+        lock = FileLock.acquire(lock_path(part))
+        if lock is None:
+            raise RecordingError(f"{part}: is still being written; end what writes it first")
+        try:
+            with whole_file(target) as draft:
+                write_whole(part, draft)
+            part.unlink()
+        finally:
+            lock.release()
+    except RecordingError:
+        raise
+    except OSError as error:
+        raise RecordingError(f"{target}: cannot be written ({error.strerror}); check the folder") from None
+
+
+def write_whole(part: Path, copy: Path) -> None:
+    """Writes what a part holds so far to `copy`, with a layout; RecordingError if that is nothing."""
+    _check_part(part)
+    try:
+        repair(part, copy)
+        # The layout comes last in a file, so a run that was killed has none.
+        with tempfile.TemporaryDirectory(prefix="emaviz-") as folder:
+            layout = Path(folder, "layout.rbl")
+            build(_contents(read(copy))).save(APPLICATION, layout)
+            repair(part, copy, layout)
+        read(copy)
+    except RecordingError as error:
+        raise RecordingError(f"{part}: cannot be repaired: {error}") from None
+
+
+def _check_part(part: Path) -> None:
+    try:
+        status = check_user_file(part, "a recording that was cut off (.part)")
+    except InputError as error:
+        raise RecordingError(str(error)) from None
+    if status.st_size == 0:
+        raise RecordingError(f"{part}: is empty; there is nothing to recover")
+
+
 def _recover(part: Path) -> Recovered:
     stem = part.name.removesuffix(_ENDING)
     if part.stat().st_size == 0:
         part.unlink()
         return Recovered(part, None, f"{part.name}: was empty and is removed")
-    copy, layout = part.with_name(f"{part.name}.repaired"), part.with_name(f"{part.name}.rbl")
+    copy = part.with_name(f"{part.name}.repaired")
     try:
-        repair(part, copy)
-        # The layout comes last in a file, so a run that was killed has none.
-        build(_contents(read(copy))).save(APPLICATION, layout)
-        repair(part, copy, layout)
-        read(copy)
+        write_whole(part, copy)
     except RecordingError as error:
         copy.unlink(missing_ok=True)
         damaged = free_name(part.parent, stem, ".rrd.damaged")
         part.rename(damaged)
-        return Recovered(part, damaged, f"{part.name}: cannot be repaired, kept as {damaged.name}: {error}")
-    finally:
-        layout.unlink(missing_ok=True)
+        return Recovered(part, damaged, f"{error}; kept as {damaged.name}")
     path = _publish(copy, part.with_name(f"{stem}.rrd"))
     part.unlink()
     return Recovered(part, path, f"{path.name}: recovered from a run that was interrupted")

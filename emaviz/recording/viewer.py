@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import shutil
 import socketserver
+import tempfile
 import threading
 import webbrowser
+from collections.abc import Iterator
+from contextlib import contextmanager
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote, unquote, urlsplit
 
+from ema_model.whole_file import lock_path
 from emaviz.recording.assets import viewer_assets
 from emaviz.recording.errors import RecordingError
-from emaviz.recording.paths import lock_of, part_of
+from emaviz.recording.paths import part_of
 from emaviz.recording.read import check
 
 _FOLDER = "/recordings/"
@@ -87,7 +91,7 @@ class ViewerHost:
         if Path(name).name != name or not name.endswith(".rrd") or "\0" in name or self.only not in (None, name):
             return None
         part = part_of(self.folder / name)
-        return part if part.is_file() and not part.is_symlink() and lock_of(part).exists() else None
+        return part if part.is_file() and not part.is_symlink() and lock_path(part).exists() else None
 
     def close(self) -> None:
         """Stops serving and frees the port."""
@@ -102,17 +106,34 @@ class ViewerHost:
 
 
 def view(path: str | Path, open_browser: bool = True, port: int = 0) -> None:
-    """Shows one recording in the browser until Ctrl-C; prints the address.  RecordingError if it cannot."""
-    path = check(path)
-    with ViewerHost(path.parent, port=port, only=path.name) as host:
-        address = host.url_of(path.name)
-        try:
+    """Shows one recording in the browser until Ctrl-C; prints the address.  RecordingError if it cannot.
+
+    Of one that was cut off (.part), or is being written, it shows what is there now.
+    """
+    path = Path(path)
+    try:
+        with _viewable(path) as file, ViewerHost(file.parent, port=port, only=file.name) as host:
+            address = host.url_of(file.name)
             print(f"{path.name}: {address}\nCtrl-C ends it.", flush=True)
             if open_browser:
                 webbrowser.open(address)
             host.wait()
-        except KeyboardInterrupt:
-            return
+    except KeyboardInterrupt:
+        return
+
+
+@contextmanager
+def _viewable(path: Path) -> Iterator[Path]:
+    """The recording itself, or a whole copy of a part for as long as it is shown."""
+    if path.suffix != ".part":
+        yield check(path)
+        return
+    from emaviz.recording.recover import write_whole  # rerun takes a second to import
+
+    with tempfile.TemporaryDirectory(prefix="emaviz-") as folder:
+        copy = Path(folder, path.with_suffix("").name).with_suffix(".rrd")
+        write_whole(path, copy)
+        yield copy
 
 
 class _Server(socketserver.ThreadingMixIn, socketserver.TCPServer):
@@ -190,7 +211,7 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _follow(self, part: Path) -> None:
         """A recording that is being written, as it grows, until its writer is done with it."""
-        lock = lock_of(part)
+        lock = lock_path(part)
         with part.open("rb") as file:  # stays the same file when it gets its name
             headers = {"Content-Type": "application/octet-stream", "Connection": "close", "Cache-Control": "no-store"}
             self._head(HTTPStatus.OK, headers)

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import http.client
+import json
+import os
+import re
 import subprocess
 import sys
 import time
+from urllib.parse import parse_qs, urlsplit
 
 import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
+from emaviz.cli import main
 from emaviz.recording import RecordingError, RecordingWriter
 from emaviz.recording.read import read
 from emaviz.recording.recover import recover
@@ -88,3 +94,71 @@ def test_iterations_reach_the_file_within_half_a_second(tmp_path):
         writer.iteration("hba", 0, 1.0, np.zeros(8))
         time.sleep(0.6)
         assert len(read(tmp_path / "a.rrd.part").identification["hba"].iteration) == 1
+
+
+def test_the_command_recovers_a_part_and_overwrites_nothing(tmp_path, running, capsys):
+    part, target = tmp_path / "a.rrd.part", tmp_path / "a.rrd"
+    assert main(["recover", str(part)]) == 2
+    assert "is still being written; end what writes it first" in capsys.readouterr().err
+    running.kill()
+    running.wait()
+    target.write_bytes(b"another recording")
+    for out in ([], ["--out", str(target)]):
+        assert main(["recover", str(part), *out]) == 2
+        told = capsys.readouterr().err
+        assert "exists already" in told and "--force" in told and told.count("\n") == 1
+    assert target.read_bytes() == b"another recording" and part.exists()
+    assert main(["recover", str(part), "--force", "--json", str(tmp_path / "r.json")]) == 0
+    assert f"{target}: recovered from a.rrd.part" in capsys.readouterr().out
+    assert sorted(os.listdir(tmp_path)) == ["a.rrd", "r.json"]
+    assert json.loads((tmp_path / "r.json").read_text())["file"] == str(target)
+    recording = read(target)
+    assert recording.complete and recording.config == "# run"
+    assert len(recording.identification["hba"].iteration) == 40 and len(RrdReader(target).blueprints()) == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "says"),
+    [
+        ("a.rrd.part", b"", "is empty"),
+        ("a.rrd.part", b"RRF2", "rrd optimize failed|nothing in it can be read|damaged"),
+        ("a.rrd.part", b"no recording" * 100, "a.rrd.part"),
+        ("a.rrd", b"RRF2 something", "ends in .part"),
+        ("none.rrd.part", None, "no such file"),
+    ],
+)
+def test_what_cannot_be_recovered_stays_as_it_is(name, content, says, tmp_path, capsys):
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    assert main(["recover", str(tmp_path / name)]) == 2
+    told = capsys.readouterr().err
+    assert re.search(says, told) and told.count("\n") == 1
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+@pytest.mark.parametrize("killed", [True, False], ids=["killed", "being written"])
+def test_view_shows_a_part(tmp_path, running, killed):
+    if killed:
+        running.kill()
+        running.wait()
+    before = sorted(os.listdir(tmp_path))
+    command = [sys.executable, "-m", "emaviz", "view", str(tmp_path / "a.rrd.part"), "--no-open"]
+    viewer = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    try:
+        assert viewer.stdout is not None
+        name, _, address = viewer.stdout.readline().strip().partition(": ")
+        assert name == "a.rrd.part"
+        file = urlsplit(parse_qs(urlsplit(address).query)["url"][0])
+        connection = http.client.HTTPConnection(file.netloc, timeout=30)
+        connection.request("GET", file.path)
+        answer = connection.getresponse()
+        assert answer.status == 200
+        (tmp_path / "seen.rrd").write_bytes(answer.read())
+        connection.close()
+    finally:
+        viewer.kill()
+        viewer.wait()
+        viewer.stdout.close()
+    assert len(read(tmp_path / "seen.rrd").identification["hba"].iteration) == 40
+    assert sorted(os.listdir(tmp_path)) == sorted([*before, "seen.rrd"])

@@ -25,6 +25,7 @@ REFERENCE_SUBSTEPS = 10  # of the Reference Model in one step of the Monitor Mod
 _LONGEST_S = 600.0
 SLOWEST_HZ, FASTEST_HZ = 100.0, 1e6  # sampling
 MOST_STEPS = 60_000_000  # of the Monitor Model in one run: its longest at its usual step
+_MOST_SAMPLES = 10_000_000
 
 
 @dataclass(frozen=True)
@@ -50,6 +51,9 @@ class Run:
             raise InputError(f"the load torque must be a number of N·m up to 1e6, not {self.load_torque_Nm:g}")
         if self.duration_s * self.sample_rate_Hz < 1.0:
             raise InputError("the run must last for one sample or more")
+        if self.samples > _MOST_SAMPLES:
+            asked = f"{self.duration_s:g} s at {self.sample_rate_Hz:g} Hz are {self.samples} samples"
+            raise InputError(f"{asked}, and {_MOST_SAMPLES} are the most; shorten the run, or lower the sample rate")
 
     @property
     def samples(self) -> int:

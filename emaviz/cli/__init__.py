@@ -5,51 +5,39 @@ Exit codes: 0 done, 2 the input or the arguments are wrong (one line on stderr),
 
 from __future__ import annotations
 
-import argparse
-import importlib
-import os
 import sys
 from collections.abc import Sequence
-from typing import NoReturn
 
-from ema_model.errors import InputError
-from emaviz import __version__
+# Whatever takes time is imported where an interrupt ends the program as it should.
+from emaviz.cli.interrupt import EXIT_CODE, until_interrupted
 
-COMMANDS = ("gui", "simulate", "identify", "compare", "discover", "effects", "view")
-
-
-class _Parser(argparse.ArgumentParser):
-    """Argparse that tells a mistake in one line."""
-
-    def error(self, message: str) -> NoReturn:
-        raise InputError(f"{message} (see {self.prog} --help)")
+COMMANDS = ("gui", "simulate", "identify", "compare", "discover", "effects", "view", "recover")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs one command; returns the exit code."""
-    given = list(sys.argv[1:] if arguments is None else arguments)
-    if given[:1] != ["--version"] and given[:1] not in (["-h"], ["--help"]) and (not given or given[0] not in COMMANDS):
-        given.insert(0, "gui")
+    """Runs one command; returns the exit code.  Without arguments it is the program, which an interrupt ends."""
+    if arguments is None:
+        return until_interrupted(lambda: _run(sys.argv[1:]))
+    return _run(list(arguments))
+
+
+def _run(given: list[str]) -> int:
     try:
-        parsed = _parser(given[0]).parse_args(given)
-        return int(parsed.run(parsed) or 0)
-    except InputError as error:
-        print(f"emaviz: {error}", file=sys.stderr)
-        return 2
+        from ema_model.errors import InputError
+        from emaviz.cli.parser import parser_of
+
+        if given[:1] not in (["-h"], ["--help"], ["--version"]) and (not given or given[0] not in COMMANDS):
+            given.insert(0, "gui")
+        try:
+            parsed = parser_of(given[0]).parse_args(given)
+            return int(parsed.run(parsed) or 0)
+        except InputError as error:
+            print(f"emaviz: {error}", file=sys.stderr)
+            return 2
     except KeyboardInterrupt:
-        return 130
+        return EXIT_CODE
     except BrokenPipeError:  # the reader of our output went away, as `| head` does
+        import os
+
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
-
-
-def _parser(wanted: str) -> _Parser:
-    parser = _Parser(prog="emaviz", description="Break, watch and identify the model of an electromechanical actuator.")
-    parser.add_argument("--version", action="version", version=f"emaviz {__version__}")
-    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    for name in COMMANDS if wanted not in COMMANDS else (wanted,):
-        module = importlib.import_module(f"emaviz.cli.{name}")
-        sub = commands.add_parser(name, help=module.HELP, description=module.HELP)
-        module.add_arguments(sub)
-        sub.set_defaults(run=module.run)
-    return parser

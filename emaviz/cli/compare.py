@@ -9,14 +9,17 @@ from ema_model.comparison import Comparison, as_dict, compare
 from ema_model.errors import InputError
 from ema_model.recordings import SIGNALS
 from ema_model.recordings.read import read_recording
-from emaviz.cli import options, output
+from emaviz.cli import files, options, output
+from emaviz.cli.numbers import FINITE
 
 HELP = "show where the model fails beside recordings"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of INTERFACES, with the signals to fit and the part to use."""
-    parser.add_argument("files", nargs="+", metavar="FILE", help="recordings of one actuator, compared together")
+    parser.add_argument(
+        "files", nargs="+", type=files.RECORDING, metavar="FILE", help="recordings of one actuator, compared together"
+    )
     options.add_actuator(parser)
     options.add_mapping(parser)
     parser.add_argument(
@@ -34,20 +37,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME[=weight]",
         help="fit only these signals, with a weight (1 is what the noise says); repeat for more",
     )
-    parser.add_argument("--from", type=float, dest="start_s", metavar="s", help="leave out what lies before")
-    parser.add_argument("--to", type=float, dest="stop_s", metavar="s", help="leave out what lies after")
-    parser.add_argument("--seed", type=int, default=0, help="of all random numbers")
-    parser.add_argument("--record", metavar="FILE.rrd", help="write the comparison for the Rerun viewer")
-    parser.add_argument("--report", metavar="FILE.html", help="write a report that opens in any browser, offline")
-    parser.add_argument("--json", metavar="FILE", help="write the result there")
+    parser.add_argument("--from", type=FINITE, dest="start_s", metavar="s", help="leave out what lies before")
+    parser.add_argument("--to", type=FINITE, dest="stop_s", metavar="s", help="leave out what lies after")
+    options.add_seed(parser)
+    options.add_record(parser, "the comparison")
+    options.add_report(parser)
+    options.add_json(parser)
+    files.add_force(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Reads, compares, writes and prints."""
     actuator = options.actuator_of(arguments)
-    for path, option in ((arguments.report, "--report"), (arguments.json, "--json")):
-        if path is not None:
-            output.check_target(Path(path), option)
     progress = output.Progress()
     try:
         measurements = []

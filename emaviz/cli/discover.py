@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 from ema_model.actuator import save_actuator
 from ema_model.comparison.summary import plain
 from ema_model.discovery import Discovery, as_dict, discover, verified
 from ema_model.effects import find
-from ema_model.errors import InputError
 from ema_model.recordings.read import read_recording
 from emaviz.cli import options, output
 from emaviz.text.discovery import VERDICTS, faults, next_experiment, settings, verification
+from emaviz.cli import files, options, output
+from emaviz.cli.numbers import whole
+from emaviz.text.discovery import VERDICTS, faults, next_experiment, settings
 
 HELP = "find the physical effects that the model lacks, and add them"
 _CURRENT_ONLY = ("current_A",)
@@ -20,41 +21,43 @@ _CURRENT_ONLY = ("current_A",)
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of INTERFACES, and where the improved model goes."""
-    parser.add_argument("files", nargs="+", metavar="FILE", help="recordings of one actuator, fitted together")
     parser.add_argument(
-        "--holdout", action="append", default=[], metavar="FILE", help="not fitted, must improve; repeat for more"
+        "files", nargs="+", type=files.RECORDING, metavar="FILE", help="recordings of one actuator, fitted together"
+    )
+    parser.add_argument(
+        "--holdout",
+        action="append",
+        default=[],
+        type=files.RECORDING,
+        metavar="FILE",
+        help="not fitted, must improve; repeat for more",
     )
     options.add_actuator(parser)
     options.add_mapping(parser)
     parser.add_argument("--signals", choices=("current", "all"), default="all", help="what is fitted")
-    parser.add_argument("--max-effects", type=int, default=3, metavar="N", help="at most so many are added")
-    parser.add_argument("--seed", type=int, default=0, help="of all random numbers")
-    parser.add_argument("--save-actuator", metavar="FILE.toml", help="write the improved model as an actuator file")
-    parser.add_argument("--record", metavar="FILE.rrd", help="write the discovery for the Rerun viewer")
-    parser.add_argument("--report", metavar="FILE.html", help="write a report that opens in any browser, offline")
-    parser.add_argument("--json", metavar="FILE", help="write the result there")
+    parser.add_argument("--max-effects", type=whole(0, 100), default=3, metavar="N", help="at most so many are added")
+    options.add_seed(parser)
+    parser.add_argument(
+        "--save-actuator",
+        type=files.SAVED_ACTUATOR,
+        metavar="FILE.toml",
+        help="write the improved model as an actuator file",
+    )
+    options.add_record(parser, "the discovery")
+    options.add_report(parser)
+    options.add_json(parser)
+    files.add_force(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Reads, discovers, writes and prints."""
     actuator = options.actuator_of(arguments)
-    written = {
-        "--json": arguments.json,
-        "--save-actuator": arguments.save_actuator,
-        "--record": arguments.record,
-        "--report": arguments.report,
-    }
-    for option, path in written.items():
-        if path is not None:
-            output.check_target(Path(path), option)
-    if arguments.record and not arguments.record.endswith(".rrd"):
-        raise InputError(f"--record {arguments.record}: the name of a recording must end in .rrd")
     progress = output.Progress()
     try:
         progress.show("reading")
         fitted, held = (
-            [read_recording(file, actuator, arguments.mapping) for file in files]
-            for files in (arguments.files, arguments.holdout)
+            [read_recording(file, actuator, arguments.mapping) for file in named]
+            for named in (arguments.files, arguments.holdout)
         )
         found = discover(
             fitted,

@@ -8,6 +8,7 @@ from dataclasses import asdict
 from typing import Any
 
 from ema_model.effects import CATALOGUE, Effect, find
+from emaviz.cli.options import add_json
 from emaviz.cli.output import configuration, write_json
 
 HELP = "list the physical effects that can be added to the models, or explain one"
@@ -16,7 +17,7 @@ HELP = "list the physical effects that can be added to the models, or explain on
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """NAME and --json."""
     parser.add_argument("name", nargs="?", metavar="NAME", help="one effect; all without it")
-    parser.add_argument("--json", metavar="FILE", help="write the result there")
+    add_json(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:

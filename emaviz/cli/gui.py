@@ -5,12 +5,16 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from emaviz.cli.files import RECORDING
+from emaviz.cli.numbers import whole
+from emaviz.cli.options import add_actuator
+
 HELP = "the app in the browser (also without a command)"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """FILE…, --host, --allow-host, --port, --open, --data-dir, --actuator."""
-    parser.add_argument("files", nargs="*", metavar="FILE", help="recordings to open")
+    parser.add_argument("files", nargs="*", type=RECORDING, metavar="FILE", help="recordings to open")
     parser.add_argument("--host", default="127.0.0.1", help="address to listen on; the default is this machine only")
     parser.add_argument(
         "--allow-host",
@@ -19,10 +23,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="name or address by which other machines ask for the page, for a --host they reach; repeatable",
     )
-    parser.add_argument("--port", type=int, default=8080)
+    parser.add_argument("--port", type=whole(0, 65535), default=8080)
     parser.add_argument("--open", action=argparse.BooleanOptionalAction, default=True, help="open the browser")
     parser.add_argument("--data-dir", type=Path, default=Path("emaviz-data"), metavar="DIR", help="recordings, uploads")
-    parser.add_argument("--actuator", metavar="A.toml", help="parameters of the actuator; without it, the thesis's")
+    add_actuator(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -16,30 +16,34 @@ from ema_model.identification.run import ALGORITHMS, ROBUST, Identification, Pro
 from ema_model.recordings import Measurement, read_measurement
 from ema_model.simulation.plant import FITNESSES, simulated
 from ema_model.simulation.sensors import Sensors
-from emaviz.cli import options, output
+from emaviz.cli import files, options, output
+from emaviz.cli.numbers import whole
 
 HELP = "find the faults k1 … k8 of recordings, or of a simulated actuator"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of INTERFACES, and those of the run that is simulated when no file is given."""
-    parser.add_argument("files", nargs="*", metavar="FILE", help="recordings of one actuator, fitted together")
+    parser.add_argument(
+        "files", nargs="*", type=files.RECORDING, metavar="FILE", help="recordings of one actuator, fitted together"
+    )
     parser.add_argument(
         "--algorithm", choices=tuple(ALGORITHMS), default=ROBUST, help="robust, or one of the thesis's as published"
     )
     parser.add_argument(
         "--polish", action="store_true", help="let a least-squares fit follow ssa, hba or do (robust always has it)"
     )
-    parser.add_argument("--population", type=int, default=50, metavar="N")
-    parser.add_argument("--iterations", type=int, default=150, metavar="N")
+    parser.add_argument("--population", type=whole(2, 100_000), default=50, metavar="N")
+    parser.add_argument("--iterations", type=whole(1, 1_000_000), default=150, metavar="N")
     parser.add_argument("--fitness", choices=FITNESSES, default="filtered", help="0.5 ms means, or every sample")
     parser.add_argument("--circuit", choices=("reduced", "thesis"), default="reduced", help="of the monitor model")
     options.add_actuator(parser)
     options.add_faults(parser)
     options.add_effects(parser)
     options.add_run(parser)
-    parser.add_argument("--record", metavar="FILE.rrd", help="write the identification for the Rerun viewer")
-    parser.add_argument("--json", metavar="FILE", help="write the result there")
+    options.add_record(parser, "the identification")
+    options.add_json(parser)
+    files.add_force(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -15,11 +15,21 @@ from ema_model.effects.user.entries import kind_of, read_entries
 from ema_model.errors import InputError
 from ema_model.recordings import read_measurement
 from ema_model.simulation.run import Run
+from emaviz.cli import files
+from emaviz.cli.numbers import FINITE, SEED, whole
+
+_COMMAND = files.Input(
+    "the file of a measurement",
+    has_side_file=True,
+    is_file=lambda name: name not in COMMANDS and bool(Path(name).suffix),
+)
 
 
 def add_actuator(parser: argparse.ArgumentParser) -> None:
     """--actuator"""
-    parser.add_argument("--actuator", metavar="A.toml", help="parameters of the actuator; without it, the thesis's")
+    parser.add_argument(
+        "--actuator", type=files.ACTUATOR, metavar="A.toml", help="parameters of the actuator; without it, the thesis's"
+    )
 
 
 def add_faults(parser: argparse.ArgumentParser) -> None:
@@ -52,10 +62,36 @@ def add_effects(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_seed(parser: argparse.ArgumentParser) -> None:
+    """--seed"""
+    parser.add_argument("--seed", type=SEED, default=0, help="of all random numbers")
+
+
+def add_json(parser: argparse.ArgumentParser) -> None:
+    """--json"""
+    parser.add_argument("--json", type=files.JSON, metavar="FILE.json", help="write the result there")
+
+
+def add_report(parser: argparse.ArgumentParser) -> None:
+    """--report"""
+    parser.add_argument(
+        "--report", type=files.REPORT, metavar="FILE.html", help="write a report that opens in any browser, offline"
+    )
+
+
+def add_record(parser: argparse.ArgumentParser, what: str) -> None:
+    """--record; what: is written there"""
+    parser.add_argument("--record", type=files.RRD, metavar="FILE.rrd", help=f"write {what} for the Rerun viewer")
+
+
 def add_run(parser: argparse.ArgumentParser) -> None:
     """What is asked of the actuator: --command, --set, --duration, --load-torque, sensors' accuracy"""
     parser.add_argument(
-        "--command", default="chirp", metavar="NAME|FILE", help=f"{', '.join(COMMANDS)}, or a recording's command"
+        "--command",
+        type=_COMMAND,
+        default="chirp",
+        metavar="NAME|FILE",
+        help=f"{', '.join(COMMANDS)}, or a recording's command",
     )
     parser.add_argument(
         "--set",
@@ -65,13 +101,15 @@ def add_run(parser: argparse.ArgumentParser) -> None:
         dest="settings",
         help="a setting of the command, e.g. amplitude_rad=0.01; repeat for more",
     )
-    parser.add_argument("--duration", type=float, metavar="s", help="0.5 s, or the whole of a recorded command")
+    parser.add_argument("--duration", type=FINITE, metavar="s", help="0.5 s, or the whole of a recorded command")
     parser.add_argument(
-        "--load-torque", type=float, default=0.0, metavar="N_m", help="on the user shaft, against positive motion"
+        "--load-torque", type=FINITE, default=0.0, metavar="N_m", help="on the user shaft, against positive motion"
     )
-    parser.add_argument("--noise-current", type=float, default=0.0, metavar="A", help="rms noise of the sensors")
-    parser.add_argument("--encoder-bits", type=int, default=0, metavar="N", help="per motor turn; 0 is a perfect one")
-    parser.add_argument("--seed", type=int, default=0, help="of all random numbers")
+    parser.add_argument("--noise-current", type=FINITE, default=0.0, metavar="A", help="rms noise of the sensors")
+    parser.add_argument(
+        "--encoder-bits", type=whole(0, 32), default=0, metavar="N", help="per motor turn; 0 is a perfect one"
+    )
+    add_seed(parser)
 
 
 def actuator_of(arguments: argparse.Namespace) -> Actuator:
@@ -147,7 +185,7 @@ def run_of(arguments: argparse.Namespace, sample_rate_Hz: float = 10_000.0) -> R
 
 def _command(arguments: argparse.Namespace) -> tuple[Command, float]:
     name = arguments.command
-    if name in COMMANDS or not Path(name).suffix:
+    if not _COMMAND.is_file(name):
         settings = {}
         for text in arguments.settings:
             key, separator, value = text.partition("=")

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import json
-import os
 import sys
 import time
-from pathlib import Path
 from typing import Any
 
 import numba
@@ -18,7 +16,10 @@ from emaviz import __version__
 
 
 def write_json(path: str | None, result: dict[str, Any], seed: int, configuration: dict[str, Any]) -> None:
-    """Writes a result with its schema, versions, seed and configuration, whole or not at all."""
+    """Writes a result with its schema, versions, seed and configuration, whole or not at all; nothing without a path.
+
+    InputError if it cannot be written.
+    """
     if path is None:
         return
     document = {
@@ -28,21 +29,12 @@ def write_json(path: str | None, result: dict[str, Any], seed: int, configuratio
         "configuration": configuration,
         **result,
     }
-    target = Path(path)
-    check_target(target, "--json")
-    with whole_file(target) as draft, open(draft, "w", encoding="utf-8") as file:
-        json.dump(document, file, indent=1, default=_plain, ensure_ascii=False, allow_nan=False)
-        file.write("\n")
-
-
-def check_target(path: Path, option: str) -> None:
-    """InputError unless a file can be written there."""
-    if path.is_dir():
-        raise InputError(f"{option} {path}: is a folder; name a file in it")
-    if not path.parent.is_dir():
-        raise InputError(f"{option} {path}: the folder {path.parent} does not exist; make it first")
-    if not os.access(path.parent, os.W_OK):
-        raise InputError(f"{option} {path}: no permission to write in {path.parent}")
+    try:
+        with whole_file(path) as draft, open(draft, "w", encoding="utf-8") as file:
+            json.dump(document, file, indent=1, default=_plain, ensure_ascii=False, allow_nan=False)
+            file.write("\n")
+    except OSError as error:
+        raise InputError(f"--json {path}: cannot be written ({error.strerror}); check the disk") from None
 
 
 def configuration(arguments: Any) -> dict[str, Any]:

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 import numpy as np
 
 from ema_model.errors import InputError
 from ema_model.faults import readings
 from ema_model.recordings import Measurement, write_measurement
-from ema_model.recordings.write import check_target
 from ema_model.simulation.run import simulate_monitor, simulate_reference
 from ema_model.simulation.sensors import Sensors
-from emaviz.cli import options, output
+from emaviz.cli import files, options, output
+from emaviz.cli.numbers import FINITE
 
 HELP = "simulate one run of the reference or the monitor model and write it as a recording"
 
@@ -26,15 +25,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     options.add_run(parser)
     options.add_faults(parser)
     options.add_effects(parser)
-    parser.add_argument("--sample-rate", type=float, default=10_000.0, metavar="Hz")
-    parser.add_argument("--out", required=True, metavar="FILE.csv|.parquet", help="the recording to write")
-    parser.add_argument("--record", metavar="FILE.rrd", help="also write it for the Rerun viewer")
-    parser.add_argument("--json", metavar="FILE", help="write a summary there")
+    parser.add_argument("--sample-rate", type=FINITE, default=10_000.0, metavar="Hz")
+    parser.add_argument(
+        "--out", required=True, type=files.MEASUREMENT, metavar="FILE.csv|.parquet", help="the recording to write"
+    )
+    options.add_record(parser, "it as well")
+    options.add_json(parser)
+    files.add_force(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Simulates, records with the sensors' accuracy, writes."""
-    check_target(Path(arguments.out))
     actuator = options.actuator_of(arguments)
     k, effects = options.faults_of(arguments, actuator.faults), options.effects_of(arguments)
     asked = options.run_of(arguments, arguments.sample_rate)

@@ -5,14 +5,16 @@ from __future__ import annotations
 import argparse
 
 from ema_model.errors import InputError
+from emaviz.cli.files import Input
+from emaviz.cli.numbers import whole
 
 HELP = "open a .rrd recording in the Rerun viewer (in the browser, no network needed)"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """FILE.rrd, --port, --open."""
-    parser.add_argument("file", metavar="FILE.rrd")
-    parser.add_argument("--port", type=int, default=0, help="0 takes a free one")
+    parser.add_argument("file", type=Input("a .rrd file"), metavar="FILE.rrd")
+    parser.add_argument("--port", type=whole(0, 65535), default=0, help="0 takes a free one")
     parser.add_argument("--open", action=argparse.BooleanOptionalAction, default=True, help="open the browser")
 
 

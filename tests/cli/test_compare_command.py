@@ -79,7 +79,7 @@ def test_options_reach_the_comparison(rig, tmp_path):
     [
         (["missing.csv"], "missing.csv: no such file"),
         ([], "FILE"),
-        (["OWN", "--actuator", "nowhere.toml"], "nowhere.toml: no such actuator file"),
+        (["OWN", "--actuator", "nowhere.toml"], "nowhere.toml: no such file"),
         (["OWN", "--map", "current=iq"], "no signal 'current'"),
         (["OWN", "--map", "current_A=iq"], "no column 'iq' for current_A"),
         (["OWN", "--map", "nonsense"], "signal=column"),

@@ -183,7 +183,7 @@ def test_the_same_effect_twice_is_refused(own):
 def simulated(tmp_path, *effects: str) -> np.ndarray:
     out = tmp_path / "run.csv"
     options = [part for effect in effects for part in ("--effect", effect)]
-    assert main(["simulate", "--model", "mm", "--duration", "0.05", "--out", str(out), *options]) == 0
+    assert main(["simulate", "--model", "mm", "--duration", "0.05", "--force", "--out", str(out), *options]) == 0
     return read_measurement(out)["current_A"]
 
 

@@ -1,0 +1,148 @@
+"""The files that a command reads and writes: declared with its options, checked all together before it begins.
+
+An option's `type` declares it: an `Input` for what is read, an `Output` for what is written.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import unicodedata
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Generic, NamedTuple, TypeVar
+
+from ema_model.recordings.user_file import check_user_file
+
+from ema_model.errors import InputError
+from ema_model.recordings import side_path
+from ema_model.recordings.formats import FORMATS
+from ema_model.recordings.refusal import shown
+from ema_model.recordings.side_file.read import OF_A_FOLDER
+from ema_model.whole_file import remove_abandoned
+
+
+@dataclass(frozen=True)
+class Input:
+    """The type of an option that names a file to read."""
+
+    expected: str  # as in "an actuator file (.toml)"
+    has_side_file: bool = False
+    is_file: Callable[[str], bool] = bool  # tells a file's name from what else the option takes
+
+    def __call__(self, text: str) -> str:
+        return text
+
+
+@dataclass(frozen=True)
+class Output:
+    """The type of an option that names a file to write."""
+
+    suffixes: tuple[str, ...]
+    is_kept: bool = True  # one that exists is replaced with --force only
+    has_side_file: bool = False
+
+    def __call__(self, text: str) -> str:
+        return text
+
+    def suffix_of(self, path: Path) -> str:
+        """As it is compared: of measurements' alone, readers take capitals."""
+        return path.suffix.lower() if self.has_side_file else path.suffix
+
+
+RECORDING = Input("the file of a measurement", has_side_file=True)
+ACTUATOR = Input("an actuator file (.toml)")
+JSON = Output((".json",), is_kept=False)
+REPORT = Output((".html", ".htm"), is_kept=False)
+RRD = Output((".rrd",))
+SAVED_ACTUATOR = Output((".toml",))
+MEASUREMENT = Output(tuple(FORMATS), has_side_file=True)
+
+
+_Declared = TypeVar("_Declared", Input, Output)
+
+
+class _Named(NamedTuple, Generic[_Declared]):
+    path: Path
+    option: str  # empty for a positional one
+    declared: _Declared
+
+
+def add_force(parser: argparse.ArgumentParser) -> None:
+    """--force, for a command with an output that is kept"""
+    parser.add_argument("--force", action="store_true", help="replace a recording or an actuator file that exists")
+
+
+def check_files(parser: argparse.ArgumentParser, arguments: argparse.Namespace) -> None:
+    """Raises InputError for an input that is no file, and for an output that may not or cannot be written.
+
+    To be asked before any work.  Where the outputs go, what killed processes left of theirs is removed.
+    """
+    inputs = [one for one in _named(Input, parser, arguments) if one.declared.is_file(str(one.path))]
+    outputs = _named(Output, parser, arguments)
+    for one in inputs:
+        check_user_file(one.path, one.declared.expected)
+    taken = [place for one in inputs for place in _taken(one)]
+    for one in outputs:
+        _check_output(one, taken, getattr(arguments, "force", False))
+        taken += _taken(one)
+    for folder in {os.path.dirname(os.path.realpath(one.path)) for one in outputs}:
+        remove_abandoned(folder)
+
+
+def _named(
+    kind: type[_Declared], parser: argparse.ArgumentParser, arguments: argparse.Namespace
+) -> list[_Named[_Declared]]:
+    named = []
+    for action in parser._actions:
+        if isinstance(action.type, kind):
+            value = getattr(arguments, action.dest)
+            option = "".join(action.option_strings[:1])
+            for text in value if isinstance(value, list) else [value]:
+                if text is not None:
+                    named.append(_Named(Path(text), option, action.type))
+    return named
+
+
+def _taken(one: _Named[_Declared]) -> list[tuple[Path, str]]:
+    """Where no other output may go, and why: the file itself, and what would be read as its side file."""
+    taken = [(one.path, f"is what {one.option} names" if one.option else "is a file to read")]
+    if one.declared.has_side_file:
+        own = side_path(one.path)
+        why = f"is the place of the side file of {shown(one.path.name, 100)}"
+        taken += [(own, why), (own.with_name(OF_A_FOLDER), why)]
+    return taken
+
+
+def _check_output(one: _Named[Output], taken: list[tuple[Path, str]], force: bool) -> None:
+    path, declared = one.path, one.declared
+    target = Path(os.path.realpath(path))
+    problem = next((f"{why}; name another file" for other, why in taken if _are_same(path, other)), None)
+    if problem is None and path.is_dir():
+        problem = "is a folder; name a file in it"
+    elif problem is None and declared.suffix_of(path) not in declared.suffixes:
+        problem = f"the name must end in {' or '.join(declared.suffixes)}"
+    elif problem is None and not target.parent.is_dir():
+        missing = target.parent if path.is_symlink() else path.parent
+        problem = f"the folder {missing} does not exist; make it first"
+    elif problem is None and target.exists() and not target.is_file():
+        problem = "is not a regular file; name another"
+    elif problem is None and not os.access(target.parent, os.W_OK):
+        problem = f"no permission to write in {target.parent}"
+    elif problem is None and declared.is_kept and target.exists() and not force:
+        problem = "exists already; name another file, or replace it with --force"
+    if problem is not None:
+        raise InputError(f"{one.option} {shown(path, 300)}: {problem}")
+
+
+def _are_same(one: Path, other: Path) -> bool:
+    """Whether both names mean one file, by links and by spellings that some file systems do not tell apart."""
+    if one.exists() or other.exists():
+        return one.exists() and other.exists() and one.samefile(other)
+    one, other = (Path(os.path.realpath(path)) for path in (one, other))
+    return one.parent == other.parent and _folded(one.name) == _folded(other.name)
+
+
+def _folded(name: str) -> str:
+    return unicodedata.normalize("NFC", name).casefold()

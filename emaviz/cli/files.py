@@ -85,7 +85,8 @@ def check_files(parser: argparse.ArgumentParser, arguments: argparse.Namespace) 
         check_user_file(one.path, one.declared.expected)
     taken = [place for one in inputs for place in _taken(one)]
     for one in outputs:
-        _check_output(one, taken, getattr(arguments, "force", False))
+        if problem := _problem(one, taken, getattr(arguments, "force", False)):
+            raise InputError(f"{one.option} {shown(one.path, 300)}: {problem}")
         taken += _taken(one)
     for folder in {os.path.dirname(os.path.realpath(one.path)) for one in outputs}:
         remove_abandoned(folder)
@@ -115,25 +116,26 @@ def _taken(one: _Named[_Declared]) -> list[tuple[Path, str]]:
     return taken
 
 
-def _check_output(one: _Named[Output], taken: list[tuple[Path, str]], force: bool) -> None:
+def _problem(one: _Named[Output], taken: list[tuple[Path, str]], force: bool) -> str | None:
+    """Why this output may not or cannot be written, if so."""
     path, declared = one.path, one.declared
     target = Path(os.path.realpath(path))
-    problem = next((f"{why}; name another file" for other, why in taken if _are_same(path, other)), None)
-    if problem is None and path.is_dir():
-        problem = "is a folder; name a file in it"
-    elif problem is None and declared.suffix_of(path) not in declared.suffixes:
-        problem = f"the name must end in {' or '.join(declared.suffixes)}"
-    elif problem is None and not target.parent.is_dir():
-        missing = target.parent if path.is_symlink() else path.parent
-        problem = f"the folder {missing} does not exist; make it first"
-    elif problem is None and target.exists() and not target.is_file():
-        problem = "is not a regular file; name another"
-    elif problem is None and not os.access(target.parent, os.W_OK):
-        problem = f"no permission to write in {target.parent}"
-    elif problem is None and declared.is_kept and target.exists() and not force:
-        problem = "exists already; name another file, or replace it with --force"
-    if problem is not None:
-        raise InputError(f"{one.option} {shown(path, 300)}: {problem}")
+    for other, why in taken:
+        if _are_same(path, other):
+            return f"{why}; name another file"
+    if target.is_dir():
+        return "is a folder; name a file in it"
+    if declared.suffix_of(path) not in declared.suffixes:
+        return f"the name must end in {' or '.join(declared.suffixes)}"
+    if not target.parent.is_dir():
+        return f"the folder {target.parent if path.is_symlink() else path.parent} does not exist; make it first"
+    if target.exists() and not target.is_file():
+        return "is not a regular file; name another"
+    if not os.access(target.parent, os.W_OK):
+        return f"no permission to write in {target.parent}"
+    if declared.is_kept and target.exists() and not force:
+        return "exists already; name another file, or replace it with --force"
+    return None
 
 
 def _are_same(one: Path, other: Path) -> bool:

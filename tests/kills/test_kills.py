@@ -1,0 +1,67 @@
+"""Processes killed while they save: no file is ever damaged, and the next start removes what they left."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+from saving import KINDS, SIZE
+
+from ema_model.whole_file import remove_abandoned
+from emaviz.recording.recover import recover
+
+LONGEST_S = 0.25  # until the kill; several savings of each kind
+
+
+def killed_while_saving(target: Path, after_s: float) -> None:
+    """Saves to the target over and over in a process, and kills it."""
+    process = subprocess.Popen(
+        [sys.executable, str(Path(__file__).with_name("saving.py")), str(target)], stdout=subprocess.PIPE, text=True
+    )
+    try:
+        assert process.stdout is not None and process.stdout.readline() == "ready\n"
+        time.sleep(after_s)
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def kill(folder: Path, names: list[str], seed: int) -> Counter[str]:
+    """Kills one process a name at a random moment; counts what was found.  Every target must be whole each time."""
+    random = np.random.default_rng(seed)
+    counts: Counter[str] = Counter()
+    for number, name in enumerate(names):
+        at = folder / str(number)
+        at.mkdir()
+        killed_while_saving(at / name, float(random.uniform(0.0, LONGEST_S)))
+        left = set(os.listdir(at)) - {name, "data"}
+        counts.update({"kills": 1, "left something": bool(left), "files left": len(left)})
+        _is_whole(at / name)
+        counts["recordings recovered"] += sum(found.ok for found in recover(at))
+        remove_abandoned(at)
+        left = {other for other in os.listdir(at) if not other.endswith((".rrd", ".rrd.damaged"))} - {name, "data"}
+        assert not left, left
+        _is_whole(at / name)
+    return counts
+
+
+def _is_whole(target: Path) -> None:
+    values = np.asarray(KINDS[target.name][1](target))
+    assert len(values) == SIZE and (values == values[0]).all()
+
+
+def test_a_kill_damages_nothing(tmp_path):
+    assert kill(tmp_path, list(KINDS), seed=1)["kills"] == len(KINDS)
+
+
+@pytest.mark.study
+def test_sixty_kills_damage_nothing(tmp_path):
+    counts = kill(tmp_path, list(KINDS) * 12, seed=2)
+    print("\n", ", ".join(f"{count} {what}" for what, count in counts.items()), "; 0 targets damaged", sep="")
+    assert counts["kills"] == 60 and counts["left something"] > 0

@@ -24,6 +24,7 @@ Lane = tuple[Effect, dict[str, float]]
 
 _FAR = 30.0  # times what there is to explain
 _ATTEMPTS = 3
+_DIVERGED = 1e100  # floors, from which on a change has no meaning: its square would overflow
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,14 +96,16 @@ def _of_group(data: Data, found: Fit, effects: list[Effect], orders: Sequence[in
         change = _changes(data, found, lanes, switchable)
         if attempt == _ATTEMPTS - 1:
             break
-        size = np.sqrt(np.mean(change**2, axis=1))
+        with np.errstate(over="ignore"):  # a loop that an effect makes unstable
+            size = np.sqrt(np.mean(change**2, axis=1))
         gentle = [_gentler(effect, one, s, found.error()) for (effect, one), s in zip(lanes, size)]
         if all(new is None for new in gentle):
             break
         lanes = [(effect, new or one) for (effect, one), new in zip(lanes, gentle)]
     prints, lane = [], 0
     for effect, settings in tried:
-        columns = np.nan_to_num(change[lane : lane + len(settings)]).T
+        columns = change[lane : lane + len(settings)].T
+        columns = np.where(np.abs(columns) < _DIVERGED, columns, 0.0)  # also NaN
         prints.append(Fingerprint(effect.name, dict(lanes[lane][1]), columns))
         lane += len(settings)
     return prints

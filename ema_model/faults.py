@@ -4,16 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ema_model.errors import InputError
 from ema_model.quantities.titles import in_sentence
-
-if TYPE_CHECKING:
-    from ema_model.actuator import Actuator
 
 _LEAST_TURNS = 0.02  # less, and the three-phase model diverges when two phases are shorted
 
@@ -69,36 +65,6 @@ def physical(k: ArrayLike) -> PhysicalFaults:
         eccentricity=k[..., 5] + 0.0,
         phase_rad=2.0 * np.pi * (k[..., 6] - 0.5),
         gain_factor=0.5 + k[..., 7],
-    )
-
-
-def readings(k: ArrayLike, actuator: Actuator) -> dict[str, float]:
-    """One k as the physical values that an engineer reads, units in the names."""
-    p = physical(k)
-    return {
-        "friction_factor": float(p.friction_factor),
-        "backlash_rad": float(p.backlash_factor * actuator.transmission.backlash_rad),
-        "turns_a": float(p.turns[0]),
-        "turns_b": float(p.turns[1]),
-        "turns_c": float(p.turns[2]),
-        "eccentricity": float(p.eccentricity),
-        "eccentricity_phase_rad": float(p.phase_rad),
-        "position_gain_1_s": float(p.gain_factor * actuator.controller.position_gain_1_s),
-    }
-
-
-def sentences(k: ArrayLike, actuator: Actuator) -> tuple[str, ...]:
-    """The same as eight short phrases, one for each k."""
-    r = readings(k, actuator)
-    return (
-        f"friction × {r['friction_factor']:.2f}",
-        f"backlash {r['backlash_rad'] * 1e6:.0f} µrad",
-        f"phase A: {r['turns_a']:.0%} of turns",
-        f"phase B: {r['turns_b']:.0%} of turns",
-        f"phase C: {r['turns_c']:.0%} of turns",
-        f"eccentricity ζ = {r['eccentricity']:.2f}",
-        f"thinnest gap at {round(np.degrees(r['eccentricity_phase_rad'])):+d}°",
-        f"gain × {physical(k).gain_factor:.2f}",
     )
 
 

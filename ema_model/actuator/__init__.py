@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from ema_model.actuator.actuator import Actuator
 from ema_model.actuator.file import load_actuator, shipped
 from ema_model.actuator.layout import paths
-from ema_model.actuator.parameters import Actuator, Rule, Tolerance
+from ema_model.actuator.parameters import Rule, Tolerance
 from ema_model.actuator.write import save_actuator
 
 __all__ = ["Actuator", "Rule", "Tolerance", "load_actuator", "paths", "save_actuator", "shipped"]

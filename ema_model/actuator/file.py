@@ -7,24 +7,19 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from ema_model.actuator.actuator import Actuator
+from ema_model.actuator.all_is_read import check_all_is_read
 from ema_model.actuator.layout import KINDS, USUAL, layout
-from ema_model.actuator.parameters import (
-    SECTIONS,
-    Actuator,
-    Rule,
-    Tolerance,
-    check_stops,
-    check_value,
-)
-from ema_model.actuator.unread import check_all_is_read, unread
+from ema_model.actuator.parameters import SECTIONS, Rule, Tolerance, check_stops, check_value
+from ema_model.actuator.unread import unread
 from ema_model.errors import InputError
-from ema_model.limits import TEXT_BYTES
 from ema_model.faults import vector
+from ema_model.files.limits import TEXT_BYTES
+from ema_model.files.toml_text import toml_of
+from ema_model.files.user_file import open_user_file
 from ema_model.quantities.axes import KINDS as AXIS_KINDS
 from ema_model.quantities.axes import Axes
 from ema_model.quantities.numbers import as_number
-from ema_model.toml_text import toml_of
-from ema_model.recordings.user_file import open_user_file
 
 _OTHERS = ("schema", "name", "description", "axes", "model", "effects", "faults", "recordings")
 _MODEL = ("step_s", "filter_s", "torque_known")
@@ -166,7 +161,7 @@ def _effects(
 def _faults(given: dict[str, Any], where: str) -> dict[str, float]:
     """The known faults k1 … k8, each a number in 0 … 1."""
     for name, value in given.items():
-        if not math.isfinite(number(value)):
+        if not math.isfinite(as_number(value)):
             raise InputError(f"{where}: [faults] {name} must be a number, not {str(value)[:40]!r}")
     faults = {name: float(value) for name, value in given.items()}
     try:

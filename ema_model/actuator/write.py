@@ -8,11 +8,12 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ema_model.actuator.actuator import Actuator
 from ema_model.actuator.layout import KINDS, layout
-from ema_model.actuator.parameters import SECTIONS, Actuator
+from ema_model.actuator.parameters import SECTIONS
 from ema_model.actuator.unread import unread
 from ema_model.errors import InputError
-from ema_model.whole_file import whole_file
+from ema_model.files.whole_file import whole_file
 
 if TYPE_CHECKING:
     from ema_model.effects.user import UserEffect

@@ -22,11 +22,11 @@ from typing import Any
 
 from ema_model.challenges.challenge import Challenge
 from ema_model.errors import InputError
-from ema_model.limits import CHALLENGE_BYTES, megabytes
-from ema_model.recordings.refusal import shown
-from ema_model.safe_zip import Damaged, Refused, opened_zip
-from ema_model.recordings.user_file import check_user_file
-from ema_model.whole_file import whole_file
+from ema_model.files.limits import CHALLENGE_BYTES, megabytes
+from ema_model.files.refusal import shown
+from ema_model.files.safe_zip import Damaged, Refused, opened_zip
+from ema_model.files.user_file import check_user_file
+from ema_model.files.whole_file import whole_file
 
 SUFFIX = ".challenge"
 SCHEMA = 1

@@ -19,7 +19,7 @@ from ema_model.challenges.make import RUNS, SENSORS, recorded, write
 from ema_model.challenges.sealed_file import HIDDEN, MOST_CHARACTERS, SUFFIX, read_parts, write_sealed
 from ema_model.challenges.truth import Truth, truth_of
 from ema_model.errors import InputError
-from ema_model.recordings.refusal import shown
+from ema_model.files.refusal import shown
 from ema_model.simulation.sensors import Sensors
 
 _HELD_OUT = "unseen"

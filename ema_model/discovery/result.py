@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.comparison.explain import Explanation
-from ema_model.comparison.result import Explanation
 from ema_model.discovery.model_fit import Data
 from ema_model.estimation import Calibrated, Calibration, Floor
 from ema_model.models import Plant

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.errors import InputError
-from ema_model.limits import COLUMNS, RUNS
+from ema_model.files.limits import COLUMNS, RUNS
+from ema_model.files.refusal import listed, refusal, shown
 from ema_model.quantities.signals import SIGNALS, lookalikes, looks_like_time
 from ema_model.recordings.columns.mapping import ColumnMapping
 from ema_model.recordings.measurement import Measurement
-from ema_model.recordings.refusal import listed, refusal, shown
 
 Array = NDArray[np.float64]
 Place = Callable[[int], str]

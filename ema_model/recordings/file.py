@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.errors import InputError
-from ema_model.limits import FILE_BYTES, megabytes
+from ema_model.files.limits import FILE_BYTES, megabytes
+from ema_model.files.refusal import listed, reason, refusal, shown
+from ema_model.files.user_file import check_user_file
 from ema_model.recordings.checks import check_finite, check_length, check_names, check_values, choose_columns
 from ema_model.recordings.columns.mapping import ColumnMapping, apply_mapping, parse_mapping
 from ema_model.recordings.formats import format_of
 from ema_model.recordings.measurement import Measurement
-from ema_model.recordings.refusal import listed, reason, refusal, shown
 from ema_model.recordings.side_file.read import SideFile, find_side_file, read_side_file
-from ema_model.recordings.user_file import check_user_file
 
 Array = NDArray[np.float64]
 

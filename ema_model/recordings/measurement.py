@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ema_model.errors import InputError
+from ema_model.files.refusal import listed, shown
 from ema_model.quantities.signals import SIGNALS
-from ema_model.recordings.refusal import listed, shown
 from ema_model.recordings.side_file.read import SideFile
 
 Array = NDArray[np.float64]

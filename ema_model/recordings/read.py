@@ -9,7 +9,7 @@ from pathlib import Path
 
 from ema_model.actuator import Actuator
 from ema_model.errors import InputError
-from ema_model.limits import FILE_BYTES
+from ema_model.files.limits import FILE_BYTES
 from ema_model.recordings import ColumnMapping, Measurement, SideFile, parse_mapping, read_measurement
 from ema_model.recordings.file import check_file
 from ema_model.recordings.formats import format_of

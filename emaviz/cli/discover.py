@@ -9,11 +9,9 @@ from ema_model.comparison.summary import plain
 from ema_model.discovery import Discovery, as_dict, discover, verified
 from ema_model.effects import find
 from ema_model.recordings.read import read_recording
-from emaviz.cli import options, output
-from emaviz.text.discovery import VERDICTS, faults, next_experiment, settings, verification
 from emaviz.cli import files, options, output
 from emaviz.cli.numbers import whole
-from emaviz.text.discovery import VERDICTS, faults, next_experiment, settings
+from emaviz.text.discovery import VERDICTS, faults, next_experiment, settings, verification
 
 HELP = "find the physical effects that the model lacks, and add them"
 _CURRENT_ONLY = ("current_A",)

@@ -13,14 +13,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Generic, NamedTuple, TypeVar
 
-from ema_model.recordings.user_file import check_user_file
-
 from ema_model.errors import InputError
+from ema_model.files.refusal import shown
+from ema_model.files.user_file import check_user_file
+from ema_model.files.whole_file import remove_abandoned
 from ema_model.recordings import side_path
 from ema_model.recordings.formats import FORMATS
-from ema_model.recordings.refusal import shown
 from ema_model.recordings.side_file.read import OF_A_FOLDER
-from ema_model.whole_file import remove_abandoned
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ import numpy as np
 
 from ema_model import faults
 from ema_model.actuator import Actuator
+from ema_model.actuator.readings import readings, sentences
 from ema_model.discovery.model_fit import with_effect
 from ema_model.errors import InputError
 from ema_model.identification.objective import Objective
@@ -102,7 +103,7 @@ def result(answer: Identification, actuator: Actuator) -> dict[str, Any]:
         "separated_by": sure.separated_by.options if sure.separated_by else "",
         "adequate": bool(sure.adequate),
         "warnings": sure.warnings,
-        "physical": faults.readings(answer.k, actuator),
+        "physical": readings(answer.k, actuator),
         "rmse": answer.rmse,
         "evaluations": answer.evaluations,
         "elapsed_s": answer.elapsed_s,
@@ -133,7 +134,7 @@ def _table(answer: Identification, actuator: Actuator) -> str:
     sure = answer.uncertainty
     known = "   truth" if answer.truth is not None else ""
     lines = [f"{'':4}{'value':>8}  {'90 % interval':17}{known}   meaning"]
-    for i, (name, phrase) in enumerate(zip(faults.NAMES, faults.sentences(answer.k, actuator))):
+    for i, (name, phrase) in enumerate(zip(faults.NAMES, sentences(answer.k, actuator))):
         low, high = sure.interval90[i]
         truth = "" if answer.truth is None else f"  {answer.truth[i]:6.3f}"
         alarm = "  ← not healthy" if name in sure.alarms else ""

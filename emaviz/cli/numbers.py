@@ -6,7 +6,7 @@ import argparse
 import math
 from dataclasses import dataclass
 
-from ema_model.recordings.refusal import shown
+from ema_model.files.refusal import shown
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import numba
 import numpy as np
 
 from ema_model.errors import InputError
-from ema_model.whole_file import whole_file
+from ema_model.files.whole_file import whole_file
 from emaviz import __version__
 
 

@@ -6,8 +6,8 @@ import argparse
 
 import numpy as np
 
+from ema_model.actuator.readings import readings
 from ema_model.errors import InputError
-from ema_model.faults import readings
 from ema_model.recordings import Measurement, write_measurement
 from ema_model.simulation.run import simulate_monitor, simulate_reference
 from ema_model.simulation.sensors import Sensors

@@ -11,7 +11,7 @@ import viser
 from ema_model.identification.run import ALGORITHMS as TITLES
 from emaviz.colours import ALGORITHMS, MONITOR
 from emaviz.figures.signals import AXIS, PADDING, legend
-from emaviz.page_text import add_html
+from emaviz.text.html import add_html
 
 _LEAST_A = 1e-9  # a logarithmic axis has no zero
 

@@ -12,8 +12,7 @@ from ema_model.simulation.with_effect import SHOWN, WithEffect
 from emaviz.colours import DIFFERENCE, MONITOR, REFERENCE
 from emaviz.figures.decimate import envelope
 from emaviz.figures.signals import CHARTS, legend, time_axis, value_axis
-from emaviz.page_text import add_html
-from emaviz.session.library import SHOWN, Felt
+from emaviz.text.html import add_html
 
 _POINTS, _SMALL_POINTS = 800, 160
 _WIDTH, _HEIGHT = 120, 44  # of a small picture, pixels

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ema_model.actuator import Actuator
-from ema_model.faults import FAULTS, sentences
+from ema_model.actuator.readings import sentences
+from ema_model.faults import FAULTS
 from emaviz.colours import DIFFERENCE, MONITOR, TRUTH
-from emaviz.figures.colours import DIFFERENCE, MONITOR, TRUTH
-from emaviz.page_text import Html, html, joined
+from emaviz.text.html import Html, html, joined
 
 
 def fault_bars(

@@ -14,7 +14,7 @@ from emaviz.colours import REFERENCE
 from emaviz.figures.convergence import colour
 from emaviz.figures.decimate import envelope
 from emaviz.figures.signals import CURSOR, PADDING, POINTS, legend, time_axis, value_axis
-from emaviz.page_text import add_html
+from emaviz.text.html import add_html
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from ema_model.identification.run import ALGORITHMS as TITLES
 from emaviz.figures.convergence import colour
-from emaviz.page_text import Html, html, joined
+from emaviz.text.html import Html, html, joined
 
 _MISSING = "–"
 _NUMBER = Html('style="text-align:right;padding:1px 4px"')

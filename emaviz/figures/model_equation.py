@@ -9,9 +9,8 @@ from ema_model.discovery import Discovery
 from ema_model.discovery.result import Added
 from ema_model.effects import Effect, find
 from emaviz.colours import ALGORITHMS, MONITOR, TRUTH
-from emaviz.figures.colours import ALGORITHMS, MONITOR, TRUTH
-from emaviz.page_text import Html, html, joined
 from emaviz.text.discovery import effect_title, settings
+from emaviz.text.html import Html, html, joined
 
 COLOURS = (MONITOR, ALGORITHMS["ssa"], ALGORITHMS["do"], TRUTH)
 # Where an effect acts, the equation of the base model that it stands in, in the order of the page.

@@ -10,7 +10,7 @@ import numpy as np
 
 from ema_model.recordings import Measurement
 from emaviz.figures.signals import CHARTS
-from emaviz.page_text import Html, html, joined
+from emaviz.text.html import Html, html, joined
 
 _MISSING = "–"
 

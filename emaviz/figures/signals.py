@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ema_model.recordings import Measurement
 from emaviz.colours import COMMAND, DIFFERENCE, GHOST, MONITOR, PHASES, REFERENCE
 from emaviz.figures.decimate import envelope
-from emaviz.page_text import Html, add_html, html, joined
+from emaviz.text.html import Html, add_html, html, joined
 
 Array = NDArray[np.float64]
 POINTS = 800  # of a line, at most

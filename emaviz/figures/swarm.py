@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from ema_model.faults import FAULTS, NAMES
 from emaviz.colours import TRUTH
-from emaviz.figures.colours import TRUTH
-from emaviz.page_text import Html, escape, unescaped
+from emaviz.text.html import Html, escape, unescaped
 
 Array = NDArray[np.floating]
 

@@ -11,11 +11,10 @@ from ema_model.faults import FAULTS
 from ema_model.recordings import SIGNALS
 from emaviz.colours import DIFFERENCE, MONITOR, REFERENCE
 from emaviz.figures.lines import line
-from emaviz.figures.theme import DARK, LIGHT
-from emaviz.recording.entry import Entry, as_text
 from emaviz.figures.theme import DARK, LIGHT, plain
-from emaviz.page_text import Html, html, joined
+from emaviz.recording.entry import Entry, as_text
 from emaviz.recording.read import IdentificationTrace, Recording
+from emaviz.text.html import Html, html, joined
 
 FIRST, SECOND = REFERENCE, MONITOR
 _POINTS = 2000

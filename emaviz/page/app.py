@@ -42,13 +42,11 @@ from emaviz.page.playback import PlaybackStrip
 from emaviz.page.recordings.result import RecordingsResult
 from emaviz.page.recordings.sessions import SessionControls, parts
 from emaviz.page.recordings.tab import RecordingsPanel
-from emaviz.page.server import LOOPBACK, open_server
-from emaviz.page_text import add_html, html, said
-from emaviz.page.server import open_server
 from emaviz.recording.viewer import ViewerHost
 from emaviz.scene.actuator import ActuatorScene
 from emaviz.scene.playback import Playback
 from emaviz.server.door import Door
+from emaviz.server.safe_server import open_server
 from emaviz.server.viser_private import Inside
 from emaviz.session.archive import Recorded, recovered
 from emaviz.session.compare.comparing import Comparing
@@ -58,6 +56,7 @@ from emaviz.session.discover.source import COMPARED
 from emaviz.session.library import Library
 from emaviz.session.session import Session, Simulation
 from emaviz.session.worker import Worker
+from emaviz.text.html import add_html, html, said
 
 _FASTEST_REDRAW_S = 0.04
 _SLOW_REDRAW_S = 0.3  # of what nobody watches while dragging

@@ -10,9 +10,9 @@ import viser
 from emaviz.page.page import Page
 from emaviz.page.style import STRIP, caption, figures, play_head
 from emaviz.page.style import page as style
-from emaviz.page_text import add_html
 from emaviz.scene.actuator import ActuatorScene
 from emaviz.scene.playback import SPEEDS, Playback
+from emaviz.text.html import add_html
 
 _SLOWEST_STEP_S = 1e-4
 

@@ -7,7 +7,7 @@ play-head stays away; nothing else depends on them.
 from __future__ import annotations
 
 from emaviz.figures.theme import DARK, MARK
-from emaviz.page_text import Html, html, unescaped
+from emaviz.text.html import Html, html, unescaped
 
 STRIP = Html('<div class="emaviz-strip"></div>')  # stands in the panel that becomes the strip
 TIME_CHARTS = Html('<div class="emaviz-time"></div>')  # stands beside charts over time

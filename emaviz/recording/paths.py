@@ -7,8 +7,8 @@ import os
 import shutil
 from pathlib import Path
 
-from ema_model.file_lock import FileLock
-from ema_model.whole_file import lock_path
+from ema_model.files.lock import FileLock
+from ema_model.files.whole_file import lock_path
 from emaviz.recording.errors import RecordingError
 
 MIN_FREE_BYTES = 200_000_000

@@ -11,10 +11,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
-from ema_model.recordings.user_file import open_user_file
 from numpy.typing import NDArray
 
 from ema_model.errors import InputError
+from ema_model.files.user_file import open_user_file
 from emaviz.recording import binary
 from emaviz.recording.errors import RecordingError
 from emaviz.recording.style import GROUPS, ITERATION, K_NAMES, PROPERTIES, SIM_TIME

@@ -7,11 +7,10 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
-from ema_model.recordings.user_file import check_user_file
-
 from ema_model.errors import InputError
-from ema_model.file_lock import FileLock
-from ema_model.whole_file import lock_path, whole_file
+from ema_model.files.lock import FileLock
+from ema_model.files.user_file import check_user_file
+from ema_model.files.whole_file import lock_path, whole_file
 from emaviz.recording.blueprint import Algorithm, Contents, build
 from emaviz.recording.errors import RecordingError
 from emaviz.recording.paths import free_name

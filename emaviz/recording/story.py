@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model import faults
+from ema_model.actuator.readings import sentences
 from ema_model.commands import Recorded
 from ema_model.identification.objective import Objective
 from ema_model.identification.run import Identification, Progress
@@ -124,7 +125,7 @@ def _result(answer: Identification, objective: Objective) -> dict[str, Any]:
     sure = answer.uncertainty
     result: dict[str, Any] = {
         name: f"{answer.k[i]:.4f}  ({sure.interval90[i, 0]:.4f} … {sure.interval90[i, 1]:.4f})  — {phrase}"
-        for i, (name, phrase) in enumerate(zip(faults.NAMES, faults.sentences(answer.k, objective.actuator)))
+        for i, (name, phrase) in enumerate(zip(faults.NAMES, sentences(answer.k, objective.actuator)))
     }
     result |= {
         "verdict": "healthy" if sure.healthy else "not healthy: " + ", ".join(sure.alarms),

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote, unquote, urlsplit
 
-from ema_model.whole_file import lock_path
+from ema_model.files.whole_file import lock_path
 from emaviz.recording.assets import viewer_assets
 from emaviz.recording.errors import RecordingError
 from emaviz.recording.paths import part_of

@@ -13,7 +13,7 @@ from pathlib import Path
 from plotly.offline import get_plotlyjs
 
 from ema_model.errors import InputError
-from ema_model.whole_file import whole_file
+from ema_model.files.whole_file import whole_file
 from emaviz import __version__
 from emaviz.figures.theme import DARK, LIGHT
 from emaviz.report.markup import escape

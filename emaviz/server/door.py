@@ -12,7 +12,7 @@ from urllib.parse import parse_qs
 from websockets.datastructures import Headers
 
 from ema_model.errors import InputError
-from ema_model.recordings.refusal import shown
+from ema_model.files.refusal import shown
 
 _NAME = re.compile(r"[a-z0-9_]([a-z0-9_.-]{0,251}[a-z0-9_])?")
 _NETLOC = re.compile(r"(?P<name>\[[0-9a-f:.]+\]|[a-z0-9_-]+(\.[a-z0-9_-]+)*\.?)(:(?P<port>[0-9]{0,5}))?")

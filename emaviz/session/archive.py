@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ema_model.errors import InputError
-from ema_model.recordings.refusal import shown
+from ema_model.files.refusal import shown
 from emaviz.recording.entry import Entry
 from emaviz.session.data_folder import sanitised
 

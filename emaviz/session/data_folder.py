@@ -14,15 +14,14 @@ from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
 
-from ema_model.recordings.user_file import check_user_file
-
 from ema_model.challenges.sealed_file import SUFFIX as CHALLENGE_SUFFIX
 from ema_model.errors import InputError
-from ema_model.file_lock import FileLock
+from ema_model.files.lock import FileLock
+from ema_model.files.refusal import shown
+from ema_model.files.user_file import check_user_file
+from ema_model.files.whole_file import new_draft, remove_abandoned, whole_file
 from ema_model.recordings import side_path
 from ema_model.recordings.formats import FORMATS
-from ema_model.recordings.refusal import shown
-from ema_model.whole_file import new_draft, remove_abandoned, whole_file
 
 ACTUATOR_SUFFIX = ".toml"
 SESSION_SUFFIX = ".emaviz"

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.errors import InputError
-from ema_model.limits import PAGE_BYTES
+from ema_model.files.limits import PAGE_BYTES
 from ema_model.recordings import ColumnMapping, Measurement, read_measurement, read_side_file
 from ema_model.recordings.health.card import Health, health
 from ema_model.recordings.read import read_recording

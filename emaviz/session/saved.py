@@ -14,14 +14,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ema_model.recordings.user_file import check_user_file
-
 from ema_model.errors import InputError
-from ema_model.limits import SESSION_BYTES, SESSION_FILES, SETTINGS_BYTES
+from ema_model.files.limits import SESSION_BYTES, SESSION_FILES, SETTINGS_BYTES
+from ema_model.files.refusal import shown
+from ema_model.files.safe_zip import Damaged, Refused, SafeZip, opened_zip
+from ema_model.files.user_file import check_user_file
+from ema_model.files.whole_file import whole_file
 from ema_model.recordings import side_path
-from ema_model.recordings.refusal import shown
-from ema_model.safe_zip import Damaged, Refused, SafeZip, opened_zip
-from ema_model.whole_file import whole_file
 from emaviz import __version__
 from emaviz.session.data_folder import SESSION_SUFFIX, DataFolder, sanitised
 

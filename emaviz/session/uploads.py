@@ -18,9 +18,9 @@ import viser
 from viser import _messages
 
 from ema_model.errors import InputError
-from ema_model.limits import FILE_BYTES, PAGE_BYTES, megabytes
+from ema_model.files.limits import FILE_BYTES, PAGE_BYTES, megabytes
+from ema_model.files.refusal import shown
 from ema_model.recordings.formats import FORMATS
-from ema_model.recordings.refusal import shown
 from emaviz.session.data_folder import DataFolder, sanitised
 
 _MOST_TRANSFERS = 20  # at once

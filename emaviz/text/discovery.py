@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from ema_model.actuator.readings import sentences as phrases_of
 from ema_model.discovery import Discovery, Verified
 from ema_model.discovery.result import Added, Rung
 from ema_model.effects import find
 from ema_model.errors import InputError
 from ema_model.estimation import Calibrated
 from ema_model.faults import BY_NAME, FAULTS, NAMES
-from ema_model.faults import sentences as phrases_of
 from ema_model.quantities.axes import Axes
 from ema_model.quantities.numbers import number
 from ema_model.quantities.titles import in_sentence, parameter_title

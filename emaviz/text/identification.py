@@ -5,7 +5,7 @@ from __future__ import annotations
 from ema_model.faults import FAULTS
 from ema_model.identification.run import Identification
 from ema_model.quantities.titles import in_sentence
-from emaviz.page_text import Html, html, joined
+from emaviz.text.html import Html, html, joined
 from emaviz.text.run import run_in_words
 
 _BOX = Html('style="padding:4px 12px;font-size:13px;line-height:1.45"')

@@ -7,11 +7,11 @@ from itertools import count
 
 import pytest
 import viser
-from raw_page import RawPage
 from support.on_page import wait_until
+from support.raw_page import RawPage
 
-from emaviz.page.server import open_server
 from emaviz.server.messages import MOST_INT
+from emaviz.server.safe_server import open_server
 from emaviz.server.values import LONGEST_TEXT
 
 # Refused by every control.  3000 digits come as text or as an extension: msgpack's own integers end at 2⁶⁴.

@@ -7,14 +7,14 @@ import urllib.request
 
 import pytest
 import viser
-from raw_page import RawPage
 from support.on_page import wait_until
+from support.raw_page import RawPage
 
 from ema_model.errors import InputError
 from emaviz.cli import main
 from emaviz.page.app import App
-from emaviz.page.server import open_server
 from emaviz.server.door import Door, is_loopback
+from emaviz.server.safe_server import open_server
 
 
 def request(port, *headers, path="/", upgrade=False):

@@ -10,8 +10,8 @@ from collections import Counter
 
 import pytest
 import viser
-from raw_page import CAMERA, RawPage
 from support.on_page import field, wait_until
+from support.raw_page import CAMERA, RawPage
 
 from emaviz.server.gate import TYPING_S
 from emaviz.server.messages import MOST_INT

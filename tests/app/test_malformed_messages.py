@@ -8,14 +8,14 @@ import socket
 
 import pytest
 import viser._messages
-from raw_page import CAMERA, RawPage
 from support.on_page import wait_until
+from support.raw_page import CAMERA, RawPage
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
-from emaviz.page.server import open_server
 from emaviz.server import messages
 from emaviz.server.complaints import Complaints
+from emaviz.server.safe_server import open_server
 
 DEEP = b"\x83\xa4type\xb0GuiUpdateMessage\xa4uuid\xa1x\xa7updates\x81\xa5value" + b"\x91" * 100_000
 MALFORMED = [

@@ -6,16 +6,16 @@ import ast
 import html as markup
 from pathlib import Path
 
-import hostile
 import pytest
+from support import hostile
 from support.on_page import wait_until
 
 import emaviz
 from emaviz.figures import two_recordings
 from emaviz.page.app import App
 from emaviz.page.recordings.tab import _card
-from emaviz.page_text import Html, escape, html, joined, said
 from emaviz.session.archive import Recorded, recovered
+from emaviz.text.html import Html, escape, html, joined, said
 
 RAW = ("<iframe srcdoc", "<img", "<script", 'href="javascript')
 

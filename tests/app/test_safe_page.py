@@ -8,8 +8,8 @@ import threading
 import pytest
 from support.on_page import field, wait_until
 
-from emaviz.page.server import open_server
 from emaviz.server.door import Door
+from emaviz.server.safe_server import open_server
 
 pytestmark = pytest.mark.browser
 

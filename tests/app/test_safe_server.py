@@ -7,8 +7,8 @@ import http.client
 import pytest
 
 from ema_model.errors import InputError
-from emaviz.page.server import open_server
 from emaviz.server.door import Door
+from emaviz.server.safe_server import open_server
 
 
 @pytest.fixture(scope="module")

@@ -20,8 +20,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))  # a script finds what tests 
 from support.browser import SOFTWARE_GL
 
 from emaviz.page.app import App
-from emaviz.page.server import open_server
 from emaviz.scene.actuator import ActuatorScene
+from emaviz.server.safe_server import open_server
 
 SECONDS, PUSHED_PER_S = 8.0, 32.0
 COUNT = """() => { window.__drawn = 0; const poses = new Set();

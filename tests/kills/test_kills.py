@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from saving import KINDS, SIZE
 
-from ema_model.whole_file import remove_abandoned
+from ema_model.files.whole_file import remove_abandoned
 from emaviz.recording.recover import recover
 
 LONGEST_S = 0.25  # until the kill; several savings of each kind

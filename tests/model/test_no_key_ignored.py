@@ -181,7 +181,7 @@ def test_refused_keys_may_stand_at_their_default(load, tmp_path, kinds):
     actuator = load(*kinds, {})
     for path in unread(*kinds):
         neutral = getattr(SECTIONS[path.partition(".")[0]], path.partition(".")[2])
-        check_value_is_read(actuator, path, neutral, "here")
+        check_value_is_read(actuator.controller.kind, actuator.inverter.kind, actuator.axes, path, neutral, "here")
         if path.startswith(("motor.", "transmission.", "sensors.")):
             assert actuator.with_values({path: neutral}) == actuator
         with pytest.raises(InputError, match=path):

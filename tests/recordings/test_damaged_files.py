@@ -7,8 +7,8 @@ import shutil
 from collections import Counter
 
 import pytest
-from damaged import damage, whole
-from reading_process import READERS, ReadingProcess
+from support.damaged import damage, whole
+from support.reading_process import READERS, ReadingProcess
 
 MOST_BYTES = 10_000_000  # that a measurement may take
 MOST_GROWN = 200e6  # bytes by which the process may grow at its peak

@@ -8,12 +8,12 @@ import sys
 
 import pytest
 
-from ema_model.whole_file import new_draft, remove_abandoned, whole_file
+from ema_model.files.whole_file import new_draft, remove_abandoned, whole_file
 from emaviz.session.data_folder import DataFolder
 
 WRITING = """
 import sys, time
-from ema_model.whole_file import whole_file
+from ema_model.files.whole_file import whole_file
 with whole_file(sys.argv[1]) as draft:
     draft.write_text("half")
     print("ready", flush=True)
@@ -76,7 +76,7 @@ def test_only_drafts_are_removed(tmp_path):
 
 
 def test_files_are_written_where_the_file_system_has_no_locks(tmp_path, monkeypatch):
-    monkeypatch.setattr("ema_model.file_lock._try_lock", lambda _: False)
+    monkeypatch.setattr("ema_model.files.lock._try_lock", lambda _: False)
     with whole_file(tmp_path / "a.txt") as draft:
         draft.write_text("new")
     assert names(tmp_path) == ["a.txt"]

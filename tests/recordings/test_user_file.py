@@ -7,11 +7,11 @@ import signal
 import sys
 
 import pytest
-from ema_model.recordings.user_file import open_user_file
 
 from ema_model.actuator import load_actuator
 from ema_model.challenges import sealed_challenge
 from ema_model.errors import InputError
+from ema_model.files.user_file import open_user_file
 from ema_model.recordings import read_columns, read_measurement, read_side_file
 from ema_model.recordings.read import read_recording
 from emaviz.cli import main

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ema_model.errors import InputError
+from ema_model.files.refusal import listed, shown
 from ema_model.quantities.signals import SIGNALS
 from ema_model.quantities.units import Unit, dimensions_of, find_unit, known_units
 from ema_model.recordings.columns.words import readings
-from ema_model.recordings.refusal import listed, shown
 
 Array = NDArray[np.float64]
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 import importlib
 import pkgutil
 
+from ema_model.files.refusal import refusal, shown
 from ema_model.recordings.formats.format import Columns, Format
-from ema_model.recordings.refusal import refusal, shown
 
 __all__ = ["FORMATS", "Columns", "Format", "format_of"]
 

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ema_model.files.refusal import listed, refusal, shown
 from ema_model.quantities.signals import SIGNALS
 from ema_model.recordings.formats.format import Array, Columns, check_size
-from ema_model.recordings.refusal import listed, refusal, shown
 
 Shape = tuple[int, ...]
 Kind = tuple[Shape, np.dtype[Any]]

@@ -18,9 +18,9 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.csv as pc
 
-from ema_model.limits import LINE_BYTES, megabytes
+from ema_model.files.limits import LINE_BYTES, megabytes
+from ema_model.files.refusal import listed, refusal, shown
 from ema_model.recordings.formats.format import Array, Columns, Format, check_size
-from ema_model.recordings.refusal import listed, refusal, shown
 
 _HEAD_BYTES = 65_536
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)(e[+-]?[0-9]+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE)

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ema_model.limits import megabytes
-from ema_model.recordings.refusal import refusal
+from ema_model.files.limits import megabytes
+from ema_model.files.refusal import refusal
 
 Array = NDArray[np.float64]
 

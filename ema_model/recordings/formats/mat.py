@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ema_model.limits import ARRAYS, megabytes
+from ema_model.files.limits import ARRAYS, megabytes
+from ema_model.files.refusal import refusal, shown
 from ema_model.recordings.formats.arrays import Kind, column_names, take
 from ema_model.recordings.formats.format import Array, Columns, Format
 from ema_model.recordings.formats.mat5 import HEADER_BYTES, Damaged, Leaf, TooLarge, TooMany, leaves
-from ema_model.recordings.refusal import refusal, shown
 
 
 def _header(path: str, max_bytes: int) -> list[str]:

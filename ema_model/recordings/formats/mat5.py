@@ -17,7 +17,7 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from ema_model.limits import ARRAYS
+from ema_model.files.limits import ARRAYS
 
 HEADER_BYTES = 128
 _MATRIX, _COMPRESSED = 14, 15

@@ -13,11 +13,11 @@ import numpy as np
 from numpy.lib import format as npy
 
 from ema_model.errors import InputError
-from ema_model.limits import ARRAYS
+from ema_model.files.limits import ARRAYS
+from ema_model.files.refusal import refusal, shown
+from ema_model.files.safe_zip import Damaged, Member, Refused, SafeZip, opened_zip
 from ema_model.recordings.formats.arrays import Kind, column_names, take
 from ema_model.recordings.formats.format import Array, Columns, Format, check_size
-from ema_model.recordings.refusal import refusal, shown
-from ema_model.safe_zip import Damaged, Member, Refused, SafeZip, opened_zip
 
 _SUFFIX = ".npy"
 _HEAD_BYTES = 20_000  # numpy takes headers of up to 10,000, but reads them to their declared end first

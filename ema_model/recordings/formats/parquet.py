@@ -11,10 +11,10 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from ema_model.limits import COLUMNS, megabytes
+from ema_model.files.limits import COLUMNS, megabytes
+from ema_model.files.refusal import refusal, shown
 from ema_model.recordings.formats.format import Array, Columns, Format, check_size
 from ema_model.recordings.formats.parquet_pages import Damaged, TooMany, unpacked_bytes
-from ema_model.recordings.refusal import refusal, shown
 
 _FOOTER_BYTES = 8_000_000
 _MOST_PARTS = 2 * COLUMNS  # of any list in the footer: columns, row groups

@@ -13,12 +13,12 @@ from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any, Literal, cast
 
 from ema_model.errors import InputError
-from ema_model.limits import TEXT_BYTES
+from ema_model.files.limits import TEXT_BYTES
+from ema_model.files.refusal import listed, reason, refusal, shown
+from ema_model.files.toml_text import toml_of
+from ema_model.files.user_file import open_user_file
 from ema_model.quantities.signals import SIGNALS
 from ema_model.recordings.columns.mapping import ColumnMapping, MappedColumn, parse_mapping
-from ema_model.recordings.refusal import listed, reason, refusal, shown
-from ema_model.toml_text import toml_of
-from ema_model.recordings.user_file import open_user_file
 
 Kind = Literal["run", "map"]
 Sampling = Literal["mean", "instantaneous"]

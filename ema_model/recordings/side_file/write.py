@@ -6,10 +6,10 @@ import json
 import math
 import os
 
+from ema_model.files.refusal import reason, refusal
+from ema_model.files.whole_file import whole_file
 from ema_model.recordings.columns.mapping import MappedColumn
-from ema_model.recordings.refusal import reason, refusal
 from ema_model.recordings.side_file.read import SideFile
-from ema_model.whole_file import whole_file
 
 
 def write_side_file(side: SideFile, path: str | os.PathLike[str]) -> None:

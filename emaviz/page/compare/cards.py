@@ -8,8 +8,8 @@ from ema_model.quantities.numbers import number
 from ema_model.recordings import SIGNALS, ColumnMapping
 from ema_model.recordings.health.card import Finding, Health
 from emaviz.figures.calibration_scores import Score
-from emaviz.page_text import Html, html, joined
 from emaviz.session.opened import Opened
+from emaviz.text.html import Html, html, joined
 
 _MARKS = {"good": ("✓", "#2b8a3e"), "note": ("●", "#1c7ed6"), "warning": ("▲", "#e8590c")}
 _BOX = Html('style="padding:0 10px 6px;font-size:12.5px;line-height:1.4"')

@@ -8,9 +8,9 @@ import viser
 
 from emaviz.page.identify.tab import recording_link
 from emaviz.page.page import Page
-from emaviz.page_text import add_html, html
 from emaviz.recording.viewer import ViewerHost
 from emaviz.session.compare.comparing import Comparing
+from emaviz.text.html import add_html, html
 
 
 class KeepControls:

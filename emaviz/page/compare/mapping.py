@@ -13,9 +13,9 @@ from ema_model.quantities.units import known_units
 from ema_model.recordings import SIGNALS, ColumnMapping, MappedColumn
 from emaviz.page.compare.cards import mapping_table
 from emaviz.page.page import Page
-from emaviz.page_text import add_html
 from emaviz.session.compare.comparing import Comparing
 from emaviz.session.opened import Opened
+from emaviz.text.html import add_html
 
 NOT_USED = "not used"
 _MOST_COLUMNS = 200

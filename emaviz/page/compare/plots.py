@@ -23,7 +23,7 @@ from emaviz.figures import (
 )
 from emaviz.page.compare.cards import calibration_table
 from emaviz.page.page import Page
-from emaviz.page_text import add_html
+from emaviz.text.html import add_html
 
 _CONFIG = {"displayModeBar": False}
 _EMPTY = "–"

@@ -13,8 +13,8 @@ from ema_model.recordings import SIGNALS
 from emaviz.figures import mapped_columns
 from emaviz.page.compare.plots import ComparePlots, View
 from emaviz.page.page import Page
-from emaviz.page_text import Html, add_html, html, joined, unescaped
 from emaviz.session.opened import Opened
+from emaviz.text.html import Html, add_html, html, joined, unescaped
 
 _BOX = Html('style="padding:2px 12px 6px;font-size:13px;line-height:1.45"')
 _CARD = "height:auto!important;min-height:2em;padding:4px 8px;font-weight:400;font-size:13px;"

@@ -16,12 +16,12 @@ from emaviz.page.compare.options import AskedControls
 from emaviz.page.compare.result import ResultPanel
 from emaviz.page.page import Page
 from emaviz.page.style import DROP
-from emaviz.page_text import Html, add_html, said
 from emaviz.session.actuators import UPLOADED
 from emaviz.session.compare.comparing import Comparing
 from emaviz.session.data_folder import ACTUATOR_SUFFIX, CHALLENGE_SUFFIX, SESSION_SUFFIX
 from emaviz.session.opened import Opened
 from emaviz.session.uploads import Uploads
+from emaviz.text.html import Html, add_html, said
 
 _NONE = "–"
 

@@ -9,11 +9,8 @@ from ema_model.discovery.snapshot import Look
 from ema_model.effects import find
 from ema_model.quantities.numbers import Quantity, number
 from ema_model.quantities.titles import in_sentence, parameter_title, unit_of
-from emaviz.figures import quantity
-from emaviz.figures.quantity import number
-from emaviz.page_text import Html, html, unescaped
-from emaviz.session.discover.look import Look
 from emaviz.text.discovery import effect_title
+from emaviz.text.html import Html, html, unescaped
 
 BOX = Html('style="padding:2px 12px 6px;font-size:13px;line-height:1.45"')
 DIM = Html('style="opacity:.65"')

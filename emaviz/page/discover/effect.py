@@ -16,9 +16,9 @@ from ema_model.quantities.titles import in_sentence, parameter_title, unit_of
 from emaviz.figures import signature
 from emaviz.page.discover import cards
 from emaviz.page.page import Page
-from emaviz.page_text import Html, add_html, html, joined
 from emaviz.session.discover.discovering import Discovering
 from emaviz.text.discovery import effect_title
+from emaviz.text.html import Html, add_html, html, joined
 
 CONFIG = {"displayModeBar": False, "responsive": False}
 

@@ -14,9 +14,9 @@ from ema_model.discovery.result import Experiment
 from ema_model.discovery.snapshot import Look
 from emaviz.page.discover import cards
 from emaviz.page.page import Page
-from emaviz.page_text import add_html, html, joined
 from emaviz.session.discover.discovering import Discovering
 from emaviz.text.discovery import next_experiment
+from emaviz.text.html import add_html, html, joined
 
 _RATE_HZ = 10_000.0
 _ASK = "Of all tests that the actuator can follow, the one that would tell the two best candidates apart."

@@ -18,9 +18,9 @@ from emaviz.figures import signature
 from emaviz.page.discover import cards
 from emaviz.page.discover.sliders import ParameterSliders
 from emaviz.page.page import Page
-from emaviz.page_text import Html, add_html, html, joined
 from emaviz.session.discover.discovering import Discovering
 from emaviz.session.discover.own_effect import Preview, Typed, typed
+from emaviz.text.html import Html, add_html, html, joined
 
 _EXAMPLE = "-c*sign(omega)*sqrt(abs(omega))"
 _TYPED_S = 0.7  # after the last key, from which a text is taken for whole: its torque is compiled then

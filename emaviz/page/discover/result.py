@@ -21,9 +21,9 @@ from emaviz.page.discover.effect import CONFIG, EffectView
 from emaviz.page.discover.next_experiment import NextTest
 from emaviz.page.discover.reveal import reveal
 from emaviz.page.page import Page
-from emaviz.page_text import Html, add_html, html, joined
 from emaviz.session.discover.discovering import Discovering
 from emaviz.text.discovery import FLOOR_NOTE, headline, sentences
+from emaviz.text.html import Html, add_html, html, joined
 
 _RESTING = Html(
     "Choose recordings on the left, and press <b>Start</b>: the model is calibrated, and what it leaves is held "

@@ -5,16 +5,17 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ema_model.actuator.readings import sentences
 from ema_model.challenges.truth import Truth
 from ema_model.discovery import Discovery
 from ema_model.discovery.result import Added
 from ema_model.effects import CATALOGUE, find
-from ema_model.faults import BY_NAME, NAMES, sentences
+from ema_model.faults import BY_NAME, NAMES
 from ema_model.quantities.numbers import Quantity, number
 from ema_model.quantities.titles import in_sentence, parameter_title, unit_of
 from emaviz.page.discover.cards import BOX
-from emaviz.page_text import Html, html, joined
 from emaviz.text.discovery import effect_title, fitted_of, value
+from emaviz.text.html import Html, html, joined
 
 _GOOD, _BAD = "#2b8a3e", "#e03131"
 _NEAR = 0.25  # of the true value, within which a strength counts as found where its interval misses it

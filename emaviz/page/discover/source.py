@@ -12,11 +12,11 @@ from ema_model.challenges import Challenge
 from ema_model.discovery.snapshot import Look
 from emaviz.page.discover import cards
 from emaviz.page.page import Page
-from emaviz.page_text import Html, add_html, html
 from emaviz.session.data_folder import CHALLENGE_SUFFIX
 from emaviz.session.discover.discovering import Discovering
 from emaviz.session.discover.source import COMPARED
 from emaviz.session.uploads import Uploads
+from emaviz.text.html import Html, add_html, html
 
 _STARS = "●○"
 _SEALED = "Sealed: "  # before the names of such files

@@ -17,10 +17,10 @@ from emaviz.page.discover.own_effect import OwnEffect
 from emaviz.page.discover.result import DiscoveryPanel
 from emaviz.page.discover.source import SourceControls
 from emaviz.page.page import Page
-from emaviz.page_text import add_html, html
 from emaviz.session.discover.discovering import Discovering
 from emaviz.session.uploads import Uploads
 from emaviz.text.discovery import effect_title
+from emaviz.text.html import add_html, html
 
 _MOST_ADDED = 6
 

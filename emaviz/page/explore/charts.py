@@ -12,9 +12,9 @@ from emaviz.figures.run_metrics import differences, metrics, table
 from emaviz.figures.signals import PHASE_SIGNALS, LivePhases, LiveSignals
 from emaviz.page.page import Page
 from emaviz.page.style import TIME_CHARTS
-from emaviz.page_text import add_html
 from emaviz.session.session import Simulation
 from emaviz.session.worker import Worker
+from emaviz.text.html import add_html
 
 
 class ChartsPanel:

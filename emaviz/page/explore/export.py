@@ -13,10 +13,10 @@ from ema_model.recordings import write_measurement
 from emaviz.figures import run_signals
 from emaviz.page.page import Page
 from emaviz.page.style import WIDE_MODAL
-from emaviz.page_text import add_html
 from emaviz.scene.actuator import ActuatorScene
 from emaviz.scene.playback import Playback
 from emaviz.session.session import Simulation
+from emaviz.text.html import add_html
 
 _FRAMES, _FRAME_S = 120, 0.04  # of an exported scene
 _NAME = "emaviz-run"

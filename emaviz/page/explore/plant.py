@@ -10,7 +10,7 @@ import viser
 from ema_model.effects import CATALOGUE, find
 from ema_model.quantities.titles import labelled
 from emaviz.page.page import Page
-from emaviz.page_text import Html, add_html, html, said
+from emaviz.text.html import Html, add_html, html, said
 
 _NONE = "–"
 

@@ -9,8 +9,8 @@ import viser
 
 from emaviz.page.discover import cards
 from emaviz.page.page import Page
-from emaviz.page_text import add_html
 from emaviz.session.discover.sealing import Sealing
+from emaviz.text.html import add_html
 
 _TEXT = (
     "The plant as it is set here, its hidden effects and faults, is recorded four times: a chirp, a small step, a slow "

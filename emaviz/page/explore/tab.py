@@ -10,16 +10,17 @@ from typing import Any
 
 import viser
 
+from ema_model.actuator.readings import sentences
 from ema_model.commands import COMMANDS
-from ema_model.faults import FAULTS, HEALTHY, sentences
+from ema_model.faults import FAULTS, HEALTHY
 from ema_model.quantities.titles import labelled
 from emaviz.page.explore.first_visit import StartHere
 from emaviz.page.explore.plant import PlantControls
 from emaviz.page.explore.presets import CUSTOM, PRESETS, name_of
 from emaviz.page.page import Page
 from emaviz.page.style import LONG_LABELS
-from emaviz.page_text import add_html, said
 from emaviz.session.settings import MONITORS
+from emaviz.text.html import add_html, said
 
 _DECIMALS = 6  # that a command's settings may have
 

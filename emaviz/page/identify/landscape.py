@@ -15,9 +15,9 @@ from ema_model.identification.run import ALGORITHMS
 from emaviz.figures import landscape as drawn
 from emaviz.page.identify.swarm import telling
 from emaviz.page.page import Page
-from emaviz.page_text import Html, add_html, html, joined
 from emaviz.session.race import Race
 from emaviz.session.worker import Steps, Worker
+from emaviz.text.html import Html, add_html, html, joined
 
 _BEST = "the answer"
 _WHOLE, _CLOSE = "all of 0 … 1", "close to it"

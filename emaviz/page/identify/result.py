@@ -18,9 +18,9 @@ from emaviz.figures.identified_table import Row, table
 from emaviz.page.identify.landscape import LandscapeView
 from emaviz.page.identify.swarm import SwarmView
 from emaviz.page.page import Page
-from emaviz.page_text import add_html
 from emaviz.session.race import Race
 from emaviz.session.worker import Worker
+from emaviz.text.html import add_html
 from emaviz.text.identification import sure_words
 
 _BEST = "the best"

@@ -8,8 +8,8 @@ from ema_model.faults import FAULTS, HEALTHY
 from emaviz.figures import swarm
 from emaviz.figures.convergence import colour
 from emaviz.page.page import Page
-from emaviz.page_text import add_html
 from emaviz.session.race import Frame, Race, Track
+from emaviz.text.html import add_html
 
 _PLANE, _LINES = "points over two k", "lines across all k"
 _NAMES = tuple(fault.label for fault in FAULTS)

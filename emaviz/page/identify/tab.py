@@ -13,11 +13,11 @@ from ema_model.simulation.plant import FITNESSES
 from emaviz.figures.convergence import colour
 from emaviz.page.identify.result import IdentifyResult
 from emaviz.page.page import Page
-from emaviz.page_text import Html, add_html, html, joined
 from emaviz.recording.viewer import ViewerHost
 from emaviz.session.compare.comparing import Comparing
 from emaviz.session.race import Race
 from emaviz.session.settings import SLIDERS
+from emaviz.text.html import Html, add_html, html, joined
 from emaviz.text.identification import verdict
 
 PLANT = "The plant of Explore's sliders"

@@ -15,8 +15,7 @@ from emaviz.page.discover import cards
 from emaviz.page.discover.effect import about
 from emaviz.page.page import Page
 from emaviz.session.library import RUNS, Library
-from emaviz.page_text import add_html, html, unescaped
-from emaviz.session.library import RUNS, Felt, Library
+from emaviz.text.html import add_html, html, unescaped
 
 _CARD = (
     "height:auto!important;min-height:52px;padding:4px 130px 4px 9px;font-weight:400;font-size:12px;"

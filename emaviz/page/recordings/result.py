@@ -10,8 +10,7 @@ import viser
 from emaviz.figures import two_recordings
 from emaviz.page.page import Page
 from emaviz.recording.entry import Entry
-from emaviz.page_text import Html, add_html, html
-from emaviz.session.archive import Entry
+from emaviz.text.html import Html, add_html, html
 
 _CONFIG = {"displayModeBar": False}
 

@@ -19,7 +19,6 @@ from emaviz.page.identify.result import IdentifyResult
 from emaviz.page.identify.tab import IdentifyPanel
 from emaviz.page.page import Page
 from emaviz.page.playback import PlaybackStrip
-from emaviz.page_text import add_html, html
 from emaviz.session import saved as session_file
 from emaviz.session.actuators import UPLOADED
 from emaviz.session.compare.comparing import Comparing
@@ -27,6 +26,7 @@ from emaviz.session.data_folder import SESSION_SUFFIX
 from emaviz.session.discover.discovering import Discovering
 from emaviz.session.saved import Part
 from emaviz.session.worker import Worker
+from emaviz.text.html import add_html, html
 
 _NONE = "–"
 

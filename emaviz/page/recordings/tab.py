@@ -14,10 +14,10 @@ from emaviz.page.identify.tab import recording_link
 from emaviz.page.page import Page
 from emaviz.page.recordings.result import RecordingsResult
 from emaviz.recording.entry import Entry, as_text
-from emaviz.page_text import Html, add_html, html, joined, said
 from emaviz.recording.viewer import ViewerHost
 from emaviz.session.archive import Recorded
 from emaviz.session.worker import Worker
+from emaviz.text.html import Html, add_html, html, joined, said
 
 NONE = "–"
 _SHOWN = 25

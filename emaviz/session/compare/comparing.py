@@ -13,7 +13,8 @@ from typing import Any
 from ema_model.actuator import Actuator
 from ema_model.comparison.result import Comparison
 from ema_model.errors import InputError
-from ema_model.limits import PAGE_BYTES
+from ema_model.files.limits import PAGE_BYTES
+from ema_model.files.refusal import shown
 from ema_model.quantities.titles import in_sentence
 from ema_model.recordings import (
     SIGNALS,
@@ -25,7 +26,6 @@ from ema_model.recordings import (
     write_side_file,
 )
 from ema_model.recordings.read import read_recording, usual_mapping
-from ema_model.recordings.refusal import shown
 from ema_model.recordings.side_file.read import SideFile
 from emaviz.session import actuators as actuator_files
 from emaviz.session.compare.keep import keep

@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ema_model.discovery import Candidate, begun, walk
-from ema_model.discovery.next_experiment import next_experiment
 from ema_model.discovery import Candidate, begun, verified, walk
-from ema_model.discovery.next_test import next_experiment
+from ema_model.discovery.next_experiment import next_experiment
 from ema_model.discovery.refit import Trial
 from ema_model.discovery.result import Experiment
 from ema_model.discovery.snapshot import Look

@@ -8,13 +8,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from ema_model.actuator import Actuator
+from ema_model.actuator.readings import sentences
 from ema_model.challenges.make import SENSORS
 from ema_model.challenges.sealed_file import SUFFIX
 from ema_model.challenges.sealing import seal
 from ema_model.challenges.truth import Truth
 from ema_model.effects import find
 from ema_model.errors import InputError
-from ema_model.faults import NAMES, named, sentences
+from ema_model.faults import NAMES, named
 from ema_model.quantities.titles import in_sentence
 from ema_model.simulation.sensors import Sensors
 from emaviz.session.data_folder import DataFolder, sanitised

@@ -14,7 +14,7 @@ from ema_model.challenges import Challenge, challenges, folder, opened, sealed_c
 from ema_model.challenges.sealing import unseal
 from ema_model.challenges.truth import Truth, read_truth
 from ema_model.errors import InputError
-from ema_model.limits import CHALLENGE_RECORDING_BYTES
+from ema_model.files.limits import CHALLENGE_RECORDING_BYTES
 from ema_model.recordings import Measurement
 from ema_model.recordings.read import read_recording
 from emaviz.session.compare.comparing import USUAL, Comparing

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from ema_model.file_lock import FileLock
+from ema_model.files.lock import FileLock
 
 _DRAFT = re.compile(r"\.[0-9a-f]{16}\.part")
 _LOCK = ".lock"  # behind the name of what is being written

@@ -11,9 +11,10 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import numpy as np
-import parquet_by_hand as by_hand
 import pyarrow as pa
 import pyarrow.parquet as pq
+
+from support import parquet_by_hand as by_hand
 
 k = np.arange(120.0)
 INDICES = bytes([8, 31]) + bytes(range(120))  # of a data page: 120 of 8 bits each

@@ -120,7 +120,7 @@ def _challenge(path: Path, _: int) -> None:
     from ema_model.actuator import load_actuator
     from ema_model.challenges import opened, sealed_challenge
     from ema_model.challenges.sealing import unseal
-    from ema_model.limits import CHALLENGE_RECORDING_BYTES
+    from ema_model.files.limits import CHALLENGE_RECORDING_BYTES
     from ema_model.recordings.read import read_recording
 
     with opened(sealed_challenge(path)) as one:

@@ -11,7 +11,7 @@ import stat
 from typing import BinaryIO
 
 from ema_model.errors import InputError
-from ema_model.recordings.refusal import reason, refusal
+from ema_model.files.refusal import reason, refusal
 
 
 def check_user_file(path: str | os.PathLike[str], expected: str, most_bytes: float = math.inf) -> os.stat_result:

@@ -14,8 +14,8 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from typing import IO, BinaryIO
 
-from ema_model.limits import megabytes
-from ema_model.recordings.refusal import shown
+from ema_model.files.limits import megabytes
+from ema_model.files.refusal import shown
 
 _PIECE = 1 << 20
 _DIRECTORY_BYTES = 4 << 20  # the list of members, which zipfile reads at once: each takes 46 and its name

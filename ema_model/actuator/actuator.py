@@ -1,0 +1,118 @@
+"""One actuator: its parameters with their tolerances, its effects and its known faults."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from fnmatch import fnmatchcase
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ema_model.actuator.parameters import (
+    SECTIONS,
+    Controller,
+    Inverter,
+    Motor,
+    Rule,
+    Sensors,
+    Tolerance,
+    Transmission,
+    check_stops,
+    check_value,
+    numbers,
+)
+from ema_model.actuator.unread import check_value_is_read
+from ema_model.errors import InputError
+from ema_model.faults import vector
+from ema_model.quantities.axes import Axes
+
+
+@dataclass(frozen=True)
+class Actuator:
+    """All parameters of one actuator; SI units, which the names say (for linear axes see `quantities.axes`).
+
+    Its faults are the known state of this unit: what simulates it (a run, a comparison, a discovery) starts from
+    them unless it is told another k.  An identification does not: its k counts from the healthy actuator, so that a
+    worn unit is found worn, whatever its file says.
+    """
+
+    name: str
+    controller: Controller
+    inverter: Inverter
+    motor: Motor
+    transmission: Transmission
+    sensors: Sensors
+    tolerances: dict[str, Tolerance] = field(default_factory=dict)  # by "section.parameter"
+    description: str = ""
+    effects: dict[str, dict[str, float]] = field(default_factory=dict)  # that belong to its model
+    faults: dict[str, float] = field(default_factory=dict)  # k1 … k8 that are known; the others are healthy
+    axes: Axes = field(default_factory=Axes)
+    step_s: float = 1e-5  # of the Monitor Model
+    filter_s: float = 12e-3  # half width over which a measured motion is differentiated, for inverse dynamics
+    torque_known: bool = True  # whether the torque constant is known, so that currents can be told as torques
+    mapping: tuple[str, ...] = ()  # of its recordings' columns, as for --map
+    rules: tuple[Rule, ...] = ()
+
+    @property
+    def has_reference_model(self) -> bool:
+        """Whether it is the kind that the three-phase Reference Model describes."""
+        return self.controller.kind == "cascade" and self.inverter.kind == "hysteresis"
+
+    @property
+    def k(self) -> NDArray[np.float64]:
+        """The known faults with the healthy ones, (8,)."""
+        return vector(self.faults)
+
+    @property
+    def current_limit_A(self) -> Any:
+        """The most current, A, that controller and drive allow; (n,) where one of them is."""
+        return np.minimum(self.controller.current_limit_A, self.inverter.current_limit_A)
+
+    def circuit(self, preferred: str = "reduced") -> str:
+        """The Monitor Model's drive; `preferred` is the circuit for the hysteresis current loop."""
+        return preferred if self.inverter.kind == "hysteresis" else self.inverter.kind
+
+    def value(self, path: str) -> float:
+        """The value of "section.parameter", or of "effects.name.parameter"."""
+        section, *names = path.split(".")
+        if section == "effects":
+            return float(self.effects[names[0]][names[1]])
+        return float(getattr(getattr(self, section), names[0]))
+
+    def with_values(self, values: dict[str, float]) -> Actuator:
+        """A copy with some "section.parameter" changed; InputError for an impossible value."""
+        changed = self
+        for path, value in values.items():
+            section, _, name = path.partition(".")
+            if section == "effects":
+                changed = changed.varied({path: float(value)})
+                continue
+            if section not in SECTIONS or name not in numbers(section):
+                raise InputError(f"no actuator parameter {path!r}; write it as section.name, e.g. motor.inertia_kgm2")
+            check_value(section, name, value, "actuator")
+            check_value_is_read(changed.controller.kind, changed.inverter.kind, changed.axes, path, value, "actuator")
+            changed = changed.varied({path: float(value)})
+        check_stops(changed.transmission, "actuator")
+        return changed
+
+    def varied(self, values: dict[str, Any]) -> Actuator:
+        """A copy with values set unchecked; they may be arrays (n,), one value for each run of a population."""
+        sections: dict[str, Any] = {}
+        for path, value in values.items():
+            section, *names = path.split(".")
+            if section == "effects":
+                effects = sections.setdefault("effects", {name: dict(given) for name, given in self.effects.items()})
+                effects[names[0]][names[1]] = value
+            else:
+                sections[section] = replace(sections.get(section, getattr(self, section)), **{names[0]: value})
+        return replace(self, **sections)
+
+    def for_recording(self, name: str) -> Actuator:
+        """The actuator as it was in the recording of that name (`rules`)."""
+        values = {path: value for rule in self.rules_for(name) for path, value in rule.values.items()}
+        return self.with_values(values) if values else self
+
+    def rules_for(self, name: str) -> tuple[Rule, ...]:
+        """The rules that hold for a recording of that name."""
+        return tuple(rule for rule in self.rules if fnmatchcase(name, rule.match))

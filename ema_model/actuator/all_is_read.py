@@ -1,0 +1,68 @@
+"""Whether all that an actuator's file says is read by a model of its kind."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+from ema_model.actuator.actuator import Actuator
+from ema_model.actuator.parameters import SECTIONS
+from ema_model.actuator.unread import INVERSE, INVERSE_PLACES, NO_WINDING, WINDING_PLACES, check_value_is_read, unread
+from ema_model.errors import InputError
+
+# In the Reference Model alone (MODEL: T 3.3): known well enough by their values, but no fit could learn of them.
+_REFERENCE_ONLY = ("inverter.hysteresis_band_A", "transmission.viscous_friction_Nms_rad")
+
+
+def check_all_is_read(actuator: Actuator, where: str) -> None:
+    """Raises InputError with the reason for whatever an actuator's file says that no model of its kind would read.
+
+    That is of values, tolerances, recordings' values, effects and settings.
+    """
+    known = actuator.controller.kind != "unknown"
+    for section in SECTIONS:
+        for one in fields(SECTIONS[section]):
+            if one.name != "kind":
+                path = f"{section}.{one.name}"
+                _check_value(actuator, path, getattr(getattr(actuator, section), one.name), where)
+    for rule in actuator.rules:
+        for path, value in rule.values.items():
+            _check_value(actuator, path, value, f"{where}: recordings.where {rule.match}")
+    for path in set(actuator.tolerances) & set(unread(actuator.controller.kind, actuator.inverter.kind)):
+        raise InputError(f"{where}: {actuator.axes.path(path)}: no model reads it, so that it cannot have a tolerance")
+    for name in actuator.effects:
+        _check_effect_acts(actuator, name, where)
+    if not known and actuator.step_s != Actuator.step_s:
+        raise InputError(f"{where}: model.step_s: {INVERSE} takes no steps; leave it out")
+    if known and actuator.filter_s != Actuator.filter_s:
+        raise InputError(f"{where}: model.filter_s: it is of inverse dynamics, for an unknown controller; leave it out")
+    if actuator.has_reference_model:
+        _check_reference_only(actuator, where)
+
+
+def _check_reference_only(actuator: Actuator, where: str) -> None:
+    for path in _REFERENCE_ONLY:
+        if path in actuator.tolerances:
+            shown = actuator.axes.path(path)
+            raise InputError(f"{where}: {shown}: the fitted model leaves it out, so that it cannot have a tolerance")
+    path = "transmission.viscous_friction_Nms_rad"
+    if actuator.value(path) > max(actuator.motor.viscous_friction_Nms_rad, 0.0):
+        motor = actuator.axes.path("motor.viscous_friction_Nms_rad")
+        raise InputError(
+            f"{where}: {actuator.axes.path(path)}: the fitted model leaves it out, as small beside the motor's own; "
+            f"add it to {motor}"
+        )
+
+
+def _check_effect_acts(actuator: Actuator, name: str, where: str) -> None:
+    from ema_model.effects import find  # the catalogue need not be loaded for an actuator without effects
+
+    effect = find(name)
+    places = {function.__name__ for function in effect.places}
+    if actuator.controller.kind == "unknown" and (effect.states or not places & set(INVERSE_PLACES)):
+        raise InputError(f"{where}: effects.{name}: {INVERSE} does not simulate what it acts on; leave it out")
+    if actuator.inverter.kind == "current" and places <= set(WINDING_PLACES):
+        raise InputError(f"{where}: effects.{name}: {NO_WINDING} for it to act on; leave it out")
+
+
+def _check_value(actuator: Actuator, path: str, value: float, where: str) -> None:
+    check_value_is_read(actuator.controller.kind, actuator.inverter.kind, actuator.axes, path, value, where)

@@ -1,0 +1,1 @@
+"""Files of users: opened, limited, taken apart safely, written whole, locked."""

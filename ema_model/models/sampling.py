@@ -33,7 +33,7 @@ def check_steps(measurements: Sequence[Measurement], parts: Sequence[list[slice]
     total, steps = 0, actuator.step_s
     for measurement, slices in zip(measurements, parts):
         period = measurement.sample_period_s
-        if actuator.has_reference_model and not 1.0 / FASTEST_HZ <= period * (1.0 + 1e-6) <= 1.0 / SLOWEST_HZ * 1.001:
+        if actuator.has_reference_model and not 0.999 / FASTEST_HZ <= period <= 1.001 / SLOWEST_HZ:
             raise InputError(
                 f"{measurement.name}: its sampling period of {period:g} s is not between {1.0 / FASTEST_HZ:g} and "
                 f"{1.0 / SLOWEST_HZ:g} s, which the reference model can follow; {_ADVICE}, or record at another rate"

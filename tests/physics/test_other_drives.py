@@ -27,7 +27,7 @@ kind = "{drive}"
 {full}
 [motor]
 torque_constant_Nm_A = 0.5
-resistance_Ohm = 4.0
+{winding}
 inertia_kgm2 = 0.01
 viscous_friction_Nms_rad = {viscous}
 static_friction_Nm = 0.0
@@ -42,6 +42,7 @@ def servo(tmp_path, extra: str = "", **changes) -> Actuator:
         "gain": 1e6,
         "drive": "voltage",
         "full": "bus_voltage_V = 12.0",
+        "winding": "resistance_Ohm = 4.0",
         "viscous": 0.0,
         "friction": 0.0,
     }
@@ -75,7 +76,7 @@ def test_viscous_drag_lowers_it(tmp_path):
 
 
 def test_ideal_current_accelerates_evenly(tmp_path):
-    actuator = servo(tmp_path, drive="current", full="current_limit_A = 2.0")
+    actuator = servo(tmp_path, drive="current", full="current_limit_A = 2.0", winding="")
     run = simulate_monitor(run_of(held(1e6, 0.5), 0.5), actuator, start_rad=0.0)
     np.testing.assert_array_equal(run["current_A"][1:], 2.0)
     np.testing.assert_allclose(run["motor_speed_rad_s"], 0.5 * 2.0 / 0.01 * run.time_s, rtol=1e-9, atol=1e-9)

@@ -81,7 +81,7 @@ def opened(one: Challenge) -> Iterator[Challenge]:
 
 def read_parts(path: Path) -> dict[str, bytes]:
     """All parts but the seal, which was found whole, by their names; InputError otherwise."""
-    check_user_file(path, "a sealed challenge")
+    check_user_file(path, "a sealed challenge", name=path.name)
     try:
         if path.stat().st_size > CHALLENGE_BYTES:
             raise InputError(f"{shown(path.name)}: is too large to be a challenge ({megabytes(path.stat().st_size)})")

@@ -14,18 +14,22 @@ from ema_model.errors import InputError
 from ema_model.files.refusal import reason, refusal
 
 
-def check_user_file(path: str | os.PathLike[str], expected: str, most_bytes: float = math.inf) -> os.stat_result:
+def check_user_file(
+    path: str | os.PathLike[str], expected: str, most_bytes: float = math.inf, *, name: str | None = None
+) -> os.stat_result:
     """The status of a regular file of at most so many bytes; raises InputError for anything else.
 
-    expected: what the file should be, as in "an actuator file (.toml)".  Nothing is opened.
+    expected: what the file should be, as in "an actuator file (.toml)"; name: what the error calls it, its path
+    unless given.  Nothing is opened.
     """
+    told = path if name is None else name
     try:
         status = os.stat(path)
     except (FileNotFoundError, NotADirectoryError):
-        raise refusal(path, "no such file; check the name and the folder") from None
+        raise refusal(told, "no such file; check the name and the folder") from None
     except (OSError, ValueError) as error:
-        raise _unreadable(path, error) from None
-    _check(path, status, expected, most_bytes)
+        raise _unreadable(told, error) from None
+    _check(told, status, expected, most_bytes)
     return status
 
 

@@ -125,9 +125,11 @@ def view(path: str | Path, open_browser: bool = True, port: int = 0) -> None:
 @contextmanager
 def _viewable(path: Path) -> Iterator[Path]:
     """The recording itself, or a whole copy of a part for as long as it is shown."""
-    if path.suffix != ".part":
+    if path.suffix == ".rrd":
         yield check(path)
         return
+    if path.suffix != ".part":
+        raise RecordingError(f"{path}: the name of a recording must end in .rrd, or in .part if it was cut off")
     from emaviz.recording.recover import write_whole  # rerun takes a second to import
 
     with tempfile.TemporaryDirectory(prefix="emaviz-") as folder:

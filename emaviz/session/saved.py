@@ -68,7 +68,7 @@ def read(path: Path, parts: Mapping[str, Part], folder: DataFolder) -> None:
 
     The files are taken all or not at all.
     """
-    check_user_file(path, "a session")
+    check_user_file(path, "a session", name=path.name)
     try:
         with path.open("rb") as file, opened_zip(file, SESSION_FILES, SESSION_BYTES) as archive:
             document = _document(archive, path)

@@ -131,7 +131,7 @@ def test_what_is_no_session_is_refused_in_one_line(folder, tmp_path, monkeypatch
     cases.append((archive_with(tmp_path / "a.emaviz", {"other.json": "{}"}), "is no session"))
     cases.append((archive_with(tmp_path / "b.emaviz", {"session.json": "{"}), "is no session"))
     cases.append((archive_with(tmp_path / "c.emaviz", {"session.json": '{"schema": 99}'}), "another version"))
-    cases.append((tmp_path / "none.emaviz", "no such file"))
+    cases.append((tmp_path / "none.emaviz", "^none.emaviz: no such file"))
     cut = archive_with(tmp_path / "d.emaviz", {"session.json": GOOD, "files/uploads/a.csv": "x" * 999})
     cut.write_bytes(cut.read_bytes()[:-30])
     cases.append((cut, "is no session"))

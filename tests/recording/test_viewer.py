@@ -11,7 +11,7 @@ import sys
 import pytest
 
 from emaviz.recording import RecordingError, RecordingWriter
-from emaviz.recording.viewer import ViewerHost
+from emaviz.recording.viewer import ViewerHost, view
 
 
 @pytest.fixture(scope="module")
@@ -142,6 +142,12 @@ def test_view_prints_the_address_and_ends_with_an_interrupt(tmp_path):
     process.send_signal(signal.SIGINT)
     assert process.wait(60) == 0  # on a loaded machine, too
     process.stdout.close()
+
+
+def test_view_tells_a_name_that_would_not_be_served(tmp_path):
+    (tmp_path / "a.RRD").write_bytes(b"RRF2 content")
+    with pytest.raises(RecordingError, match=r"must end in \.rrd, or in \.part"):
+        view(tmp_path / "a.RRD", open_browser=False)
 
 
 @pytest.mark.browser

@@ -23,7 +23,7 @@ from ema_model.actuator.parameters import (
     numbers,
 )
 from ema_model.actuator.unread import check_value_is_read
-from ema_model.errors import InputError
+from ema_model.errors import InputError, quoted
 from ema_model.faults import vector
 from ema_model.quantities.axes import Axes
 
@@ -89,7 +89,9 @@ class Actuator:
                 changed = changed.varied({path: float(value)})
                 continue
             if section not in SECTIONS or name not in numbers(section):
-                raise InputError(f"no actuator parameter {path!r}; write it as section.name, e.g. motor.inertia_kgm2")
+                raise InputError(
+                    f"no actuator parameter {quoted(path)!r}; write it as section.name, e.g. motor.inertia_kgm2"
+                )
             check_value(section, name, value, "actuator")
             check_value_is_read(changed.controller.kind, changed.inverter.kind, changed.axes, path, value, "actuator")
             changed = changed.varied({path: float(value)})

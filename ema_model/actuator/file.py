@@ -12,7 +12,7 @@ from ema_model.actuator.all_is_read import check_all_is_read
 from ema_model.actuator.layout import KINDS, USUAL, layout
 from ema_model.actuator.parameters import SECTIONS, Rule, Tolerance, check_stops, check_value
 from ema_model.actuator.unread import unread
-from ema_model.errors import InputError
+from ema_model.errors import InputError, quoted
 from ema_model.faults import vector
 from ema_model.files.limits import TEXT_BYTES
 from ema_model.files.toml_text import toml_of
@@ -36,8 +36,8 @@ def load_actuator(path: str | Path | None = None) -> Actuator:
             text = file.read().decode("utf-8")
     except (OSError, UnicodeDecodeError) as error:
         why = getattr(error, "strerror", None) or "not UTF-8"
-        raise InputError(f"{path}: cannot be read as text ({why})") from None
-    return _parse(text, str(path))
+        raise InputError(f"{quoted(path)}: cannot be read as text ({why})") from None
+    return _parse(text, path)
 
 
 def shipped(name: str) -> str:
@@ -48,11 +48,12 @@ def shipped(name: str) -> str:
     return (Path(__file__).parents[2] / "assets" / "actuators" / name).read_text(encoding="utf-8")
 
 
-def _parse(text: str, where: str) -> Actuator:
+def _parse(text: str, path: str | Path) -> Actuator:
+    where = quoted(path)
     try:
         document = toml_of(text)
     except ValueError as error:
-        raise InputError(f"{where}: not valid TOML: {error}") from None
+        raise InputError(f"{where}: not valid TOML: {quoted(error)}") from None
     try:
         return _actuator(document, where)
     except InputError:
@@ -63,11 +64,11 @@ def _parse(text: str, where: str) -> Actuator:
 
 def _actuator(document: dict[str, Any], where: str) -> Actuator:
     if document.get("schema", 1) != 1:
-        raise InputError(f"{where}: schema {document['schema']!r} is not known; this version reads schema 1")
+        raise InputError(f"{where}: schema {quoted(document['schema'], 40)} is not known; this version reads schema 1")
     unknown = set(document) - set(SECTIONS) - set(_OTHERS)
     if unknown:
         sections = ", ".join((*SECTIONS, *_OTHERS[3:]))
-        raise InputError(f"{where}: unknown entry {sorted(unknown)[0]!r}; sections are {sections}")
+        raise InputError(f"{where}: unknown entry {quoted(sorted(unknown)[0])!r}; sections are {sections}")
     tables = {name: _table(document, name, where) for name in (*SECTIONS, *_OTHERS[3:])}
     axes = _axes(tables["axes"], where)
     kinds = {
@@ -110,7 +111,7 @@ def _section(
     for extra in set(given) - set(inside) - ({"kind"} if section in KINDS else set()):
         reason = f": {why[extra]}" if extra in why else ""
         raise InputError(
-            f"{where}: [{section}] has no parameter {extra!r}{reason}; it has {', '.join(inside) or 'none'}"
+            f"{where}: [{section}] has no parameter {quoted(extra)!r}{reason}; it has {', '.join(inside) or 'none'}"
         )
     values: dict[str, Any] = {"kind": kinds[section]} if section in KINDS else {}
     for shown, name in inside.items():
@@ -133,7 +134,7 @@ def _effects(
 
     effects: dict[str, dict[str, float]] = {}
     for given_name in given:
-        inside = f"[effects.{given_name}]"
+        inside = f"[effects.{quoted(given_name)}]"
         table = _table(given, given_name, f"{where}: [effects]")
         kind = kind_of(given_name)
         try:
@@ -146,8 +147,8 @@ def _effects(
         values = {}
         for shown, entry in table.items():
             if shown not in names:
-                raise InputError(f"{where}: {inside} has no {shown!r}; it has {', '.join(names)}")
-            value, tolerance = _number_and_tolerance(f"effects.{given_name}", shown, entry, where)
+                raise InputError(f"{where}: {inside} has no {quoted(shown)!r}; it has {', '.join(names)}")
+            value, tolerance = _number_and_tolerance(f"effects.{quoted(given_name)}", quoted(shown), entry, where)
             values[names[shown]] = value
             if tolerance is not None:
                 tolerances[f"effects.{effect.name}.{names[shown]}"] = tolerance
@@ -162,7 +163,7 @@ def _faults(given: dict[str, Any], where: str) -> dict[str, float]:
     """The known faults k1 … k8, each a number in 0 … 1."""
     for name, value in given.items():
         if not math.isfinite(as_number(value)):
-            raise InputError(f"{where}: [faults] {name} must be a number, not {str(value)[:40]!r}")
+            raise InputError(f"{where}: [faults] {name} must be a number, not {quoted(value, 40)!r}")
     faults = {name: float(value) for name, value in given.items()}
     try:
         vector(faults)
@@ -186,7 +187,7 @@ def _number_and_tolerance(section: str, name: str, entry: Any, where: str) -> tu
             raise InputError(f"{where}: [{section}] {name} takes value, tolerance or sigma, free")
         value = entry["value"]
     if not math.isfinite(as_number(value)):
-        raise InputError(f"{where}: [{section}] {name} must be a number, not {str(value)[:40]!r}")
+        raise InputError(f"{where}: [{section}] {name} must be a number, not {quoted(value, 40)!r}")
     if isinstance(entry, dict) and ("tolerance" in entry or "sigma" in entry):
         given, scale = (entry["sigma"], 1.0) if "sigma" in entry else (entry["tolerance"], abs(value))
         sigma = as_number(given) * scale
@@ -194,7 +195,7 @@ def _number_and_tolerance(section: str, name: str, entry: Any, where: str) -> tu
             raise InputError(f"{where}: [{section}] {name}: the tolerance must be above 0 (sigma where value is 0)")
         free = entry.get("free", True)
         if not isinstance(free, bool):
-            raise InputError(f"{where}: [{section}] {name}: free must be true or false, not {free!r}")
+            raise InputError(f"{where}: [{section}] {name}: free must be true or false, not {quoted(free)!r}")
         tolerance = Tolerance(sigma, free)
     return float(value), tolerance
 
@@ -202,42 +203,42 @@ def _number_and_tolerance(section: str, name: str, entry: Any, where: str) -> tu
 def _table(document: dict[str, Any], name: str, where: str) -> dict[str, Any]:
     table = document.get(name, {})
     if not isinstance(table, dict):
-        raise InputError(f"{where}: [{name}] must be a table")
+        raise InputError(f"{where}: [{quoted(name)}] must be a table")
     return table
 
 
 def _choice(table: dict[str, Any], key: str, usual: str, choices: tuple[str, ...], section: str, where: str) -> str:
     chosen = table.get(key, usual)
     if chosen not in choices:
-        raise InputError(f"{where}: [{section}] {key} must be {' or '.join(choices)}, not {str(chosen)[:40]!r}")
+        raise InputError(f"{where}: [{section}] {key} must be {' or '.join(choices)}, not {quoted(chosen, 40)!r}")
     return chosen
 
 
 def _axes(table: dict[str, Any], where: str) -> Axes:
     for extra in set(table) - {"motor", "user"}:
-        raise InputError(f"{where}: [axes] has no {extra!r}; it has motor, user")
+        raise InputError(f"{where}: [axes] has no {quoted(extra)!r}; it has motor, user")
     return Axes(*(_choice(table, key, "rotary", AXIS_KINDS, "axes", where) for key in ("motor", "user")))
 
 
 def _seconds(table: dict[str, Any], name: str, usual: float, where: str) -> float:
     for extra in set(table) - set(_MODEL):
-        raise InputError(f"{where}: [model] has no {extra!r}; it has {', '.join(_MODEL)}")
+        raise InputError(f"{where}: [model] has no {quoted(extra)!r}; it has {', '.join(_MODEL)}")
     value = as_number(table.get(name, usual))
     if not 1e-7 <= value <= 1.0:
-        raise InputError(f"{where}: [model] {name} must lie between 1e-7 and 1 s, not {str(table[name])[:40]!r}")
+        raise InputError(f"{where}: [model] {name} must lie between 1e-7 and 1 s, not {quoted(table[name], 40)!r}")
     return value
 
 
 def _flag(table: dict[str, Any], name: str, where: str) -> bool:
     value = table.get(name, True)
     if not isinstance(value, bool):
-        raise InputError(f"{where}: [model] {name} must be true or false, not {str(value)[:40]!r}")
+        raise InputError(f"{where}: [model] {name} must be true or false, not {quoted(value, 40)!r}")
     return value
 
 
 def _mapping(table: dict[str, Any], where: str) -> tuple[str, ...]:
     for extra in set(table) - {"mapping", "where"}:
-        raise InputError(f"{where}: [recordings] has no {extra!r}; it has mapping, where")
+        raise InputError(f"{where}: [recordings] has no {quoted(extra)!r}; it has mapping, where")
     mapping = table.get("mapping", [])
     if not isinstance(mapping, list) or not all(isinstance(text, str) for text in mapping):
         raise InputError(f'{where}: [recordings] mapping must be a list of texts such as "time_s=t[ms]"')
@@ -251,7 +252,7 @@ def _rules(table: dict[str, Any], axes: Axes, where: str) -> tuple[Rule, ...]:
     rules = []
     for rule in given:
         for extra in set(rule) - {"match", "set", "kind"}:
-            raise InputError(f"{where}: [[recordings.where]] has no {extra!r}; it has match, set, kind")
+            raise InputError(f"{where}: [[recordings.where]] has no {quoted(extra)!r}; it has match, set, kind")
         if not isinstance(rule.get("match"), str):
             raise InputError(f'{where}: [[recordings.where]] needs match, a pattern of file names such as "*kp100*"')
         kind = _choice(rule, "kind", "run", _RECORDING_KINDS, "recordings.where", where)
@@ -265,7 +266,7 @@ def _rules(table: dict[str, Any], axes: Axes, where: str) -> tuple[Rule, ...]:
             )
             if shown not in inside or shown == "kind":
                 raise InputError(
-                    f'{where}: [[recordings.where]] no parameter {path[:60]!r}; write "section.name" = value'
+                    f'{where}: [[recordings.where]] no parameter {quoted(path, 60)!r}; write "section.name" = value'
                 )
             check_value(section, inside[shown], value, f"{where}: recordings.where")
             values[f"{section}.{inside[shown]}"] = float(value)

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field, fields
 from typing import Any
 
-from ema_model.errors import InputError
+from ema_model.errors import InputError, quoted
 from ema_model.quantities.numbers import as_number
 
 _FAR = 1e9  # rad, where an end stop is out of reach
@@ -128,11 +128,11 @@ def low_limit(path: str) -> float:
 def check_value(section: str, name: str, value: Any, where: str) -> None:
     """Raises InputError for what is no number, or not one that this parameter can have."""
     if not math.isfinite(as_number(value)):
-        raise InputError(f"{where}: [{section}] {name} must be a number, not {str(value)[:40]!r}")
+        raise InputError(f"{where}: [{section}] {name} must be a number, not {quoted(value, 40)!r}")
     if name in _POSITIVE and value <= 0.0:
-        raise InputError(f"{where}: [{section}] {name} must be above 0, not {value!r}")
+        raise InputError(f"{where}: [{section}] {name} must be above 0, not {quoted(value)}")
     if name not in _ANY_SIGN and value < 0.0:
-        raise InputError(f"{where}: [{section}] {name} must not be negative, not {value!r}")
+        raise InputError(f"{where}: [{section}] {name} must not be negative, not {quoted(value)}")
 
 
 def check_stops(transmission: Transmission, where: str) -> None:

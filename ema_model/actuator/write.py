@@ -12,7 +12,7 @@ from ema_model.actuator.actuator import Actuator
 from ema_model.actuator.layout import KINDS, layout
 from ema_model.actuator.parameters import SECTIONS
 from ema_model.actuator.unread import unread
-from ema_model.errors import InputError
+from ema_model.errors import InputError, quoted
 from ema_model.files.whole_file import whole_file
 
 if TYPE_CHECKING:
@@ -26,12 +26,12 @@ def save_actuator(actuator: Actuator, path: str | os.PathLike[str]) -> None:
     """
     target = Path(path)
     if target.suffix != ".toml":
-        raise InputError(f"{target}: the name of an actuator file must end in .toml")
+        raise InputError(f"{quoted(target)}: the name of an actuator file must end in .toml")
     try:
         with whole_file(target) as draft:
             draft.write_text(as_toml(actuator), encoding="utf-8")
     except OSError as error:
-        raise InputError(f"{target}: cannot be written ({error.strerror}); check the folder") from None
+        raise InputError(f"{quoted(target)}: cannot be written ({error.strerror}); check the folder") from None
 
 
 def as_toml(actuator: Actuator) -> str:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 
-from ema_model.errors import InputError
+from ema_model.errors import InputError, quoted
 
 _FILE = "challenge.toml"
 
@@ -45,10 +45,12 @@ def _read(path: Path) -> Challenge:
         title, grade, story = str(told["title"]), int(told["grade"]), str(told["story"]).strip()
         found = Challenge(path.parent.name, title, grade, story, training, holdout)
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, TypeError, ValueError) as error:
-        raise InputError(f"{path}: not a challenge: {error}; mend it or remove its folder") from None
+        raise InputError(f"{quoted(path)}: not a challenge: {quoted(error)}; mend it or remove its folder") from None
     except KeyError as error:
-        raise InputError(f"{path}: {error.args[0]} is missing; add it") from None
+        raise InputError(f"{quoted(path)}: {error.args[0]} is missing; add it") from None
     missing = [file.name for file in (*found.training, *found.holdout) if not file.is_file()]
     if missing:
-        raise InputError(f"{path}: there is no {missing[0]} beside it; run python -m ema_model.challenges")
+        raise InputError(
+            f"{quoted(path)}: there is no {quoted(missing[0])} beside it; run python -m ema_model.challenges"
+        )
     return found

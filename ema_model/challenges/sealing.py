@@ -18,7 +18,7 @@ from ema_model.actuator import Actuator, save_actuator
 from ema_model.challenges.make import RUNS, SENSORS, recorded, write
 from ema_model.challenges.sealed_file import HIDDEN, MOST_CHARACTERS, SUFFIX, read_parts, write_sealed
 from ema_model.challenges.truth import Truth, truth_of
-from ema_model.errors import InputError
+from ema_model.errors import InputError, quoted
 from ema_model.files.refusal import shown
 from ema_model.simulation.sensors import Sensors
 
@@ -45,7 +45,7 @@ def seal(
     cannot be written.
     """
     if path.suffix != SUFFIX:
-        raise InputError(f"{path.name}: the name of a sealed challenge must end in {SUFFIX}")
+        raise InputError(f"{quoted(path.name)}: the name of a sealed challenge must end in {SUFFIX}")
     for (name, most), text in zip(MOST_CHARACTERS.items(), (title, story)):
         if not text.strip() or len(text) > most:
             raise InputError(f"the challenge needs a {name} of up to {most} characters; it has {len(text.strip())}")

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.effects import find
-from ema_model.errors import InputError
+from ema_model.errors import InputError, quoted
 from ema_model.faults import vector
 
 _KEYS = {"schema", "seed", "answer", "torque", "torque_parameters", "effects", "faults"}
@@ -46,13 +46,13 @@ def read_truth(path: Path) -> Truth:
     try:
         return truth_of(tomllib.loads(path.read_text(encoding="utf-8")), path.stem, str(path))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise InputError(f"{path}: not a challenge's truth: {error}") from None
+        raise InputError(f"{quoted(path)}: not a challenge's truth: {quoted(error)}") from None
 
 
 def truth_of(told: Mapping[str, Any], name: str, where: str) -> Truth:
     """The truth that a file tells; InputError, which begins with `where`, tells a mistake."""
     if unknown := told.keys() - _KEYS:
-        raise InputError(f"{where}: {min(unknown)} is not known; known are {', '.join(sorted(_KEYS))}")
+        raise InputError(f"{where}: {quoted(min(unknown))} is not known; known are {', '.join(sorted(_KEYS))}")
     try:
         effects = {effect: find(effect).settings(dict(given)) for effect, given in told.get("effects", {}).items()}
         faults = {fault: float(value) for fault, value in told.get("faults", {}).items()}
@@ -69,4 +69,4 @@ def truth_of(told: Mapping[str, Any], name: str, where: str) -> Truth:
     except KeyError as error:
         raise InputError(f"{where}: {error.args[0]} is missing; add it") from None
     except (TypeError, ValueError, AttributeError, OverflowError) as error:
-        raise InputError(f"{where}: not a challenge's truth: {error}") from None
+        raise InputError(f"{where}: not a challenge's truth: {quoted(error)}") from None

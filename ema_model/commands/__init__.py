@@ -13,7 +13,7 @@ from typing import Any
 
 from ema_model.commands.command import Command
 from ema_model.commands.recorded import Recorded
-from ema_model.errors import InputError
+from ema_model.errors import InputError, quoted
 
 __all__ = ["COMMANDS", "Command", "Recorded", "command"]
 
@@ -34,13 +34,13 @@ COMMANDS: dict[str, type[Command]] = {
 def command(name: str, settings: Mapping[str, Any] | None = None) -> Command:
     """The command of that name with some settings changed; text values are read as the setting's type."""
     if name not in COMMANDS:
-        raise InputError(f"no command {name!r}; commands are {', '.join(COMMANDS)}, or a recording's file")
+        raise InputError(f"no command {quoted(name)!r}; commands are {', '.join(COMMANDS)}, or a recording's file")
     cls = COMMANDS[name]
     known = {f.name: f.default for f in fields(cls)}
     read: dict[str, Any] = {}
     for setting, value in (settings or {}).items():
         if setting not in known:
-            raise InputError(f"{name} has no setting {setting!r}; it has {', '.join(known)}")
+            raise InputError(f"{name} has no setting {quoted(setting)!r}; it has {', '.join(known)}")
         read[setting] = _number(name, setting, value, known[setting])
     return cls(**read)
 
@@ -53,4 +53,4 @@ def _number(name: str, setting: str, value: Any, like: Any) -> Any:
         return float(value)
     except (TypeError, ValueError):
         expected = "numbers joined by + (1+3+7)" if isinstance(like, tuple) else "a number"
-        raise InputError(f"{name}: {setting} must be {expected}, not {value!r}") from None
+        raise InputError(f"{name}: {setting} must be {expected}, not {quoted(value)!r}") from None

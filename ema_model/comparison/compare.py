@@ -14,7 +14,7 @@ from ema_model.comparison.assemble import residuals_of
 from ema_model.comparison.result import Compared, Comparison, SignalError
 from ema_model.comparison.verdict import judge
 from ema_model.effects import find
-from ema_model.errors import InputError
+from ema_model.errors import InputError, quoted
 from ema_model.estimation import Calibration, Floor, floor
 from ema_model.estimation import calibrate as fit
 from ema_model.estimation.calibrate import SIGNALS
@@ -126,7 +126,7 @@ def weights_of(signals: Sequence[str] | Mapping[str, float] | None, actuator: Ac
     known = {actuator.axes.signal(name): name for name in (*SIGNALS, "motor_speed_rad_s")}
     for name in signals:
         if name not in known:
-            raise InputError(f"no signal {name!r} to compare; there are {', '.join(known)}")
+            raise InputError(f"no signal {quoted(name)!r} to compare; there are {', '.join(known)}")
     weights = signals if isinstance(signals, Mapping) else dict.fromkeys(signals, 1.0)
     for name, weight in weights.items():
         if not 0.0 < weight < np.inf:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ema_model.actuator import Actuator
-from ema_model.errors import InputError
+from ema_model.errors import InputError, quoted
 from ema_model.models.closed_loop import ClosedLoop
 from ema_model.models.window import BLOCK_S, Window
 from ema_model.physics.rows import LANES
@@ -40,7 +40,7 @@ class Objective(ClosedLoop):
         fitness: str = "filtered",
     ) -> None:
         if fitness not in FITNESSES:
-            raise InputError(f"no fitness {fitness!r}; fitnesses are {', '.join(FITNESSES)}")
+            raise InputError(f"no fitness {quoted(fitness)!r}; fitnesses are {', '.join(FITNESSES)}")
         super().__init__(
             measurements,
             replace(actuator, faults={}),

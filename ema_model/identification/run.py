@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ema_model import faults
-from ema_model.errors import InputError
+from ema_model.errors import InputError, quoted
 from ema_model.identification.fit import Setting, refine, refine_best, setting
 from ema_model.identification.objective import Objective
 from ema_model.identification.optimisers import OPTIMISERS, Optimiser, create
@@ -88,7 +88,7 @@ def steps(
     """
     if algorithm == ROBUST:
         if settings:
-            raise InputError(f"the robust algorithm has no setting {next(iter(settings))!r}")
+            raise InputError(f"the robust algorithm has no setting {quoted(next(iter(settings)))!r}")
         _check_size("population", population, 2)
         _check_size("iterations", iterations, 1)
         running = _robust(objective, population, iterations, seed, parameters_known)
@@ -180,7 +180,7 @@ def _robust(
 
 def _check_size(what: str, value: int, least: int) -> None:
     if value != int(value) or value < least:
-        raise InputError(f"{what} must be a whole number of at least {least}, got {value!r}")
+        raise InputError(f"{what} must be a whole number of at least {least}, got {quoted(value)}")
 
 
 def identify(

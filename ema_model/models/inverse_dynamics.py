@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.effects import find
-from ema_model.errors import InputError
+from ema_model.errors import InputError, quoted
 from ema_model.models.motion import Motion, motion_of
 from ema_model.models.sampling import check_period, on_even_grid
 from ema_model.models.window import CONTEXT
@@ -149,7 +149,7 @@ def _stretches(
     measurement.require("motor_position_rad")
     target = next((name for name in ("current_A", "motor_torque_Nm") if name in measurement), None)
     if target is None:
-        raise InputError(f"{measurement.name}: nothing to compare; current_A or motor_torque_Nm is needed")
+        raise InputError(f"{quoted(measurement.name)}: nothing to compare; current_A or motor_torque_Nm is needed")
     values = {path: value for rule in actuator.rules_for(measurement.name) for path, value in rule.values.items()}
     period = measurement.sample_period_s
     if not measurement.is_map:
@@ -200,7 +200,9 @@ def _stretches(
             )
         )
     if not found:
-        raise InputError(f"{measurement.name}: too little motion to compare; {10 * size} samples in motion are needed")
+        raise InputError(
+            f"{quoted(measurement.name)}: too little motion to compare; {10 * size} samples in motion are needed"
+        )
     return found
 
 

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.commands.recorded import between
-from ema_model.errors import InputError
+from ema_model.errors import InputError, quoted
 from ema_model.recordings import Measurement
 from ema_model.simulation.pack import integral_at_start
 from ema_model.simulation.run import steps_per_sample
@@ -86,7 +86,7 @@ def cut(
     """
     measurement.require("command_rad")
     if not any(name in measurement for name in COMPARED):
-        raise InputError(f"{measurement.name}: nothing to compare; one of {', '.join(COMPARED)} is needed")
+        raise InputError(f"{quoted(measurement.name)}: nothing to compare; one of {', '.join(COMPARED)} is needed")
     period = measurement.sample_period_s
     samples = max(1, round(block_s / period))
     steps = steps_per_sample(period, actuator.step_s)
@@ -128,7 +128,7 @@ def cut(
         )
     if not windows:
         short = f"{measurement.duration_s:g} s are too short to compare; {10 * samples * period:g} s are needed"
-        raise InputError(f"{measurement.name}: {short}; check the unit of time_s")
+        raise InputError(f"{quoted(measurement.name)}: {short}; check the unit of time_s")
     return windows
 
 

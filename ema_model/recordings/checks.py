@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ema_model.errors import InputError
+from ema_model.errors import InputError, quoted
 from ema_model.files.limits import COLUMNS, RUNS
 from ema_model.files.refusal import listed, refusal, shown
 from ema_model.quantities.signals import SIGNALS, lookalikes, looks_like_time
@@ -79,7 +79,9 @@ def check_values(path: str, arrays: Mapping[str, Array], place: Place) -> None:
             whole = (values == np.round(values)) if name == "segment" else (values == 0.0) | (values == 1.0)
             expected = "a whole number" if name == "segment" else "0 or 1"
             for row in np.flatnonzero(~whole)[:1]:
-                raise refusal(path, f"{place(row)}, column {name!r}: {expected} is expected, found {values[row]:g}")
+                raise refusal(
+                    path, f"{place(row)}, column {quoted(name)!r}: {expected} is expected, found {values[row]:g}"
+                )
     if "segment" in arrays and (runs := np.count_nonzero(np.diff(arrays["segment"])) + 1) > RUNS:
         found = f"column 'segment' tells {runs} runs apart, over the limit of {RUNS}"
         raise refusal(path, f"{found}; correct it, or split the file")
@@ -104,7 +106,7 @@ def check_finite(path: str, arrays: Mapping[str, Array], place: Place) -> None:
             found = "NaN" if np.isnan(value) else "an infinite value" if np.isinf(value) else f"{value:.3g}"
             expected = "a finite number is expected" if not np.isfinite(value) else "no quantity is that large"
             problem = f"{found}; {expected}, correct it or remove the row"
-            raise refusal(path, f"{place(row)}, column {name!r}: {problem}")
+            raise refusal(path, f"{place(row)}, column {quoted(name)!r}: {problem}")
 
 
 def check_length(path: str, samples: int) -> None:
@@ -121,5 +123,7 @@ def check_needed(measurement: Measurement, *names: str) -> None:
         values = measurement[name]
         if not values.size or np.all(values == values[0]):
             value = f"is constant ({values[0]:g})" if values.size else "is empty"
-            where = f"{measurement.name}: " if measurement.name else ""
-            raise InputError(f"{where}column {name!r} {value}, but it must vary here; record it while the axis moves")
+            where = f"{quoted(measurement.name)}: " if measurement.name else ""
+            raise InputError(
+                f"{where}column {quoted(name)!r} {value}, but it must vary here; record it while the axis moves"
+            )

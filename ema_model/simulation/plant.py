@@ -9,7 +9,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from ema_model.actuator import Actuator
-from ema_model.errors import InputError
+from ema_model.errors import InputError, quoted
 from ema_model.recordings import Measurement
 from ema_model.simulation.run import Run, simulate_monitor, simulate_reference
 
@@ -70,7 +70,7 @@ def simulated(
 ) -> Measurement:
     """A recording of the Reference Model for identification, sampled at the fitness's own rate (10 or 100 kHz)."""
     if fitness not in FITNESSES:
-        raise InputError(f"no fitness {fitness!r}; fitnesses are {', '.join(FITNESSES)}")
+        raise InputError(f"no fitness {quoted(fitness)!r}; fitnesses are {', '.join(FITNESSES)}")
     return simulate_reference(_at_rate(run, fitness), actuator, k, effects)
 
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from ema_model.actuator import Actuator
 from ema_model.commands import Command, command
 from ema_model.effects import find
-from ema_model.errors import InputError
+from ema_model.errors import InputError, quoted
 from ema_model.physics.rows import LANES
 from ema_model.recordings import Measurement
 from ema_model.simulation.pack import initial_reference_state, initial_state, monitor_rows, reference_rows, stack_for
@@ -104,7 +104,8 @@ def simulate_reference(
     effects = {name: find(name).settings(dict(given)) for name, given in (effects or {}).items()}
     if not actuator.has_reference_model:
         raise InputError(
-            f"{actuator.name}: the reference model is of a cascade with a hysteresis inverter; use the monitor model"
+            f"{quoted(actuator.name)}: the reference model is of a cascade with a hysteresis inverter; "
+            "use the monitor model"
         )
     stack = stack_for(actuator, effects)
     period = _steps_per_sample(run, MONITOR_STEP_S)
@@ -147,7 +148,7 @@ def simulate_monitor(
     """The Monitor Model's signals; raises as `simulate_reference`."""
     effects = {name: find(name).settings(dict(given)) for name, given in (effects or {}).items()}
     if actuator.controller.kind == "unknown":
-        raise InputError(f"{actuator.name}: its controller is not known, so that no command can be simulated")
+        raise InputError(f"{quoted(actuator.name)}: its controller is not known, so that no command can be simulated")
     stack = stack_for(actuator, effects, circuit)
     period = _steps_per_sample(run, actuator.step_s)
     dt = 1.0 / run.sample_rate_Hz / period

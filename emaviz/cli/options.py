@@ -12,7 +12,7 @@ from ema_model.actuator import Actuator, load_actuator
 from ema_model.commands import COMMANDS, Command, Recorded, command
 from ema_model.effects import find
 from ema_model.effects.user.entries import kind_of, read_entries
-from ema_model.errors import InputError
+from ema_model.errors import InputError, quoted
 from ema_model.recordings import read_measurement
 from ema_model.simulation.run import Run
 from emaviz.cli import files
@@ -129,14 +129,14 @@ def effects_of(arguments: argparse.Namespace) -> dict[str, dict[str, float]]:
         name, _, rest = text.partition(":")
         parts = split_at_commas(rest)
         if (kind := kind_of(name)) is None:
-            effect, given = find(name), dict(_pair(part, f"--effect {name}") for part in parts)
+            effect, given = find(name), dict(_pair(part, f"--effect {quoted(name)}") for part in parts)
         else:
             try:
                 effect, given = read_entries(kind, dict(_user_entry(part) for part in parts))
             except InputError as error:
-                raise InputError(f"--effect {name}: {error}") from None
+                raise InputError(f"--effect {quoted(name)}: {error}") from None
         if effect.name in effects:
-            raise InputError(f"--effect {name}: given twice; write it once")
+            raise InputError(f"--effect {quoted(name)}: given twice; write it once")
         effects[effect.name] = effect.settings(given)
     return effects
 
@@ -157,7 +157,7 @@ def _user_entry(part: str) -> tuple[str, str | float | list[float]]:
     """One entry of a user's effect: a text, a number, or a list of numbers in brackets."""
     name, separator, value = (piece.strip() for piece in part.partition("="))
     if not separator:
-        raise InputError(f"{part.strip()}: write it as name=value")
+        raise InputError(f"{quoted(part.strip())}: write it as name=value")
     if name in ("expression", "variable", "modulator"):
         return name, value
     try:
@@ -166,7 +166,7 @@ def _user_entry(part: str) -> tuple[str, str | float | list[float]]:
         return name, float(value)
     except ValueError:
         as_what = "values=[number,number,…]" if name == "values" else "name=number"
-        raise InputError(f"{part.strip()}: write it as {as_what}") from None
+        raise InputError(f"{quoted(part.strip())}: write it as {as_what}") from None
 
 
 def weights_of(texts: list[str] | None) -> dict[str, float] | None:
@@ -190,7 +190,7 @@ def _command(arguments: argparse.Namespace) -> tuple[Command, float]:
         for text in arguments.settings:
             key, separator, value = text.partition("=")
             if not separator:
-                raise InputError(f"--set {text}: write it as NAME=value")
+                raise InputError(f"--set {quoted(text)}: write it as NAME=value")
             settings[key] = value
         return command(name, settings), 0.5
     if arguments.settings:
@@ -207,4 +207,4 @@ def _pair(text: str, option: str) -> tuple[str, float]:
             raise ValueError
         return name.strip(), float(value)
     except ValueError:
-        raise InputError(f"{option} {text}: write it as name=number") from None
+        raise InputError(f"{option} {quoted(text)}: write it as name=number") from None

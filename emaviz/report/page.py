@@ -12,7 +12,7 @@ from pathlib import Path
 
 from plotly.offline import get_plotlyjs
 
-from ema_model.errors import InputError
+from ema_model.errors import InputError, quoted
 from ema_model.files.whole_file import whole_file
 from emaviz import __version__
 from emaviz.figures.theme import DARK, LIGHT
@@ -51,14 +51,14 @@ def write(path: str | Path, text: str) -> None:
     target = Path(path)
     try:
         if target.is_dir():
-            raise InputError(f"{target}: is a folder; name a file in it")
+            raise InputError(f"{quoted(target)}: is a folder; name a file in it")
         if not target.parent.is_dir():
-            raise InputError(f"{target}: the folder {target.parent} does not exist; make it first")
+            raise InputError(f"{quoted(target)}: the folder {quoted(target.parent)} does not exist; make it first")
         with whole_file(target) as draft:
             draft.write_text(text, encoding="utf-8", newline="\n")
     except OSError as error:
         why = error.strerror or type(error).__name__
-        raise InputError(f"{target}: the report cannot be written: {why}; write it elsewhere") from None
+        raise InputError(f"{quoted(target)}: the report cannot be written: {why}; write it elsewhere") from None
 
 
 def _figures(figures: Figures) -> str:

@@ -91,7 +91,11 @@ class Recorded:
     def path(self, name: str) -> Path:
         """Where it is; refused unless the folder itself lists it."""
         path = self.folder / name
-        if Path(name).name != name or not name.endswith(_ENDING) or not path.is_file() or path.is_symlink():
+        try:
+            listed = Path(name).name == name and name.endswith(_ENDING) and path.is_file() and not path.is_symlink()
+        except OSError:  # longer than any name
+            listed = False
+        if not listed:
             raise InputError(f"{shown(name)}: no such recording; choose one of the list")
         return path
 

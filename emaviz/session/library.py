@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from ema_model.commands import command
 from ema_model.discovery.fingerprints import off
 from ema_model.effects import CATALOGUE, find
-from ema_model.errors import InputError
+from ema_model.errors import InputError, quoted
 from ema_model.quantities.titles import in_sentence
 from ema_model.recordings import Measurement
 from ema_model.simulation.run import Run, simulate_monitor
@@ -45,7 +45,7 @@ class Library:
     def feel(self, name: str, settings: Mapping[str, float], run: str) -> None:
         """Simulates soon; of several requests the last one counts.  InputError for a setting out of range."""
         if run not in RUNS:
-            raise InputError(f"no run {run[:40]!r}; runs are {', '.join(RUNS)}")
+            raise InputError(f"no run {quoted(run, 40)!r}; runs are {', '.join(RUNS)}")
         full = find(name).settings(dict(settings))
 
         def job() -> None:

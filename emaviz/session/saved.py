@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ema_model.errors import InputError
+from ema_model.errors import InputError, quoted
 from ema_model.files.limits import SESSION_BYTES, SESSION_FILES, SETTINGS_BYTES
 from ema_model.files.refusal import shown
 from ema_model.files.safe_zip import Damaged, Refused, SafeZip, opened_zip
@@ -60,7 +60,7 @@ def write(path: Path, parts: Mapping[str, Part], folder: DataFolder, names: Sequ
                     archive.write(side, _FILES + folder.name_of(side))
             archive.writestr(_DOCUMENT, json.dumps(document, indent=1))
     except OSError as error:
-        raise InputError(f"{path.name}: cannot be written ({error.strerror}); check the disk") from None
+        raise InputError(f"{quoted(path.name)}: cannot be written ({error.strerror}); check the disk") from None
 
 
 def read(path: Path, parts: Mapping[str, Part], folder: DataFolder) -> None:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
-from ema_model.errors import InputError
+from ema_model.errors import InputError, quoted
 from ema_model.faults import HEALTHY
 from ema_model.identification.objective import Objective
 from ema_model.identification.run import Identification, Progress, warm_up
@@ -214,7 +214,7 @@ class Session:
             notify(self.events.told, "That does not work", str(error))
             return
         traceback.print_exception(error)
-        notify(self.events.told, "Something failed; the app goes on", f"{type(error).__name__}: {error}")
+        notify(self.events.told, "Something failed; the app goes on", f"{type(error).__name__}: {quoted(error)}")
 
 
 def readable(settings: Settings) -> dict[str, Any]:
@@ -250,4 +250,4 @@ def _search(settings: Settings) -> dict[str, Any]:
 
 
 def _no_files(name: str) -> Measurement:
-    raise InputError(f"{name[:100]}: there is no data folder to read it from")
+    raise InputError(f"{quoted(name, 100)}: there is no data folder to read it from")

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ema_model.actuator import Actuator
 from ema_model.commands import COMMANDS, command
 from ema_model.effects import find
-from ema_model.errors import InputError
+from ema_model.errors import InputError, quoted
 from ema_model.faults import HEALTHY, physical
 from ema_model.identification.run import ALGORITHMS
 from ema_model.simulation.plant import FITNESSES
@@ -123,7 +123,7 @@ class Settings:
     def set_source(self, value: Any) -> None:
         """What is identified: `SLIDERS`, or the name of a file in the data folder."""
         if not isinstance(value, str):
-            raise InputError(f"what to identify must be the name of a file, not {str(value)[:40]!r}")
+            raise InputError(f"what to identify must be the name of a file, not {quoted(value, 40)!r}")
         self.source = value
 
     def set_algorithm(self, value: Any) -> None:
@@ -133,7 +133,7 @@ class Settings:
     def set_algorithms(self, values: Any) -> None:
         """The optimisers that search at once, in the order of `ALGORITHMS`; one at least."""
         if not isinstance(values, (list, tuple)):
-            raise InputError(f"algorithms must be a list, not {str(values)[:40]!r}")
+            raise InputError(f"algorithms must be a list, not {quoted(values, 40)!r}")
         chosen = {_one_of(value, tuple(ALGORITHMS), "algorithm") for value in values}
         if not chosen:
             raise InputError("no algorithm is chosen; tick one at least")
@@ -234,7 +234,7 @@ def number(value: Any, what: str) -> float:
     except (TypeError, ValueError):
         read = math.nan
     if not math.isfinite(read):
-        raise InputError(f"{what} must be a number, not {str(value)[:40]!r}")
+        raise InputError(f"{what} must be a number, not {quoted(value, 40)!r}")
     return read
 
 
@@ -254,5 +254,5 @@ def _within(value: Any, what: str, most: float, unit: str) -> float:
 
 def _one_of(value: Any, choices: tuple[str, ...], what: str) -> str:
     if value not in choices:
-        raise InputError(f"{what} must be one of {', '.join(choices)}, not {str(value)[:40]!r}")
+        raise InputError(f"{what} must be one of {', '.join(choices)}, not {quoted(value, 40)!r}")
     return str(value)

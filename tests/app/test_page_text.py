@@ -5,13 +5,14 @@ from __future__ import annotations
 import ast
 import html as markup
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from support import hostile
 from support.on_page import wait_until
 
 import emaviz
-from emaviz.figures import two_recordings
+from emaviz.figures import signature, theme, two_recordings
 from emaviz.page.app import App
 from emaviz.page.recordings.tab import _card
 from emaviz.session.archive import Recorded, recovered
@@ -50,6 +51,14 @@ def test_the_page_gets_html_and_markdown_in_no_other_way():
                 if id(node) not in plain or not ours:
                     wrong.append(f"{path.name}:{node.lineno}: Markdown that is no literal; take page_text's add_html")
     assert not wrong
+
+
+@pytest.mark.parametrize("name", hostile.NAMES)
+def test_figures_take_no_name_for_a_tag(name):
+    figure, empty = theme.new(name, name, name).layout, theme.missing(name, name).layout
+    texts = [figure.title.text, figure.xaxis.title.text, figure.yaxis.title.text, empty.annotations[0].text]
+    texts.append(signature._legend(SimpleNamespace(name=name)))
+    assert all(markup.escape(name, quote=False) in text for text in texts)
 
 
 @pytest.fixture(scope="module")

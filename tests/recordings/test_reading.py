@@ -102,7 +102,7 @@ def test_no_file_to_read(tmp_path, monkeypatch):
     assert "no such file" in refused(tmp_path / "missing.csv")
     assert "is a folder" in refused(tmp_path)
     assert "File name too long" in refused("x" * 260 + ".csv")
-    with pytest.raises(InputError, match=r"a b\.csv: cannot be read"):
+    with pytest.raises(InputError, match=r"a␀b\.csv: cannot be read"):
         read_measurement("a\0b.csv")
     (tmp_path / "a.csv").write_text(text())
     assert "no such file" in refused(tmp_path / "a.csv" / "b.csv")
@@ -196,7 +196,7 @@ def test_foreign_file_name_stays_on_one_line(tmp_path):
     path.write_text(text(line_7="0.005,a\tb\x07,2"))
     with pytest.raises(InputError) as caught:
         read_measurement(path)
-    assert str(caught.value).isprintable() and "a b.csv: line 7" in str(caught.value)
+    assert str(caught.value).isprintable() and "a␊b.csv: line 7" in str(caught.value)
 
 
 GOOD = {

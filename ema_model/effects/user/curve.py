@@ -12,7 +12,7 @@ from ema_model.effects.effect import PLACES
 from ema_model.effects.user.module import generated_module
 from ema_model.effects.user.torque import RANGE
 from ema_model.effects.user.user_effect import UserEffect
-from ema_model.errors import InputError
+from ema_model.errors import InputError, quoted
 
 MOST_KNOTS = 24
 _ARGUMENTS = {"theta": "theta", "omega": "omega", "user": "user", "q": "current", "load": "load"}
@@ -35,9 +35,9 @@ def torque_curve(
     """
     knots = _knots(values)
     if variable not in _ARGUMENTS:
-        raise InputError(f"no variable {variable!r} for a torque curve; variables are {', '.join(_ARGUMENTS)}")
+        raise InputError(f"no variable {quoted(variable)!r} for a torque curve; variables are {', '.join(_ARGUMENTS)}")
     if modulator not in _FACTORS:
-        raise InputError(f"no modulator {modulator!r} for a torque curve; modulators are {', '.join(_FACTORS)}")
+        raise InputError(f"no modulator {quoted(modulator)!r} for a torque curve; modulators are {', '.join(_FACTORS)}")
     if not (math.isfinite(low) and math.isfinite(high) and high - low > 1e-12 * max(abs(low), abs(high))):
         raise InputError(f"a torque curve must go from a number to a larger one, not from {low} to {high}")
     low, high = float(low), float(high)

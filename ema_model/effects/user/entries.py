@@ -21,7 +21,7 @@ from ema_model.effects.user.curve import torque_curve
 from ema_model.effects.user.expression import parse
 from ema_model.effects.user.torque import RANGE, user_torque
 from ema_model.effects.user.user_effect import UserEffect
-from ema_model.errors import InputError
+from ema_model.errors import InputError, quoted
 from ema_model.quantities.numbers import as_number
 
 KINDS = ("user_torque", "torque_curve")
@@ -61,7 +61,7 @@ def _torque(entries: Mapping[str, Any]) -> tuple[UserEffect, dict[str, Any]]:
     ranges = {}
     for name, entry in given.items():
         if name not in known:
-            raise InputError(f"has no {name!r}; its expression has {', '.join(known) or 'no parameters'}")
+            raise InputError(f"has no {quoted(name)!r}; its expression has {', '.join(known) or 'no parameters'}")
         if isinstance(entry, dict):
             given[name] = {key: part for key, part in entry.items() if key not in ("low", "high")}
             ranges[name] = (_number("low", entry.get("low", RANGE[0])), _number("high", entry.get("high", RANGE[1])))
@@ -74,7 +74,7 @@ def _torque(entries: Mapping[str, Any]) -> tuple[UserEffect, dict[str, Any]]:
 def _curve(entries: Mapping[str, Any]) -> tuple[UserEffect, dict[str, Any]]:
     for name in entries:
         if name not in _CURVE:
-            raise InputError(f"has no {name!r}; it has {', '.join(_CURVE)}")
+            raise InputError(f"has no {quoted(name)!r}; it has {', '.join(_CURVE)}")
     for name in _CURVE:
         if name not in entries and name != "modulator":
             raise InputError(f"lacks {name}; it has {', '.join(_CURVE)}")
@@ -94,5 +94,5 @@ def _curve(entries: Mapping[str, Any]) -> tuple[UserEffect, dict[str, Any]]:
 
 def _number(name: str, value: Any) -> float:
     if not math.isfinite(as_number(value)):
-        raise InputError(f"{name} must be a number, not {str(value)[:40]!r}")
+        raise InputError(f"{name} must be a number, not {quoted(value, 40)!r}")
     return float(value)

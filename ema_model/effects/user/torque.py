@@ -10,7 +10,7 @@ from ema_model.effects.effect import ADVANCE, PLACES
 from ema_model.effects.user.expression import VARIABLES, Expression, Node, parse
 from ema_model.effects.user.module import generated_module
 from ema_model.effects.user.user_effect import UserEffect
-from ema_model.errors import InputError
+from ema_model.errors import InputError, quoted
 
 RANGE = (-1e3, 1e3)
 _ARGUMENTS = {"t": "time", "theta": "theta", "omega": "omega", "q": "current", "user": "user"}
@@ -42,7 +42,7 @@ def user_torque(text: str, ranges: Mapping[str, tuple[float, float]] | None = No
     for name, (low, high) in ranges.items():
         if name not in expression.parameters:
             known = ", ".join(expression.parameters) or "none"
-            raise InputError(f"the expression has no parameter {name!r}; it has {known}")
+            raise InputError(f"the expression has no parameter {quoted(name)!r}; it has {known}")
         if not (math.isfinite(low) and math.isfinite(high) and low < high):
             raise InputError(f"the range of {name} must go from a number to a larger one, not from {low} to {high}")
     name, module = generated_module("user_torque", kernels(expression), expression.parameters)

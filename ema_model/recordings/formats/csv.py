@@ -18,6 +18,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.csv as pc
 
+from ema_model.errors import quoted
 from ema_model.files.limits import LINE_BYTES, megabytes
 from ema_model.files.refusal import listed, refusal, shown
 from ema_model.recordings.formats.format import Array, Columns, Format, check_size
@@ -245,10 +246,10 @@ def _explain_block(
             cell = cells[column].strip()
             if not cell:
                 blank = "blank; a number is expected, fill it or remove the line"
-                raise refusal(path, f"line {number}, column {name!r}: {blank}")
+                raise refusal(path, f"line {number}, column {quoted(name)!r}: {blank}")
             if not _is_number(cell, dialect.decimal):
                 found = f"a number is expected, found {shown(cell)!r}; correct it or remove the line"
-                raise refusal(path, f"line {number}, column {name!r}: {found}")
+                raise refusal(path, f"line {number}, column {quoted(name)!r}: {found}")
     raise refusal(path, f"cannot be read as CSV from line {first} on ({shown(problem, 80)}); export it again")
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from ema_model.errors import quoted
 from ema_model.files.limits import COLUMNS, megabytes
 from ema_model.files.refusal import refusal, shown
 from ema_model.recordings.formats.format import Array, Columns, Format, check_size
@@ -37,7 +38,9 @@ def _read(path: str, names: Sequence[str], max_bytes: int, strict: bool) -> Colu
         numeric = [name for name in names if _is_numeric(kinds[name])]
         if strict and len(numeric) < len(names):
             name = next(name for name in names if name not in numeric)
-            raise refusal(path, f"column {name!r} holds {shown(kinds[name])}; numbers are expected, store it as double")
+            raise refusal(
+                path, f"column {quoted(name)!r} holds {shown(kinds[name])}; numbers are expected, store it as double"
+            )
         check_size(path, _values(file.metadata, numeric), max_bytes)
         check_size(path, _unpacked_bytes(path, file.metadata, numeric) / 8, max_bytes)
         table = file.read(columns=numeric)
@@ -50,7 +53,9 @@ def _read(path: str, names: Sequence[str], max_bytes: int, strict: bool) -> Colu
             arrays[name] = column.to_numpy().astype(np.float64, copy=False)
         elif strict:
             row = np.flatnonzero(column.is_null().to_numpy())[0]
-            raise refusal(path, f"{_place(row)}, column {name!r}: blank; a number is expected, fill or remove the row")
+            raise refusal(
+                path, f"{_place(row)}, column {quoted(name)!r}: blank; a number is expected, fill or remove the row"
+            )
     return Columns(arrays, _place)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import viser
 
-from ema_model.errors import InputError
+from ema_model.errors import InputError, quoted
 from ema_model.quantities.units import known_units
 from ema_model.recordings import SIGNALS, ColumnMapping, MappedColumn
 from emaviz.page.compare.cards import mapping_table
@@ -91,7 +91,7 @@ class MappingStep:
             return
         column = self._column.value
         if column not in self._opened.columns:
-            raise InputError(f"no column {str(column)[:40]!r}; choose one of the list")
+            raise InputError(f"no column {quoted(column, 40)!r}; choose one of the list")
         signal = next((name for name in SIGNALS if _title(name) == self._signal.value), None)
         others = tuple(e for e in self.mapping.entries if column != e.column and signal != e.signal)
         given_up = [e.column for e in self.mapping.entries if e.signal == signal and e.column != column]

@@ -12,7 +12,7 @@ from typing import Any
 
 from ema_model.actuator import Actuator
 from ema_model.comparison.result import Comparison
-from ema_model.errors import InputError
+from ema_model.errors import InputError, quoted
 from ema_model.files.limits import PAGE_BYTES
 from ema_model.files.refusal import shown
 from ema_model.quantities.titles import in_sentence
@@ -174,13 +174,15 @@ class Comparing:
     def set_free(self, path: str, free: bool) -> None:
         """Whether a calibration may move a parameter of the actuator."""
         if path not in self.actuator.tolerances:
-            raise InputError(f"{path[:60]}: the actuator's file gives it no tolerance, so it cannot be calibrated")
+            raise InputError(
+                f"{quoted(path, 60)}: the actuator's file gives it no tolerance, so it cannot be calibrated"
+            )
         self.free = self.free | {path} if free else self.free - {path}
 
     def set_weight(self, name: str, weight: Any) -> None:
         """How much a signal counts in the calibration, 1 as its floor says; 0 leaves it out."""
         if name not in COMPARABLE:
-            raise InputError(f"{name[:60]} is not compared; choose of {', '.join(COMPARABLE)}")
+            raise InputError(f"{quoted(name, 60)} is not compared; choose of {', '.join(COMPARABLE)}")
         value = number(weight, f"the weight of the {in_sentence(SIGNALS[name].title)}")
         if not 0.0 <= value <= _MOST_WEIGHT:
             raise InputError(f"the weight of a signal must lie between 0 and {_MOST_WEIGHT:g}, not {value:g}")
@@ -214,7 +216,7 @@ class Comparing:
         """
         waiting = [o.name for o in self.opened.values() if o.measurement is None]
         if waiting:
-            raise InputError(f"{waiting[0]}: its columns are not mapped yet; check them and press Use")
+            raise InputError(f"{quoted(waiting[0])}: its columns are not mapped yet; check them and press Use")
         measurements = [o.measurement for o in self.opened.values() if o.measurement is not None]
         if not measurements:
             raise InputError("no recording is chosen; upload one, or choose one of the data folder")
@@ -302,7 +304,9 @@ class Comparing:
             notify(self.session.events.told, "That does not work", line)
             return
         traceback.print_exception(error)
-        notify(self.session.events.told, "Something failed; the app goes on", f"{type(error).__name__}: {error}")
+        notify(
+            self.session.events.told, "Something failed; the app goes on", f"{type(error).__name__}: {quoted(error)}"
+        )
 
 
 def _freed(actuator: Actuator) -> set[str]:

@@ -13,7 +13,7 @@ from ema_model.discovery.snapshot import Look
 from ema_model.discovery.unknown import curve_for
 from ema_model.effects import CATALOGUE, find
 from ema_model.effects.user import UserEffect
-from ema_model.errors import InputError
+from ema_model.errors import InputError, quoted
 from ema_model.quantities.titles import in_sentence
 from emaviz.session.compare.comparing import Comparing
 from emaviz.session.discover.keep import keep
@@ -88,7 +88,7 @@ class Discovering:
         told, look = self._seen()
         candidate = look.candidate(name)
         if candidate is None:
-            raise InputError(f"{name[:60]}: no candidate; choose a card")
+            raise InputError(f"{quoted(name, 60)}: no candidate; choose a card")
         return self._add(candidate, told, look)
 
     def add_own(self, effect: UserEffect, start: Mapping[str, float]) -> bool:
@@ -143,7 +143,7 @@ class Discovering:
         """One of the added effects out of the model again, refitted."""
         told, look = self._seen()
         if all(one.key != key for one in look.added):
-            raise InputError(f"{key[:60]} is not in the model")
+            raise InputError(f"{quoted(key, 60)} is not in the model")
 
         def job(tell: Tell) -> None:
             tell("fitting without it")

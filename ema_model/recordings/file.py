@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 from numpy.typing import NDArray
 
 from ema_model.errors import InputError
@@ -54,7 +55,8 @@ def read_measurement(
         check_length(path, next(iter(columns.arrays.values())).size)
         check_finite(path, columns.arrays, columns.place)
         signals, done = apply_mapping(columns.arrays, used)
-        columns.arrays.clear()  # copied, and large
+        columns.arrays.clear()  # they are copied, and large; Arrow would keep their memory for later
+        pa.default_memory_pool().release_unused()
     except OSError as error:
         raise refusal(path, f"cannot be read ({reason(error)}); check the disk and the permissions") from None
     except MemoryError:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import threading
 import time
 from dataclasses import replace
@@ -12,6 +13,7 @@ import pytest
 from ema_model.actuator import load_actuator, shipped
 from ema_model.commands import command
 from ema_model.errors import InputError
+from ema_model.limits import FILE_BYTES, PAGE_BYTES
 from ema_model.recordings import ColumnMapping, MappedColumn, read_side_file, side_path, write_measurement
 from ema_model.simulation.run import Run, simulate_reference
 from ema_model.simulation.sensors import Sensors
@@ -103,6 +105,14 @@ def test_foreign_columns_wait_for_the_user_and_are_remembered(comparing, heard, 
     again.add("uploads/rig.csv")
     assert later.wait(later.opened).measurement is not None, "the side file is used the next time"
     again.close()
+
+
+def test_the_page_takes_less_than_the_command_line(comparing, heard, recording, monkeypatch):
+    assert PAGE_BYTES < FILE_BYTES
+    foreign_csv(recording, comparing.folder.uploads / "rig.csv")
+    monkeypatch.setattr("emaviz.session.compare.comparing.PAGE_BYTES", 1000)
+    comparing.add("uploads/rig.csv")
+    assert re.search(r"rig\.csv: is [0-9.]+ MB large, over the limit of 0\.001 MB", heard.wait(heard.told))
 
 
 def test_a_corrected_sign_reaches_the_measurement_and_the_side_file(comparing, heard, recording):

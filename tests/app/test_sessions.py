@@ -140,10 +140,13 @@ def test_what_is_no_session_is_refused_in_one_line(folder, tmp_path, monkeypatch
             session_file.read(file, {}, folder)
         assert "\n" not in str(told.value)
     monkeypatch.setattr(session_file, "SESSION_BYTES", 1000)
-    listing = json.dumps({"schema": 1, "files": ["uploads/a.csv"]})
-    bomb = archive_with(tmp_path / "e.emaviz", {"session.json": listing, "files/uploads/a.csv": "0" * 5000})
+    listing = json.dumps({"schema": 1, "files": ["uploads/a.csv", "uploads/b.csv"]})
+    bomb = archive_with(
+        tmp_path / "e.emaviz", {"session.json": listing, "files/uploads/a.csv": "0", "files/uploads/b.csv": "0" * 5000}
+    )
     with pytest.raises(InputError, match=r"unpacks to over 0\.001 MB, which is the limit"):
         session_file.read(bomb, {}, folder)
+    assert not [file for file in folder.folder.rglob("*") if file.is_file()], "no half of a session is left"
 
 
 def test_files_of_a_session_stay_inside_the_data_folder(folder, tmp_path):

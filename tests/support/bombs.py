@@ -15,6 +15,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from support import parquet_by_hand as by_hand
+from ema_model.recordings import Measurement, write_measurement
 
 k = np.arange(120.0)
 INDICES = bytes([8, 31]) + bytes(range(120))  # of a data page: 120 of 8 bits each
@@ -132,6 +133,29 @@ def parquet(path: Path, rows: int = 120, told: int | None = None, **more: int) -
     path.write_bytes(by_hand.parquet(columns, rows, told))
 
 
+def other_schema(path: Path) -> None:
+    """A column that may be blank in the pages, and may not in the schema: one bit."""
+    by_library(path, time_s=k, current_A=k)
+    content = path.read_bytes()
+    changed = content.replace(b"\x25\x02\x18\x09current_A", b"\x25\x00\x18\x09current_A", 1)
+    assert changed != content
+    path.write_bytes(changed)
+
+
+def largest(path: Path, limit: int) -> None:
+    """A whole measurement, of two columns, as large as may be."""
+    time = np.arange(limit // 17) / 1e3
+    write_measurement(Measurement({"time_s": time, "current_A": np.round(np.sin(time), 3)}), path)
+
+
+def largest_csv(path: Path, limit: int) -> None:
+    """The same in text, whose numbers take four fifths of it."""
+    with path.open("wb") as file:
+        file.write(b"time_s,current_A\n")
+        for start in range(0, limit // 22, 10_000):
+            file.write(b"".join(b"%010d,%.6f\n" % (i, i / 1e9) for i in range(start, start + 10_000)))
+
+
 def session(path: Path, document: bytes, members: dict[str, bytes | int], way: int = zipfile.ZIP_DEFLATED) -> None:
     zipped(path, {"session.json": document, **members}, way)
 
@@ -199,6 +223,7 @@ BOMBS: dict[str, tuple[str, Write, str]] = {
     "parquet of rows declared elsewhere": ("parquet", lambda p, n: parquet(p, n, 120), "unpacks to"),
     "parquet of a vast dictionary": ("parquet", lambda p, n: parquet(p, more=3 * n), "unpacks to"),
     "parquet of a vast page": ("parquet", lambda p, n: parquet(p, after=3 * n), "unpacks to"),
+    "parquet of a schema unlike its pages": ("parquet", lambda p, n: other_schema(p), "not a whole Parquet file"),
     "npz by bzip2": ("npz", lambda p, n: npz(p, n // 4, zipfile.ZIP_BZIP2), "packed by bzip2"),
     "npz by LZMA": ("npz", lambda p, n: npz(p, n // 4, zipfile.ZIP_LZMA), "packed by LZMA"),
     "npz of zeros": ("npz", lambda p, n: npz(p, n // 4), "unpacks to"),
@@ -257,6 +282,10 @@ BOMBS: dict[str, tuple[str, Write, str]] = {
         lambda p, n: mat(p, packed([matrix(b"time_s", element(9, k.tobytes()))], n // 2)),
         "",
     ),
+    "csv as large as may be": ("csv", largest_csv, ""),
+    "parquet as large as may be": ("parquet", largest, ""),
+    "npz as large as may be": ("npz", largest, ""),
+    "mat as large as may be": ("mat", largest, ""),
     "side file of deep keys": (
         "side file",
         lambda p, n: Path.write_bytes(p, b"a" + b".a" * 49_000 + b"=1"),

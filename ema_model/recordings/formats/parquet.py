@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import BinaryIO
@@ -16,8 +15,11 @@ from ema_model.files.limits import COLUMNS, megabytes
 from ema_model.files.refusal import refusal, shown
 from ema_model.recordings.formats.format import Array, Columns, Format, check_size
 from ema_model.recordings.formats.parquet_pages import Damaged, TooMany, unpacked_bytes
+from ema_model.recordings.formats.parquet_pages import Damaged, TooMany, footer_size, numbers_and_bytes
+from ema_model.recordings.refusal import refusal, shown
 
-_FOOTER_BYTES = 8_000_000
+_FOOTER_BYTES = 4_000_000
+_BUFFER_BYTES = 1 << 20  # else a column's packed bytes are read at once
 _MOST_PARTS = 2 * COLUMNS  # of any list in the footer: columns, row groups
 _KEY, _VERSION = b"emaviz_schema", b"1"
 
@@ -41,8 +43,7 @@ def _read(path: str, names: Sequence[str], max_bytes: int, strict: bool) -> Colu
             raise refusal(
                 path, f"column {quoted(name)!r} holds {shown(kinds[name])}; numbers are expected, store it as double"
             )
-        check_size(path, _values(file.metadata, numeric), max_bytes)
-        check_size(path, _unpacked_bytes(path, file.metadata, numeric) / 8, max_bytes)
+        _check_contents(path, numeric, file.metadata.num_rows, max_bytes)
         table = file.read(columns=numeric)
     columns = dict(zip(numeric, table.columns))
     del table  # each column goes when it is converted
@@ -63,26 +64,16 @@ def _is_numeric(kind: pa.DataType) -> bool:
     return pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_boolean(kind)
 
 
-def _values(metadata: pq.FileMetaData, names: Sequence[str]) -> int:
-    """How many numbers the columns have: as their parts tell, which are what is read, or the file itself."""
-    asked = set(names)
-    total = 0
-    for i in range(metadata.num_row_groups):
-        group = metadata.row_group(i)
-        chunks = [group.column(j) for j in range(group.num_columns)]
-        total += sum(max(c.num_values, group.num_rows) for c in chunks if c.path_in_schema in asked)
-    return max(total, metadata.num_rows * len(names))
-
-
-def _unpacked_bytes(path: str, metadata: pq.FileMetaData, names: Sequence[str]) -> int:
+def _check_contents(path: str, names: Sequence[str], rows: int, max_bytes: int) -> None:
+    """Raises InputError if the columns take more than `max_bytes` in memory, or on the way there."""
     with open(path, "rb") as file:
         try:
-            return unpacked_bytes(file, metadata, names)
+            numbers, unpacked = numbers_and_bytes(file, names)
         except Damaged:
-            problem = "is not a whole Parquet file (a page's header is damaged); export it again"
-            raise refusal(path, problem) from None
+            raise refusal(path, "is not a whole Parquet file (its contents are damaged); export it again") from None
         except TooMany:
             raise refusal(path, "has far too many pages; export it again with pages of 1 MB") from None
+    check_size(path, max(numbers, rows * len(names), unpacked / 8), max_bytes)
 
 
 def _write(signals: Mapping[str, Array], path: str) -> None:
@@ -102,7 +93,9 @@ def _opened(path: str) -> Iterator[pq.ParquetFile]:
     with open(path, "rb") as file:
         _check_footer(path, file)
         try:
-            with pq.ParquetFile(file, pre_buffer=False, thrift_container_size_limit=_MOST_PARTS) as parquet:
+            with pq.ParquetFile(
+                file, pre_buffer=False, buffer_size=_BUFFER_BYTES, thrift_container_size_limit=_MOST_PARTS
+            ) as parquet:
                 yield parquet
         except (pa.ArrowException, OSError, UnicodeError) as error:
             if "size limit" in str(error):
@@ -113,12 +106,11 @@ def _opened(path: str) -> Iterator[pq.ParquetFile]:
 
 def _check_footer(path: str, file: BinaryIO) -> None:
     """Raises InputError for a list of contents out of all proportion: in memory it takes many times its size."""
-    file.seek(-min(8, file.seek(0, os.SEEK_END)), os.SEEK_END)
-    size, mark = int.from_bytes(file.read(4), "little"), file.read(4)
-    file.seek(0)
-    if mark == b"PAR1" and size > _FOOTER_BYTES:
+    size = footer_size(file)
+    if size > _FOOTER_BYTES:
         found = f"lists its contents in {megabytes(size)}, over the limit of {megabytes(_FOOTER_BYTES)}"
         raise refusal(path, f"{found}; keep fewer columns, or write larger row groups")
+    file.seek(0)
 
 
 FORMAT = Format(".parquet", "Parquet", _header, _read, _write)

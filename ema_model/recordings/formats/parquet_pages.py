@@ -1,63 +1,85 @@
-"""What a Parquet file's pages unpack to, as each page's own header says, which is what its library makes room for.
+"""What the columns of a Parquet file unpack to, by its list of contents and by each page's own header.
 
-The file's list of contents may say anything else, and the library asks for neither: a page of 200 kB fills gigabytes.
+Its library makes room for whatever a page's header says, whatever the list of contents says, so that a page of 200 kB
+fills gigabytes.  It also ends the whole process when asked for a damaged list's details; so both are read here.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
+from collections.abc import Iterator, Sequence
 from typing import Any, BinaryIO
-
-import pyarrow.parquet as pq
 
 _MOST_PAGES = 200_000  # of all columns: of 8 kB, the smallest that is usual, 1.6 GB
 _HEADER_BYTES = (256, 65_536)  # to read: nearly always enough, and surely
-_UNPACKED_SIZE, _PACKED_SIZE, _DATA, _DATA_2 = 2, 3, 5, 8  # numbers of a page header's fields
-_VALUES = 1  # of the last two's
-_DEEPEST = 8
+_DEEPEST = 12
+# Numbers of the fields: of the file, a row group, a column; of what is known of that; of a page's header.
+_GROUPS, _COLUMNS, _ROWS, _KNOWN = 4, 1, 3, 3
+_PATH, _VALUES, _PACKED, _DATA_AT, _DICTIONARY_AT = 3, 5, 7, 9, 11
+_UNPACKED_SIZE, _PACKED_SIZE, _KINDS_OF_DATA, _VALUES_OF_PAGE = 2, 3, (5, 8), 1
 
 
 class Damaged(Exception):
-    """A page's header cannot be read."""
+    """The list of contents, or a page's header, cannot be read."""
 
 
 class TooMany(Exception):
     """There are more pages than can be looked at in seconds."""
 
 
-def unpacked_bytes(file: BinaryIO, metadata: pq.FileMetaData, names: Sequence[str]) -> int:
-    """Bytes to which the pages of these columns unpack."""
-    asked, total, pages = set(names), 0, 0
-    for i in range(metadata.num_row_groups):
-        group = metadata.row_group(i)
-        for chunk in (group.column(j) for j in range(group.num_columns)):
-            if chunk.path_in_schema not in asked:
-                continue
-            place, values = chunk.data_page_offset, 0
-            if chunk.has_dictionary_page and 0 < chunk.dictionary_page_offset < place:
-                place = chunk.dictionary_page_offset
-            end = place + chunk.total_compressed_size
-            while 0 <= place < end and values < chunk.num_values:
-                pages += 1
-                if pages > _MOST_PAGES:
-                    raise TooMany
-                header, length = _header(file, place)
-                total += _count(header, _UNPACKED_SIZE)
-                place += length + _count(header, _PACKED_SIZE)
-                for kind in (_DATA, _DATA_2):
-                    if isinstance(header.get(kind), dict):
-                        values += _count(header[kind], _VALUES)
-    return total
+def footer_size(file: BinaryIO) -> int:
+    """Bytes of the list of contents, as the file's end says; 0 if it is not Parquet's."""
+    file.seek(-min(8, file.seek(0, os.SEEK_END)), os.SEEK_END)
+    end = file.read(8)
+    return int.from_bytes(end[:4], "little") if end[4:] == b"PAR1" else 0
 
 
-def _count(fields: dict[int, Any], number: int) -> int:
-    found = fields.get(number)
+def numbers_and_bytes(file: BinaryIO, names: Sequence[str]) -> tuple[int, int]:
+    """How many numbers these columns have, and how many bytes their pages unpack to."""
+    numbers = unpacked = pages = 0
+    for rows, column in _columns(file, {name.encode() for name in names}):
+        values = _count(column, _VALUES)
+        numbers += max(rows, values)
+        place = _count(column, _DATA_AT)
+        if _DICTIONARY_AT in column:
+            place = min(place, _count(column, _DICTIONARY_AT) or place)  # some writers say 0 for none
+        end = place + _count(column, _PACKED)
+        while place < end and values > 0:
+            pages += 1
+            if pages > _MOST_PAGES:
+                raise TooMany
+            header, length = _page_header(file, place)
+            unpacked += _count(header, _UNPACKED_SIZE)
+            place += length + _count(header, _PACKED_SIZE)
+            for kind in _KINDS_OF_DATA:
+                if kind in header:
+                    values -= _count(header[kind], _VALUES_OF_PAGE)
+    return numbers, unpacked
+
+
+def _columns(file: BinaryIO, asked: set[bytes]) -> Iterator[tuple[int, dict[int, Any]]]:
+    """Each part of the columns: the rows of its row group, and what is known of it."""
+    size = footer_size(file)
+    file.seek(-min(8 + size, file.seek(0, os.SEEK_END)), os.SEEK_END)
+    try:
+        contents, _ = _fields(file.read(size), 0, 0)
+        for group in contents.get(_GROUPS, ()):
+            for column in group.get(_COLUMNS, ()):
+                known = column.get(_KNOWN, {})
+                if len(known.get(_PATH, ())) == 1 and known[_PATH][0] in asked:
+                    yield _count(group, _ROWS), known
+    except (IndexError, AttributeError, TypeError):
+        raise Damaged from None
+
+
+def _count(fields: Any, number: int) -> int:
+    found = fields.get(number) if isinstance(fields, dict) else None
     if not isinstance(found, int) or found < 0:
         raise Damaged
     return found
 
 
-def _header(file: BinaryIO, place: int) -> tuple[dict[int, Any], int]:
+def _page_header(file: BinaryIO, place: int) -> tuple[dict[int, Any], int]:
     """A page's header, and its length."""
     for size in _HEADER_BYTES:
         file.seek(place)
@@ -97,10 +119,24 @@ def _value(raw: bytes, at: int, kind: int, depth: int) -> tuple[Any, int]:
         return None, _within(raw, at + 8)
     if kind == 8:
         size, at = _varint(raw, at)
-        return None, _within(raw, at + size)
+        return raw[at : at + size], _within(raw, at + size)
+    if kind == 9:
+        return _list(raw, at, depth)
     if kind == 12:
         return _fields(raw, at, depth + 1)
-    raise Damaged  # lists, sets and maps are in no page's header
+    raise Damaged  # there are no sets and no maps
+
+
+def _list(raw: bytes, at: int, depth: int) -> tuple[list[Any], int]:
+    size, kind = raw[at] >> 4, raw[at] & 0xF
+    at += 1
+    if size == 15:
+        size, at = _varint(raw, at)
+    items = []
+    for _ in range(size):
+        item, at = _value(raw, at, 3 if kind <= 2 else kind, depth + 1)  # true and false take a byte here
+        items.append(item)
+    return items, at
 
 
 def _within(raw: bytes, at: int) -> int:

@@ -14,8 +14,8 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from support import parquet_by_hand as by_hand
 from ema_model.recordings import Measurement, write_measurement
+from support import parquet_by_hand as by_hand
 
 k = np.arange(120.0)
 INDICES = bytes([8, 31]) + bytes(range(120))  # of a data page: 120 of 8 bits each

@@ -24,6 +24,7 @@ from typing import Any
 from ema_model.effects import find
 from ema_model.effects.effect import ADVANCE, PLACES
 from ema_model.errors import InputError
+from ema_model.kernel_cache.folder import cache_folder
 from ema_model.physics.rows import LANES, PARAMETER_ROWS
 
 CIRCUITS = ("thesis", "reduced")  # the drives that stand for the hysteresis current loop
@@ -94,6 +95,12 @@ def find_stack(circuit: str = "reduced", effects: Iterable[str] = (), controller
     return _stack(circuit, controller, tuple(sorted(set(effects))))
 
 
+def is_known(circuit: str, effects: Iterable[str], controller: str) -> bool:
+    """Whether some kernel of this stack is compiled, in this process or in the cache."""
+    name = _package_of((circuit, controller, *sorted(set(effects))))
+    return name in _compositions or any(cache_folder().glob(f"{name}.*.nbc"))
+
+
 @cache
 def _stack(circuit: str, controller: str, names: tuple[str, ...]) -> Stack:
     effects = [find(name) for name in names]
@@ -114,7 +121,7 @@ def _composition(circuit: str, controller: str, effects: Sequence[Any]) -> str:
     """Source of the stack's composition.py."""
     imports = [
         '"""Generated: the places where this stack\'s effects act."""',
-        "from ema_model.physics.jit import scalar",
+        "from ema_model.physics.jit import passed_on, scalar",
         f"from ema_model.physics.controller import {controller}_controller as control",
         f"from ema_model.physics.drive import {circuit}_drive as advance_current",
     ]
@@ -141,18 +148,24 @@ def _composition(circuit: str, controller: str, effects: Sequence[Any]) -> str:
     functions = []
     for place, arguments in PLACES.items():
         head = f"def {place}({', '.join(arguments)}, s, first, p, i):"
-        functions += ["", "", "@scalar", head, *bodies[place], f"    return {arguments[0]}"]
+        decorator = "@scalar" if bodies[place] else "@passed_on"
+        functions += ["", "", decorator, head, *bodies[place], f"    return {arguments[0]}"]
     head = f"def advance_states({', '.join(ADVANCE)}, s, first, p, i):"
-    functions += ["", "", "@scalar", head, *(advances or ["    pass"])]
+    functions += ["", "", "@scalar" if advances else "@passed_on", head, *(advances or ["    pass"])]
     return "\n".join([*imports, *functions, ""])
 
 
 def _import(parts: tuple[str, ...], composition: str) -> str:
-    """The name of the stack's package, which tells its parts: compiled kernels are found again under it."""
-    name = f"ema_model_stack_{hashlib.sha256('+'.join(parts).encode()).hexdigest()[:16]}"
+    """Makes the stack's package; its name."""
+    name = _package_of(parts)
     _compositions[name] = composition
     importlib.import_module(name)
     return name
+
+
+def _package_of(parts: tuple[str, ...]) -> str:
+    """The name of a stack's package, which tells its parts: compiled kernels are found again under it."""
+    return f"ema_model_stack_{hashlib.sha256('+'.join(parts).encode()).hexdigest()[:16]}"
 
 
 _compositions: dict[str, str] = {}  # sources, by the name of the stack's package

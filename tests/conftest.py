@@ -10,6 +10,9 @@ from typing import Any
 import pytest
 from support.browser import SOFTWARE_GL
 
+# Tests take what a first use takes; what is compiled behind it, they would wait for elsewhere.
+os.environ["EMAVIZ_COMPILE_AHEAD"] = "0"
+
 
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
     """The whole suite takes two processes or more; chosen tests, a study, or `-s` run here."""

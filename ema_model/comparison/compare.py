@@ -22,6 +22,7 @@ from ema_model.estimation.floor import twin_error
 from ema_model.faults import named
 from ema_model.models import ClosedLoop, Plant, Stretch, Window, plant_for
 from ema_model.models.stretches import evaluation_stretches, fit_stretches
+from ema_model.one_stack import compile_behind
 from ema_model.recordings import Measurement
 from ema_model.recordings.equivalent_current import with_current
 from ema_model.recordings.health.card import health
@@ -63,6 +64,7 @@ def compare(
     faults = actuator.faults if k is None else named(k)
     actuator = replace(actuator, effects=_with_settings(actuator, effects), faults=faults)
     wanted = weights_of(signals, actuator)
+    compile_behind(actuator)  # who compares an improved model does so again
     tell("measuring the model's floor")
     fitted = plant_for(recordings, actuator, stretches=fit_stretches(recordings, actuator))
     sensors = [_stated(m, actuator) for m in measurements]

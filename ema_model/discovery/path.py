@@ -16,7 +16,7 @@ from ema_model.actuator import Actuator
 from ema_model.comparison.compare import prepared, weights_of
 from ema_model.comparison.explain import Explanation
 from ema_model.discovery.faults import fault_for
-from ema_model.discovery.fingerprints import Fingerprint, fingerprints, stacks_of_their_own
+from ema_model.discovery.fingerprints import Fingerprint, fingerprints
 from ema_model.discovery.model_fit import (
     Data,
     Fit,
@@ -37,10 +37,10 @@ from ema_model.discovery.unknown import curve_for
 from ema_model.effects import CATALOGUE, catalogue_name, find
 from ema_model.faults import BY_NAME
 from ema_model.models.stretches import fit_stretches
+from ema_model.one_stack import compile_behind, compile_library
 from ema_model.quantities.titles import in_sentence
 from ema_model.recordings import Measurement
 from ema_model.recordings.read import check_same_actuator
-from ema_model.simulation.precompile import compile_ahead
 
 Progress = Callable[[str], None]
 Array = NDArray[np.float64]
@@ -101,7 +101,7 @@ class Story:
         known = self.current.actuator.effects
         wanted = [name for name in names or CATALOGUE if name not in known and name not in _NOT_LOOKED_FOR]
         orders = (left or self.left()).orders
-        self._prints = fingerprints(self.data, self.current, wanted, orders, self._prints)
+        self._prints = fingerprints(self.data, self.current, wanted, orders)
         return scored(self.current, self._prints)
 
     def signatures(self, ranked: Sequence[Candidate]) -> dict[str, Array]:
@@ -148,6 +148,7 @@ class Story:
         errors = before.rmse, rung.rmse, before.holdout_rmse, rung.holdout_rmse
         new = [Added(catalogue_name(key), {}, *errors, tuple(ties), key, {}, moved) for key in trial.effects]
         self._append(trial.fit, rung, (*self.added, *new))
+        compile_behind(trial.fit.actuator)
 
     def remove(self, key: str, found: Fit | None = None) -> None:
         """Takes an effect out again, as a step of its own; found: the fit without it, if it is known."""
@@ -208,7 +209,7 @@ def begun(
     Raises InputError for recordings that cannot be compared.
     """
     check_same_actuator([*measurements, *holdout])
-    compile_ahead(stacks_of_their_own(actuator))
+    compile_library(actuator)
     story = _calibrated(measurements, actuator, holdout, signals, tell)
     inverse = None if story.repeatable else by_inverse_dynamics(story.data, actuator)
     if inverse is None:

@@ -64,12 +64,18 @@ class Effect:
     advance_states: Callable[..., Any] | None = None  # (*ema_model.stacks.ADVANCE, parameters, states) → new states
     duplicates: str = ""  # path of the base parameter that does the same, e.g. "motor.inertia_kgm2"
     is_load: bool = False  # pulls at the user from outside, so that its torque counts as the load
+    nothing: float = 0.0  # the first parameter, the others at their defaults, with which kernels go on as without it
     name: str = ""  # of the file; the catalogue fills it in
 
     @property
     def is_periodic(self) -> bool:
         """Whether it has an order and a phase, so that a model may hold it several times."""
         return {"order", "phase_rad"} <= {parameter.name for parameter in self.parameters}
+
+    @property
+    def neutral(self) -> dict[str, float]:
+        """Settings with which it does nothing, all parameters in order; they may lie outside what a user may set."""
+        return {p.name: p.default for p in self.parameters} | {self.parameters[0].name: self.nothing}
 
     def settings(self, given: dict[str, float]) -> dict[str, float]:
         """All parameters, in order, those not given at their default; InputError for names and values."""

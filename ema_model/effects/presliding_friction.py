@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from ema_model.effects.effect import Effect, Parameter
 from ema_model.physics.elementary import decay
 from ema_model.physics.jit import scalar
@@ -10,17 +12,18 @@ _STICK_RAD_S = 1.0  # speed over which the level falls from static to dynamic, w
 
 
 @scalar
-def _level(omega, static, dynamic):
-    """g(ω): the friction of a bristle bent as far as it goes."""
+def _slip(omega, static, dynamic):
+    """|ω| / g(ω), g the friction of a bristle bent as far as it goes."""
     ratio = omega * (1.0 / _STICK_RAD_S)
-    return dynamic + (static - dynamic) * decay(ratio * ratio)
+    return abs(omega) / (dynamic + (static - dynamic) * decay(ratio * ratio))
 
 
 @scalar
 def friction(torque, omega, active, static, dynamic, stiffness, damping, bend):
-    """σ_0 z + σ_1 ż in place of the base law's."""
-    rate = omega - stiffness * abs(omega) * bend / _level(omega, static, dynamic)
-    return stiffness * bend + damping * rate
+    """σ_0 z + σ_1 ż in place of the base law's, which bristles of no give have."""
+    rate = omega - stiffness * bend * _slip(omega, static, dynamic)
+    bristles = stiffness * bend + damping * rate
+    return bristles if stiffness < math.inf else torque
 
 
 @scalar
@@ -28,7 +31,8 @@ def advance_states(
     dt, theta, omega, rigid, rigid_next, user_step, gear, load, active, static, dynamic, stiffness, damping, bend
 ):
     """z after the step, implicit, so that any speed is stable."""
-    return ((bend + dt * omega) / (1.0 + dt * stiffness * abs(omega) / _level(omega, static, dynamic)),)
+    bent = (bend + dt * omega) / (1.0 + dt * stiffness * _slip(omega, static, dynamic))
+    return (bent if stiffness < math.inf else 0.0,)
 
 
 EFFECT = Effect(
@@ -51,4 +55,5 @@ EFFECT = Effect(
     mistaken_for="backlash",
     states=("bend_rad",),
     advance_states=advance_states,
+    nothing=math.inf,
 )

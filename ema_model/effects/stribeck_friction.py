@@ -9,9 +9,9 @@ from ema_model.physics.jit import scalar
 
 @scalar
 def moving_friction(level, static, omega, motor_torque, load, gear, speed):
-    """T_d + (T_s − T_d) e^{−(ω/ω_s)²}."""
+    """T_d + (T_s − T_d) e^{−(ω/ω_s)²}, of which nothing is left beyond T_d where ω_s = 0."""
     ratio = omega / speed
-    return level + (static - level) * decay(ratio * ratio)
+    return level + (static - level) * (decay(ratio * ratio) if speed > 0.0 else 0.0)
 
 
 EFFECT = Effect(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from ema_model.effects.effect import Effect, Parameter
 from ema_model.physics.jit import scalar
 
@@ -16,8 +18,9 @@ def user_position(user, theta, gear, stiffness, damping, inertia, deflection, sp
 def shaft_torque(
     torque, theta, omega, current, user, gear, load, stiffness, damping, inertia, deflection, speed, twist
 ):
-    """The twisted shaft's torque in place of the load, which acts on the user's side of it."""
-    return torque + gear * (load - twist)
+    """The twisted shaft's torque in place of the load, which acts on the user's side of it; a rigid one's as it is."""
+    twisted = torque + gear * (load - twist)
+    return twisted if stiffness < math.inf else torque
 
 
 @scalar
@@ -26,12 +29,14 @@ def advance_states(
     stiffness, damping, inertia, deflection, speed, twist,
 ):  # fmt: skip
     """J_u dv/dt = K (θτ − θ_user) + C (ωτ − v) − T_load; implicit in C, speed before angle (symplectic)."""
-    rate = dt / inertia
     moved = rigid_next - rigid
-    pushed = speed + rate * (damping * moved / dt - stiffness * deflection - load)
-    speed1 = pushed / (1.0 + rate * damping)
+    driven = moved * (1.0 / dt)
+    pushed = inertia * speed + dt * (damping * driven - stiffness * deflection - load)
+    speed1 = pushed / (inertia + dt * damping)
     deflection1 = deflection + dt * speed1 - moved
-    return deflection1, speed1, damping * (moved / dt - speed1) - stiffness * deflection1
+    twist1 = damping * (driven - speed1) - stiffness * deflection1
+    gives = stiffness < math.inf
+    return deflection1 if gives else 0.0, speed1 if gives else 0.0, twist1 if gives else 0.0
 
 
 EFFECT = Effect(
@@ -56,4 +61,5 @@ EFFECT = Effect(
     mistaken_for="backlash, inertia error",
     states=("deflection_rad", "speed_rad_s", "twist_Nm"),
     advance_states=advance_states,
+    nothing=math.inf,
 )

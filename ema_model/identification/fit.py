@@ -67,9 +67,11 @@ def setting(objective: ClosedLoop, *, parameters_known: bool) -> Setting:
     unrecorded = any("load_torque_Nm" not in m for m in objective.measurements)
     if unrecorded and not parameters_known and LOAD not in (*effects, *objective.actuator.effects):
         effects[LOAD] = {"torque_Nm": 0.0}
-    plant = ClosedLoop(objective.recorded, objective.actuator, effects=effects, circuit=objective.stack.circuit)
-    bare = ClosedLoop(
-        objective.recorded, objective.actuator, effects=objective.effects, circuit=objective.stack.circuit
+    plant, bare = (
+        ClosedLoop(
+            objective.recorded, objective.actuator, effects=given, circuit=objective.stack.circuit, own_kernels=True
+        )
+        for given in (effects, objective.effects)
     )
     floors = [floor(bare, window) for window in bare.windows]
     unknown = nuisances(plant, floors, parameters_known=parameters_known)

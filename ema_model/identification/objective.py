@@ -46,6 +46,7 @@ class Objective(ClosedLoop):
             replace(actuator, faults={}),
             effects=effects,
             circuit=circuit,
+            own_kernels=True,
             block_s=BLOCK_S if fitness == "filtered" else 0.0,
         )
         for measurement in self.measurements:

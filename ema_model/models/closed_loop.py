@@ -13,9 +13,11 @@ from ema_model.effects import find
 from ema_model.errors import InputError
 from ema_model.models.sampling import check_steps, on_even_grid
 from ema_model.models.window import BLOCK_S, Window, cut
+from ema_model.one_stack import own_stack, stack_at_hand
 from ema_model.physics.rows import LANES
 from ema_model.recordings import Measurement
-from ema_model.simulation.pack import initial_state, monitor_rows, stack_for
+from ema_model.simulation.pack import initial_state, monitor_rows
+from ema_model.simulation.precompile import wait_for
 from ema_model.stacks import exclusive
 
 Array = NDArray[np.float64]
@@ -35,14 +37,20 @@ class ClosedLoop:
         *,
         effects: Mapping[str, Mapping[str, float]] | None = None,
         circuit: str = "reduced",
+        own_kernels: bool = False,
         block_s: float = BLOCK_S,
         stretches: Sequence[list[slice] | None] | None = None,
     ) -> None:
+        """own_kernels: whether they are worth waiting for, instead of the library's in the meantime."""
         if not measurements:
             raise InputError("one recording or more is needed")
         self.actuator = actuator
         self.effects = {name: find(name).settings(dict(given)) for name, given in (effects or {}).items()}
-        self.stack = stack_for(actuator, self.effects, circuit)
+        self.stack = (
+            own_stack(actuator, self.effects, circuit)
+            if own_kernels
+            else stack_at_hand(actuator, self.effects, circuit, "traces")
+        )
         self.recorded = list(measurements)  # before they were put on an even grid
         self.measurements = [on_even_grid(m) for m in measurements]
         chosen = stretches or [None] * len(self.measurements)
@@ -80,6 +88,7 @@ class ClosedLoop:
             self.stack,
             window.integral_Nm(actuator, k, turned_rad, play_rad),
         )
+        wait_for(self.stack, "traces")
         lanes = np.empty((4, len(k), window.blocks))
         steps = window.steps_per_block
         for first in range(0, window.blocks, _CHUNK):  # long recordings would fill the memory with lanes

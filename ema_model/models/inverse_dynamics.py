@@ -20,10 +20,12 @@ from ema_model.errors import InputError, quoted
 from ema_model.models.motion import Motion, motion_of
 from ema_model.models.sampling import check_period, on_even_grid
 from ema_model.models.window import CONTEXT
+from ema_model.one_stack import stack_at_hand
 from ema_model.physics.rows import LANES
 from ema_model.recordings import Measurement
 from ema_model.recordings.noise import sample_noise
-from ema_model.simulation.pack import monitor_rows, stack_for
+from ema_model.simulation.pack import monitor_rows
+from ema_model.simulation.precompile import wait_for
 from ema_model.stacks import exclusive
 
 Array = NDArray[np.float64]
@@ -84,7 +86,7 @@ class InverseDynamics:
             raise InputError("one recording or more is needed")
         self.actuator = actuator
         self.effects = {name: find(name).settings(dict(given)) for name, given in (effects or {}).items()}
-        self.stack = stack_for(actuator, self.effects)
+        self.stack = stack_at_hand(actuator, self.effects, "reduced", "currents")
         self.recorded = list(measurements)  # before they were put on an even grid
         self.measurements = [m if m.is_map else on_even_grid(m) for m in measurements]
         chosen = stretches or [None] * len(self.measurements)
@@ -125,6 +127,7 @@ class InverseDynamics:
 
     def _currents(self, rows: Array, n: int, window: Stretch, acceleration: Array) -> Array:
         """(n, samples), A"""
+        wait_for(self.stack, "currents")
         currents = np.empty((n, window.position.size))
         for first in range(0, window.position.size, _CHUNK):
             part = slice(first, min(first + _CHUNK, window.position.size))

@@ -27,6 +27,9 @@ scalar: Callable[[Any], Any] = numba.njit(forceinline=True, **_MODEL)
 the population kernel ten times slower.
 """
 
+passed_on: Callable[[Any], Any] = numba.njit(inline="always", **_MODEL)
+"""A function that hands on its first argument: numba leaves it out, which saves its compilation."""
+
 kernel: Callable[[Any], Any] = kept(numba.njit(**_MODEL))
 """An outer kernel of one thread.  Kept in the cache, so it must live in a package that `stacks` makes."""
 

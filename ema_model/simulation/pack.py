@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,9 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from ema_model import faults
 from ema_model.actuator import Actuator
+from ema_model.effects import CATALOGUE, catalogue_name
 from ema_model.physics.phases import flux_harmonics
 from ema_model.physics.rows import LANES, REFERENCE_STATE_ROWS, STATE_ROWS
-from ema_model.stacks import Stack, find_stack
+from ema_model.stacks import Stack
 
 Array = NDArray[np.float64]
 EffectSettings = Mapping[str, Mapping[str, ArrayLike]]
@@ -35,17 +36,11 @@ def reduced_circuit(actuator: Actuator) -> Circuit:
     return Circuit(scale * motor.resistance_Ohm, scale * motor.inductance_H, voltage)
 
 
-def stack_for(actuator: Actuator, effects: Iterable[str] = (), circuit: str = "reduced") -> Stack:
-    """The kernels of an actuator with effects besides its own; circuit: for the hysteresis current loop."""
-    controller = "cascade" if actuator.controller.kind == "unknown" else actuator.controller.kind
-    return find_stack(actuator.circuit(circuit), {*actuator.effects, *effects}, controller)
-
-
 def monitor_rows(actuator: Actuator, k: ArrayLike, stack: Stack, effects: EffectSettings) -> Array:
     """Parameters of the Monitor Model for a population: k (n, 8) → (blocks, rows·LANES).
 
-    effects: besides those that belong to the actuator.  Parameters are numbers or (n,) each.  Lanes beyond n
-    repeat the last individual.
+    effects: besides those that belong to the actuator; the stack's others do nothing.  Parameters are numbers or
+    (n,) each.  Lanes beyond n repeat the last individual.
     """
     k = np.atleast_2d(np.asarray(k, dtype=float))
     fault = faults.physical(k)
@@ -219,7 +214,9 @@ def _blocks(values: Mapping[str, ArrayLike], stack: Stack, effects: EffectSettin
     blocks = -(-individuals // LANES)
     rows = np.zeros((blocks, len(stack.parameter_rows), LANES))
     given = dict(values)
-    for effect, parameters in effects.items():
+    library = (name for name in stack.effects if catalogue_name(name) in CATALOGUE)
+    resting = {name: CATALOGUE[catalogue_name(name)].neutral for name in library}
+    for effect, parameters in {**resting, **effects}.items():
         given |= {f"{effect}.{name}": value for name, value in parameters.items()}
     index = {name: row for row, name in enumerate(stack.parameter_rows)}
     for name, value in given.items():

@@ -10,7 +10,9 @@ from numpy.typing import ArrayLike
 
 from ema_model.actuator import Actuator
 from ema_model.errors import InputError, quoted
+from ema_model.one_stack import library_stack, stack_at_hand
 from ema_model.recordings import Measurement
+from ema_model.simulation import precompile as ahead
 from ema_model.simulation.run import Run, simulate_monitor, simulate_reference
 
 _RATE_HZ = {"filtered": 10_000.0, "raw": 100_000.0}  # of what is identified, by the fitness that it is for
@@ -35,6 +37,18 @@ def note(actuator: Actuator) -> str:
         f"{actuator.name} has no three-phase reference model, which is of a cascade with a hysteresis inverter: the "
         "plant here is the monitor model with these faults, it starts at rest and has no phase currents."
     )
+
+
+def is_compiled(actuator: Actuator, effects: Mapping[str, Any]) -> bool:
+    """Whether the next simulation with these effects begins at once."""
+    kernel = _kernel(actuator)
+    return ahead.is_compiled(stack_at_hand(actuator, effects, "reduced", kernel), kernel)
+
+
+def compile_behind(actuator: Actuator) -> None:
+    """Begins to compile what the first hidden effect and the first discovery need, in another process."""
+    library = library_stack(actuator)
+    ahead.compile_ahead([(library, _kernel(actuator)), (library, "traces")], urgent=False)
 
 
 def simulate(
@@ -84,6 +98,10 @@ def to_identify(run: Run, actuator: Actuator, k: ArrayLike, fitness: str, effect
 
 def _at_rate(run: Run, fitness: str) -> Run:
     return replace(run, sample_rate_Hz=_RATE_HZ[fitness])
+
+
+def _kernel(actuator: Actuator) -> str:
+    return "run" if actuator.has_reference_model else "traces"
 
 
 def _require(actuator: Actuator) -> None:

@@ -1,17 +1,18 @@
 """Kernels that will be needed soon, compiled by another process: numba compiles on one core only.
 
-    python -m ema_model.simulation.precompile reduced+cascade+torsional_compliance …
+    python -m ema_model.simulation.precompile urgent traces+reduced+cascade+torsional_compliance …
 
-compiles stacks into the cache, where `find_stack`'s kernels are found on their first call.
+compiles kernels of stacks into the cache, where `find_stack`'s kernels are found on their first call.
 """
 
 from __future__ import annotations
 
-import atexit
 import os
 import subprocess
 import sys
+import time
 from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -20,52 +21,86 @@ from ema_model.actuator import load_actuator
 from ema_model.faults import HEALTHY
 from ema_model.kernel_cache.folder import cache_folder
 from ema_model.physics.rows import LANES
-from ema_model.simulation.pack import initial_state, monitor_rows
+from ema_model.simulation.pack import initial_reference_state, initial_state, monitor_rows, reference_rows
 from ema_model.stacks import Stack, exclusive, find_stack
 
-_running: list[subprocess.Popen[bytes]] = []
+MODULES = {"traces": "monitor", "currents": "inverse", "run": "reference"}  # of the kernels
+_POLL_S = 0.02
 
 
-def compile_ahead(stacks: Iterable[Stack]) -> None:
-    """Begins to compile the `traces` kernels that the cache lacks; returns at once.  Effects are the catalogue's."""
-    _running[:] = [process for process in _running if process.poll() is None]
-    missing = ["+".join((one.circuit, one.controller, *one.effects)) for one in stacks if not _is_cached(one)]
-    if not missing or (os.cpu_count() or 1) < 2:
+@dataclass(frozen=True)
+class _Job:
+    process: subprocess.Popen[bytes]
+    kernels: list[tuple[Stack, str]]
+    urgent: bool
+
+
+_running: list[_Job] = []
+
+
+def compile_ahead(kernels: Iterable[tuple[Stack, str]], *, urgent: bool = True) -> None:
+    """Begins to compile kernels of stacks where the cache lacks them; returns at once.  Effects are the catalogue's.
+
+    What is not urgent takes only the time that nobody else wants, waits for no other (it is asked for again), and is
+    finished even when this process ends.  EMAVIZ_COMPILE_AHEAD=0 leaves all to this process.
+    """
+    missing = [one for one in kernels if not is_compiled(*one) and not _is_coming(*one)]
+    if not missing or (_running and not urgent):
+        return
+    if (os.cpu_count() or 1) < 2 or os.environ.get("EMAVIZ_COMPILE_AHEAD") == "0":
         return
     package = str(Path(__file__).parents[2])
     paths = os.pathsep.join(filter(None, [package, os.environ.get("PYTHONPATH")]))
-    _running.append(
-        subprocess.Popen(
-            [sys.executable, "-m", __name__, *missing],
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            env={**os.environ, "PYTHONPATH": paths, "EMAVIZ_CACHE_DIR": str(cache_folder().parents[2])},
-        )
+    names = ["+".join((kernel, one.circuit, one.controller, *one.effects)) for one, kernel in missing]
+    process = subprocess.Popen(
+        [sys.executable, "-m", __name__, "urgent" if urgent else "behind", *names],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        env={**os.environ, "PYTHONPATH": paths, "EMAVIZ_CACHE_DIR": str(cache_folder().parents[2])},
     )
+    _running.append(_Job(process, missing, urgent))
 
 
-def _is_cached(stack: Stack) -> bool:
-    return any(cache_folder().glob(f"{stack.monitor.__name__}.traces-*.nbc"))
+def is_compiled(stack: Stack, kernel: str) -> bool:
+    """Whether a kernel of a stack needs no compiler: this process has it, or the cache does."""
+    module = getattr(stack, MODULES[kernel])
+    if getattr(module, kernel).signatures:
+        return True
+    return any(cache_folder().glob(f"{module.__name__}.{kernel}-*.nbc"))
 
 
-def _compile(stack: Stack) -> None:
+def wait_for(stack: Stack, kernel: str) -> None:
+    """Returns once a kernel is there that another process compiles urgently, so that it is not compiled here too."""
+    while _running and _is_coming(stack, kernel) and not is_compiled(stack, kernel):
+        time.sleep(_POLL_S)
+
+
+def _is_coming(stack: Stack, kernel: str) -> bool:
+    _running[:] = [job for job in _running if job.process.poll() is None]
+    return any(job.urgent and (stack, kernel) in job.kernels for job in _running)
+
+
+def _compile(stack: Stack, kernel: str) -> None:
     actuator, samples = load_actuator(), np.zeros(1)
     effects = {name: {} for name in stack.effects}
     rows = monitor_rows(actuator, HEALTHY, stack, effects)
-    state = initial_state(actuator, len(rows), stack=stack)
-    result = np.empty((len(rows), 1, 4, LANES))
-    exclusive(stack.monitor.traces, state, rows, samples, samples, samples, 1, 1, actuator.step_s, result)
-
-
-@atexit.register
-def _stop() -> None:
-    for process in _running:
-        process.kill()
-        process.wait()
+    if kernel == "traces":
+        state = initial_state(actuator, len(rows), stack=stack)
+        result = np.empty((len(rows), 1, 4, LANES))
+        exclusive(stack.monitor.traces, state, rows, samples, samples, samples, 1, 1, actuator.step_s, result)
+    elif kernel == "currents":
+        result = np.empty((len(rows), 1, LANES))
+        exclusive(stack.inverse.currents, rows, samples, samples, samples, samples, 1.0, result)
+    else:
+        rows = reference_rows(actuator, HEALTHY, stack, effects)
+        state, pair = initial_reference_state(actuator, stack=stack), np.zeros(2)
+        stack.reference.run(state, rows, pair, pair, 1, 1, 1e-6, np.empty((1, 11)))
 
 
 if __name__ == "__main__":
-    for text in sys.argv[1:]:
-        circuit, controller, *names = text.split("+")
-        _compile(find_stack(circuit, names, controller))
+    if sys.argv[1] == "behind" and hasattr(os, "nice"):
+        os.nice(15)
+    for text in sys.argv[2:]:
+        kernel, circuit, controller, *names = text.split("+")
+        _compile(find_stack(circuit, names, controller), kernel)

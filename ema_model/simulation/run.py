@@ -12,9 +12,11 @@ from ema_model.actuator import Actuator
 from ema_model.commands import Command, command
 from ema_model.effects import find
 from ema_model.errors import InputError, quoted
+from ema_model.one_stack import stack_at_hand
 from ema_model.physics.rows import LANES
 from ema_model.recordings import Measurement
-from ema_model.simulation.pack import initial_reference_state, initial_state, monitor_rows, reference_rows, stack_for
+from ema_model.simulation.pack import initial_reference_state, initial_state, monitor_rows, reference_rows
+from ema_model.simulation.precompile import wait_for
 from ema_model.stacks import exclusive
 
 Array = NDArray[np.float64]
@@ -107,7 +109,7 @@ def simulate_reference(
             f"{quoted(actuator.name)}: the reference model is of a cascade with a hysteresis inverter; "
             "use the monitor model"
         )
-    stack = stack_for(actuator, effects)
+    stack = stack_at_hand(actuator, effects, "reduced", "run")
     period = _steps_per_sample(run, MONITOR_STEP_S)
     dt = 1.0 / run.sample_rate_Hz / period
     times = np.arange(run.samples * period + 1) * dt
@@ -115,6 +117,7 @@ def simulate_reference(
     load = np.full_like(times, run.load_torque_Nm)
     start = float(demand[0]) if start_rad is None else start_rad
     result = np.empty((run.samples, 11))
+    wait_for(stack, "run")
     stack.reference.run(
         initial_reference_state(actuator, start, start_speed_rad_s, start_play_rad, stack, start_integral_Nm),
         reference_rows(actuator, actuator.k if k is None else k, stack, effects),
@@ -149,12 +152,13 @@ def simulate_monitor(
     effects = {name: find(name).settings(dict(given)) for name, given in (effects or {}).items()}
     if actuator.controller.kind == "unknown":
         raise InputError(f"{quoted(actuator.name)}: its controller is not known, so that no command can be simulated")
-    stack = stack_for(actuator, effects, circuit)
+    stack = stack_at_hand(actuator, effects, circuit, "traces")
     period = _steps_per_sample(run, actuator.step_s)
     dt = 1.0 / run.sample_rate_Hz / period
     demand = run.command.at(np.arange(run.samples * period + 1) * dt)
     start = float(demand[0]) if start_rad is None else start_rad
     result = np.empty((1, run.samples, 4, LANES))
+    wait_for(stack, "traces")
     exclusive(
         stack.monitor.traces,
         initial_state(actuator, 1, start, stack=stack),

@@ -7,7 +7,6 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 
 from ema_model.commands import command
-from ema_model.discovery.fingerprints import off
 from ema_model.effects import CATALOGUE, find
 from ema_model.errors import InputError, quoted
 from ema_model.quantities.titles import in_sentence
@@ -35,12 +34,12 @@ class LibraryEvents:
 
 
 class Library:
-    """Runs effects; those that can be switched off share one stack, which is compiled once."""
+    """Runs effects, in the library's one stack, which is compiled once."""
 
     def __init__(self, session: Session) -> None:
         self.session = session
         self.events = LibraryEvents()
-        self._without: dict[tuple[str, tuple[str, ...]], Measurement] = {}
+        self._without: dict[str, Measurement] = {}
 
     def feel(self, name: str, settings: Mapping[str, float], run: str) -> None:
         """Simulates soon; of several requests the last one counts.  InputError for a setting out of range."""
@@ -77,22 +76,13 @@ class Library:
         self._say("")
 
     def _felt(self, name: str, settings: Mapping[str, float], run: str) -> WithEffect:
-        effect = find(name)
-        stack: dict[str, dict[str, float]] = {}
-        if off(effect) is not None:
-            stack = {
-                other.name: {**other.settings({}), other.parameters[0].name: neutral}
-                for other in CATALOGUE.values()
-                if (neutral := off(other)) is not None
-            }
-        key = run, tuple(stack)
         try:
-            if key not in self._without:
-                self._without[key] = simulate_monitor(RUNS[run], self.session.actuator, effects=stack)
-            with_it = simulate_monitor(RUNS[run], self.session.actuator, effects={**stack, name: dict(settings)})
+            if run not in self._without:
+                self._without[run] = simulate_monitor(RUNS[run], self.session.actuator)
+            with_it = simulate_monitor(RUNS[run], self.session.actuator, effects={name: dict(settings)})
         except FloatingPointError as error:
-            raise InputError(f"{effect.title}: {error}; make it weaker") from None
-        return WithEffect(name, run, dict(settings), with_it, self._without[key])
+            raise InputError(f"{find(name).title}: {error}; make it weaker") from None
+        return WithEffect(name, run, dict(settings), with_it, self._without[run])
 
     def _say(self, text: str) -> None:
         for listener in self.events.said:

@@ -70,7 +70,6 @@ class Session:
         self.ready = threading.Event()
         self.reins = Reins()  # of the identification that runs, or ran last
         self.open_file: Callable[[str], Measurement] = _no_files  # by the name of a file in the data folder
-        self._compiled: set[tuple[str, ...]] = {()}  # stacks of hidden effects
         self.worker = Worker("emaviz-compute", self._on_error)
 
     def start(self) -> None:
@@ -92,9 +91,9 @@ class Session:
         if not self.ready.is_set() or not plant.can_be_explored(self.actuator):
             return  # the warm-up ends with a simulation
         settings = copy.deepcopy(self.settings)
-        stack = tuple(sorted(settings.effects))
-        if stack not in self._compiled:
-            notify(self.events.status, f"Compiling the plant with {', '.join(stack).replace('_', ' ')}…")
+        compiling = not plant.is_compiled(self.actuator, settings.effects)
+        if compiling:
+            notify(self.events.status, "Compiling the plant with the library of effects…")
         started = time.perf_counter()
         run, start = settings.run(), settings.start_rad()
         fitted = self.identified.k if self.identified is not None else HEALTHY
@@ -113,8 +112,7 @@ class Session:
         except FloatingPointError as error:
             raise InputError(str(error)) from None
         elapsed = time.perf_counter() - started
-        if stack not in self._compiled:
-            self._compiled.add(stack)
+        if compiling:
             notify(self.events.status, f"Ready ({elapsed:.1f} s).")
         reference = settings.sensors.record(reference, settings.seed)
         self.simulation = Simulation(reference, monitor, settings.k, elapsed, settings.command, settings.monitor, asked)
@@ -134,6 +132,7 @@ class Session:
         self._simulate()
         notify(self.events.status, "Compiling the identification…")
         warm_up(Objective([reference], self.actuator))
+        plant.compile_behind(self.actuator)
         notify(self.events.status, f"Ready ({time.perf_counter() - started:.1f} s).")
 
     # --- identification ---------------------------------------------------------------------------------------------

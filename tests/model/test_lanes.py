@@ -12,6 +12,7 @@ from ema_model.commands import command
 from ema_model.effects import find
 from ema_model.faults import HEALTHY, vector
 from ema_model.identification.objective import Objective
+from ema_model.one_stack import stack_at_hand
 from ema_model.physics.rows import LANES
 from ema_model.recordings import Measurement
 from ema_model.simulation import run as simulation
@@ -42,36 +43,6 @@ def recording() -> Measurement:
 
 @each_circuit
 @each_stack
-def test_traces_of_a_population_are_single_runs(monkeypatch, circuit, effects):
-    """A single run's own call of its kernel, repeated with a population in place of the one."""
-    n = LANES + 5  # a block and a part of one
-    k = population(n)
-    settings = {name: find(name).settings(dict(given)) for name, given in effects.items()}
-    rows = monitor_rows(ACTUATOR, k, find_stack(circuit, settings), settings)
-    assert len(rows) == 2
-    calls = []
-
-    def spy(kernel, *arguments):
-        calls.append((kernel, arguments))
-        return exclusive(kernel, *arguments)
-
-    monkeypatch.setattr(simulation, "exclusive", spy)
-    simulate_monitor(RUN, ACTUATOR, k[0], effects, circuit)
-    [(kernel, (_, _, *same, alone))] = calls
-    result = np.empty((len(rows), *alone.shape[1:]))
-    exclusive(kernel, initial_state(ACTUATOR, len(rows)), rows, *same, result)
-    columns = ("current_A", "motor_speed_rad_s", "motor_position_rad")
-    for i in (0, 1, LANES - 1, LANES, n - 1):
-        single = simulate_monitor(RUN, ACTUATOR, k[i], effects, circuit)
-        for column, name in enumerate(columns):
-            lane = result[i // LANES, :, column, i % LANES]
-            np.testing.assert_array_equal(lane, single[name][1:], err_msg=f"{name}, individual {i}")
-    ends = {result[i // LANES, -1, 2, i % LANES] for i in range(n)}
-    assert len(ends) >= n - 2, "individuals must differ, but for those whose friction holds them"
-
-
-@each_circuit
-@each_stack
 def test_fitness_does_not_depend_on_the_neighbours(recording, circuit, effects):
     objective = Objective([recording], ACTUATOR, effects=effects, circuit=circuit)
     k = population(LANES + 8, seed=1)
@@ -83,6 +54,40 @@ def test_fitness_does_not_depend_on_the_neighbours(recording, circuit, effects):
     # and it is the root mean square of what `currents` gives
     rms = np.sqrt(np.mean((objective.currents(k) - objective.target) ** 2, axis=1))
     np.testing.assert_allclose(together, rms, rtol=1e-9)
+
+
+@each_circuit
+@each_stack
+def test_traces_of_a_population_are_single_runs(monkeypatch, circuit, effects):
+    """A single run's own call of its kernel, repeated with a population in place of the one.
+
+    The objectives above have compiled these stacks; the library's lanes are in test_one_stack.
+    """
+    n = LANES + 5  # a block and a part of one
+    k = population(n)
+    settings = {name: find(name).settings(dict(given)) for name, given in effects.items()}
+    stack = stack_at_hand(ACTUATOR, settings, circuit, "traces")
+    rows = monitor_rows(ACTUATOR, k, stack, settings)
+    assert len(rows) == 2
+    calls = []
+
+    def spy(kernel, *arguments):
+        calls.append((kernel, arguments))
+        return exclusive(kernel, *arguments)
+
+    monkeypatch.setattr(simulation, "exclusive", spy)
+    simulate_monitor(RUN, ACTUATOR, k[0], effects, circuit)
+    [(kernel, (_, _, *same, alone))] = calls
+    result = np.empty((len(rows), *alone.shape[1:]))
+    exclusive(kernel, initial_state(ACTUATOR, len(rows), stack=stack), rows, *same, result)
+    columns = ("current_A", "motor_speed_rad_s", "motor_position_rad")
+    for i in (0, 1, LANES - 1, LANES, n - 1):
+        single = simulate_monitor(RUN, ACTUATOR, k[i], effects, circuit)
+        for column, name in enumerate(columns):
+            lane = result[i // LANES, :, column, i % LANES]
+            np.testing.assert_array_equal(lane, single[name][1:], err_msg=f"{name}, individual {i}")
+    ends = {result[i // LANES, -1, 2, i % LANES] for i in range(n)}
+    assert len(ends) >= n - 2, "individuals must differ, but for those whose friction holds them"
 
 
 def test_effects_parameters_may_differ_by_lane():

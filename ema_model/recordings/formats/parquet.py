@@ -15,7 +15,6 @@ from ema_model.files.limits import COLUMNS, megabytes
 from ema_model.files.refusal import refusal, shown
 from ema_model.recordings.formats.format import Array, Columns, Format, check_size
 from ema_model.recordings.formats.parquet_pages import Damaged, TooMany, footer_size, numbers_and_bytes
-from ema_model.recordings.refusal import refusal, shown
 
 _FOOTER_BYTES = 4_000_000
 _BUFFER_BYTES = 1 << 20  # else a column's packed bytes are read at once

@@ -22,12 +22,12 @@ from ema_model.estimation.floor import twin_error
 from ema_model.faults import named
 from ema_model.models import ClosedLoop, Plant, Stretch, Window, plant_for
 from ema_model.models.stretches import evaluation_stretches, fit_stretches
-from ema_model.one_stack import compile_behind
 from ema_model.recordings import Measurement
 from ema_model.recordings.equivalent_current import with_current
 from ema_model.recordings.health.card import health
 from ema_model.recordings.read import check_same_actuator
 from ema_model.recordings.side_file.read import stated
+from ema_model.simulation.one_stack import compile_behind
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]

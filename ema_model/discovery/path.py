@@ -37,10 +37,10 @@ from ema_model.discovery.unknown import curve_for
 from ema_model.effects import CATALOGUE, catalogue_name, find
 from ema_model.faults import BY_NAME
 from ema_model.models.stretches import fit_stretches
-from ema_model.one_stack import compile_behind, compile_library
 from ema_model.quantities.titles import in_sentence
 from ema_model.recordings import Measurement
 from ema_model.recordings.read import check_same_actuator
+from ema_model.simulation.one_stack import compile_behind, compile_library
 
 Progress = Callable[[str], None]
 Array = NDArray[np.float64]

@@ -13,9 +13,9 @@ from ema_model.effects import find
 from ema_model.errors import InputError
 from ema_model.models.sampling import check_steps, on_even_grid
 from ema_model.models.window import BLOCK_S, Window, cut
-from ema_model.one_stack import own_stack, stack_at_hand
 from ema_model.physics.rows import LANES
 from ema_model.recordings import Measurement
+from ema_model.simulation.one_stack import own_stack, stack_at_hand
 from ema_model.simulation.pack import initial_state, monitor_rows
 from ema_model.simulation.precompile import wait_for
 from ema_model.stacks import exclusive

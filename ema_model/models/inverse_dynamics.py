@@ -20,10 +20,10 @@ from ema_model.errors import InputError, quoted
 from ema_model.models.motion import Motion, motion_of
 from ema_model.models.sampling import check_period, on_even_grid
 from ema_model.models.window import CONTEXT
-from ema_model.one_stack import stack_at_hand
 from ema_model.physics.rows import LANES
 from ema_model.recordings import Measurement
 from ema_model.recordings.noise import sample_noise
+from ema_model.simulation.one_stack import stack_at_hand
 from ema_model.simulation.pack import monitor_rows
 from ema_model.simulation.precompile import wait_for
 from ema_model.stacks import exclusive

@@ -12,9 +12,9 @@ from ema_model.actuator import Actuator
 from ema_model.commands import Command, command
 from ema_model.effects import find
 from ema_model.errors import InputError, quoted
-from ema_model.one_stack import stack_at_hand
 from ema_model.physics.rows import LANES
 from ema_model.recordings import Measurement
+from ema_model.simulation.one_stack import stack_at_hand
 from ema_model.simulation.pack import initial_reference_state, initial_state, monitor_rows, reference_rows
 from ema_model.simulation.precompile import wait_for
 from ema_model.stacks import exclusive

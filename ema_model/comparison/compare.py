@@ -23,8 +23,8 @@ from ema_model.faults import named
 from ema_model.models import ClosedLoop, Plant, Stretch, Window, plant_for
 from ema_model.models.stretches import evaluation_stretches, fit_stretches
 from ema_model.recordings import Measurement
-from ema_model.recordings.equivalent_current import with_current
 from ema_model.recordings.health.card import health
+from ema_model.recordings.prepared import prepared
 from ema_model.recordings.read import check_same_actuator
 from ema_model.recordings.side_file.read import stated
 from ema_model.simulation.one_stack import compile_behind
@@ -102,12 +102,6 @@ def compare(
         sentences=judgement.sentences,
         warnings=judgement.warnings,
     )
-
-
-def prepared(measurement: Measurement, actuator: Actuator) -> Measurement:
-    """The measurement under the names inside, with a current."""
-    inside = replace(measurement, signals=actuator.axes.inside(measurement.signals))
-    return with_current(inside, actuator.motor.pole_pairs, actuator.motor.rotor_offset_rad)
 
 
 def _finite(value: float) -> float | None:

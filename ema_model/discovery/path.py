@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
-from ema_model.comparison.compare import prepared, weights_of
+from ema_model.comparison.compare import weights_of
 from ema_model.comparison.explain import Explanation
 from ema_model.discovery.faults import fault_for
 from ema_model.discovery.fingerprints import Fingerprint, fingerprints
@@ -39,6 +39,7 @@ from ema_model.faults import BY_NAME
 from ema_model.models.stretches import fit_stretches
 from ema_model.quantities.titles import in_sentence
 from ema_model.recordings import Measurement
+from ema_model.recordings.prepared import prepared
 from ema_model.recordings.read import check_same_actuator
 from ema_model.simulation.one_stack import compile_behind, compile_library
 

@@ -6,9 +6,12 @@ from ema_model.quantities.signals import SIGNALS, Signal
 from ema_model.recordings.checks import check_needed
 from ema_model.recordings.columns.guess import guess_mapping
 from ema_model.recordings.columns.mapping import ColumnMapping, MappedColumn, apply_mapping, parse_mapping
+from ema_model.recordings.columns.reading import Reading
 from ema_model.recordings.equivalent_current import can_have_current, with_equivalent_current
-from ema_model.recordings.file import read_columns, read_measurement
+from ema_model.recordings.file import read_columns
 from ema_model.recordings.measurement import Measurement
+from ema_model.recordings.prepared import prepared
+from ema_model.recordings.read import read
 from ema_model.recordings.side_file.read import SideFile, find_side_file, read_side_file, side_path
 from ema_model.recordings.side_file.write import write_side_file
 from ema_model.recordings.write import check_target, write_measurement
@@ -18,6 +21,7 @@ __all__ = [
     "ColumnMapping",
     "MappedColumn",
     "Measurement",
+    "Reading",
     "SideFile",
     "Signal",
     "apply_mapping",
@@ -27,8 +31,9 @@ __all__ = [
     "find_side_file",
     "guess_mapping",
     "parse_mapping",
+    "prepared",
+    "read",
     "read_columns",
-    "read_measurement",
     "read_side_file",
     "side_path",
     "with_equivalent_current",

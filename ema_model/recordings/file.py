@@ -1,9 +1,13 @@
-"""Reads a measurement from a file of any format."""
+"""A file of any format as columns, and as a measurement once it is known which column is which signal.
+
+`ema_model.recordings.read` is the way in; this is what it is built on.
+"""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -47,7 +51,7 @@ def read_measurement(
         side = read_side_file(found) if found else SideFile()
         if found:
             notes.append(f"the side file {shown(found.name, 100)} is used")
-    try:
+    with _told(path):
         header = file_format.header(path, max_bytes)
         used = _merged(path, side, mapping, header)
         known, foreign = choose_columns(path, header, used, needs_time=side.kind == "run")
@@ -57,10 +61,6 @@ def read_measurement(
         signals, done = apply_mapping(columns.arrays, used)
         columns.arrays.clear()  # they are copied, and large; Arrow would keep their memory for later
         pa.default_memory_pool().release_unused()
-    except OSError as error:
-        raise refusal(path, f"cannot be read ({reason(error)}); check the disk and the permissions") from None
-    except MemoryError:
-        raise refusal(path, "does not fit into memory; split it, or keep fewer columns") from None
     if side.kind == "map" and "time_s" not in signals:
         signals = {"time_s": np.arange(float(next(iter(signals.values())).size)), **signals}
         done = (*done, "a static map without time: time_s counts the samples")
@@ -75,6 +75,13 @@ def read_measurement(
     return measurement
 
 
+def read_header(path: str, max_bytes: int) -> list[str]:
+    """The columns' names in the file's order; InputError for a file that cannot be read as a table."""
+    check_file(path, max_bytes)
+    with _told(path):
+        return format_of(path).header(path, max_bytes)
+
+
 def read_columns(path: str | os.PathLike[str], *, max_bytes: int = FILE_BYTES) -> dict[str, Array]:
     """The columns of numbers as they stand in the file, for a mapping step to show; others are left out.
 
@@ -83,7 +90,7 @@ def read_columns(path: str | os.PathLike[str], *, max_bytes: int = FILE_BYTES) -
     path = os.fspath(path)
     check_file(path, max_bytes)
     file_format = format_of(path)
-    try:
+    with _told(path):
         names = [name for name in file_format.header(path, max_bytes) if name]
         check_names(path, names)
         if not names:
@@ -93,6 +100,13 @@ def read_columns(path: str | os.PathLike[str], *, max_bytes: int = FILE_BYTES) -
             file_format.read(path, names, max_bytes, False).arrays
             or file_format.read(path, names, max_bytes, True).arrays
         )
+
+
+@contextmanager
+def _told(path: str) -> Iterator[None]:
+    """What the system cannot do becomes an InputError."""
+    try:
+        yield
     except OSError as error:
         raise refusal(path, f"cannot be read ({reason(error)}); check the disk and the permissions") from None
     except MemoryError:

@@ -12,7 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from ema_model.errors import InputError
 from ema_model.files.refusal import listed, shown
+from ema_model.quantities.axes import Axes
 from ema_model.quantities.signals import SIGNALS
+from ema_model.recordings.columns.reading import Reading
+from ema_model.recordings.refusal import listed, shown
 from ema_model.recordings.side_file.read import SideFile
 
 Array = NDArray[np.float64]
@@ -37,6 +40,8 @@ class Measurement:
     side: SideFile = field(
         default_factory=SideFile
     )  # what else is known: the actuator's file, the sensors' accuracy, the kind
+    reading: Reading = field(default_factory=Reading)  # which columns of its file it was read from, and what was made
+    axes: Axes | None = None  # whose names inside the signals have; None: the names that files and people use
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "signals", {name: _frozen(values) for name, values in self.signals.items()})

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from ema_model.actuator import Actuator
 from ema_model.errors import InputError
 from ema_model.files.limits import PAGE_BYTES
-from ema_model.recordings import ColumnMapping, Measurement, read_measurement, read_side_file
+from ema_model.recordings import ColumnMapping, Measurement, prepared, read_side_file
 from ema_model.recordings.health.card import Health, health
-from ema_model.recordings.read import read_recording
+from ema_model.recordings.read import recorded
 from ema_model.recordings.side_file.read import SideFile, find_side_file
 from emaviz.session.data_folder import DataFolder
 
@@ -28,7 +28,8 @@ class Opened:
     path: Path
     columns: dict[str, Array]  # as they stand in the file
     mapping: ColumnMapping  # in use, or guessed
-    measurement: Measurement | None = None
+    recorded: Measurement | None = None  # as files name the signals, for any actuator
+    measurement: Measurement | None = None  # as the chosen actuator's model needs it
     health: Health | None = None
 
 
@@ -43,13 +44,11 @@ def side_file_of(path: Path, folder: DataFolder) -> SideFile | None:
 
 
 def measured(opened: Opened, actuator: Actuator, side: SideFile | None = None) -> Opened:
-    """The same with what was measured and its health; without a side file, as the recording's own one says."""
-    if side is None:
-        measurement = read_recording(opened.path, actuator, max_bytes=PAGE_BYTES)
-    else:
-        measurement = read_measurement(opened.path, side=side, max_bytes=PAGE_BYTES)
+    """The same with what was measured and its health; `side` is the recording's side file, where it has one."""
+    found = recorded(opened.path, actuator, side=side or SideFile(), max_bytes=PAGE_BYTES)
+    measurement = prepared(found, actuator)
     limit: float | None = actuator.controller.current_limit_A
     if not np.isfinite(limit):  # a drive whose limit is not known
         limit = None
     card = health(measurement, current_limit_A=limit, pole_pairs=actuator.motor.pole_pairs)
-    return replace(opened, measurement=measurement, health=card)
+    return replace(opened, recorded=found, measurement=measurement, health=card)

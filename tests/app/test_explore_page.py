@@ -14,7 +14,8 @@ from ema_model.commands import command
 from ema_model.effects import CATALOGUE
 from ema_model.errors import InputError
 from ema_model.faults import HEALTHY
-from ema_model.recordings import Measurement, read_measurement
+from ema_model.recordings import Measurement
+from ema_model.recordings.file import read_measurement
 from ema_model.simulation.run import Run, simulate_monitor, simulate_reference
 from emaviz.figures import run_signals
 from emaviz.figures.run_metrics import differences, metrics, rise_time_s

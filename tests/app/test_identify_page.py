@@ -14,7 +14,8 @@ from ema_model.commands import command
 from ema_model.errors import InputError
 from ema_model.faults import performance_coefficient, vector
 from ema_model.identification.run import ALGORITHMS, Progress
-from ema_model.recordings import read_measurement, write_measurement
+from ema_model.recordings import write_measurement
+from ema_model.recordings.file import read_measurement
 from ema_model.simulation.run import Run, simulate_reference
 from ema_model.simulation.sensors import Sensors
 from emaviz.figures import swarm

@@ -16,7 +16,7 @@ from ema_model.actuator import load_actuator
 from ema_model.commands import command
 from ema_model.comparison import compare
 from ema_model.recordings import Measurement, write_measurement
-from ema_model.recordings.read import read_recording
+from ema_model.recordings import read as read_recording
 from ema_model.simulation.run import Run, simulate_reference
 from ema_model.simulation.sensors import Sensors
 from emaviz.report import write_report

@@ -10,7 +10,7 @@ import sys
 import numpy as np
 import pytest
 
-from ema_model.recordings import read_measurement
+from ema_model.recordings.file import read_measurement
 from emaviz.cli import main
 
 

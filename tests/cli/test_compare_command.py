@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from ema_model.recordings import read_measurement
+from ema_model.recordings.file import read_measurement
 from emaviz.cli import main
 from emaviz.recording import read
 

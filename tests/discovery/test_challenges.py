@@ -21,7 +21,7 @@ from ema_model.discovery import discover
 from ema_model.effects import CATALOGUE
 from ema_model.errors import InputError
 from ema_model.estimation import default_free
-from ema_model.recordings import read_measurement
+from ema_model.recordings.file import read_measurement
 
 # A few that a test has time for.
 NAMES = ("cogging_torque", "stribeck_friction", "hinge_moment", "dead_time")

@@ -11,7 +11,7 @@ from support.hidden_effects import ACTUATOR, SINE, recorded
 from ema_model.actuator import load_actuator, save_actuator
 from ema_model.actuator.parameters import Controller, Inverter
 from ema_model.comparison.assemble import residuals_of
-from ema_model.comparison.compare import known_error, prepared
+from ema_model.comparison.compare import known_error
 from ema_model.comparison.explain import Explanation, explain
 from ema_model.comparison.residuals import Residuals
 from ema_model.discovery.model_fit import Data, Fit, fit, gather, holdout_error
@@ -19,6 +19,7 @@ from ema_model.discovery.torque_curve import curve_of, is_torque, with_curve
 from ema_model.effects import find
 from ema_model.effects.user import user_torque
 from ema_model.errors import InputError
+from ema_model.recordings import prepared
 
 COMMANDS = [("chirp", {}, 0.5), ("step", {"final_rad": 0.005}, 0.5), SINE]
 UNSEEN = [("sine", {"amplitude_rad": 0.02, "frequency_Hz": 5}, 0.6)]

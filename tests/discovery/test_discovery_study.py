@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 from support.hidden_effects import ACTUATOR, SINE, recorded
 
-from ema_model.comparison.compare import prepared, weights_of
+from ema_model.comparison.compare import weights_of
 from ema_model.discovery import discover
 from ema_model.discovery.model_fit import fit, gather
 from ema_model.effects import CATALOGUE
@@ -28,6 +28,7 @@ from ema_model.effects.user import user_torque
 from ema_model.estimation import default_free
 from ema_model.estimation.problem import Problem
 from ema_model.faults import HEALTHY
+from ema_model.recordings import prepared
 
 pytestmark = pytest.mark.study
 

@@ -19,7 +19,7 @@ from ema_model.challenges.sealing import seal, unseal
 from ema_model.challenges.truth import Truth
 from ema_model.effects import CATALOGUE
 from ema_model.errors import InputError
-from ema_model.recordings.read import read_recording
+from ema_model.recordings import read
 from ema_model.simulation.run import simulate_reference
 from ema_model.simulation.sensors import Sensors
 
@@ -53,7 +53,7 @@ def test_recordings_story_and_truth_come_back(sealed):
     with opened(one) as files:
         actuator = load_actuator(files.actuator)
         assert actuator.tolerances == load_actuator().tolerances
-        recordings = [read_recording(file, actuator) for file in (*files.training, *files.holdout)]
+        recordings = [read(file, actuator) for file in (*files.training, *files.holdout)]
         folder = files.training[0].parent
     assert not folder.exists(), "nothing is left behind"
     for recording, (name, run) in zip(recordings, RUNS.items(), strict=True):
@@ -106,9 +106,9 @@ def test_a_change_is_noticed(sealed, tmp_path, name):
         parts[name] = parts[name][:-1] + bytes([parts[name][-1] ^ 1])
 
     path = rewritten(sealed, tmp_path / "x.challenge", change)
-    for read in (sealed_challenge, unseal):
+    for opening in (sealed_challenge, unseal):
         with pytest.raises(InputError, match=r"x\.challenge: was changed after it was sealed"):
-            read(path)
+            opening(path)
 
 
 HOSTILE = [
@@ -176,7 +176,7 @@ def test_a_hostile_sealer_is_told_in_one_line(sealed, tmp_path):
             opened(sealed_challenge(resealed(sealed, path, **{part: content}))) as files,
         ):
             actuator = load_actuator(files.actuator)
-            read_recording(files.training[0], actuator)
+            read(files.training[0], actuator)
         assert "emaviz-challenge-" not in str(told.value), "a folder that is gone is nothing to be told of"
 
 

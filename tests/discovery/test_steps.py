@@ -9,7 +9,7 @@ import pytest
 from support.hidden_effects import ACTUATOR, SINE, recorded
 
 from ema_model.commands import command
-from ema_model.comparison.compare import prepared, weights_of
+from ema_model.comparison.compare import weights_of
 from ema_model.discovery import discover
 from ema_model.discovery.fingerprints import fingerprints
 from ema_model.discovery.model_fit import fit, gather, with_effect
@@ -18,6 +18,7 @@ from ema_model.discovery.repeatability import is_lost, with_divergence
 from ema_model.discovery.score import scored, scored_together
 from ema_model.estimation.floor import floor
 from ema_model.models import plant_for
+from ema_model.recordings import prepared
 from ema_model.simulation.run import Run, simulate_reference
 from ema_model.simulation.sensors import Sensors
 

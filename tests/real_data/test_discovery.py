@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ema_model.actuator import load_actuator
 from ema_model.discovery import discover
-from ema_model.recordings.read import read_recording
+from ema_model.recordings import read as read_recording
 
 
 def read(folder, pattern, actuator):

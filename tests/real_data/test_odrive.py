@@ -6,7 +6,7 @@ import pytest
 
 from ema_model.actuator import load_actuator
 from ema_model.comparison import compare
-from ema_model.recordings.read import read_recording
+from ema_model.recordings import read
 
 KNOWN_ORDERS = {7, 12, 14, 28, 36, 84}
 
@@ -18,7 +18,7 @@ def actuator(actuators):
 
 def test_spin_ups_show_cogging(data_folder, actuator):
     files = sorted((data_folder / "odrive").glob("spinup_*.csv"))
-    found = compare([read_recording(file, actuator) for file in files], actuator)
+    found = compare([read(file, actuator) for file in files], actuator)
     assert found.calibration is not None and found.calibration.converged
     first = found.explained_by[0]
     assert first.variable == "motor_angle" and first.significant
@@ -30,7 +30,7 @@ def test_spin_ups_show_cogging(data_folder, actuator):
 
 @pytest.mark.parametrize("name", ["holdmap_a_4", "holdmap_a_16"])
 def test_hold_map_orders(data_folder, actuator, name):
-    found = compare([read_recording(data_folder / "odrive" / f"{name}.csv", actuator)], actuator)
+    found = compare([read(data_folder / "odrive" / f"{name}.csv", actuator)], actuator)
     assert found.recordings[0].measurement.is_map
     assert [one.order for one in found.orders[:3]] == [7, 28, 14]
     known = {7: 0.86, 28: 0.56, 14: 0.35, 36: 0.29, 12: 0.26, 84: 0.12}
@@ -39,7 +39,7 @@ def test_hold_map_orders(data_folder, actuator, name):
 
 
 def test_slow_sweeps_show_the_same_orders(data_folder, actuator):
-    recordings = [read_recording(file, actuator) for file in sorted((data_folder / "odrive").glob("slow2_*.csv"))]
+    recordings = [read(file, actuator) for file in sorted((data_folder / "odrive").glob("slow2_*.csv"))]
     found = compare([recording.selected((1.0, 1e9)) for recording in recordings], actuator)
     assert found.explained_by[0].variable == "motor_angle"
     assert {7, 28, 14} <= {one.order for one in found.orders[:4]}

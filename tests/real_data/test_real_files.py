@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ema_model.recordings import SideFile, guess_mapping, read_columns, read_measurement
+from ema_model.recordings import SideFile, guess_mapping, read_columns
+from ema_model.recordings.file import read_measurement
 from ema_model.recordings.health.card import health
 
 DATA = Path(os.environ.get("EMAVIZ_DATA") or Path(__file__).resolve().parents[3] / "shared" / "data")

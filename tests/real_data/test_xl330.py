@@ -7,14 +7,14 @@ import pytest
 
 from ema_model.actuator import load_actuator
 from ema_model.comparison import compare
-from ema_model.recordings.read import read_recording
+from ema_model.recordings import read
 
 
 @pytest.fixture(scope="module")
 def compared(data_folder, actuators):
     actuator = load_actuator(actuators / "xl330.toml")
     files = sorted((data_folder / "xl330").glob("*.csv"))
-    return compare([read_recording(file, actuator) for file in files], actuator)
+    return compare([read(file, actuator) for file in files], actuator)
 
 
 def test_calibration_converges_on_all_twelve(compared):

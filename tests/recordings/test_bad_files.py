@@ -15,7 +15,8 @@ from scipy.io import savemat
 from scipy.sparse import csc_matrix
 
 from ema_model.errors import InputError
-from ema_model.recordings import read_columns, read_measurement
+from ema_model.recordings import read_columns
+from ema_model.recordings.file import read_measurement
 
 N = 120
 LIMIT = 10_000_000  # bytes

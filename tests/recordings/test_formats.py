@@ -7,7 +7,8 @@ import pytest
 from scipy.io import savemat
 
 from ema_model.errors import InputError
-from ema_model.recordings import SIGNALS, Measurement, read_columns, read_measurement, write_measurement
+from ema_model.recordings import SIGNALS, Measurement, read_columns, write_measurement
+from ema_model.recordings.file import read_measurement
 from ema_model.recordings.formats import FORMATS
 
 N = 150

@@ -18,8 +18,8 @@ from ema_model.recordings import (
     apply_mapping,
     guess_mapping,
     parse_mapping,
-    read_measurement,
 )
+from ema_model.recordings.file import read_measurement
 
 # header: the signal of each column in its order, with the unit where it is not the signal's own; - is left aside
 HEADERS = {

@@ -7,7 +7,8 @@ from time import perf_counter
 import numpy as np
 import pytest
 
-from ema_model.recordings import Measurement, read_measurement, write_measurement
+from ema_model.recordings import Measurement, write_measurement
+from ema_model.recordings.file import read_measurement
 from ema_model.recordings.health.card import health
 
 

@@ -11,7 +11,8 @@ import pytest
 
 from ema_model.errors import InputError
 from ema_model.quantities.signals import lookalikes
-from ema_model.recordings import SIGNALS, Measurement, check_needed, read_measurement, write_measurement
+from ema_model.recordings import SIGNALS, Measurement, check_needed, write_measurement
+from ema_model.recordings.file import read_measurement
 from ema_model.recordings.formats import FORMATS
 
 N = 120

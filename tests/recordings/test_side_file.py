@@ -17,11 +17,11 @@ from ema_model.recordings import (
     MappedColumn,
     SideFile,
     find_side_file,
-    read_measurement,
     read_side_file,
     side_path,
     write_side_file,
 )
+from ema_model.recordings.file import read_measurement
 from ema_model.recordings.side_file.read import SENSOR_KEYS
 
 N = 600

@@ -12,8 +12,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from ema_model.errors import InputError
-from ema_model.recordings import SIGNALS, Measurement, read_measurement, write_measurement
+from ema_model.recordings import SIGNALS, Measurement, write_measurement
 from ema_model.recordings.checks import LARGEST
+from ema_model.recordings.file import read_measurement
 from ema_model.recordings.formats import FORMATS
 
 N = 120

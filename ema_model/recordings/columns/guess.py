@@ -26,11 +26,15 @@ from ema_model.recordings.columns.words import (
     Name,
     readings,
 )
+from ema_model.recordings.refusal import listed, shown
 
 _LEAST = 0.3  # confidence below which a column is left aside
+_SURE = 0.6  # and from which on a guess is used without asking; tried on the headers of tests/recordings/test_mapping
+_AS_LIKELY = 0.04  # less than this apart, two guesses are as likely; "iq" is surer than "current" by more
 _CURRENT_WORDS = frozenset("i im iph phase ph cur curr current".split())
 _ROTARY = frozenset("angle theta q phi rotation encoder enc resolver".split())
 _PHASE_OF = dict(zip("abcuvw", "abcabc"))
+_NOTHING = ColumnMapping()
 
 
 @dataclass(frozen=True)
@@ -42,17 +46,22 @@ class _Guess:
 
 
 def guess_mapping(
-    columns: Mapping[str, ArrayLike] | Iterable[str], *, counts_per_turn: int | None = None
+    columns: Mapping[str, ArrayLike] | Iterable[str],
+    *,
+    known: ColumnMapping = _NOTHING,
+    counts_per_turn: int | None = None,
 ) -> ColumnMapping:
     """The likely mapping of a file's columns; every entry says how sure it is and why.
 
     `columns` are the names, or names with their numbers ((n,) each), which then help with units that the
-    names leave open.  `counts_per_turn` is the encoder's, for columns in counts.  Nothing is raised for
-    strange names: what is not understood is in `unmapped`, with the reason.
+    names leave open.  `known` is what is mapped already and stays.  `counts_per_turn` is the encoder's, for
+    columns in counts.  Nothing is raised for strange names: what is not understood is in `unmapped`, with the
+    reason.
     """
     tables = columns if isinstance(columns, Mapping) else {}
-    names = [str(name) for name in columns]
-    shares = _Context(names)
+    settled = {entry.column for entry in known.entries}
+    names = [name for name in map(str, columns) if name not in settled]
+    shares = _Context([*names, *settled], known)
     guesses: list[tuple[float, int, str, _Guess]] = []
     reasons = {name: "its name says nothing known" for name in names}
     for order, name in enumerate(names):
@@ -64,7 +73,7 @@ def guess_mapping(
             guess = _checked(guess, tables.get(name))
             if guess.confidence >= _LEAST:
                 guesses.append((-guess.confidence, order, name, guess))
-    entries: dict[str, MappedColumn] = {}
+    entries = {entry.signal: entry for entry in known.entries}
     used: set[str] = set()
     for _, _, name, guess in sorted(guesses, key=lambda item: item[:2]):
         if name in used or not name:
@@ -76,17 +85,44 @@ def guess_mapping(
             guess.signal, name, guess.unit, confidence=round(guess.confidence, 2), reason=guess.reason
         )
         used.add(name)
+    guessed_as = {entry.column: entry for entry in entries.values()}
+    for signal, entry in entries.items():
+        if entry.column not in settled:
+            entries[signal] = replace(entry, rivals=_rivals(entry, guesses, guessed_as))
     ordered = tuple(entries[name] for name in SIGNALS if name in entries)
     return ColumnMapping(ordered, tuple((name, reasons[name]) for name in names if name not in used))
+
+
+def doubt(entry: MappedColumn) -> str:
+    """Why a guess must not be used before somebody has said so, in plain words; "" for one that is sure."""
+    if entry.rivals:
+        return f"{listed(map(repr, map(shown, entry.rivals)))} may be it as well"
+    if entry.signal != "time_s" and not entry.unit and entry.column != entry.signal and SIGNALS[entry.signal].unit:
+        return "it has no unit"  # the unit of time shows in its steps
+    return entry.reason if entry.confidence < _SURE else ""
+
+
+def _rivals(
+    entry: MappedColumn, guesses: list[tuple[float, int, str, _Guess]], chosen: Mapping[str, MappedColumn]
+) -> tuple[str, ...]:
+    """The columns that are as likely to be the signal, and are not used for what they are likelier to be."""
+    found = []
+    for _, _, column, guess in guesses:
+        near = guess.signal == entry.signal and guess.confidence > entry.confidence - _AS_LIKELY
+        elsewhere = chosen.get(column)
+        better = elsewhere is not None and elsewhere.confidence >= guess.confidence + _AS_LIKELY
+        if near and column != entry.column and not better:
+            found.append(column)
+    return tuple(found)
 
 
 class _Context:
     """What the other columns tell about one."""
 
-    def __init__(self, names: list[str]) -> None:
+    def __init__(self, names: list[str], known: ColumnMapping) -> None:
         every = [readings(name)[0] for name in names]
         self.lowered = {name.lower() for name in names}
-        self.has_position_command = any(
+        self.has_position_command = any(entry.signal.startswith("command") for entry in known.entries) or any(
             _is_commanded(name, what) for name in every if (what := _quantity(name)) in ("position", "")
         )
         self.has_duty = any(_quantity(name) == "duty" for name in every)

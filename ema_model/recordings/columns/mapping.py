@@ -39,6 +39,7 @@ class MappedColumn:
     offset: float = 0.0
     confidence: float = 1.0  # of a guess, 0 to 1
     reason: str = ""  # of a guess, in plain words
+    rivals: tuple[str, ...] = ()  # columns that a guess finds as likely
 
     def __post_init__(self) -> None:
         if self.signal not in SIGNALS:

@@ -10,6 +10,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from ema_model.recordings.refusal import shown
+
 from ema_model.actuator import Actuator
 from ema_model.comparison.result import Comparison
 from ema_model.errors import InputError, quoted
@@ -20,12 +22,12 @@ from ema_model.recordings import (
     SIGNALS,
     ColumnMapping,
     Measurement,
-    can_have_current,
-    guess_mapping,
+    prepared,
+    read,
     read_columns,
     write_side_file,
 )
-from ema_model.recordings.read import read_recording, usual_mapping
+from ema_model.recordings.read import how_to_read
 from ema_model.recordings.side_file.read import SideFile
 from emaviz.session import actuators as actuator_files
 from emaviz.session.compare.keep import keep
@@ -91,12 +93,16 @@ class Comparing:
         """Opens a file of the data folder soon; what is wrong with it is told."""
         self._files.post(f"open {name}", lambda: self._open(name))
 
-    def measurement(self, name: str) -> Measurement:
-        """A file of the data folder as a measurement of the app's actuator; as Compare has it, if it is open here."""
-        opened = self.opened.get(name)
-        if opened is not None and opened.measurement is not None:
-            return opened.measurement
-        return read_recording(self.folder.measurement(name), self.session.actuator)
+    def measurement(self, name: str, actuator: Actuator | None = None) -> Measurement:
+        """A file of the data folder for an actuator, the app's without one; as Compare has it, if it is open here."""
+        actuator, opened = actuator or self.session.actuator, self.opened.get(name)
+        if opened is not None and opened.recorded is not None:
+            return prepared(opened.recorded, actuator)
+        path = self.folder.measurement(name)
+        measurement = read(path, actuator, side=side_file_of(path, self.folder) or SideFile())
+        if measurement.reading.assumed:
+            notify(self.session.events.told, "Columns were guessed", f"{path.name}: {measurement.reading.assumed}")
+        return measurement
 
     def remove(self, name: str) -> None:
         """Takes a recording off the list; its file stays."""
@@ -114,13 +120,9 @@ class Comparing:
         columns = read_columns(path, max_bytes=PAGE_BYTES)
         side = side_file_of(path, self.folder)
         refused = self._take_actuator(side) if side is not None else None
-        of_actuator = usual_mapping(self.actuator, columns)
-        if side is not None or set(columns) <= set(SIGNALS) or of_actuator.entries:
-            mapping = (side.mapping if side else None) or of_actuator
-            table = Opened(name, path, columns, mapping if mapping.entries else guess_mapping(columns))
-            self._opened(measured(table, self.actuator))
-        else:
-            self._opened(Opened(name, path, columns, guess_mapping(columns)))
+        reading = how_to_read(path, self.actuator, side=side or SideFile(), columns=columns)
+        table = Opened(name, path, columns, reading.proposed(columns))
+        self._opened(table if reading.is_guess else measured(table, self.actuator, side))
         if refused is not None:
             raise refused  # told once the recording is there all the same
 
@@ -163,8 +165,10 @@ class Comparing:
         self._use(chosen)
         self.actuator_name = str(name)
         for opened in list(self.opened.values()):
-            if opened.measurement is None and usual_mapping(chosen, opened.columns).entries:
-                self.add(opened.name)  # this actuator's file knows their columns
+            if opened.recorded is None:
+                self.add(opened.name)  # this actuator's file may know its columns
+            else:
+                self.opened[opened.name] = replace(opened, measurement=prepared(opened.recorded, chosen))
 
     def _use(self, actuator: Actuator) -> None:
         self.actuator = actuator
@@ -199,13 +203,7 @@ class Comparing:
     def signals_available(self) -> list[str]:
         """Those of `COMPARABLE` that every recording has, or can be given."""
         measurements = [o.measurement for o in self.opened.values() if o.measurement is not None]
-
-        def has(measurement: Measurement, name: str) -> bool:
-            if name == "current_A" and can_have_current(measurement):
-                return True
-            return self.actuator.axes.signal(name) in measurement
-
-        return [name for name in COMPARABLE if measurements and all(has(m, name) for m in measurements)]
+        return [name for name in COMPARABLE if measurements and all(name in m for m in measurements)]
 
     # --- comparison -------------------------------------------------------------------------------------------------
 

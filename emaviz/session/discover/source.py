@@ -15,8 +15,7 @@ from ema_model.challenges.sealing import unseal
 from ema_model.challenges.truth import Truth, read_truth
 from ema_model.errors import InputError
 from ema_model.files.limits import CHALLENGE_RECORDING_BYTES
-from ema_model.recordings import Measurement
-from ema_model.recordings.read import read_recording
+from ema_model.recordings import Measurement, read
 from emaviz.session.compare.comparing import USUAL, Comparing
 from emaviz.session.settings import number
 
@@ -113,13 +112,16 @@ class DiscoverySource:
             with opened(self.challenge) as challenge:
                 actuator = load_actuator(challenge.actuator)
                 fitted, held = (
-                    [read_recording(file, actuator, max_bytes=CHALLENGE_RECORDING_BYTES) for file in files]
+                    [read(file, actuator, max_bytes=CHALLENGE_RECORDING_BYTES) for file in files]
                     for files in (challenge.training, challenge.holdout)
                 )
             return Material(fitted, held, actuator, None, recipe)
         try:
             actuator = actuator_of(recipe["actuator"])
-            fitted, held = ([self._recording(name, actuator) for name in recipe[which]] for which in ("fitted", "held"))
+            fitted, held = (
+                [self._comparing.measurement(str(name), actuator) for name in recipe[which]]
+                for which in ("fitted", "held")
+            )
             signals = None if recipe["signals"] is None else [str(name) for name in recipe["signals"]]
             window = recipe["window_s"]
             if window is not None:
@@ -132,10 +134,6 @@ class DiscoverySource:
         if not fitted:
             raise InputError(NOTHING)
         return Material(fitted, held, actuator, signals, recipe)
-
-    def _recording(self, name: str, actuator: Actuator) -> Measurement:
-        known = self.compared.get(str(name))
-        return known if known is not None else read_recording(self._comparing.folder.measurement(str(name)), actuator)
 
     def reveal(self) -> Truth:
         """What is hidden in the challenge."""

@@ -1,0 +1,52 @@
+"""How a file was read: which columns are which signals, what of it was guessed, and what was made from others."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass, field
+
+from ema_model.quantities.signals import SIGNALS
+from ema_model.recordings.columns.mapping import ColumnMapping, MappedColumn, unit_in_name
+from ema_model.recordings.refusal import shown
+
+
+@dataclass(frozen=True)
+class Reading:
+    """The page, the command line and side files tell and keep the same of it."""
+
+    mapping: ColumnMapping = field(default_factory=ColumnMapping)  # in use; canonical names need no entry
+    guessed: tuple[MappedColumn, ...] = ()  # those of the mapping that nobody has said
+    doubts: tuple[tuple[MappedColumn, str], ...] = ()  # guesses that are not used, and why
+    made: tuple[str, ...] = ()  # signals made from others
+
+    @property
+    def is_guess(self) -> bool:
+        """Whether there were columns of which nobody has said what they are."""
+        return bool(self.guessed or self.doubts or self.mapping.unmapped)
+
+    @property
+    def assumed(self) -> str:
+        """'motor_speed_rad_s from Motordrehzahl [rpm], current_A from iq [mA]'; "" where nothing was guessed."""
+        used = ", ".join(f"{entry.signal} from {_with_unit(entry)}" for entry in self.guessed)
+        aside = ", ".join(f"{shown(entry.column)} ({why})" for entry, why in self.doubts)
+        return "; left aside: ".join(filter(None, (used, aside))) if used else aside and f"left aside: {aside}"
+
+    def proposed(self, columns: Iterable[str]) -> ColumnMapping:
+        """Everything that somebody should look at: what is used, canonical names too, and what is in doubt."""
+        entries = {entry.signal: entry for entry, _ in self.doubts}
+        entries |= {name: MappedColumn(name, name) for name in columns if name in SIGNALS}
+        entries |= {entry.signal: entry for entry in self.mapping.entries}
+        return ColumnMapping(tuple(entries[name] for name in SIGNALS if name in entries), self.mapping.unmapped)
+
+
+def without_unit(columns: Collection[str]) -> list[str]:
+    """The columns as a message lists them: those in whose names no unit is found say so."""
+    return [
+        name if name in SIGNALS or any(unit_in_name(name, signal) for signal in SIGNALS) else f"{name} (no unit)"
+        for name in columns
+    ]
+
+
+def _with_unit(entry: MappedColumn) -> str:
+    unit = f" [{entry.unit}]" if entry.unit and not unit_in_name(entry.column, entry.signal) else ""
+    return f"{shown(entry.column)}{unit}"

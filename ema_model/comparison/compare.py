@@ -42,13 +42,15 @@ def compare(
     calibrate: bool = True,
     free: Sequence[str] | None = None,
     signals: Sequence[str] | Mapping[str, float] | None = None,
+    holdout: Sequence[Measurement] = (),
     on_progress: Progress | None = None,
 ) -> Comparison:
     """The recordings of one actuator beside its model.
 
     k: the actuator's faults, in place of its file's; effects: besides the actuator's own.
     free: parameters to calibrate in place of those that the actuator's file leaves free; signals: to fit, in place of
-    current and positions, with weights where it is a mapping (1 is what the signal's floor says).
+    current and positions, with weights where it is a mapping (1 is what the signal's floor says).  holdout: recordings
+    that are only held against the calibrated model, of which no more than their starts are fitted.
     on_progress is told what goes on, and may raise to stop.
     Raises InputError for recordings that cannot be compared.
     """
@@ -57,6 +59,7 @@ def compare(
     check_same_actuator(measurements)
     tell("checking the data")
     recordings = [prepared(measurement, actuator) for measurement in measurements]
+    unseen = [prepared(measurement, actuator) for measurement in holdout]
     cards = [
         health(m, current_limit_A=_finite(actuator.controller.current_limit_A), pole_pairs=actuator.motor.pole_pairs)
         for m in recordings
@@ -88,6 +91,10 @@ def compare(
     ]
     errors = _together(compared)
     judgement = judge(residuals, errors, calibration if calibrate else None, actuator)
+    held: Sequence[Compared] = ()
+    if unseen:
+        tell("holding it against what was not fitted")
+        held = compare(unseen, calibration.actuator, k=calibration.k, calibrate=False, signals=signals).recordings
     return Comparison(
         actuator=actuator,
         calibration=calibration if calibrate else None,
@@ -101,6 +108,7 @@ def compare(
         adequate=judgement.adequate,
         sentences=judgement.sentences,
         warnings=judgement.warnings,
+        holdout=held,
     )
 
 

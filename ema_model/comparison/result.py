@@ -79,3 +79,4 @@ class Comparison:
     adequate: bool
     sentences: Sequence[str]  # the answer in plain words, the first one first
     warnings: Sequence[str] = field(default_factory=tuple)
+    holdout: Sequence[Compared] = field(default_factory=tuple)  # not fitted, beside the calibrated model

@@ -58,6 +58,10 @@ def as_dict(comparison: Comparison) -> dict[str, Any]:
                 }
                 for one in comparison.recordings
             ],
+            "holdout": [
+                {"name": one.name, "signals": {name: _error(error) for name, error in one.errors.items()}}
+                for one in comparison.holdout
+            ],
         }
     )
 

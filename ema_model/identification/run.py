@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Generator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -58,6 +58,7 @@ class Identification:
     truth: Array | None = None
     polished: bool = False  # by a least-squares fit after the search
     searched_k: Array | None = None  # (8,), where the search alone ended
+    parameters: dict[str, float] = field(default_factory=dict)  # of the actuator, where the fit moved them beside k
 
     @property
     def error_percent(self) -> float | None:
@@ -134,6 +135,7 @@ def steps(
         truth=None if truth is None else np.asarray(truth, dtype=float),
         polished=polishes,
         searched_k=last.k,
+        parameters=found.problem.rig(found.x, 0)[0] if polishes else {},
     )
 
 

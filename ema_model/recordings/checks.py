@@ -26,12 +26,17 @@ _NONE = ColumnMapping()
 
 
 def choose_columns(
-    path: str, header: Sequence[str], mapping: ColumnMapping = _NONE, *, needs_time: bool = True
+    path: str,
+    header: Sequence[str],
+    mapping: ColumnMapping = _NONE,
+    *,
+    needs_time: bool = True,
+    looked_at: bool = False,
 ) -> tuple[list[str], list[str]]:
     """The columns of a header to read, canonical or mapped, and the foreign ones to be left aside.
 
     Raises InputError if a name stands twice, the time is missing, or a foreign name looks like a canonical
-    one that is missing; the last is no matter once columns are mapped.
+    one that is missing; the last is no matter once columns are mapped, or somebody has looked at them.
     """
     check_names(path, header)
     mapped = {entry.column for entry in mapping.entries}
@@ -46,7 +51,7 @@ def choose_columns(
         raise refusal(path, f"no column time_s; {advice} (present: {listed(header)})")
     if not known:
         raise refusal(path, f"no column has a known name; map them with --map (present: {listed(header)})")
-    for name in foreign if not mapping.entries else ():
+    for name in foreign if not mapping.entries and not looked_at else ():
         candidates = lookalikes(name)
         if candidates and not set(candidates) & set(known):
             meant = " or ".join(candidates)

@@ -54,7 +54,9 @@ def read_measurement(
     with _told(path):
         header = file_format.header(path, max_bytes)
         used = _merged(path, side, mapping, header)
-        known, foreign = choose_columns(path, header, used, needs_time=side.kind == "run")
+        known, foreign = choose_columns(
+            path, header, used, needs_time=side.kind == "run", looked_at=isinstance(mapping, ColumnMapping)
+        )
         columns = file_format.read(path, known, max_bytes, True)
         check_length(path, next(iter(columns.arrays.values())).size)
         check_finite(path, columns.arrays, columns.place)

@@ -15,7 +15,6 @@ from ema_model.files.refusal import listed, shown
 from ema_model.quantities.axes import Axes
 from ema_model.quantities.signals import SIGNALS
 from ema_model.recordings.columns.reading import Reading
-from ema_model.recordings.refusal import listed, shown
 from ema_model.recordings.side_file.read import SideFile
 
 Array = NDArray[np.float64]

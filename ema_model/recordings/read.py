@@ -21,7 +21,7 @@ from ema_model.files.limits import FILE_BYTES
 from ema_model.files.refusal import listed, refusal, shown
 from ema_model.quantities.signals import SIGNALS
 from ema_model.recordings.columns.guess import doubt, guess_mapping
-from ema_model.recordings.columns.mapping import ColumnMapping, MappedColumn, parse_mapping
+from ema_model.recordings.columns.mapping import ColumnMapping, MappedColumn, parse_mapping, unit_in_name
 from ema_model.recordings.columns.reading import Reading, without_unit
 from ema_model.recordings.equivalent_current import PHASES
 from ema_model.recordings.file import check_file, read_columns, read_header, read_measurement
@@ -96,9 +96,8 @@ def how_to_read(
         known = known.with_entry(entry)
     settled = {entry.column for entry in known.entries} | {"", *SIGNALS}
     there = _there(actuator, known, header)
-    missing = {
-        name for group in needed(actuator, is_map=side.kind == "map") for name in group if there.isdisjoint(group)
-    }
+    needs = needed(actuator, is_map=side.kind == "map")
+    missing = {name for group in needs if there.isdisjoint(group) for name in group}
     if by_side or (of_actuator and not missing) or settled.issuperset(header):
         return Reading(known)  # somebody has looked at these columns
     guess = guess_mapping(read_columns(path, max_bytes=max_bytes) if columns is None else columns, known=known)
@@ -163,7 +162,9 @@ def _ask(path: str, actuator: Actuator, reading: Reading, header: Sequence[str],
         entry, why = doubts.get(name) or (MappedColumn(actuator.axes.signal(name), "COLUMN"), "")
         doubtful = f"{shown(entry.column)!r} may be {entry.signal}, but {why}"
         questions.append(doubtful if why else f"{entry.signal} is needed")
-        options.append(f"--map {shlex.quote(replace(entry, unit=entry.unit or SIGNALS[entry.signal].unit).text)}")
+        if not unit_in_name(entry.column, entry.signal):
+            entry = replace(entry, unit=entry.unit or SIGNALS[entry.signal].unit)
+        options.append(f"--map {shlex.quote(entry.text)}")
     if questions:
         found = f"say which column it is: {' '.join(options)} (the file has {listed(without_unit(header))})"
         raise refusal(path, f"{'; '.join(questions)}; {found}")

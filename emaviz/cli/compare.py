@@ -3,25 +3,23 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
+from ema_model.actuator import save_actuator
 from ema_model.comparison import Comparison, as_dict, compare
 from ema_model.errors import InputError
 from ema_model.recordings import SIGNALS
-from ema_model.recordings.read import read_recording
 from emaviz.cli import files, options, output
-from emaviz.cli.numbers import FINITE
+from emaviz.text.comparison import held_out
 
 HELP = "show where the model fails beside recordings"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The options of INTERFACES, with the signals to fit and the part to use."""
+    """The options of INTERFACES, with the signals to fit."""
     parser.add_argument(
         "files", nargs="+", type=files.RECORDING, metavar="FILE", help="recordings of one actuator, compared together"
     )
-    options.add_actuator(parser)
-    options.add_mapping(parser)
+    options.add_fit(parser, "the comparison")
     parser.add_argument(
         "--calibrate", action=argparse.BooleanOptionalAction, default=True, help="fit the actuator within tolerances"
     )
@@ -37,30 +35,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME[=weight]",
         help="fit only these signals, with a weight (1 is what the noise says); repeat for more",
     )
-    parser.add_argument("--from", type=FINITE, dest="start_s", metavar="s", help="leave out what lies before")
-    parser.add_argument("--to", type=FINITE, dest="stop_s", metavar="s", help="leave out what lies after")
     options.add_seed(parser)
-    options.add_record(parser, "the comparison")
-    options.add_report(parser)
-    options.add_json(parser)
-    files.add_force(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Reads, compares, writes and prints."""
     actuator = options.actuator_of(arguments)
+    if arguments.save_actuator and not arguments.calibrate:
+        raise InputError("--save-actuator writes what the calibration found; leave --no-calibrate out")
     progress = output.Progress()
     try:
-        measurements = []
-        for file in arguments.files:
-            progress.show(f"reading {Path(file).name}")
-            measurements.append(read_recording(file, actuator, arguments.mapping))
-        if arguments.start_s is not None or arguments.stop_s is not None:
-            window = (
-                -float("inf") if arguments.start_s is None else arguments.start_s,
-                float("inf") if arguments.stop_s is None else arguments.stop_s,
-            )
-            measurements = [measurement.selected(window) for measurement in measurements]
+        measurements, held = (
+            options.read_all(files, arguments, actuator, progress) for files in (arguments.files, arguments.holdout)
+        )
         result = compare(
             measurements,
             actuator,
@@ -69,6 +56,7 @@ def run(arguments: argparse.Namespace) -> int:
             calibrate=arguments.calibrate,
             free=arguments.free,
             signals=options.weights_of(arguments.signals),
+            holdout=held,
             on_progress=progress.show,
         )
         if arguments.record:
@@ -81,6 +69,8 @@ def run(arguments: argparse.Namespace) -> int:
             write_report(result, arguments.report)
     finally:
         progress.done()
+    if result.calibration is not None and arguments.save_actuator:
+        save_actuator(result.calibration.actuator, arguments.save_actuator)
     output.write_json(arguments.json, as_dict(result), arguments.seed, output.configuration(arguments))
     print(text(result))
     return 0
@@ -111,6 +101,8 @@ def text(result: Comparison) -> str:
                 lines.append(
                     f"{one.name[:33]:34}{error.rmse:12.4g}{error.noise_floor:12.4g}{error.mean_absolute:12.4g}"
                 )
+    if result.holdout:
+        lines += ["", *(held_out(one) for one in result.holdout)]
     if result.explained_by:
         lines += ["", "what explains the residual (share told ahead on parts that were left out)"]
         for one in result.explained_by[:6]:

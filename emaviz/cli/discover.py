@@ -8,7 +8,6 @@ from ema_model.actuator import save_actuator
 from ema_model.comparison.summary import plain
 from ema_model.discovery import Discovery, as_dict, discover, verified
 from ema_model.effects import find
-from ema_model.recordings.read import read_recording
 from emaviz.cli import files, options, output
 from emaviz.cli.numbers import whole
 from emaviz.text.discovery import VERDICTS, faults, next_experiment, settings, verification
@@ -18,33 +17,14 @@ _CURRENT_ONLY = ("current_A",)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The options of INTERFACES, and where the improved model goes."""
+    """The options of INTERFACES."""
     parser.add_argument(
         "files", nargs="+", type=files.RECORDING, metavar="FILE", help="recordings of one actuator, fitted together"
     )
-    parser.add_argument(
-        "--holdout",
-        action="append",
-        default=[],
-        type=files.RECORDING,
-        metavar="FILE",
-        help="not fitted, must improve; repeat for more",
-    )
-    options.add_actuator(parser)
-    options.add_mapping(parser)
+    options.add_fit(parser, "the discovery")
     parser.add_argument("--signals", choices=("current", "all"), default="all", help="what is fitted")
     parser.add_argument("--max-effects", type=whole(0, 100), default=3, metavar="N", help="at most so many are added")
     options.add_seed(parser)
-    parser.add_argument(
-        "--save-actuator",
-        type=files.SAVED_ACTUATOR,
-        metavar="FILE.toml",
-        help="write the improved model as an actuator file",
-    )
-    options.add_record(parser, "the discovery")
-    options.add_report(parser)
-    options.add_json(parser)
-    files.add_force(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -52,10 +32,8 @@ def run(arguments: argparse.Namespace) -> int:
     actuator = options.actuator_of(arguments)
     progress = output.Progress()
     try:
-        progress.show("reading")
         fitted, held = (
-            [read_recording(file, actuator, arguments.mapping) for file in named]
-            for named in (arguments.files, arguments.holdout)
+            options.read_all(named, arguments, actuator, progress) for named in (arguments.files, arguments.holdout)
         )
         found = discover(
             fitted,

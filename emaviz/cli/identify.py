@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from ema_model import faults
-from ema_model.actuator import Actuator
+from ema_model.actuator import Actuator, save_actuator
 from ema_model.actuator.readings import readings, sentences
 from ema_model.discovery.model_fit import with_effect
 from ema_model.errors import InputError
 from ema_model.identification.objective import Objective
 from ema_model.identification.run import ALGORITHMS, ROBUST, Identification, Progress, identify
-from ema_model.recordings import Measurement, read_measurement
+from ema_model.recordings import Measurement
 from ema_model.simulation.plant import FITNESSES, simulated
 from ema_model.simulation.sensors import Sensors
 from emaviz.cli import files, options, output
@@ -38,13 +38,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--iterations", type=whole(1, 1_000_000), default=150, metavar="N")
     parser.add_argument("--fitness", choices=FITNESSES, default="filtered", help="0.5 ms means, or every sample")
     parser.add_argument("--circuit", choices=("reduced", "thesis"), default="reduced", help="of the monitor model")
-    options.add_actuator(parser)
+    options.add_fit(parser, "the identification")
     options.add_faults(parser)
     options.add_effects(parser)
     options.add_run(parser)
-    options.add_record(parser, "the identification")
-    options.add_json(parser)
-    files.add_force(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -53,10 +50,18 @@ def run(arguments: argparse.Namespace) -> int:
     for name, settings in options.effects_of(arguments).items():
         actuator = with_effect(actuator, name, settings)
     truth = options.faults_of(arguments) if arguments.fault or not arguments.files else None
-    measurements = _recordings(arguments, actuator, truth)
-    objective = Objective(measurements, actuator, circuit=arguments.circuit, fitness=arguments.fitness)
-    recorder = _Recorder(arguments, measurements, objective, truth) if arguments.record else None
     progress = output.Progress()
+    try:
+        measurements = _recordings(arguments, actuator, truth, progress)
+        unseen = options.read_all(arguments.holdout, arguments, actuator, progress)
+    finally:
+        progress.done()
+
+    def fitness(of: list[Measurement]) -> Objective:
+        return Objective(of, actuator, circuit=arguments.circuit, fitness=arguments.fitness)
+
+    objective, held = fitness(measurements), fitness(unseen) if unseen else None
+    recorder = _Recorder(arguments, measurements, objective, truth) if arguments.record else None
 
     def on_iteration(at: Progress) -> None:
         progress.show(f"{at.algorithm} {at.iteration}/{at.iterations}  rmse {at.rmse:.4f} A")
@@ -83,14 +88,28 @@ def run(arguments: argparse.Namespace) -> int:
         progress.done()
     if recorder is not None:
         recorder.finish(answer)
-    output.write_json(arguments.json, result(answer, actuator), arguments.seed, output.configuration(arguments))
+    holdout_rmse = None if held is None else _finite(held(answer.k)[0])
+    if arguments.save_actuator:
+        # The faults k have no place in an actuator file; here they would go in.
+        save_actuator(actuator.with_values(answer.parameters), arguments.save_actuator)
+    document = result(answer, actuator, holdout_rmse)
+    output.write_json(arguments.json, document, arguments.seed, output.configuration(arguments))
     print(_table(answer, actuator))
+    if unseen and holdout_rmse is None:
+        print("the model diverges on what was not fitted")
+    elif holdout_rmse is not None:
+        print(f"rmse {holdout_rmse:.4f} A on what was not fitted: {', '.join(one.name for one in unseen)}")
+    if arguments.report:
+        from emaviz.report import write_identification_report  # plotly takes a second to import
+
+        configuration = output.configuration(arguments)
+        write_identification_report(answer, objective, arguments.report, holdout_rmse, configuration)
     if recorder is not None and recorder.failed:
         raise InputError(recorder.failed)
     return 0
 
 
-def result(answer: Identification, actuator: Actuator) -> dict[str, Any]:
+def result(answer: Identification, actuator: Actuator, holdout_rmse: float | None = None) -> dict[str, Any]:
     """The JSON form of an answer (INTERFACES)."""
     sure = answer.uncertainty
     document = {
@@ -111,6 +130,8 @@ def result(answer: Identification, actuator: Actuator) -> dict[str, Any]:
         "algorithm": answer.algorithm,
         "polished": answer.polished,
         "searched_k": answer.searched_k,
+        "parameters": {actuator.axes.path(path): value for path, value in answer.parameters.items()},
+        "holdout_rmse": holdout_rmse,
         "history": {"rmse": answer.rmse_history, "k": answer.k_history},
     }
     if answer.truth is not None:
@@ -118,16 +139,22 @@ def result(answer: Identification, actuator: Actuator) -> dict[str, Any]:
     return document
 
 
-def _recordings(arguments: argparse.Namespace, actuator: Actuator, truth: np.ndarray | None) -> list[Measurement]:
+def _recordings(
+    arguments: argparse.Namespace, actuator: Actuator, truth: np.ndarray | None, progress: output.Progress
+) -> list[Measurement]:
     if arguments.files:
-        return [read_measurement(file) for file in arguments.files]
+        return options.read_all(arguments.files, arguments, actuator, progress)
     assert truth is not None
     sensors = Sensors(arguments.noise_current, arguments.encoder_bits)
     try:
-        clean = simulated(options.run_of(arguments), actuator, truth, arguments.fitness)
+        clean = simulated(options.run_of(arguments, actuator), actuator, truth, arguments.fitness)
     except FloatingPointError as error:
         raise InputError(str(error)) from None
     return [sensors.record(clean, arguments.seed)]
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
 
 
 def _table(answer: Identification, actuator: Actuator) -> str:

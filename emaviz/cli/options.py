@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
+import math
+import sys
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,16 +15,74 @@ from ema_model.commands import COMMANDS, Command, Recorded, command
 from ema_model.effects import find
 from ema_model.effects.user.entries import kind_of, read_entries
 from ema_model.errors import InputError, quoted
-from ema_model.recordings import read_measurement
+from ema_model.recordings import Measurement, read
+from ema_model.recordings.read import COMMAND_ALONE, Needs
 from ema_model.simulation.run import Run
 from emaviz.cli import files
 from emaviz.cli.numbers import FINITE, SEED, whole
+from emaviz.cli.output import Progress
 
 _COMMAND = files.Input(
     "the file of a measurement",
     has_side_file=True,
     is_file=lambda name: name not in COMMANDS and bool(Path(name).suffix),
 )
+
+
+def add_fit(parser: argparse.ArgumentParser, what: str) -> None:
+    """What identify, compare and discover share: the recordings' part to use, and where the result, `what`, goes"""
+    add_actuator(parser)
+    add_mapping(parser)
+    parser.add_argument("--from", type=FINITE, dest="start_s", metavar="s", help="leave out what lies before")
+    parser.add_argument("--to", type=FINITE, dest="stop_s", metavar="s", help="leave out what lies after")
+    parser.add_argument(
+        "--holdout",
+        action="append",
+        default=[],
+        type=files.RECORDING,
+        metavar="FILE",
+        help="a recording that is not fitted, to judge the result by; repeat for more",
+    )
+    parser.add_argument(
+        "--save-actuator",
+        type=files.SAVED_ACTUATOR,
+        metavar="FILE.toml",
+        help="write the fitted model as an actuator file",
+    )
+    add_record(parser, what)
+    add_report(parser)
+    add_json(parser)
+    files.add_force(parser)
+
+
+def read_all(
+    names: Sequence[str], arguments: argparse.Namespace, actuator: Actuator, progress: Progress
+) -> list[Measurement]:
+    """The recordings, cut to --from and --to; says on stderr what was assumed of their columns."""
+    found = []
+    for name in names:
+        progress.show(f"reading {Path(name).name}")
+        found.append(_read(name, arguments, actuator, progress))
+    if arguments.start_s is None and arguments.stop_s is None:
+        return found
+    start = -math.inf if arguments.start_s is None else arguments.start_s
+    stop = math.inf if arguments.stop_s is None else arguments.stop_s
+    return [measurement.selected((start, stop)) for measurement in found]
+
+
+def _read(
+    file: str,
+    arguments: argparse.Namespace,
+    actuator: Actuator,
+    progress: Progress | None = None,
+    needs: Needs | None = None,
+) -> Measurement:
+    measurement = read(file, actuator, arguments.mapping, needs=needs)
+    if assumed := measurement.reading.assumed:
+        if progress is not None:
+            progress.done()
+        print(f"{Path(file).name}: {assumed}", file=sys.stderr)
+    return measurement
 
 
 def add_actuator(parser: argparse.ArgumentParser) -> None:
@@ -176,14 +236,14 @@ def weights_of(texts: list[str] | None) -> dict[str, float] | None:
     return dict(_pair(text, "--signal") if "=" in text else (text, 1.0) for text in texts)
 
 
-def run_of(arguments: argparse.Namespace, sample_rate_Hz: float = 10_000.0) -> Run:
+def run_of(arguments: argparse.Namespace, actuator: Actuator, sample_rate_Hz: float = 10_000.0) -> Run:
     """The run that the options ask for."""
-    demand, length = _command(arguments)
+    demand, length = _command(arguments, actuator)
     duration = arguments.duration if arguments.duration is not None else length
     return Run(demand, duration, sample_rate_Hz, arguments.load_torque)
 
 
-def _command(arguments: argparse.Namespace) -> tuple[Command, float]:
+def _command(arguments: argparse.Namespace, actuator: Actuator) -> tuple[Command, float]:
     name = arguments.command
     if not _COMMAND.is_file(name):
         settings = {}
@@ -195,7 +255,7 @@ def _command(arguments: argparse.Namespace) -> tuple[Command, float]:
         return command(name, settings), 0.5
     if arguments.settings:
         raise InputError("--set changes a built-in command, not a recorded one")
-    recording = read_measurement(name)
+    recording = _read(name, arguments, actuator, needs=COMMAND_ALONE)
     recording.require("command_rad")
     return Recorded(recording.time_s, recording["command_rad"], str(name)), recording.duration_s
 

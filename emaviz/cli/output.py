@@ -61,6 +61,7 @@ class Progress:
         """Takes the line away."""
         if self._drawn:
             print("\r\x1b[K", end="", file=sys.stderr, flush=True)
+            self._drawn = False
 
 
 def _plain(value: Any) -> Any:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 
 import numpy as np
 
@@ -23,6 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--circuit", choices=("reduced", "thesis"), default="reduced", help="of the monitor model")
     options.add_actuator(parser)
     options.add_run(parser)
+    options.add_mapping(parser)
     options.add_faults(parser)
     options.add_effects(parser)
     parser.add_argument("--sample-rate", type=FINITE, default=10_000.0, metavar="Hz")
@@ -38,7 +40,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Simulates, records with the sensors' accuracy, writes."""
     actuator = options.actuator_of(arguments)
     k, effects = options.faults_of(arguments, actuator.faults), options.effects_of(arguments)
-    asked = options.run_of(arguments, arguments.sample_rate)
+    asked = options.run_of(arguments, actuator, arguments.sample_rate)
     sensors = Sensors(arguments.noise_current, arguments.encoder_bits)
     try:
         if arguments.model == "rm":
@@ -48,6 +50,7 @@ def run(arguments: argparse.Namespace) -> int:
     except FloatingPointError as error:
         raise InputError(str(error)) from None
     signals = sensors.record(signals, arguments.seed)
+    signals = replace(signals, signals=actuator.axes.outside(signals.signals))  # a linear axis has names of its own
     write_measurement(signals, arguments.out)
     if arguments.record:
         _record(arguments, signals, k)

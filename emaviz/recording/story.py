@@ -42,18 +42,20 @@ class IdentificationStory:
         """
         self.path = Path(path)
         self._writer = RecordingWriter(path)
+        self._outside = objective.actuator.axes.outside  # the names that files have
         self._objective = objective
         self._measurement = measurement
         self._source = source
         self._configuration = dict(configuration)
         self._writer.config(_configuration(configuration))
-        self._writer.signals(source, measurement.time_s, _signals(measurement))
+        self._writer.signals(source, measurement.time_s, self._outside(_signals(measurement)))
         if truth is not None:
             self._writer.truth(truth)
         if algorithms:
             residual = [name for name in _RESIDUAL if name in measurement]
-            groups = {source: list(_signals(measurement)), "monitor": list(_FITTED), "residual": residual}
-            self._writer.expect(groups, algorithms)
+            groups = {source: _signals(measurement), "monitor": _FITTED, "residual": residual}
+            expected = {group: list(self._outside(dict.fromkeys(names))) for group, names in groups.items()}
+            self._writer.expect(expected, algorithms)
 
     @property
     def failed(self) -> str | None:
@@ -74,13 +76,13 @@ class IdentificationStory:
         """The fitted monitor and the residual of the best answer, the result of each; closes the file."""
         monitor = self._fitted(best)
         time = self._measurement.time_s
-        self._writer.signals("monitor", time[: monitor.samples], _signals(monitor))
+        self._writer.signals("monitor", time[: monitor.samples], self._outside(_signals(monitor)))
         residual = {
             name: monitor[name] - self._measurement[name][: monitor.samples]
             for name in _RESIDUAL
             if name in self._measurement
         }
-        self._writer.signals("residual", time[: monitor.samples], residual)
+        self._writer.signals("residual", time[: monitor.samples], self._outside(residual))
         for answer in (best, *others):
             self._writer.result(_result(answer, self._objective), answer.algorithm)
         found = {answer.algorithm: _facts(answer) for answer in (best, *others)}

@@ -9,11 +9,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from ema_model.limits import FILE_BYTES, PAGE_BYTES
 
 from ema_model.actuator import load_actuator, shipped
 from ema_model.commands import command
 from ema_model.errors import InputError
+from ema_model.files.limits import FILE_BYTES, PAGE_BYTES
 from ema_model.recordings import ColumnMapping, MappedColumn, read_side_file, side_path, write_measurement
 from ema_model.simulation.run import Run, simulate_reference
 from ema_model.simulation.sensors import Sensors

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ema_model.files.refusal import shown
+from ema_model.files.refusal import listed, shown
 from ema_model.quantities.signals import SIGNALS
 from ema_model.quantities.titles import in_sentence
 from ema_model.quantities.units import find_unit
@@ -26,7 +26,6 @@ from ema_model.recordings.columns.words import (
     Name,
     readings,
 )
-from ema_model.recordings.refusal import listed, shown
 
 _LEAST = 0.3  # confidence below which a column is left aside
 _SURE = 0.6  # and from which on a guess is used without asking; tried on the headers of tests/recordings/test_mapping

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field
 
+from ema_model.files.refusal import shown
 from ema_model.quantities.signals import SIGNALS
 from ema_model.recordings.columns.mapping import ColumnMapping, MappedColumn, unit_in_name
-from ema_model.recordings.refusal import shown
 
 
 @dataclass(frozen=True)

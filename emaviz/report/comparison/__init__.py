@@ -10,6 +10,7 @@ from emaviz.report.comparison.calibration import CalibrationTable
 from emaviz.report.comparison.data_health import DataHealth
 from emaviz.report.comparison.errors_per_signal import ErrorsPerSignal
 from emaviz.report.comparison.explanation import WhatExplains
+from emaviz.report.comparison.held_out import HeldOut
 from emaviz.report.comparison.recordings import Recordings
 from emaviz.report.comparison.worst_regions import WorstRegions
 from emaviz.report.page import page, write
@@ -18,6 +19,7 @@ from emaviz.report.section import Section
 SECTIONS: tuple[Section[Comparison], ...] = (
     Answer(),
     ErrorsPerSignal(),
+    HeldOut(),
     WorstRegions(),
     WhatExplains(),
     Recordings(),

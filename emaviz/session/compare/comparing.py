@@ -10,8 +10,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from ema_model.recordings.refusal import shown
-
 from ema_model.actuator import Actuator
 from ema_model.comparison.result import Comparison
 from ema_model.errors import InputError, quoted
@@ -165,10 +163,10 @@ class Comparing:
         self._use(chosen)
         self.actuator_name = str(name)
         for opened in list(self.opened.values()):
-            if opened.recorded is None:
-                self.add(opened.name)  # this actuator's file may know its columns
-            else:
+            if opened.recorded is not None:
                 self.opened[opened.name] = replace(opened, measurement=prepared(opened.recorded, chosen))
+            elif not how_to_read(opened.path, chosen, side=SideFile(), columns=opened.columns).is_guess:
+                self.add(opened.name)  # this actuator's file knows their columns
 
     def _use(self, actuator: Actuator) -> None:
         self.actuator = actuator

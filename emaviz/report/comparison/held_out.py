@@ -1,0 +1,19 @@
+"""How far the calibrated model is from recordings that were not fitted."""
+
+from __future__ import annotations
+
+from ema_model.comparison.result import Comparison
+from emaviz.report.markup import bullets
+from emaviz.report.section import Figures, Section
+from emaviz.text.comparison import held_out
+
+
+class HeldOut(Section[Comparison]):
+    """Left out where all were fitted."""
+
+    title = "Not fitted"
+    anchor = "held-out"
+
+    def body(self, subject: Comparison, figures: Figures) -> str:
+        """A line for each."""
+        return bullets(held_out(one) for one in subject.holdout)

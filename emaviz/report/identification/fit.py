@@ -1,0 +1,24 @@
+"""The measured current beside the Monitor Model's at the answer, and what is left."""
+
+from __future__ import annotations
+
+from emaviz.figures import identified_fit
+from emaviz.report.identification.subject import Identified
+from emaviz.report.markup import paragraph
+from emaviz.report.section import Figures, Section
+
+
+class Fit(Section[Identified]):
+    """Two figures for each recording, and the errors."""
+
+    title = "Fit"
+    anchor = "fit"
+
+    def body(self, subject: Identified, figures: Figures) -> str:
+        """Always there."""
+        held = subject.holdout_rmse
+        beside = "" if held is None else f"; {held:.4f} A on the recordings that were not fitted"
+        parts = [paragraph(f"The current is off by {subject.answer.rmse:.4f} A (rms){beside}.")]
+        for chart in identified_fit.figures(subject.objective, subject.answer.k):
+            parts.append(figures.place(chart, 320))
+        return "".join(parts)

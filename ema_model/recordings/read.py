@@ -162,9 +162,9 @@ def _ask(path: str, actuator: Actuator, reading: Reading, header: Sequence[str],
         entry, why = doubts.get(name) or (MappedColumn(actuator.axes.signal(name), "COLUMN"), "")
         doubtful = f"{shown(entry.column)!r} may be {entry.signal}, but {why}"
         questions.append(doubtful if why else f"{entry.signal} is needed")
-        if not unit_in_name(entry.column, entry.signal):
-            entry = replace(entry, unit=entry.unit or SIGNALS[entry.signal].unit)
-        options.append(f"--map {shlex.quote(entry.text)}")
+        in_name = unit_in_name(entry.column, entry.signal)
+        stated = replace(entry, unit=entry.unit or SIGNALS[entry.signal].unit).text
+        options.append(f"--map {shlex.quote(f'{entry.signal}={entry.column}' if in_name else stated)}")
     if questions:
         found = f"say which column it is: {' '.join(options)} (the file has {listed(without_unit(header))})"
         raise refusal(path, f"{'; '.join(questions)}; {found}")

@@ -14,7 +14,7 @@ from ema_model.actuator import load_actuator, shipped
 from ema_model.commands import command
 from ema_model.errors import InputError
 from ema_model.files.limits import FILE_BYTES, PAGE_BYTES
-from ema_model.recordings import ColumnMapping, MappedColumn, read_side_file, side_path, write_measurement
+from ema_model.recordings import ColumnMapping, MappedColumn, Measurement, read_side_file, side_path, write_measurement
 from ema_model.simulation.run import Run, simulate_reference
 from ema_model.simulation.sensors import Sensors
 from emaviz.recording import read
@@ -45,6 +45,21 @@ def foreign_csv(recording, path):
     table = np.column_stack(list(columns.values()))
     np.savetxt(path, table, delimiter=",", header=",".join(columns), comments="", fmt="%.10g")
     return path
+
+
+AXIS = """
+[axes]
+motor = "linear"
+user = "linear"
+[controller]
+kind = "unknown"
+[motor]
+force_constant_N_A = 20.0
+mass_kg = { value = 2.0, tolerance = 0.2 }
+viscous_friction_Ns_m = { value = 3.0, sigma = 2.0 }
+static_friction_N = 0.0
+dynamic_friction_N = { value = 5.0, sigma = 3.0 }
+"""
 
 
 class Heard:
@@ -261,6 +276,22 @@ def test_actuators_come_with_the_app_or_by_upload(comparing):
     with pytest.raises(InputError):
         comparing.choose_actuator(name)
     assert comparing.actuator.name == "Rig two"
+
+
+def test_another_actuators_axes_are_those_of_the_measurement(comparing, heard, recording):
+    """The recording's own names stay: what is opened for a rotary axis serves a linear one as well."""
+    text = shipped("odrive.toml").split("[controller]")[0] + AXIS
+    (comparing.folder.actuators / "axis.toml").write_text(text, encoding="utf-8")
+    own = {"time_s": recording.time_s, "current_A": recording["current_A"]}
+    way = 1e-3 * recording["motor_position_rad"]
+    write_measurement(Measurement({**own, "motor_position_m": way}), comparing.folder.uploads / "run.csv")
+    comparing.add("uploads/run.csv")
+    heard.wait(heard.opened)
+    assert comparing.signals_available() == ["current_A"]
+    comparing.choose_actuator(f"{UPLOADED}actuators/axis.toml")
+    assert comparing.signals_available() == ["current_A", "motor_position_rad"]
+    assert np.array_equal(comparing.opened["uploads/run.csv"].measurement["motor_position_rad"], way)
+    assert "motor_position_rad" not in comparing.measurement("uploads/run.csv"), "the app's own axis is rotary"
 
 
 def test_a_side_files_actuator_outside_the_data_folder_is_left_alone(comparing, heard, recording, tmp_path):

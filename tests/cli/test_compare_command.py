@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 
+from ema_model.actuator import load_actuator
 from ema_model.recordings.file import read_measurement
 from emaviz.cli import main
 from emaviz.recording import read
@@ -74,6 +75,22 @@ def test_options_reach_the_comparison(rig, tmp_path):
     assert json.loads(out.read_text())["adequate"] is True
 
 
+def test_held_out_recordings_judge_the_calibrated_model_which_is_saved(rig, tmp_path, capsys):
+    out, report, model = tmp_path / "r.json", tmp_path / "r.html", tmp_path / "calibrated.toml"
+    kept = ["--save-actuator", str(model), "--report", str(report), "--json", str(out)]
+    held = ["--holdout", str(rig[0]), "--free", "motor.inertia_kgm2"]
+    assert main(["compare", str(rig[0]), *held, "--to", "0.5", *kept]) == 0
+    result = json.loads(out.read_text())
+    (one,) = result["holdout"]
+    assert one["name"] == "own" and len(result["recordings"]) == 1
+    fitted = result["signals"]["current_A"]
+    assert one["signals"]["current_A"]["rmse"] == pytest.approx(fitted["rmse"], rel=0.2)
+    line = "own was not fitted; the calibrated model is off by: equivalent current "
+    assert line in capsys.readouterr().out and line in report.read_text(encoding="utf-8")
+    inertia = result["calibration"]["parameters"]["motor.inertia_kgm2"]
+    assert load_actuator(model).value("motor.inertia_kgm2") == inertia["value"] != inertia["initial"]
+
+
 @pytest.mark.parametrize(
     "arguments, says",
     [
@@ -83,8 +100,11 @@ def test_options_reach_the_comparison(rig, tmp_path):
         (["OWN", "--map", "current=iq"], "no signal 'current'"),
         (["OWN", "--map", "current_A=iq"], "no column 'iq' for current_A"),
         (["OWN", "--map", "nonsense"], "signal=column"),
-        (["FOREIGN"], "no column time_s"),
-        (["FOREIGN", "--map", "time_s=t[ms]"], "command_rad is needed"),
+        (["FOREIGN"], "'set' may be command_rad, but it has no unit"),
+        (["FOREIGN", "--map", "command_rad=set[deg]"], "--map 'current_A=iq[A]'"),
+        (["OWN", "--holdout", "missing.csv"], "missing.csv: no such file"),
+        (["OWN", "--save-actuator", "a.txt"], "must end in .toml"),
+        (["OWN", "--save-actuator", "a.toml", "--no-calibrate"], "leave --no-calibrate out"),
         (["OWN", "--free", "motor.colour"], "motor.colour cannot be calibrated"),
         (["OWN", "--fault", "k9=1"], "k9"),
         (["OWN", "--effect", "rust"], "no effect 'rust'"),

@@ -66,6 +66,7 @@ def test_recording_and_report_tell_the_same(rig, tmp_path):
         (["SINE", "--record", "nowhere/a.rrd"], "the folder nowhere does not exist"),
         (["SINE", "--record", "a.html"], "must end in .rrd"),
         (["SINE", "--map", "x=y"], "no signal 'x'"),
+        (["SINE", "--from", "5"], "no sample lies in the chosen window"),
     ],
 )
 def test_each_mistake_is_one_clear_line(rig, tmp_path, monkeypatch, capsys, arguments, says):

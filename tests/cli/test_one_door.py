@@ -119,7 +119,9 @@ def on_page(way, path, actuator_file, tmp_path):
             comparing.use_mapping(name, comparing.opened[name].mapping)
             wait_until(lambda: comparing.opened[name].measurement is not None)
         if way == "page":
-            return comparing.opened[name].measurement
+            measurement = comparing.opened[name].measurement
+            assert measurement is not None
+            return measurement
         source = DiscoverySource(comparing)
         return source.read(source.recipe()).fitted[0]
     finally:

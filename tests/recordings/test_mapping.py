@@ -19,6 +19,7 @@ from ema_model.recordings import (
     guess_mapping,
     parse_mapping,
 )
+from ema_model.recordings.columns.guess import doubt
 from ema_model.recordings.file import read_measurement
 
 # header: the signal of each column in its order, with the unit where it is not the signal's own; - is left aside
@@ -136,6 +137,37 @@ def test_numbers_tell_what_names_leave_open():
     assert falling is None or (falling.confidence < 0.5 and "does not increase" in falling.reason)
     assert guess_mapping({"angle_counts": count}).entries == ()  # of how many a turn?
     assert "counts per turn" in guess_mapping(["angle_counts"]).unmapped[0][1]
+
+
+UNSURE = {  # header: why, by signal; the others are sure
+    "t [s],set [deg],motor angle [deg],rotor position [deg]": {
+        "motor_position_rad": "'rotor position [deg]' may be it as well"
+    },
+    "t [s],goal_position,iq [A],motor current [A]": {"command_rad": "it has no unit"},
+    "t,iq [A],speed": {"motor_speed_rad_s": "it has no unit"},
+    "t [s],cmd [deg],pos_1 [deg],pos_2 [deg]": {
+        "user_position_rad": "'pos_2 [deg]' may be it as well",
+        "motor_position_rad": "'pos 2' is a position",
+    },
+    "t [s],cmd [deg],output angle [deg],encoder [deg],board temp [degC],coil temp [degC]": {
+        "temperature_C": "'coil temp [degC]' may be it as well"
+    },
+}
+
+
+@pytest.mark.parametrize("header", UNSURE)
+def test_what_is_doubtful_says_why(header):
+    mapping = guess_mapping(header.split(","))
+    doubts = {entry.signal: why for entry in mapping.entries if (why := doubt(entry))}
+    assert doubts.keys() == UNSURE[header].keys()
+    assert all(why in doubts[signal] for signal, why in UNSURE[header].items())
+
+
+def test_what_is_known_is_not_guessed_again():
+    known = parse_mapping(["motor_position_rad=pos[deg]"])
+    mapping = guess_mapping(["t [s]", "pos", "position [deg]"], known=known)
+    assert mapping.get("motor_position_rad") == known.entries[0]
+    assert mapping.get("user_position_rad").column == "position [deg]"
 
 
 @given(st.lists(st.text(max_size=60), max_size=8))

@@ -86,14 +86,14 @@ def read(path: str | Path) -> Recording:
     """
     path = check(path)
     try:
-        return _Chunks(path).recording(path)
+        return _verified(path).recording(path)
     except Exception as error:  # the reader raises whatever its native part makes of the damage
         first = error
     with tempfile.TemporaryDirectory(prefix="emaviz-") as folder:
         copy = Path(folder, "repaired.rrd")
         try:
             repair(path, copy)
-            recording = _Chunks(copy).recording(path)
+            recording = _verified(copy).recording(path)
         except Exception:
             why = " ".join(str(first).split())
             raise RecordingError(f"{path}: is damaged and cannot be repaired: {why}") from first
@@ -129,6 +129,15 @@ def repair(source: Path, target: Path, layout: Path | None = None) -> None:
     binary.run("rrd", "optimize", *sources, "-o", str(target), timeout_s=_REPAIR_TIMEOUT_S)
     if not target.is_file() or not RrdReader(target).recordings():
         raise RecordingError(f"{source}: nothing in it can be read")
+
+
+def _verified(path: Path) -> _Chunks:
+    """The file's chunks; its reader ends this whole process on some damage, so a program of its own goes first."""
+    try:
+        binary.run("rrd", "verify", str(path), timeout_s=_REPAIR_TIMEOUT_S)
+    except RecordingError:  # its last line is about itself, or advice for its makers
+        raise RecordingError("its contents cannot be decoded") from None
+    return _Chunks(path)
 
 
 class _Chunks:

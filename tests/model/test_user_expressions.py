@@ -151,16 +151,28 @@ def hostile_mix(rng: random.Random) -> str:
     return text * rng.choice([1, 1, 1, 3, 20_000])
 
 
-def test_a_thousand_hostile_expressions_are_refused_or_harmless():
+def refused_of(count: int) -> int:
+    """How many of so many hostile expressions are refused; the others must be harmless."""
     rng = random.Random(20)
     refused = 0
-    for _ in range(1000):
+    for _ in range(count):
         found = judged(hostile_mix(rng))
         if found is None:
             refused += 1
         else:
             assert_harmless(found)
-    assert 900 <= refused < 1000  # some are plain arithmetic
+    return refused
+
+
+def test_a_thousand_hostile_expressions_are_refused_or_harmless():
+    assert 900 <= refused_of(1000) < 1000  # some are plain arithmetic
+
+
+@pytest.mark.study
+def test_ten_thousand_hostile_expressions_are_refused_or_harmless():
+    refused = refused_of(10_000)
+    print(f"expressions  10000: {10_000 - refused} read, {refused} refused, 0 uncaught")
+    assert 9_000 <= refused < 10_000
 
 
 @settings(max_examples=300, deadline=None)

@@ -12,7 +12,7 @@ import numpy as np
 import psutil
 import pytest
 
-from emaviz.recording import RecordingError, RecordingWriter, paths
+from emaviz.recording import RecordingError, RecordingWriter, binary, paths
 from emaviz.recording.file import RrdFile
 from emaviz.recording.read import read
 
@@ -165,3 +165,25 @@ def test_rerun_turned_off_is_said(tmp_path, monkeypatch):
     with pytest.raises(RecordingError, match="RERUN=off"):
         RrdFile(tmp_path / "a.rrd", "a", 0)
     assert not list(tmp_path.iterdir())
+
+
+def test_what_the_program_cannot_verify_never_reaches_the_reader(tmp_path, signals, monkeypatch):
+    """Its native part ends the whole process on some damage, the page with it."""
+    time_s, values = signals
+    with RecordingWriter(tmp_path / "a.rrd") as writer:
+        writer.signals("reference", time_s, values)
+    assert read(tmp_path / "a.rrd").complete
+    program = binary.run
+    asked = []
+
+    def run(*arguments, timeout_s):
+        asked.append(arguments[1])
+        if arguments[1] == "verify":
+            raise RecordingError("rerun rrd verify failed: exit code 102")
+        program(*arguments, timeout_s=timeout_s)
+
+    monkeypatch.setattr(binary, "run", run)
+    monkeypatch.setattr(sys.modules[read.__module__], "_Chunks", lambda path: pytest.fail("it is read"))
+    with pytest.raises(RecordingError, match="is damaged and cannot be repaired: its contents cannot be decoded"):
+        read(tmp_path / "a.rrd")
+    assert asked == ["verify", "optimize", "verify"]

@@ -71,6 +71,7 @@ class ReadingProcess:
 
 def _measurement(path: Path, most_bytes: int) -> None:
     from ema_model.errors import InputError
+    from ema_model.limits import PAGE_BYTES
     from ema_model.recordings import read_columns, read_measurement
     from ema_model.recordings.health.card import health
 
@@ -82,10 +83,11 @@ def _measurement(path: Path, most_bytes: int) -> None:
         del measurement
     except InputError as error:
         refused = error
-    try:
-        read_columns(path, max_bytes=most_bytes)
-    except InputError as error:
-        _checked(str(error))
+    if most_bytes <= PAGE_BYTES:  # the command line shows no table
+        try:
+            read_columns(path, max_bytes=most_bytes)
+        except InputError as error:
+            _checked(str(error))
     if refused is not None:
         raise refused
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -90,8 +91,8 @@ def run(arguments: argparse.Namespace) -> int:
         recorder.finish(answer)
     holdout_rmse = None if held is None else _finite(held(answer.k)[0])
     if arguments.save_actuator:
-        # The faults k have no place in an actuator file; here they would go in.
-        save_actuator(actuator.with_values(answer.parameters), arguments.save_actuator)
+        found = replace(actuator.with_values(answer.parameters), faults=faults.named(answer.k))
+        save_actuator(found, arguments.save_actuator)
     document = result(answer, actuator, holdout_rmse)
     output.write_json(arguments.json, document, arguments.seed, output.configuration(arguments))
     print(_table(answer, actuator))

@@ -71,7 +71,7 @@ class ReadingProcess:
 
 def _measurement(path: Path, most_bytes: int) -> None:
     from ema_model.errors import InputError
-    from ema_model.limits import PAGE_BYTES
+    from ema_model.files.limits import PAGE_BYTES
     from ema_model.recordings import read_columns, read_measurement
     from ema_model.recordings.health.card import health
 

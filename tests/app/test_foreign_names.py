@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import hostile
 import pytest
-from emaviz.page_text import said
 from hostile import FRAME, IMAGE, MARKDOWN
 from support.on_page import choose, wait_until
 
 from emaviz.page.app import App
 from emaviz.page.identify.tab import PLANT
+from emaviz.text.html import said
 
 pytestmark = pytest.mark.browser
 

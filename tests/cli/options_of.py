@@ -9,7 +9,7 @@ from emaviz.cli.files import Input
 from emaviz.cli.parser import parser_of
 
 TEXT = {  # options that name no file and take no single number; each is refused or taken by what it is for
-    "--fault", "--effect", "--map", "--free", "--signal", "--set", "--host", "--data-dir", "name",
+    "--fault", "--effect", "--map", "--free", "--signal", "--set", "--host", "--allow-host", "--data-dir", "name",
 }  # fmt: skip
 
 

@@ -16,8 +16,9 @@ from ema_model.commands import command
 from ema_model.effects import find
 from ema_model.effects.user import user_torque
 from ema_model.errors import InputError, quoted
-from ema_model.recordings import ColumnMapping, MappedColumn, read_measurement
+from ema_model.recordings import ColumnMapping, MappedColumn
 from ema_model.recordings.columns.mapping import parse_mapping
+from ema_model.recordings.file import read_measurement
 from emaviz.cli import main
 from emaviz.session import saved as session_file
 from emaviz.session.archive import Recorded
@@ -74,8 +75,9 @@ def test_column_names_and_cells(tmp_path, text):
             read_measurement(path)
         one_line(told.value)
     path = tmp_path / "mapped.csv"
-    path.write_text(f"time_s,{cell},c\n{rows}1e3,nonsense,1\n", encoding="utf-8")
-    mapping = parse_mapping([f"current_A={cell}"])
+    column = cell[:900]  # as long as a column's name may be
+    path.write_text(f"time_s,{column},c\n{rows}1e3,nonsense,1\n", encoding="utf-8")
+    mapping = parse_mapping([f"current_A={column}"])
     with pytest.raises(InputError) as told:
         read_measurement(path, mapping=mapping)
     assert "nonsense" in one_line(told.value)

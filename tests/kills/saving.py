@@ -15,7 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from ema_model.actuator import load_actuator, save_actuator
-from ema_model.recordings import Measurement, read_measurement, write_measurement
+from ema_model.recordings import Measurement, write_measurement
+from ema_model.recordings.file import read_measurement
 from emaviz.cli.output import write_json
 from emaviz.recording import RecordingWriter, read
 from emaviz.session import saved as session_file

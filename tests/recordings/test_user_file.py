@@ -12,8 +12,8 @@ from ema_model.actuator import load_actuator
 from ema_model.challenges import sealed_challenge
 from ema_model.errors import InputError
 from ema_model.files.user_file import open_user_file
-from ema_model.recordings import read_columns, read_measurement, read_side_file
-from ema_model.recordings.read import read_recording
+from ema_model.recordings import read, read_columns, read_side_file
+from ema_model.recordings.file import read_measurement
 from emaviz.cli import main
 from emaviz.recording import RecordingError
 from emaviz.recording.read import check
@@ -28,7 +28,7 @@ DOORS = {
     "side file": (read_side_file, "a.toml"),
     "measurement": (read_measurement, "a.csv"),
     "columns": (read_columns, "a.csv"),
-    "recording": (lambda path: read_recording(path, load_actuator()), "a.csv"),
+    "recording": (lambda path: read(path, load_actuator()), "a.csv"),
     "challenge": (sealed_challenge, "a.challenge"),
     "session": (lambda path: session_file.read(path, {}, DataFolder(path.parent)), "a.emaviz"),
     "taken in": (lambda path: DataFolder(path.parent / "data").take_in(path), "a.csv"),

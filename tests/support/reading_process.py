@@ -72,7 +72,8 @@ class ReadingProcess:
 def _measurement(path: Path, most_bytes: int) -> None:
     from ema_model.errors import InputError
     from ema_model.files.limits import PAGE_BYTES
-    from ema_model.recordings import read_columns, read_measurement
+    from ema_model.recordings import read_columns
+    from ema_model.recordings.file import read_measurement
     from ema_model.recordings.health.card import health
 
     refused = None
@@ -120,12 +121,12 @@ def _challenge(path: Path, _: int) -> None:
     from ema_model.challenges import opened, sealed_challenge
     from ema_model.challenges.sealing import unseal
     from ema_model.files.limits import CHALLENGE_RECORDING_BYTES
-    from ema_model.recordings.read import read_recording
+    from ema_model.recordings import read
 
     with opened(sealed_challenge(path)) as one:
         actuator = load_actuator(one.actuator)
         for file in (*one.training, *one.holdout):
-            read_recording(file, actuator, max_bytes=CHALLENGE_RECORDING_BYTES)
+            read(file, actuator, max_bytes=CHALLENGE_RECORDING_BYTES)
     unseal(path)
 
 

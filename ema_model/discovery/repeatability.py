@@ -27,8 +27,8 @@ _LOST = 0.5  # of the blocks, from which on a recording cannot be compared in ti
 def with_divergence(data: Data, found: Fit) -> tuple[Data, float]:
     """The data with what such neighbours differ by in the model's floor, and the share of blocks that are lost.
 
-    A block is lost where the neighbours' currents (or positions) differ by more than noise and model floor, and by more
-    than in proportion: a recording without noise would show any change.
+    A block is lost where the neighbours' currents (or positions) differ by more than the noise, and by more than in
+    proportion: a recording without noise would show any change.
     """
     plant = found.plant
     if not isinstance(plant, ClosedLoop):
@@ -49,7 +49,7 @@ def with_divergence(data: Data, found: Fit) -> tuple[Data, float]:
         name = next((name for name in data.signals if name in apart), None)
         if name is not None:
             size = float(np.sqrt(np.mean(window.measured[name] ** 2)))
-            lost.append(apart[name] > np.maximum(one.sigma(name), _IN_PROPORTION * size))
+            lost.append(apart[name] > max(one.noise[name], _IN_PROPORTION * size))
     return replace(data, floors=floors), float(np.mean(np.concatenate(lost)) if lost else 0.0)
 
 

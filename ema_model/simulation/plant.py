@@ -10,6 +10,9 @@ from numpy.typing import ArrayLike
 
 from ema_model.actuator import Actuator
 from ema_model.errors import InputError, quoted
+from ema_model.errors import InputError
+from ema_model.identification.objective import simulated
+from ema_model.one_stack import library_stack, own_stack, stack_at_hand
 from ema_model.recordings import Measurement
 from ema_model.simulation import precompile as ahead
 from ema_model.simulation.one_stack import library_stack, stack_at_hand
@@ -43,6 +46,11 @@ def is_compiled(actuator: Actuator, effects: Mapping[str, Any]) -> bool:
     """Whether the next simulation with these effects begins at once."""
     kernel = _kernel(actuator)
     return ahead.is_compiled(stack_at_hand(actuator, effects, "reduced", kernel), kernel)
+
+
+def compile_own(actuator: Actuator) -> None:
+    """Compiles what every simulation without hidden effects takes, of an actuator that has effects in its file too."""
+    ahead.compile_here(own_stack(actuator), _kernel(actuator))
 
 
 def compile_behind(actuator: Actuator) -> None:

@@ -81,10 +81,10 @@ def _is_coming(stack: Stack, kernel: str) -> bool:
     return any(job.urgent and (stack, kernel) in job.kernels for job in _running)
 
 
-def _compile(stack: Stack, kernel: str) -> None:
+def compile_here(stack: Stack, kernel: str) -> None:
+    """Compiles a kernel of a stack in this process, or finds it in the cache."""
     actuator, samples = load_actuator(), np.zeros(1)
-    effects = {name: {} for name in stack.effects}
-    rows = monitor_rows(actuator, HEALTHY, stack, effects)
+    rows = monitor_rows(actuator, HEALTHY, stack, {})
     if kernel == "traces":
         state = initial_state(actuator, len(rows), stack=stack)
         result = np.empty((len(rows), 1, 4, LANES))
@@ -93,7 +93,7 @@ def _compile(stack: Stack, kernel: str) -> None:
         result = np.empty((len(rows), 1, LANES))
         exclusive(stack.inverse.currents, rows, samples, samples, samples, samples, 1.0, result)
     else:
-        rows = reference_rows(actuator, HEALTHY, stack, effects)
+        rows = reference_rows(actuator, HEALTHY, stack, {})
         state, pair = initial_reference_state(actuator, stack=stack), np.zeros(2)
         stack.reference.run(state, rows, pair, pair, 1, 1, 1e-6, np.empty((1, 11)))
 
@@ -103,4 +103,4 @@ if __name__ == "__main__":
         os.nice(15)
     for text in sys.argv[2:]:
         kernel, circuit, controller, *names = text.split("+")
-        _compile(find_stack(circuit, names, controller), kernel)
+        compile_here(find_stack(circuit, names, controller), kernel)

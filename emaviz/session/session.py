@@ -125,6 +125,7 @@ class Session:
             self.ready.set()
             notify(self.events.status, "Ready.")
             return
+        plant.compile_own(self.actuator)
         run = Settings().run()
         reference = plant.simulate(run, self.actuator, HEALTHY, {})
         simulate_monitor(run, self.actuator)

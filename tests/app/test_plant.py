@@ -11,7 +11,9 @@ from support.on_page import wait_until
 from ema_model.actuator import load_actuator
 from ema_model.errors import InputError
 from ema_model.faults import HEALTHY, vector
+from ema_model.one_stack import library_stack, own_stack, stack_at_hand
 from ema_model.simulation import plant
+from ema_model.simulation import precompile as ahead
 from ema_model.simulation.run import Run, simulate_monitor, simulate_reference
 from emaviz.page.app import App
 from emaviz.session.actuators import shipped_actuators
@@ -107,3 +109,20 @@ def replace_first(k, value):
     changed = k.copy()
     changed[0] = value
     return changed
+
+
+@pytest.mark.parametrize(("name", "kernel"), [(None, "run"), (SERVO, "traces")])
+def test_a_start_compiles_the_plants_own_kernels_and_behind_them_the_librarys(tmp_path, monkeypatch, name, kernel):
+    asked = []
+    monkeypatch.setattr(ahead, "compile_ahead", lambda kernels, urgent=True: asked.append((list(kernels), urgent)))
+    ours = load_actuator() if name is None else actuator(name)
+    session = Session(ours, tmp_path)
+    session.start()
+    try:
+        wait_until(lambda: asked, 120.0)
+    finally:
+        session.close()
+    library = library_stack(ours)
+    assert asked == [([(library, kernel), (library, "traces")], False)]
+    assert stack_at_hand(ours, [], "reduced", kernel) is own_stack(ours)
+    assert plant.is_compiled(ours, {}) and not plant.is_compiled(ours, {"cogging_torque_3": {}})

@@ -10,12 +10,9 @@ from numpy.typing import ArrayLike
 
 from ema_model.actuator import Actuator
 from ema_model.errors import InputError, quoted
-from ema_model.errors import InputError
-from ema_model.identification.objective import simulated
-from ema_model.one_stack import library_stack, own_stack, stack_at_hand
 from ema_model.recordings import Measurement
 from ema_model.simulation import precompile as ahead
-from ema_model.simulation.one_stack import library_stack, stack_at_hand
+from ema_model.simulation.one_stack import library_stack, own_stack, stack_at_hand
 from ema_model.simulation.run import Run, simulate_monitor, simulate_reference
 
 _RATE_HZ = {"filtered": 10_000.0, "raw": 100_000.0}  # of what is identified, by the fitness that it is for

@@ -57,7 +57,7 @@ def compile_ahead(kernels: Iterable[tuple[Stack, str]], *, urgent: bool = True) 
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
-        env={**os.environ, "PYTHONPATH": paths, "EMAVIZ_CACHE_DIR": str(cache_folder().parents[2])},
+        env={**os.environ, "PYTHONPATH": paths, "EMAVIZ_CACHE_DIR": str(cache_folder().parents[1])},
     )
     _running.append(_Job(process, missing, urgent))
 

@@ -133,6 +133,13 @@ class DataFolder:
             self._receiving[path] = lock
         return path
 
+    def drop(self, part: Path) -> None:
+        """Gives up what `part` began."""
+        with suppress(OSError):
+            part.unlink()
+        if lock := self._receiving.pop(part, None):
+            lock.release()
+
     def keep(self, part: Path, filename: str) -> Path:
         """Gives a finished transfer its name; returns where it is.  The part is gone in any case."""
         try:
@@ -141,10 +148,7 @@ class DataFolder:
         except OSError as error:
             raise InputError(f"{shown(filename)}: cannot be kept ({error.strerror}); check the disk") from None
         finally:
-            with suppress(OSError):
-                part.unlink()
-            if lock := self._receiving.pop(part, None):
-                lock.release()
+            self.drop(part)
         return path
 
     def take_in(self, given: Path) -> Path:

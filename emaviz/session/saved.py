@@ -115,7 +115,7 @@ def _take_files(archive: SafeZip, document: Mapping[str, Any], folder: DataFolde
                 here = folder.folder / name
                 part = _unpacked(archive, _FILES + name, folder)
                 if folder.holds(here) and here.is_file() and filecmp.cmp(here, part, shallow=False):
-                    part.unlink()
+                    folder.drop(part)
                     names[name] = name
                     continue
                 kept.append(folder.keep(part, Path(name).name))
@@ -138,7 +138,7 @@ def _unpacked(archive: SafeZip, name: str, folder: DataFolder) -> Path:
         with part.open("xb") as file:
             archive.copy(name, file)
     except BaseException:
-        part.unlink(missing_ok=True)
+        folder.drop(part)
         raise
     return part
 

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from plotly.offline import get_plotlyjs
 from support.comparison_by_hand import comparison as by_hand
 
+from ema_model.quantities.numbers import number
 from emaviz.figures import (
     calibration_scores,
     explained,
@@ -208,7 +209,7 @@ def test_ranges_over_the_end_of_a_turn(low, high, parts):
     [(0.0352, "0.0352"), (1.3e-5, "1.30·10⁻⁵"), (-12.34, "−12.3"), (1234.0, "1234"), (np.nan, "–"), (0, "0.00")],
 )
 def test_numbers_are_short(value, text):
-    assert quantity.number(value) == text
+    assert number(value) == text
 
 
 def test_units_suit_the_size():

@@ -36,20 +36,20 @@ def test_values_are_escaped_and_templates_are_not(name):
 
 
 def test_the_page_gets_html_and_markdown_in_no_other_way():
-    """Markdown is for literals that are never written anew; all other pieces come from page_text."""
+    """Markdown is for literals that are never written anew; all other pieces come from text.html."""
     wrong = []
     for path in Path(emaviz.__file__).parent.rglob("*.py"):
         tree = ast.parse(path.read_text(encoding="utf-8"))
         plain = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
         for node in ast.walk(tree):
             name = node.func.attr if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) else ""
-            if name == "add_html" and path.name != "page_text.py":
-                wrong.append(f"{path.name}:{node.lineno}: add_html of viser; take page_text's")
+            if name == "add_html" and path.name != "html.py":
+                wrong.append(f"{path.name}:{node.lineno}: add_html of viser; take text.html's")
             if name == "add_markdown":
                 (text,) = node.args
                 ours = isinstance(text, ast.Constant) or (isinstance(text, ast.Name) and text.id.isupper())
                 if id(node) not in plain or not ours:
-                    wrong.append(f"{path.name}:{node.lineno}: Markdown that is no literal; take page_text's add_html")
+                    wrong.append(f"{path.name}:{node.lineno}: Markdown that is no literal; take text.html's add_html")
     assert not wrong
 
 

@@ -11,9 +11,9 @@ from support.on_page import wait_until
 from ema_model.actuator import load_actuator
 from ema_model.errors import InputError
 from ema_model.faults import HEALTHY, vector
-from ema_model.one_stack import library_stack, own_stack, stack_at_hand
 from ema_model.simulation import plant
 from ema_model.simulation import precompile as ahead
+from ema_model.simulation.one_stack import library_stack, own_stack, stack_at_hand
 from ema_model.simulation.run import Run, simulate_monitor, simulate_reference
 from emaviz.page.app import App
 from emaviz.session.actuators import shipped_actuators

@@ -19,7 +19,7 @@ def test_what_diverges_at_every_strength_cannot_be_shown(monkeypatch):
     story = begun([recording], actuator)
     values = len(story.current.residual)
     strange = np.array([1e200, np.inf, np.nan, -1e180])[np.arange(values) % 4]
-    monkeypatch.setattr(fingerprints, "_changes", lambda data, found, lanes, _: np.tile(strange, (len(lanes), 1)))
+    monkeypatch.setattr(fingerprints, "_changes", lambda data, found, lanes: np.tile(strange, (len(lanes), 1)))
     prints = fingerprints.fingerprints(story.data, story.current, ["constant_load", "cogging_torque"], [12])
     assert all(np.all(one.columns == 0.0) for one in prints)
     assert all(one.predicted_drop == 0.0 and one.untestable_reason for one in scored(story.current, prints))

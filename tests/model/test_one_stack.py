@@ -10,18 +10,18 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from ema_model import one_stack
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
 from ema_model.effects import CATALOGUE, find
 from ema_model.effects.user import user_torque
 from ema_model.faults import HEALTHY
-from ema_model.identification.objective import Objective, simulated
+from ema_model.identification.objective import Objective
 from ema_model.models import ClosedLoop, InverseDynamics
-from ema_model.one_stack import LIBRARY, library_stack, own_stack, stack_at_hand
 from ema_model.physics.rows import LANES
+from ema_model.simulation import one_stack
 from ema_model.simulation.one_stack import LIBRARY, library_stack, own_stack, stack_at_hand
 from ema_model.simulation.pack import initial_reference_state, initial_state, monitor_rows, reference_rows
+from ema_model.simulation.plant import simulated
 from ema_model.simulation.precompile import is_compiled
 from ema_model.simulation.run import Run
 from ema_model.stacks import ADVANCE, PLACES, Stack, exclusive
@@ -186,10 +186,8 @@ def test_what_is_compared_goes_in_the_library_and_what_is_searched_has_its_own(m
 TAKEN = """
 import sys
 from ema_model.actuator import load_actuator
-from ema_model.simulation.precompile import _compile, compile_ahead, is_compiled, wait_for
 from ema_model.simulation.one_stack import library_stack, own_stack, stack_at_hand
 from ema_model.simulation.precompile import compile_ahead, compile_here, is_compiled, wait_for
-from ema_model.one_stack import library_stack, own_stack, stack_at_hand
 actuator, names = load_actuator(), ["winding_resistance"]
 assert stack_at_hand(actuator, names, "reduced", "currents") is library_stack(actuator)
 own = own_stack(actuator, names)

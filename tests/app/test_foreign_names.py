@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import hostile
 import pytest
-from hostile import FRAME, IMAGE, MARKDOWN
+from support import hostile
+from support.hostile import FRAME, IMAGE, MARKDOWN
 from support.on_page import choose, wait_until
 
 from emaviz.page.app import App

@@ -297,7 +297,7 @@ BOMBS: dict[str, tuple[str, Write, str]] = {
         "nested too deeply",
     ),
     "side file of digits": ("side file", lambda p, n: Path.write_bytes(p, b"x=" + b"1" * 90_000), "too many digits"),
-    "side file, large": ("side file", lambda p, n: Path.write_bytes(p, b"# x\n" * (n // 8)), "over 100 kB"),
+    "side file, large": ("side file", lambda p, n: Path.write_bytes(p, b"# x\n" * (n // 8)), "limit of 0.1 MB"),
     "actuator of deep keys": (
         "actuator",
         lambda p, n: Path.write_bytes(p, b"a" + b".a" * 49_000 + b"=1"),
@@ -309,7 +309,7 @@ BOMBS: dict[str, tuple[str, Write, str]] = {
         lambda p, n: Path.write_bytes(p, b"schema=0x" + b"f" * 90_000),
         "too many digits",
     ),
-    "actuator, large": ("actuator", lambda p, n: Path.write_bytes(p, b"# x\n" * (n // 8)), "over 100 kB"),
+    "actuator, large": ("actuator", lambda p, n: Path.write_bytes(p, b"# x\n" * (n // 8)), "limit of 0.1 MB"),
     "session by bzip2": (
         "session",
         lambda p, n: session(p, LISTED, {"files/uploads/0.csv": 4 * n}, zipfile.ZIP_BZIP2),

@@ -32,6 +32,18 @@ class FileLock:
                 return cls(path, descriptor)
             os.close(descriptor)
 
+    @staticmethod
+    def is_held(path: Path) -> bool:
+        """Whether somebody living holds the lock; a file that a killed process left is no lock."""
+        try:
+            descriptor = os.open(path, os.O_RDWR)
+        except OSError:
+            return False
+        try:
+            return not _try_lock(descriptor)
+        finally:
+            os.close(descriptor)
+
     def release(self) -> None:
         """Removes the file and unlocks; a second call does nothing."""
         if self._descriptor < 0:

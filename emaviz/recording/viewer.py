@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote, unquote, urlsplit
 
+from ema_model.files.lock import FileLock
 from ema_model.files.whole_file import lock_path
 from emaviz.recording.assets import viewer_assets
 from emaviz.recording.errors import RecordingError
@@ -91,7 +92,7 @@ class ViewerHost:
         if Path(name).name != name or not name.endswith(".rrd") or "\0" in name or self.only not in (None, name):
             return None
         part = part_of(self.folder / name)
-        return part if part.is_file() and not part.is_symlink() and lock_path(part).exists() else None
+        return part if part.is_file() and not part.is_symlink() and FileLock.is_held(lock_path(part)) else None
 
     def close(self) -> None:
         """Stops serving and frees the port."""
@@ -219,7 +220,7 @@ class _Handler(BaseHTTPRequestHandler):
             self._head(HTTPStatus.OK, headers)
             self.close_connection = True
             while self.command == "GET":
-                done = not (part.exists() and lock.exists()) or self.server.host.closing.is_set()
+                done = not (part.exists() and FileLock.is_held(lock)) or self.server.host.closing.is_set()
                 while chunk := file.read(1 << 16):
                     self.wfile.write(chunk)
                 if done:

@@ -143,10 +143,16 @@ class DataFolder:
     def keep(self, part: Path, filename: str) -> Path:
         """Gives a finished transfer its name; returns where it is.  The part is gone in any case."""
         try:
-            path = self.place(filename)
+            return self.keep_at(part, self.place(filename))
+        finally:
+            self.drop(part)
+
+    def keep_at(self, part: Path, path: Path) -> Path:
+        """Puts a finished transfer in that place of the folder.  The part is gone in any case."""
+        try:
             os.replace(part, path)
         except OSError as error:
-            raise InputError(f"{shown(filename)}: cannot be kept ({error.strerror}); check the disk") from None
+            raise InputError(f"{shown(path.name)}: cannot be kept ({error.strerror}); check the disk") from None
         finally:
             self.drop(part)
         return path

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import filecmp
 import json
-import os
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -122,8 +121,7 @@ def _take_files(archive: SafeZip, document: Mapping[str, Any], folder: DataFolde
                 names[name] = folder.name_of(kept[-1])
                 side = _FILES + side_path(Path(name)).as_posix()
                 if side in inside and side != _FILES + name:
-                    os.replace(_unpacked(archive, side, folder), side_path(kept[-1]))
-                    kept.append(side_path(kept[-1]))
+                    kept.append(folder.keep_at(_unpacked(archive, side, folder), side_path(kept[-1])))
     except BaseException:  # half a session is of no use
         for path in kept:
             path.unlink(missing_ok=True)

@@ -108,6 +108,7 @@ def test_a_session_carries_its_files_to_another_folder(folder, tmp_path):
     assert taken == [({"x": [1, 2]}, {"uploads/a.csv": "uploads/a-2.csv"})]
     assert (other.uploads / "a-2.csv").read_text() == (folder.uploads / "a.csv").read_text()
     assert (other.uploads / "a-2.toml").read_text() == "# side\n"
+    assert not [path.name for path in other.uploads.iterdir() if path.name.startswith(".")], "no draft, no lock"
     assert (other.uploads / "a.csv").read_text() == "another file of this name"
     session_file.read(path, {}, other)
     session_file.read(path, {}, folder)

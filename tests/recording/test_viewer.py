@@ -10,6 +10,8 @@ import sys
 
 import pytest
 
+from ema_model.files.lock import FileLock
+from ema_model.files.whole_file import lock_path
 from emaviz.recording import RecordingError, RecordingWriter
 from emaviz.recording.viewer import ViewerHost, view
 
@@ -114,6 +116,19 @@ def test_one_file_only(tmp_path):
     with ViewerHost(tmp_path, only="a.rrd") as host:
         assert get(host, "/recordings/a.rrd")[0].status == 200
         assert get(host, "/recordings/b.rrd")[0].status == 404
+
+
+def test_what_a_killed_writer_left_does_not_keep_a_browser_waiting(tmp_path):
+    part = tmp_path / "a.rrd.part"
+    part.write_bytes(b"RRF2")
+    with ViewerHost(tmp_path) as host:
+        lock = FileLock.acquire(lock_path(part))
+        assert lock is not None and host.find_growing("a.rrd") == part
+        lock.release()
+        lock_path(part).touch()  # of a process that is gone
+        assert host.find_growing("a.rrd") is None
+        answer, _ = get(host, "/recordings/a.rrd")
+        assert answer.status == 404
 
 
 def test_a_host_that_cannot_start_says_why(tmp_path):

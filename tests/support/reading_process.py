@@ -149,6 +149,7 @@ READERS: dict[str, Callable[[Path, int], Any]] = {
 
 def _checked(line: str) -> str:
     assert line.isprintable(), f"the refusal is not one line: {line!r}"
+    assert len(line) < 1_000, f"the refusal is {len(line)} characters long: {line[:200]!r}…"
     return line
 
 

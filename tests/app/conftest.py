@@ -28,6 +28,7 @@ def page(browser: Any, app: App) -> Iterator[Any]:
     # An earlier test may have left work that brings another panel to the front when it ends.
     wait_until(lambda: not (app.comparing.running or app.discovering.running or app.session.worker.busy))
     app.session.refresh()  # brings the signals there
+    app.strip.play(False)  # software GL draws a moving actuator with most of a core
     tab.on("request", lambda request: asked.append(request.url))
     tab.goto(app.address)
     tab.get_by_role("tab", name="Explore").wait_for(timeout=60_000)

@@ -10,6 +10,8 @@ from typing import Any
 import pytest
 from support.browser import SOFTWARE_GL
 
+# As `emaviz` says it, before any test imports numpy: two processes' threads would wait for each other.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # Tests take what a first use takes; what is compiled behind it, they would wait for elsewhere.
 os.environ["EMAVIZ_COMPILE_AHEAD"] = "0"
 

@@ -119,7 +119,7 @@ def _finite(value: float) -> float | None:
 def _with_settings(
     actuator: Actuator, effects: Mapping[str, Mapping[str, float]] | None
 ) -> dict[str, dict[str, float]]:
-    added = {name: find(name).settings(dict(given)) for name, given in (effects or {}).items()}
+    added = {name: find(name, actuator.axes).settings(dict(given)) for name, given in (effects or {}).items()}
     return {**actuator.effects, **added}
 
 

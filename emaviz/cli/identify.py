@@ -10,6 +10,7 @@ import numpy as np
 
 from ema_model import faults
 from ema_model.actuator import Actuator, save_actuator
+from ema_model.actuator.naming import on_axes
 from ema_model.actuator.readings import readings, sentences
 from ema_model.discovery.model_fit import with_effect
 from ema_model.errors import InputError
@@ -48,7 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Fits, records and prints."""
     actuator = options.actuator_of(arguments)
-    for name, settings in options.effects_of(arguments).items():
+    for name, settings in options.effects_of(arguments, actuator.axes).items():
         actuator = with_effect(actuator, name, settings)
     truth = options.faults_of(arguments) if arguments.fault or not arguments.files else None
     progress = output.Progress()
@@ -131,7 +132,7 @@ def result(answer: Identification, actuator: Actuator, holdout_rmse: float | Non
         "algorithm": answer.algorithm,
         "polished": answer.polished,
         "searched_k": answer.searched_k,
-        "parameters": {actuator.axes.path(path): value for path, value in answer.parameters.items()},
+        "parameters": {on_axes(path, actuator.axes).path: value for path, value in answer.parameters.items()},
         "holdout_rmse": holdout_rmse,
         "history": {"rmse": answer.rmse_history, "k": answer.k_history},
     }

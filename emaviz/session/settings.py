@@ -16,6 +16,7 @@ from ema_model.effects import find
 from ema_model.errors import InputError, quoted
 from ema_model.faults import HEALTHY, physical
 from ema_model.identification.run import ALGORITHMS
+from ema_model.quantities.axes import ROTARY, Axes
 from ema_model.simulation.plant import FITNESSES
 from ema_model.simulation.run import Run
 from ema_model.simulation.sensors import Sensors
@@ -36,6 +37,7 @@ _PLAIN = (
 class Settings:
     """Everything that the controls set; only the setters below change it."""
 
+    axes: Axes = ROTARY  # of the actuator, which are not saved
     k: NDArray[np.float64] = field(default_factory=lambda: HEALTHY.copy())
     command: str = "chirp"
     command_settings: dict[str, dict[str, Any]] = field(default_factory=lambda: {name: {} for name in COMMANDS})
@@ -106,7 +108,7 @@ class Settings:
 
     def set_effect(self, name: Any, parameter: str | None = None, value: Any = None) -> None:
         """Hides an effect in the plant, or changes one of its parameters; InputError leaves the old one."""
-        effect = find(str(name))
+        effect = find(str(name), self.axes)
         tried = dict(self.effects.get(effect.name) or effect.settings({}))
         if parameter is not None:
             tried[parameter] = number(value, parameter)
@@ -171,7 +173,7 @@ class Settings:
         """Takes what `saved` gave; InputError, and nothing is changed, if anything in it makes no sense."""
         if not isinstance(saved, dict):
             raise InputError("the session's settings are damaged; save it anew")
-        new = Settings()
+        new = Settings(axes=self.axes)
         try:
             for index, value in enumerate(saved.get("k", HEALTHY)):
                 new.set_fault(index, value)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from ema_model.actuator.naming import on_axes
 from ema_model.actuator.readings import sentences as phrases_of
 from ema_model.discovery import Discovery, Verified
 from ema_model.discovery.result import Added, Rung
@@ -13,7 +14,7 @@ from ema_model.estimation import Calibrated
 from ema_model.faults import BY_NAME, FAULTS, NAMES
 from ema_model.quantities.axes import Axes
 from ema_model.quantities.numbers import number
-from ema_model.quantities.titles import in_sentence, parameter_title
+from ema_model.quantities.titles import in_sentence
 from ema_model.recordings import SIGNALS
 from emaviz.text.run import run_in_words
 
@@ -61,7 +62,7 @@ def sentences(found: Discovery) -> list[str]:
             rivals = _listed([in_sentence(effect_title(name)) for name in one.same_as])
             told.append(f"These recordings cannot tell {in_sentence(effect_title(one.name))} from {rivals}.")
     if found.parameters_outside_tolerance:
-        outside = _listed([parameter(found.actuator.axes, path) for path in found.parameters_outside_tolerance])
+        outside = _listed([on_axes(path, found.actuator.axes).title for path in found.parameters_outside_tolerance])
         whose = "its" if len(found.parameters_outside_tolerance) == 1 else "their"
         told.append(f"Outside {whose} tolerance: {outside}.")
     if found.unknown is not None:
@@ -124,17 +125,8 @@ def rung_title(label: str, axes: Axes) -> str:
         return f"{sign} {effect_title(name)}"
     path, outside, _ = label.partition(" outside its tolerance")
     if outside:
-        return f"{parameter(axes, path)} freed"
+        return f"{on_axes(path, axes).title} freed"
     return label[:1].upper() + label[1:]
-
-
-def parameter(axes: Axes, path: str) -> str:
-    """'Motor inertia' of 'motor.inertia_kgm2', by the name that the actuator's axes give it."""
-    section, _, rest = path.partition(".")
-    if section != "effects":
-        return parameter_title(axes.path(path))
-    effect, _, name = rest.partition(".")
-    return f"{effect_title(effect)}: {in_sentence(parameter_title('.' + name))}"
 
 
 def value(one: Calibrated) -> str:

@@ -12,7 +12,7 @@ from ema_model.discovery.result import Added
 from ema_model.effects import CATALOGUE, find
 from ema_model.faults import BY_NAME, NAMES
 from ema_model.quantities.numbers import Quantity, number
-from ema_model.quantities.titles import in_sentence, parameter_title, unit_of
+from ema_model.quantities.titles import in_sentence
 from emaviz.page.discover.cards import BOX
 from emaviz.text.discovery import effect_title, fitted_of, value
 from emaviz.text.html import Html, html, joined
@@ -96,10 +96,10 @@ def _effect(name: str, given: dict[str, float], found: Discovery, added: tuple[A
     low, high = fitted.interval90
     inside = low <= given[first.name] <= high
     near = inside or abs(fitted.value - given[first.name]) <= _NEAR * abs(given[first.name])
-    shown = Quantity("", unit_of(first.name)).scaled([given[first.name]])
+    shown = Quantity("", first.unit).scaled([given[first.name]])
     half = number(shown.factor * 0.5 * (high - low), 2)
     told = (
-        f"{in_sentence(parameter_title(first.name))} {shown.text(given[first.name])} in truth, "
+        f"{in_sentence(first.title)} {shown.text(given[first.name])} in truth, "
         f"{number(shown.factor * fitted.value)} ± {half} {shown.unit} found".rstrip()
     )
     if order is not None:

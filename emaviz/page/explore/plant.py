@@ -8,7 +8,6 @@ from typing import Any
 import viser
 
 from ema_model.effects import CATALOGUE, find
-from ema_model.quantities.titles import labelled
 from emaviz.page.page import Page
 from emaviz.text.html import Html, add_html, html, said
 
@@ -84,15 +83,15 @@ class PlantControls:
             self._choice.value = _NONE
             self._chosen()
 
-    @staticmethod
-    def _clear(name: str) -> tuple[str, float]:
+    def _clear(self, name: str) -> tuple[str, float]:
         """The first parameter at its clear severity."""
-        effect = find(name)
+        effect = find(name, self._page.session.actuator.axes)
         return effect.parameters[0].name, effect.severities[1]
 
     def _show(self, name: str) -> None:
         """The parameters of an effect that is in the plant now."""
-        gui, session, effect = self._page.server.gui, self._page.session, find(name)
+        gui, session = self._page.server.gui, self._page.session
+        effect = find(name, session.actuator.axes)
         with self._folder:
             folder = gui.add_folder(effect.title)
         self._shown[name] = folder
@@ -101,7 +100,7 @@ class PlantControls:
                 value = session.settings.effects[name][parameter.name]
                 span = parameter.high - parameter.low
                 entry = gui.add_number(
-                    labelled(parameter.name),
+                    parameter.label,
                     int(value) if parameter.integer else value,
                     min=parameter.low,
                     max=parameter.high,

@@ -7,6 +7,8 @@ from numpy.typing import ArrayLike
 
 from ema_model.actuator.actuator import Actuator
 from ema_model.faults import physical
+from ema_model.quantities.numbers import amount
+from ema_model.quantities.sides import USER
 
 
 def readings(k: ArrayLike, actuator: Actuator) -> dict[str, float]:
@@ -29,7 +31,7 @@ def sentences(k: ArrayLike, actuator: Actuator) -> tuple[str, ...]:
     r = readings(k, actuator)
     return (
         f"friction × {r['friction_factor']:.2f}",
-        f"backlash {r['backlash_rad'] * 1e6:.0f} µrad",
+        f"backlash {amount(r['backlash_rad'], actuator.axes.unit('rad', USER))}",
         f"phase A: {r['turns_a']:.0%} of turns",
         f"phase B: {r['turns_b']:.0%} of turns",
         f"phase C: {r['turns_c']:.0%} of turns",

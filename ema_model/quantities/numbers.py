@@ -80,6 +80,12 @@ class Quantity:
         return f"{number(value * self.factor)} {self.unit}".strip()
 
 
+def with_uncertainty(value: float, half: float, unit: str) -> str:
+    """'12.2 ± 0.70 mN·m': half the width of an interval with two digits."""
+    shown = Quantity("", unit).scaled(value)
+    return f"{number(shown.factor * value)} ± {number(shown.factor * half, 2)} {shown.unit}".rstrip()
+
+
 def amount(value: float, unit: str) -> str:
     """A size with its unit, prefixed so that it reads well: 0.0352 N·m → '35.2 mN·m'."""
     return Quantity("", unit).scaled(value).text(value)

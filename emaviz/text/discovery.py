@@ -13,9 +13,10 @@ from ema_model.errors import InputError
 from ema_model.estimation import Calibrated
 from ema_model.faults import BY_NAME, FAULTS, NAMES
 from ema_model.quantities.axes import Axes
-from ema_model.quantities.numbers import number
+from ema_model.quantities.numbers import amount, number, with_uncertainty
+from ema_model.quantities.shown import of_signal
+from ema_model.quantities.sides import USER
 from ema_model.quantities.titles import in_sentence
-from ema_model.recordings import SIGNALS
 from emaviz.text.run import run_in_words
 
 VERDICTS = {
@@ -88,11 +89,12 @@ def next_experiment(found: Discovery) -> list[str]:
     best = found.next_experiment
     if best is None:
         return []
-    asked = f"Record {run_in_words(best.command, best.settings, best.duration_s)}"
+    axes = found.actuator.axes
+    asked = f"Record {run_in_words(best.command, best.settings, best.duration_s, axes)}"
     if best.load_torque_Nm:
-        asked += f", under a load of {number(best.load_torque_Nm)} N·m at the user"
+        asked += f", under a load of {amount(best.load_torque_Nm, axes.unit('N·m', USER))} at the user"
     if best.add_signal:
-        names = [in_sentence(SIGNALS[name].title) if name in SIGNALS else name for name in best.add_signal.split(", ")]
+        names = [in_sentence(of_signal(name, axes).title) for name in best.add_signal.split(", ")]
         asked += f", and measure the {_listed(names)} as well"
     rivals = _listed([in_sentence(effect_title(name)) for name in best.separates])
     return [f"{asked}.", f"It would tell {rivals} apart: χ² of {best.expected_chi2:.0f} is expected between them."]
@@ -130,9 +132,9 @@ def rung_title(label: str, axes: Axes) -> str:
 
 
 def value(one: Calibrated) -> str:
-    """'0.0122 ± 0.0007 N·m': with half of the 90 % interval."""
+    """'12.2 ± 0.70 mN·m': with half of the 90 % interval."""
     half = 0.5 * (one.interval90[1] - one.interval90[0])
-    return f"{number(one.value)} ± {number(half, 2)} {one.unit}".rstrip()
+    return with_uncertainty(one.value, half, one.unit)
 
 
 def settings(found: Discovery, one: Added) -> dict[str, str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from argparse import Namespace
 from pathlib import Path
 
 import numpy as np
@@ -19,8 +20,12 @@ from ema_model.models.window import cut
 from ema_model.quantities.axes import Axes
 from ema_model.recordings import Measurement
 from ema_model.recordings.checks import check_needed
+from ema_model.recordings.health.card import health
 from ema_model.recordings.prepared import prepared
-from ema_model.simulation.run import Run
+from ema_model.simulation.run import Run, _finite
+from emaviz.cli.options import effects_of
+from emaviz.figures.signals import charts
+from emaviz.text.run import run_in_words
 
 PROJECT = Path(__file__).parents[2]
 ROTARY, LINEAR = Axes(), Axes("linear", "linear")
@@ -224,6 +229,31 @@ def test_a_still_signal_is_named_as_its_file_has_it(tmp_path):
         check_needed(prepared(still, actuator(tmp_path, LINEAR)), "motor_position_rad")
 
 
+@pytest.mark.parametrize(("axes", "unit"), [(LINEAR, "mm"), (SCREW, "mrad")])
+def test_the_health_card_measures_a_motor_in_its_own_unit(axes, unit, tmp_path):
+    name = f"motor_position_{unit[1:]}"
+    way = np.round(0.5 * np.sin(9.0 * TIME) / 0.02) * 0.02
+    found = health(prepared(Measurement({"time_s": TIME, name: way}, name="slide"), actuator(tmp_path, axes)))
+    step = found.of("quantisation", name)
+    assert step is not None and step.sentence == f"Motor position comes in steps of 20.0 {unit}."
+
+
+def test_the_command_line_takes_effects_by_the_names_of_the_axes():
+    given = Namespace(effect=["torsional_compliance:stiffness_N_m=5e7,mass_kg=3", "stribeck_friction:speed_rad_s=4"])
+    screw = effects_of(given, SCREW)
+    assert screw["torsional_compliance"]["stiffness_Nm_rad"] == 5e7
+    assert screw["torsional_compliance"]["inertia_kgm2"] == 3.0 and screw["stribeck_friction"]["speed_rad_s"] == 4.0
+    with pytest.raises(InputError, match="has no parameter 'speed_rad_s'; it has speed_m_s"):
+        effects_of(given, LINEAR)
+
+
+def test_a_run_is_drawn_in_the_units_of_the_axes():
+    shown = {chart.signal: (chart.unit, chart.difference_unit) for chart in charts(SCREW)}
+    assert shown["user_position_rad"] == ("mm", "µm") and shown["motor_position_rad"] == ("rad", "mrad")
+    told = run_in_words("sine", {"amplitude_rad": 0.03, "frequency_Hz": 2.0}, 0.5, SCREW)
+    assert told == "a sine with amplitude 0.03 m, frequency 2 Hz, for 0.5 s"
+
+
 NEW_EFFECT = '''"""A rubber bumper."""
 
 from ema_model.effects.effect import USER, Effect, Parameter
@@ -282,7 +312,5 @@ def test_a_new_effect_at_the_user_is_one_file(tmp_path):
 
 
 def test_a_run_that_diverges_names_the_axis_own_signal():
-    from ema_model.simulation.run import _finite
-
     with pytest.raises(FloatingPointError, match="command_m is not finite"):
         _finite({"time_s": Run().time_s, "command_rad": np.full(Run().samples + 1, np.nan)}, "the model", SCREW)

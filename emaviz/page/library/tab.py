@@ -107,7 +107,7 @@ class EffectPage:
         self._run = gui.add_dropdown("Run", tuple(RUNS))
         self._place = gui.add_folder("What each parameter does")
         self._status = add_html(gui)
-        self._charts = EffectCharts(gui)
+        self._charts = EffectCharts(gui, page.session.actuator.axes)
         self._run.on_update(lambda event: event.client and self._ask())
 
     def open(self, name: str) -> None:

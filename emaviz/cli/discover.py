@@ -82,7 +82,8 @@ def text(found: Discovery) -> str:
     for one in found.effects:
         effect = find(one.name)
         lines += ["", f"{effect.title}: {effect.equation}"]
-        lines += [f"  {name:24}  {told}" for name, told in settings(found, one).items()]
+        names = {name: on_axes(f"effects.{one.key}.{name}", found.actuator.axes).name for name in one.parameters}
+        lines += [f"  {names.get(name, name):24}  {told}" for name, told in settings(found, one).items()]
         if one.same_as:
             lines.append(f"  these recordings cannot tell it from {', '.join(one.same_as)}")
     if found.faults:

@@ -16,6 +16,7 @@ from ema_model.discovery.model_fit import with_effect
 from ema_model.errors import InputError
 from ema_model.identification.objective import Objective
 from ema_model.identification.run import ALGORITHMS, ROBUST, Identification, Progress, identify
+from ema_model.quantities.numbers import amount
 from ema_model.recordings import Measurement
 from ema_model.simulation.plant import FITNESSES, simulated
 from ema_model.simulation.sensors import Sensors
@@ -100,7 +101,7 @@ def run(arguments: argparse.Namespace) -> int:
     if unseen and holdout_rmse is None:
         print("the model diverges on what was not fitted")
     elif holdout_rmse is not None:
-        print(f"rmse {holdout_rmse:.4f} A on what was not fitted: {', '.join(one.name for one in unseen)}")
+        print(f"rmse {amount(holdout_rmse, 'A')} on what was not fitted: {', '.join(one.name for one in unseen)}")
     if arguments.report:
         from emaviz.report import write_identification_report  # plotly takes a second to import
 
@@ -179,7 +180,7 @@ def _table(answer: Identification, actuator: Actuator) -> str:
     lines += sure.warnings
     error = "" if answer.truth is None else f", Err {answer.error_percent:.2f} %"
     lines.append(
-        f"rmse {answer.rmse:.4f} A{error}; {answer.evaluations} simulations in {answer.elapsed_s:.2f} s "
+        f"rmse {amount(answer.rmse, 'A')}{error}; {answer.evaluations} simulations in {answer.elapsed_s:.2f} s "
         f"({answer.algorithm}), compiled in {answer.compile_s:.1f} s"
     )
     return "\n".join(lines)

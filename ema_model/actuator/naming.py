@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, fields
 
 from ema_model.actuator.parameters import SECTIONS
@@ -48,6 +49,11 @@ def on_axes(path: str, axes: Axes) -> Named:
     kind, window, _ = path.partition(" ")
     unit, side = _OF_WINDOWS.get(kind, ("", None)) if window else ("", None)
     return Named(path, parameter_title(path), axes.unit(unit, side))
+
+
+def path_inside(path: str, among: Iterable[str], axes: Axes) -> str:
+    """The path inside of one that files and people have, among these; what is none of them stays."""
+    return next((one for one in among if on_axes(one, axes).path == path), path)
 
 
 def _of_effect(path: str, axes: Axes) -> Named:

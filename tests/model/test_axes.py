@@ -5,16 +5,18 @@ from __future__ import annotations
 import subprocess
 import sys
 from argparse import Namespace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from ema_model.actuator import Actuator, load_actuator, save_actuator
-from ema_model.actuator.naming import on_axes
+from ema_model.actuator import Actuator, Tolerance, load_actuator, save_actuator
+from ema_model.actuator.naming import on_axes, path_inside
 from ema_model.actuator.parameters import SECTIONS, numbers
 from ema_model.effects import CATALOGUE, Parameter, find
 from ema_model.errors import InputError
+from ema_model.estimation.problem import unknown_of
 from ema_model.models.inverse_dynamics import InverseDynamics
 from ema_model.models.window import cut
 from ema_model.quantities.axes import Axes
@@ -188,6 +190,16 @@ def test_files_name_effects_by_the_side_they_act_at(tmp_path):
         actuator(tmp_path, LINEAR).with_values({"motor.inertia_kgm2": -1.0})
     with pytest.raises(InputError, match="stop_low_m must be below stop_high_m"):
         actuator(tmp_path, SCREW, "position", "[transmission]\nstop_low_m = 1.0\nstop_high_m = 0.0\n")
+
+
+def test_what_to_calibrate_is_named_as_in_the_file(tmp_path):
+    slide = actuator(tmp_path, LINEAR)
+    slide = replace(slide, tolerances={"motor.inertia_kgm2": Tolerance(0.1, False)})
+    assert path_inside("motor.mass_kg", slide.tolerances, LINEAR) == "motor.inertia_kgm2"
+    assert path_inside("k2", slide.tolerances, LINEAR) == "k2"
+    assert unknown_of(slide, "motor.inertia_kgm2").nominal == 2.0
+    with pytest.raises(InputError, match=r"free may be motor\.mass_kg$"):
+        unknown_of(slide, "motor.dynamic_friction_Nm")
 
 
 TIME = np.linspace(0.0, 1.0, 500)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ema_model.actuator.naming import on_axes
 from ema_model.actuator.parameters import (
     SECTIONS,
     Controller,
@@ -92,10 +93,10 @@ class Actuator:
                 raise InputError(
                     f"no actuator parameter {quoted(path)!r}; write it as section.name, e.g. motor.inertia_kgm2"
                 )
-            check_value(section, name, value, "actuator")
+            check_value(section, name, value, "actuator", on_axes(path, changed.axes).name)
             check_value_is_read(changed.controller.kind, changed.inverter.kind, changed.axes, path, value, "actuator")
             changed = changed.varied({path: float(value)})
-        check_stops(changed.transmission, "actuator")
+        check_stops(changed.transmission, changed.axes, "actuator")
         return changed
 
     def varied(self, values: dict[str, Any]) -> Actuator:

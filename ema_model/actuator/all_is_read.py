@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import fields
 
 from ema_model.actuator.actuator import Actuator
+from ema_model.actuator.naming import on_axes
 from ema_model.actuator.parameters import SECTIONS
 from ema_model.actuator.unread import INVERSE, INVERSE_PLACES, NO_WINDING, WINDING_PLACES, check_value_is_read, unread
 from ema_model.errors import InputError
@@ -28,7 +29,9 @@ def check_all_is_read(actuator: Actuator, where: str) -> None:
         for path, value in rule.values.items():
             _check_value(actuator, path, value, f"{where}: recordings.where {rule.match}")
     for path in set(actuator.tolerances) & set(unread(actuator.controller.kind, actuator.inverter.kind)):
-        raise InputError(f"{where}: {actuator.axes.path(path)}: no model reads it, so that it cannot have a tolerance")
+        raise InputError(
+            f"{where}: {on_axes(path, actuator.axes).path}: no model reads it, so that it cannot have a tolerance"
+        )
     for name in actuator.effects:
         _check_effect_acts(actuator, name, where)
     if not known and actuator.step_s != Actuator.step_s:
@@ -42,14 +45,13 @@ def check_all_is_read(actuator: Actuator, where: str) -> None:
 def _check_reference_only(actuator: Actuator, where: str) -> None:
     for path in _REFERENCE_ONLY:
         if path in actuator.tolerances:
-            shown = actuator.axes.path(path)
+            shown = on_axes(path, actuator.axes).path
             raise InputError(f"{where}: {shown}: the fitted model leaves it out, so that it cannot have a tolerance")
     path = "transmission.viscous_friction_Nms_rad"
     if actuator.value(path) > max(actuator.motor.viscous_friction_Nms_rad, 0.0):
-        motor = actuator.axes.path("motor.viscous_friction_Nms_rad")
+        shown, motor = (on_axes(one, actuator.axes).path for one in (path, "motor.viscous_friction_Nms_rad"))
         raise InputError(
-            f"{where}: {actuator.axes.path(path)}: the fitted model leaves it out, as small beside the motor's own; "
-            f"add it to {motor}"
+            f"{where}: {shown}: the fitted model leaves it out, as small beside the motor's own; add it to {motor}"
         )
 
 

@@ -10,6 +10,7 @@ from typing import Any
 from ema_model.actuator.actuator import Actuator
 from ema_model.actuator.all_is_read import check_all_is_read
 from ema_model.actuator.layout import KINDS, USUAL, layout
+from ema_model.actuator.naming import on_axes
 from ema_model.actuator.parameters import SECTIONS, Rule, Tolerance, check_stops, check_value
 from ema_model.actuator.unread import unread
 from ema_model.errors import InputError, quoted
@@ -82,7 +83,7 @@ def _actuator(document: dict[str, Any], where: str) -> Actuator:
         raise InputError(f'{where}: [inverter] a cascade needs kind = "hysteresis" or "current"')
     tolerances: dict[str, Tolerance] = {}
     sections = {section: _section(section, tables[section], kinds, axes, tolerances, where) for section in SECTIONS}
-    check_stops(sections["transmission"], where)
+    check_stops(sections["transmission"], axes, where)
     actuator = Actuator(
         name=str(document.get("name", Path(where).stem)),
         description=str(document.get("description", "")),
@@ -105,9 +106,9 @@ def _section(
     section: str, given: dict[str, Any], kinds: dict[str, str], axes: Axes, tolerances: dict[str, Tolerance], where: str
 ) -> Any:
     needed, optional = layout(section, kinds)
-    inside = {axes.parameter(name): name for name in (*needed, *optional)}
+    inside = {on_axes(f"{section}.{name}", axes).name: name for name in (*needed, *optional)}
     reasons = unread(kinds["controller"], kinds["inverter"])
-    why = {axes.path(path).partition(".")[2]: reason for path, reason in reasons.items() if path.startswith(section)}
+    why = {on_axes(path, axes).name: reason for path, reason in reasons.items() if path.startswith(section)}
     for extra in set(given) - set(inside) - ({"kind"} if section in KINDS else set()):
         reason = f": {why[extra]}" if extra in why else ""
         raise InputError(
@@ -116,7 +117,7 @@ def _section(
     values: dict[str, Any] = {"kind": kinds[section]} if section in KINDS else {}
     for shown, name in inside.items():
         if shown in given:
-            values[name], tolerance = _entry(section, name, given[shown], where)
+            values[name], tolerance = _entry(section, name, shown, given[shown], where)
             if tolerance is not None:
                 tolerances[f"{section}.{name}"] = tolerance
         elif name in needed:
@@ -138,12 +139,12 @@ def _effects(
         table = _table(given, given_name, f"{where}: [effects]")
         kind = kind_of(given_name)
         try:
-            effect, table = (find(given_name), table) if kind is None else read_entries(kind, table)
+            effect, table = (find(given_name, axes), table) if kind is None else read_entries(kind, table)
         except InputError as error:
             raise InputError(f"{where}: {'[effects]' if kind is None else inside} {error}") from None
         if effect.name in effects:
             raise InputError(f"{where}: {inside} is the same as another one; write them as one")
-        names = {axes.parameter(p.name) if kind is None else p.name: p.name for p in effect.parameters}
+        names = {p.shown: p.name for p in effect.parameters}
         values = {}
         for shown, entry in table.items():
             if shown not in names:
@@ -172,30 +173,30 @@ def _faults(given: dict[str, Any], where: str) -> dict[str, float]:
     return faults
 
 
-def _entry(section: str, name: str, entry: Any, where: str) -> tuple[float, Tolerance | None]:
-    value, tolerance = _number_and_tolerance(section, name, entry, where)
-    check_value(section, name, value, where)
+def _entry(section: str, name: str, shown: str, entry: Any, where: str) -> tuple[float, Tolerance | None]:
+    value, tolerance = _number_and_tolerance(section, shown, entry, where)
+    check_value(section, name, value, where, shown)
     return value, tolerance
 
 
-def _number_and_tolerance(section: str, name: str, entry: Any, where: str) -> tuple[float, Tolerance | None]:
+def _number_and_tolerance(section: str, shown: str, entry: Any, where: str) -> tuple[float, Tolerance | None]:
     tolerance = None
     value = entry
     if isinstance(entry, dict):
         extra = set(entry) - {"value", "tolerance", "sigma", "free"}
         if extra or "value" not in entry:
-            raise InputError(f"{where}: [{section}] {name} takes value, tolerance or sigma, free")
+            raise InputError(f"{where}: [{section}] {shown} takes value, tolerance or sigma, free")
         value = entry["value"]
     if not math.isfinite(as_number(value)):
-        raise InputError(f"{where}: [{section}] {name} must be a number, not {quoted(value, 40)!r}")
+        raise InputError(f"{where}: [{section}] {shown} must be a number, not {quoted(value, 40)!r}")
     if isinstance(entry, dict) and ("tolerance" in entry or "sigma" in entry):
         given, scale = (entry["sigma"], 1.0) if "sigma" in entry else (entry["tolerance"], abs(value))
         sigma = as_number(given) * scale
         if not 0.0 < sigma < math.inf:
-            raise InputError(f"{where}: [{section}] {name}: the tolerance must be above 0 (sigma where value is 0)")
+            raise InputError(f"{where}: [{section}] {shown}: the tolerance must be above 0 (sigma where value is 0)")
         free = entry.get("free", True)
         if not isinstance(free, bool):
-            raise InputError(f"{where}: [{section}] {name}: free must be true or false, not {quoted(free)!r}")
+            raise InputError(f"{where}: [{section}] {shown}: free must be true or false, not {quoted(free)!r}")
         tolerance = Tolerance(sigma, free)
     return float(value), tolerance
 
@@ -260,7 +261,7 @@ def _rules(table: dict[str, Any], axes: Axes, where: str) -> tuple[Rule, ...]:
         for path, value in _table(rule, "set", where).items():
             section, _, shown = path.partition(".")
             inside = (
-                {axes.parameter(name): name for name in SECTIONS[section].__annotations__}
+                {on_axes(f"{section}.{name}", axes).name: name for name in SECTIONS[section].__annotations__}
                 if section in SECTIONS
                 else {}
             )
@@ -268,7 +269,7 @@ def _rules(table: dict[str, Any], axes: Axes, where: str) -> tuple[Rule, ...]:
                 raise InputError(
                     f'{where}: [[recordings.where]] no parameter {quoted(path, 60)!r}; write "section.name" = value'
                 )
-            check_value(section, inside[shown], value, f"{where}: recordings.where")
+            check_value(section, inside[shown], value, f"{where}: recordings.where", shown)
             values[f"{section}.{inside[shown]}"] = float(value)
         rules.append(Rule(rule["match"], values, kind))
     return tuple(rules)

@@ -7,9 +7,18 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 from ema_model.errors import InputError, quoted
+from ema_model.quantities.axes import Axes
 from ema_model.quantities.numbers import as_number
+from ema_model.quantities.sides import MOTOR, USER
 
 _FAR = 1e9  # rad, where an end stop is out of reach
+
+
+# Where a parameter sits: the side whose axis it is of, and for what is rad/rad, the side that it is counted by.
+_MOTOR = {"side": MOTOR}
+_USER = {"side": USER}
+_MOTOR_PER_USER = {"side": MOTOR, "per": USER}
+_USER_PER_MOTOR = {"side": USER, "per": MOTOR}
 
 
 @dataclass(frozen=True)
@@ -22,15 +31,15 @@ class Controller:
     """
 
     kind: str = "cascade"
-    position_gain_1_s: float = 0.0
-    speed_limit_rad_s: float = 0.0
-    speed_gain_Nms_rad: float = 0.0
-    integral_gain_Nm_rad: float = 0.0
-    derivative_gain_Nms2_rad: float = 0.0
-    integrator_window_rad: float = 1.0
-    torque_constant_Nm_A: float = 1.0
+    position_gain_1_s: float = field(default=0.0, metadata=_MOTOR_PER_USER)
+    speed_limit_rad_s: float = field(default=0.0, metadata=_MOTOR)
+    speed_gain_Nms_rad: float = field(default=0.0, metadata=_MOTOR)
+    integral_gain_Nm_rad: float = field(default=0.0, metadata=_MOTOR)
+    derivative_gain_Nms2_rad: float = field(default=0.0, metadata=_MOTOR)
+    integrator_window_rad: float = field(default=1.0, metadata=_USER)
+    torque_constant_Nm_A: float = field(default=1.0, metadata=_MOTOR)
     current_limit_A: float = math.inf
-    gain_1_rad: float = 0.0
+    gain_1_rad: float = field(default=0.0, metadata=_USER)
     output_limit: float = 1.0
 
 
@@ -48,28 +57,28 @@ class Inverter:
 class Motor:
     """Electric motor and rotor (T 3.2.5, Table 3.3)."""
 
-    torque_constant_Nm_A: float
-    inertia_kgm2: float
-    viscous_friction_Nms_rad: float
-    static_friction_Nm: float
-    dynamic_friction_Nm: float
+    torque_constant_Nm_A: float = field(metadata=_MOTOR)
+    inertia_kgm2: float = field(metadata=_MOTOR)
+    viscous_friction_Nms_rad: float = field(metadata=_MOTOR)
+    static_friction_Nm: float = field(metadata=_MOTOR)
+    dynamic_friction_Nm: float = field(metadata=_MOTOR)
     resistance_Ohm: float = 1.0
     inductance_H: float = 1e-6
     emf_scale: float = 1.0
     pole_pairs: float = 1.0
-    torque_limit_Nm: float = 1e9
-    rotor_offset_rad: float = 0.0
+    torque_limit_Nm: float = field(default=1e9, metadata=_MOTOR)
+    rotor_offset_rad: float = field(default=0.0, metadata=_MOTOR)
 
 
 @dataclass(frozen=True)
 class Transmission:
     """Gear, screw and user (T 3.2.6)."""
 
-    gear_ratio: float = 1.0
-    backlash_rad: float = 0.0
-    viscous_friction_Nms_rad: float = 0.0
-    stop_low_rad: float = -_FAR
-    stop_high_rad: float = _FAR
+    gear_ratio: float = field(default=1.0, metadata=_USER_PER_MOTOR)
+    backlash_rad: float = field(default=0.0, metadata=_USER)
+    viscous_friction_Nms_rad: float = field(default=0.0, metadata=_MOTOR)
+    stop_low_rad: float = field(default=-_FAR, metadata=_USER)
+    stop_high_rad: float = field(default=_FAR, metadata=_USER)
 
 
 @dataclass(frozen=True)
@@ -125,17 +134,19 @@ def low_limit(path: str) -> float:
     return -math.inf if path.startswith("effects.") or name in _ANY_SIGN else 0.0
 
 
-def check_value(section: str, name: str, value: Any, where: str) -> None:
-    """Raises InputError for what is no number, or not one that this parameter can have."""
+def check_value(section: str, name: str, value: Any, where: str, shown: str = "") -> None:
+    """Raises InputError for what is no number, or not one that this parameter can have; shown: its name in files."""
+    shown = shown or name
     if not math.isfinite(as_number(value)):
-        raise InputError(f"{where}: [{section}] {name} must be a number, not {quoted(value, 40)!r}")
+        raise InputError(f"{where}: [{section}] {shown} must be a number, not {quoted(value, 40)!r}")
     if name in _POSITIVE and value <= 0.0:
-        raise InputError(f"{where}: [{section}] {name} must be above 0, not {quoted(value)}")
+        raise InputError(f"{where}: [{section}] {shown} must be above 0, not {quoted(value)}")
     if name not in _ANY_SIGN and value < 0.0:
-        raise InputError(f"{where}: [{section}] {name} must not be negative, not {quoted(value)}")
+        raise InputError(f"{where}: [{section}] {shown} must not be negative, not {quoted(value)}")
 
 
-def check_stops(transmission: Transmission, where: str) -> None:
+def check_stops(transmission: Transmission, axes: Axes, where: str) -> None:
     """Raises InputError for end stops in the wrong order."""
     if not transmission.stop_low_rad < transmission.stop_high_rad:
-        raise InputError(f"{where}: [transmission] stop_low_rad must be below stop_high_rad")
+        low, high = (axes.name(name, USER) for name in ("stop_low_rad", "stop_high_rad"))
+        raise InputError(f"{where}: [transmission] {low} must be below {high}")

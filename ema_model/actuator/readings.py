@@ -7,6 +7,8 @@ from numpy.typing import ArrayLike
 
 from ema_model.actuator.actuator import Actuator
 from ema_model.faults import physical
+from ema_model.quantities.numbers import amount
+from ema_model.quantities.sides import USER
 
 
 def readings(k: ArrayLike, actuator: Actuator) -> dict[str, float]:
@@ -14,7 +16,7 @@ def readings(k: ArrayLike, actuator: Actuator) -> dict[str, float]:
     p = physical(k)
     return {
         "friction_factor": float(p.friction_factor),
-        "backlash_rad": float(p.backlash_factor * actuator.transmission.backlash_rad),
+        _backlash(actuator): float(p.backlash_factor * actuator.transmission.backlash_rad),
         "turns_a": float(p.turns[0]),
         "turns_b": float(p.turns[1]),
         "turns_c": float(p.turns[2]),
@@ -24,12 +26,16 @@ def readings(k: ArrayLike, actuator: Actuator) -> dict[str, float]:
     }
 
 
+def _backlash(actuator: Actuator) -> str:
+    return actuator.axes.name("backlash_rad", USER)
+
+
 def sentences(k: ArrayLike, actuator: Actuator) -> tuple[str, ...]:
     """The same as eight short phrases, one for each k."""
     r = readings(k, actuator)
     return (
         f"friction × {r['friction_factor']:.2f}",
-        f"backlash {r['backlash_rad'] * 1e6:.0f} µrad",
+        f"backlash {amount(r[_backlash(actuator)], actuator.axes.unit('rad', USER))}",
         f"phase A: {r['turns_a']:.0%} of turns",
         f"phase B: {r['turns_b']:.0%} of turns",
         f"phase C: {r['turns_c']:.0%} of turns",

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import fields
 
+from ema_model.actuator.naming import on_axes
 from ema_model.actuator.parameters import SECTIONS
 from ema_model.errors import InputError
 from ema_model.quantities.axes import Axes
@@ -82,4 +83,4 @@ def check_value_is_read(controller: str, inverter: str, axes: Axes, path: str, v
     reason = unread(controller, inverter).get(path)
     neutral = getattr(SECTIONS[section], name, None)  # a dataclass keeps its defaults on the class
     if reason is not None and value != neutral:
-        raise InputError(f"{where}: {axes.path(path)}: {reason}; leave it out")
+        raise InputError(f"{where}: {on_axes(path, axes).path}: {reason}; leave it out")

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from ema_model.actuator.actuator import Actuator
 from ema_model.actuator.layout import KINDS, layout
+from ema_model.actuator.naming import on_axes
 from ema_model.actuator.parameters import SECTIONS
 from ema_model.actuator.unread import unread
 from ema_model.errors import InputError, quoted
@@ -51,7 +52,7 @@ def as_toml(actuator: Actuator) -> str:
         for name in (*needed, *optional):
             value = float(getattr(getattr(actuator, section), name))
             if math.isfinite(value) and f"{section}.{name}" not in silent:
-                lines.append(_entry(actuator, f"{section}.{name}", axes.parameter(name), value))
+                lines.append(_entry(actuator, f"{section}.{name}", on_axes(f"{section}.{name}", axes).name, value))
     lines += _effects(actuator)
     if actuator.faults:
         lines += ["", "[faults]", *(f"{name} = {float(value)!r}" for name, value in actuator.faults.items())]
@@ -60,7 +61,9 @@ def as_toml(actuator: Actuator) -> str:
     for rule in actuator.rules:
         lines += ["", "[[recordings.where]]", f"match = {_text(rule.match)}", f"kind = {_text(rule.kind)}"]
         if rule.values:
-            given = ", ".join(f"{_text(axes.path(path))} = {float(value)!r}" for path, value in rule.values.items())
+            given = ", ".join(
+                f"{_text(on_axes(path, axes).path)} = {float(value)!r}" for path, value in rule.values.items()
+            )
             lines.append(f"set = {{ {given} }}")
     return "\n".join([*lines, ""])
 
@@ -82,8 +85,8 @@ def _effects(actuator: Actuator) -> list[str]:
         else:
             lines += ["", f"[effects.{name}]"]
             lines += [
-                _entry(actuator, f"effects.{name}.{n}", actuator.axes.parameter(n), float(v))
-                for n, v in settings.items()
+                _entry(actuator, path, on_axes(path, actuator.axes).name, float(value))
+                for path, value in ((f"effects.{name}.{one}", value) for one, value in settings.items())
             ]
     return lines
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ema_model.actuator import Actuator, load_actuator
+from ema_model.actuator.naming import path_inside
 from ema_model.comparison.assemble import residuals_of
 from ema_model.comparison.result import Compared, Comparison, SignalError
 from ema_model.comparison.verdict import judge
@@ -67,6 +68,8 @@ def compare(
     faults = actuator.faults if k is None else named(k)
     actuator = replace(actuator, effects=_with_settings(actuator, effects), faults=faults)
     wanted = weights_of(signals, actuator)
+    if free is not None:
+        free = [path_inside(path, actuator.tolerances, actuator.axes) for path in free]
     compile_behind(actuator)  # who compares an improved model does so again
     tell("measuring the model's floor")
     fitted = plant_for(recordings, actuator, stretches=fit_stretches(recordings, actuator))
@@ -119,7 +122,7 @@ def _finite(value: float) -> float | None:
 def _with_settings(
     actuator: Actuator, effects: Mapping[str, Mapping[str, float]] | None
 ) -> dict[str, dict[str, float]]:
-    added = {name: find(name).settings(dict(given)) for name, given in (effects or {}).items()}
+    added = {name: find(name, actuator.axes).settings(dict(given)) for name, given in (effects or {}).items()}
     return {**actuator.effects, **added}
 
 

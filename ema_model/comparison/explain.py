@@ -19,11 +19,11 @@ from ema_model.comparison.curves import families, harmonics, orders_in, quantile
 from ema_model.comparison.residuals import Residuals
 from ema_model.comparison.sentences import explanation_sentence
 from ema_model.quantities.axes import Axes
+from ema_model.quantities.variables import MODULATORS, VARIABLES
 from ema_model.recordings import SIGNALS
 
 Array = NDArray[np.float64]
 
-MODULATORS = ("1", "sign_speed", "current")
 _PAIRS = (1, 3, 6)  # orders that a curve of the angle is made of
 _LEAST_T = 4.0  # of the mean gain over its standard error, so that 1 % of all recordings raise a false alarm
 _LEAST_T_WHITE, _LEAST_WHITE = 2.0, 30.0  # or of a gain on few stretches, with its χ² against white noise
@@ -35,16 +35,6 @@ _LEAST_BLOCKS, _MOST_BLOCKS, _PIECE = 60, 40_000, 200
 # What an explanation must be better by, as a share, to go before a simpler one that does as well; of gains
 # below _SMALL a share of that, since a few χ² more say nothing.
 _FINER, _MODULATED, _SMALL = 0.015, 0.01, 200.0
-_DIRECT = {
-    "motor_angle": 0.0,
-    "motor_speed": 0.0,
-    "load": 0.0,
-    "current": 0.005,
-    "user_position": 0.01,
-    "acceleration": 0.03,
-    "temperature": 0.05,
-    "time": 0.15,
-}
 _NOT_FRICTION = 0.05  # what turns with the direction is friction, which knows speed, load and current
 _BINS = 24
 _LEAST_WITHIN = 0.3  # of a variable's variance, within recordings
@@ -215,7 +205,7 @@ def _candidate(
     gains = list(_by_family(residuals, used, y, values, variable, scale, bounded))
     if not gains:
         return None
-    penalty = _DIRECT[variable] + (_MODULATED if modulator != "1" else 0.0)
+    penalty = VARIABLES[variable].indirect + (_MODULATED if modulator != "1" else 0.0)
     if modulator == "sign_speed" and variable not in ("motor_speed", "load", "current"):
         penalty += _NOT_FRICTION
     totals = np.array([float(one.sum()) for one in gains])

@@ -14,9 +14,6 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-VARIABLES = (
-    *("motor_angle", "user_position", "motor_speed", "acceleration", "current", "load", "time", "temperature"),
-)
 _STILL = 1e-3  # of the largest speed, below which the motor counts as standing
 
 
@@ -37,9 +34,8 @@ class Adjustable:
 class Residuals:
     """Measurement minus model, by signal, per block, of one recording or of several joined; arrays are (blocks,).
 
-    `variables` has the names of `VARIABLES` that are known: motor_angle (rad, not wrapped), user_position (rad),
-    motor_speed (rad/s), acceleration (rad/s², of the motor), current (A), load (N·m at the user), time (s since
-    the recording's start), temperature (°C).  For linear axes rad is m and N·m is N.  A value that a recording
+    `variables` has those of `quantities.variables` that are known, in their units: the motor's angle not wrapped, the
+    acceleration the motor's, the load at the user, the time since the recording's start.  A value that a recording
     does not have is NaN; so is a residual that a recording lacks.
     """
 

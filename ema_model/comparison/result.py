@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ema_model.comparison.explain import Explanation
 from ema_model.comparison.residuals import Residuals
+from ema_model.quantities.numbers import Quantity
 
 if TYPE_CHECKING:
     from ema_model.actuator import Actuator
@@ -33,7 +34,7 @@ class Region:
     rmse: float  # in the signal's unit
     mean: float  # of the residual, likewise
     excess: float  # rmse over the floor there
-    sentence: str  # "The motor needs 35 mN·m more at 300 rad/s than the model."
+    sentence: str  # "The motor needs 35.2 mN·m more at 300 rad/s than the model."
     blocks: NDArray[np.bool_]  # (blocks,) of the joined residuals
 
 
@@ -46,6 +47,10 @@ class SignalError:
     nrmse: float  # rmse over the range of the measured signal
     noise_floor: float  # noise and model floor, rms
     mean_absolute: float
+
+    def quantity(self, signal: Quantity) -> Quantity:
+        """The signal in the prefix that all numbers of its error are written with."""
+        return signal.scaled([self.rmse, self.noise_floor])
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,55 +2,25 @@
 
 from __future__ import annotations
 
-import math
-
 from ema_model.quantities.axes import Axes
+from ema_model.quantities.numbers import Quantity, number
+from ema_model.quantities.shown import of_residual
 from ema_model.quantities.titles import in_sentence
+from ema_model.quantities.variables import MODULATORS, VARIABLES, is_turn, of_variable
 from ema_model.recordings import SIGNALS
-
-_PREFIXES = ((1e-6, "µ"), (1e-3, "m"), (1.0, ""), (1e3, "k"))
-_SCALED = ("N·m", "rad", "A", "m", "N", "V", "rad/s", "m/s")
-_EXPLAINED = {
-    "motor_angle": "repeats with the motor's angle",
-    "user_position": "goes with the user's position",
-    "motor_speed": "goes with the motor's speed",
-    "acceleration": "goes with the acceleration",
-    "current": "goes with the motor's current",
-    "load": "goes with the load",
-    "time": "drifts with time",
-    "temperature": "goes with the temperature",
-}
-_MODULATED = {"1": "", "sign_speed": ", with the direction of motion", "current": ", in proportion to the current"}
-
-
-def amount(value: float, unit: str, digits: int = 2) -> str:
-    """A size with its unit, prefixed so that it reads well: 0.0352 N·m → 35 mN·m."""
-    if not math.isfinite(value):
-        return f"? {unit}"
-    size = abs(value)
-    scale, prefix = 1.0, ""
-    if unit in _SCALED and size > 0.0:
-        scale, prefix = max((pair for pair in _PREFIXES if size >= 0.9995 * pair[0]), default=_PREFIXES[0])
-        if scale == 1e3 and size < 1e4:
-            scale, prefix = 1.0, ""
-    number = value / scale
-    decimals = max(0, digits - 1 - math.floor(math.log10(abs(number)))) if number else 0
-    rounded = round(number, digits - 1 - math.floor(math.log10(abs(number)))) if number else 0.0
-    text = f"{rounded:.{decimals}f}".replace("-", "−")
-    return f"{text} {prefix}{unit}".rstrip()
 
 
 def explanation_sentence(signal: str, variable: str, modulator: str, r2: float) -> str:
     """One line on what explains a residual, and how much of it."""
     title = in_sentence(SIGNALS[signal].title)
     share = f"{100.0 * max(0.0, r2):.0f} % of what is left"
-    return f"The {title}'s error {_EXPLAINED[variable]}{_MODULATED[modulator]} ({share})."
+    return f"The {title}'s error {VARIABLES[variable].phrase}{MODULATORS[modulator].phrase} ({share})."
 
 
-def order_sentence(order: int, amplitude: float, unit: str) -> str:
-    """One line on an order of the residual."""
+def order_sentence(order: int, amplitude: float, of: Quantity) -> str:
+    """One line on an order of the residual, with its amplitude in SI units."""
     times = "once" if order == 1 else f"{order} times"
-    return f"What is missing repeats {times} a turn with an amplitude of {amount(amplitude, unit)}."
+    return f"What is missing repeats {times} a turn with an amplitude of {of.scaled(amplitude).text(amplitude)}."
 
 
 def region_sentence(
@@ -76,36 +46,33 @@ def region_sentence(
     moving = ""
     if direction and variable != "motor_speed":
         moving = " when it moves forward" if direction > 0 else " when it moves back"
+    told = of_residual(signal, axes, torque_constant)
+    size = told.scaled(mean).text(abs(mean))
     if SIGNALS[signal].kind in ("current", "torque", "force"):
-        size, unit = abs(mean), SIGNALS[signal].unit
-        if signal == "current_A" and torque_constant is not None:
-            size, unit = size * torque_constant, "N" if axes.motor == "linear" else "N·m"
         if direction:
             more = "more" if mean * direction > 0.0 else "less"
-            return f"The motor needs {amount(size, unit)} {more} {where}{moving} than the model."
+            return f"The motor needs {size} {more} {where}{moving} than the model."
         way = "forward" if mean > 0.0 else "backward"
-        what = {"N": "force", "A": "current"}.get(unit, "torque")
-        return f"The motor needs {amount(size, unit)} more {what} {way} {where} than the model."
-    title, unit = in_sentence(SIGNALS[signal].title), SIGNALS[signal].unit
+        what = told.title.rpartition(" ")[2]
+        return f"The motor needs {size} more {what} {way} {where} than the model."
+    title = in_sentence(SIGNALS[signal].title)
     if SIGNALS[signal].kind == "position":
         behind = direction and mean * direction < 0.0
         side = ("behind" if behind else "ahead of") if direction else ("above" if mean > 0.0 else "below")
-        return f"The {title} is {amount(abs(mean), unit)} {side} the model {where}{moving}."
-    return f"The {title} is {amount(abs(mean), unit)} {'above' if mean > 0 else 'below'} the model {where}{moving}."
+        return f"The {title} is {size} {side} the model {where}{moving}."
+    return f"The {title} is {size} {'above' if mean > 0 else 'below'} the model {where}{moving}."
 
 
 def _where(variable: str, low: float, high: float, typical: float, axes: Axes, duration_s: float, slow: bool) -> str:
-    unit = axes.variable_unit(variable)
-    if variable == "motor_angle" and axes.motor == "rotary":
-        return f"between {math.degrees(low):.0f}° and {math.degrees(high):.0f}° of the motor's turn"
-    if variable == "motor_speed":
-        return "at reversals and standstill" if slow else f"at {amount(typical, unit)}"
+    told = of_variable(variable, axes)
+    if is_turn(variable, axes):
+        return f"between {told.factor * low:.0f}° and {told.factor * high:.0f}° of the motor's turn"
+    if variable == "motor_speed" and slow:
+        return "at reversals and standstill"
     if variable == "time":
         part = ""
         if duration_s > 0.0:
             part = " (the start)" if high < 0.2 * duration_s else " (the end)" if low > 0.8 * duration_s else ""
-        return f"from {amount(low, unit, 3)} to {amount(high, unit, 3)}{part}"
-    if variable == "load":
-        return f"under a load of {amount(typical, unit)}"
-    names = {"user_position": "a user position of ", "acceleration": "an acceleration of ", "temperature": ""}
-    return f"at {names.get(variable, '')}{amount(typical, unit)}"
+        told = told.scaled(high)
+        return f"from {number(told.factor * low)} to {told.text(high)}{part}"
+    return f"{VARIABLES[variable].place}{told.scaled(typical).text(typical)}"

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ema_model.actuator.naming import on_axes
 from ema_model.comparison.result import Comparison, SignalError
 from ema_model.estimation import Calibrated, Calibration
 from ema_model.quantities.axes import Axes
@@ -81,10 +82,10 @@ def calibration_dict(calibration: Calibration, axes: Axes) -> dict[str, Any]:
     return {
         "converged": calibration.converged,
         "evaluations": calibration.evaluations,
-        "parameters": {axes.path(name): parameter_dict(one) for name, one in calibration.parameters.items()},
+        "parameters": {on_axes(name, axes).path: parameter_dict(one) for name, one in calibration.parameters.items()},
         "starts": {name: parameter_dict(one) for name, one in calibration.starts.items()},
-        "outside_tolerance": [axes.path(name) for name in calibration.outside_tolerance],
-        "confounded": [[axes.path(a), axes.path(b)] for a, b in calibration.confounded],
+        "outside_tolerance": [on_axes(name, axes).path for name in calibration.outside_tolerance],
+        "confounded": [[on_axes(a, axes).path, on_axes(b, axes).path] for a, b in calibration.confounded],
     }
 
 

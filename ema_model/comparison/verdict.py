@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
+from ema_model.actuator.naming import on_axes
 from ema_model.comparison.explain import Explanation, explain, used_blocks
 from ema_model.comparison.orders import Order, residual_orders
 from ema_model.comparison.regions import worst_regions
@@ -17,7 +18,9 @@ from ema_model.comparison.result import Region, SignalError
 from ema_model.comparison.sentences import order_sentence
 from ema_model.estimation import Calibration
 from ema_model.estimation.floor import CORRELATED_S
-from ema_model.quantities.titles import in_sentence, parameter_title
+from ema_model.quantities.numbers import Quantity
+from ema_model.quantities.shown import of_residual, of_signal
+from ema_model.quantities.titles import in_sentence
 from ema_model.recordings import SIGNALS
 
 Array = NDArray[np.float64]
@@ -60,7 +63,7 @@ def judge(
         if orders and significant and significant[0].variable == "motor_angle":
             sentences.append(_order(orders[0], primary, residuals, actuator))
         sentences += [one.sentence for one in regions[:3]]
-    sentences += [_summary(shown, errors[shown], adequate)]
+    sentences += [_summary(of_signal(primary, actuator.axes), errors[shown], adequate)]
     return Judgement(
         residuals=residuals,
         primary=shown,
@@ -75,10 +78,7 @@ def judge(
 
 def _order(order: Order, primary: str, residuals: Residuals, actuator: Actuator) -> str:
     """The strongest order, as a torque where the signal is a current."""
-    if primary == "current_A" and residuals.torque_constant is not None:
-        unit = "N" if actuator.axes.motor == "linear" else "N·m"
-        return order_sentence(order.order, order.amplitude * residuals.torque_constant, unit)
-    return order_sentence(order.order, order.amplitude, SIGNALS[actuator.axes.signal(primary)].unit)
+    return order_sentence(order.order, order.amplitude, of_residual(primary, actuator.axes, residuals.torque_constant))
 
 
 def slow_ratio(residuals: Residuals, name: str) -> float:
@@ -97,10 +97,9 @@ def slow_ratio(residuals: Residuals, name: str) -> float:
     return float(np.sqrt(np.mean(means(values) ** 2) / np.mean(floor)))
 
 
-def _summary(name: str, error: SignalError, adequate: bool) -> str:
-    signal = SIGNALS[name]
-    size = f"{error.rmse:.3g} {signal.unit} rms"
-    floor = f"{error.noise_floor:.3g} {signal.unit}"
+def _summary(signal: Quantity, error: SignalError, adequate: bool) -> str:
+    shown = error.quantity(signal)
+    size, floor = f"{shown.text(error.rmse)} rms", shown.text(error.noise_floor)
     if adequate:
         left = f"what is left of the {in_sentence(signal.title)}, {size}, is noise and the model's own floor ({floor})"
         return f"The model explains the recordings: {left}."
@@ -115,7 +114,7 @@ def _warnings(residuals: Residuals, primary: str, calibration: Calibration | Non
     if calibration is not None:
         if not calibration.converged:
             found.append("The calibration has not converged: what looks like missing physics may be an unfinished fit.")
-        outside = [in_sentence(parameter_title(actuator.axes.path(name))) for name in calibration.outside_tolerance]
+        outside = [in_sentence(on_axes(name, actuator.axes).title) for name in calibration.outside_tolerance]
         if outside:
             found.append(
                 f"At the edge of {'its' if len(outside) == 1 else 'their'} tolerance (3 σ): {', '.join(outside)}. "

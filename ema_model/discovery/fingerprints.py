@@ -52,7 +52,7 @@ def variants(effect: Effect, orders: Sequence[int]) -> list[list[dict[str, float
 
 def fingerprints(data: Data, found: Fit, names: Iterable[str], orders: Sequence[int]) -> list[Fingerprint]:
     """Those of all effects that are not yet in the model, at the model's calibrated parameters."""
-    effects = [find(name) for name in names if name not in found.effects]
+    effects = [find(name, found.actuator.axes) for name in names if name not in found.effects]
     tried = [(effect, settings) for effect in effects for settings in variants(effect, orders)]
     lanes = [(effect, one) for effect, settings in tried for one in settings]
     if not lanes:

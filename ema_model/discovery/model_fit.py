@@ -95,7 +95,7 @@ def gather(
 
 def with_effect(actuator: Actuator, name: str, settings: Mapping[str, float]) -> Actuator:
     """The actuator with an effect, its parameters free around these settings; whole numbers stay."""
-    effect = find(name)
+    effect = find(name, actuator.axes)
     tolerances = dict(actuator.tolerances)
     full = effect.settings(dict(settings))
     for parameter in effect.parameters:

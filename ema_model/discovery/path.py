@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
+from ema_model.actuator.naming import on_axes
 from ema_model.comparison.compare import weights_of
 from ema_model.comparison.explain import Explanation
 from ema_model.discovery.faults import fault_for
@@ -186,7 +187,7 @@ class Story:
             return f"fault {BY_NAME[name].label}"
         path = find(name).duplicates
         if path:
-            return f"{self.current.actuator.axes.path(path)} outside its tolerance"
+            return f"{on_axes(path, self.current.actuator.axes).path} outside its tolerance"
         return f"+ {in_sentence(find(name).title)}" if name not in CATALOGUE else f"+ {name}"
 
     def _append(self, found: Fit, rung: Rung, added: Sequence[Added]) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ema_model.discovery.model_fit import Data, Fit, fit, holdout_error, with_effect
 from ema_model.discovery.result import Candidate
-from ema_model.effects import find
+from ema_model.effects import Effect, find
 
 Progress = Callable[[str], None]
 
@@ -45,7 +45,7 @@ def tried(
     """The effects in the model, refitted together with all that it holds."""
     best = _refitted(data, current, effects, tell)
     if best.chi2 > current.chi2:  # it began too strong to find back
-        faint = {name: _weakened(name, settings) for name, settings in effects.items()}
+        faint = {name: _weakened(find(name, current.actuator.axes), settings) for name, settings in effects.items()}
         best = min(best, _refitted(data, current, faint, tell), key=lambda one: one.chi2)
     return Trial(candidate, effects, best, current.chi2 - best.chi2)
 
@@ -85,8 +85,8 @@ def _refitted(data: Data, current: Fit, effects: Mapping[str, Mapping[str, float
     return fit(data, actuator, current.starts, tell, current.faults)
 
 
-def _weakened(name: str, settings: Mapping[str, float]) -> dict[str, float]:
-    first = find(name).parameters[0]
+def _weakened(effect: Effect, settings: Mapping[str, float]) -> dict[str, float]:
+    first = effect.parameters[0]
     return {**settings, first.name: max(first.low, _FAINT * settings[first.name])}
 
 

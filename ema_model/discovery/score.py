@@ -96,7 +96,7 @@ def amounts_of(found: Fit, columns: Array, jacobian: Array, gram: Array) -> tupl
 
 def _scored(found: Fit, one: Fingerprint, jacobian: Array, gram: Array) -> Candidate:
     amounts, energy, toward = amounts_of(found, one.columns, jacobian, gram)
-    effect = find(one.name)
+    effect = find(one.name, found.actuator.axes)
     first = effect.parameters[0]
     strong = effect.severities[2] / one.settings[first.name]
     reason = ""

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from ema_model.actuator.naming import on_axes
 from ema_model.discovery.result import Added
 from ema_model.effects import find
 from ema_model.faults import BY_NAME
 from ema_model.quantities.axes import Axes
-from ema_model.quantities.titles import in_sentence, parameter_title
+from ema_model.quantities.titles import in_sentence
 
 NOT_REPEATABLE = (
     "The closed loop is not repeatable (a change of 0.05 % in the inertia moves its signals by more than the noise): "
@@ -21,7 +22,7 @@ def masked(added: Sequence[Added], axes: Axes) -> list[str]:
     lines = []
     for one in added:
         moved = [
-            f"{in_sentence(parameter_title(axes.path(part.path)))} ({part.before:+.1f} → {part.after:+.1f} σ)"
+            f"{in_sentence(on_axes(part.path, axes).title)} ({part.before:+.1f} → {part.after:+.1f} σ)"
             for part in one.stood_in
             if part.path != find(one.name).duplicates
         ]

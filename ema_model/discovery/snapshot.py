@@ -99,7 +99,7 @@ class Look:
 
         A strength that explains d of χ² is known to 1/√d of itself.
         """
-        first = find(one.name).parameters[0]
+        first = find(one.name, self.found.actuator.axes).parameters[0]
         if first.low > 0.0 or one.predicted_drop <= 0.0:
             return None
         return _TO_90 * abs(one.settings[first.name]) / math.sqrt(one.predicted_drop)

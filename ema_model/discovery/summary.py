@@ -6,8 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from ema_model.actuator.naming import on_axes
 from ema_model.comparison.summary import calibration_dict, parameter_dict, plain
 from ema_model.discovery.result import Added, Discovery, Experiment, Rung
+from ema_model.quantities.axes import Axes
 
 
 def as_dict(found: Discovery) -> dict[str, Any]:
@@ -18,7 +20,7 @@ def as_dict(found: Discovery) -> dict[str, Any]:
         {
             "verdict": found.verdict,
             "calibration": calibration_dict(found.calibration, axes),
-            "effects": [_added(one) for one in found.effects],
+            "effects": [_added(one, axes) for one in found.effects],
             "ladder": [_rung(rung) for rung in found.ladder],
             "candidates": [
                 {
@@ -26,13 +28,15 @@ def as_dict(found: Discovery) -> dict[str, Any]:
                     "predicted_drop": one.predicted_drop,
                     "tested": one.refitted_drop is not None,
                     "refitted_drop": one.refitted_drop,
-                    "settings": one.settings,
+                    "settings": {
+                        on_axes(f"effects.{one.name}.{name}", axes).name: value for name, value in one.settings.items()
+                    },
                     "untestable_reason": one.untestable_reason,
                 }
                 for one in found.candidates
             ],
             "faults": {name: parameter_dict(one) for name, one in found.faults.items()},
-            "parameters_outside_tolerance": [axes.path(name) for name in found.parameters_outside_tolerance],
+            "parameters_outside_tolerance": [on_axes(name, axes).path for name in found.parameters_outside_tolerance],
             "unknown": None
             if unknown is None
             else {
@@ -40,7 +44,7 @@ def as_dict(found: Discovery) -> dict[str, Any]:
                 "modulator": unknown.modulator,
                 "r2": unknown.r2,
                 "curve": np.column_stack([unknown.centres, unknown.curve, unknown.error]).tolist(),
-                "added": None if found.curve is None else _added(found.curve),
+                "added": None if found.curve is None else _added(found.curve, axes),
             },
             "next_experiment": _experiment(found.next_experiment),
             "warnings": list(found.warnings),
@@ -71,13 +75,12 @@ def _experiment(one: Experiment | None) -> dict[str, Any] | None:
     }
 
 
-def _added(one: Added) -> dict[str, Any]:
+def _added(one: Added, axes: Axes) -> dict[str, Any]:
+    chosen = {name: {"value": value, "interval90": [value, value], "unit": ""} for name, value in one.chosen.items()}
+    found = {name: parameter_dict(parameter) for name, parameter in one.parameters.items()} | chosen
     return {
         "name": one.name,
-        "parameters": {
-            **{name: parameter_dict(parameter) for name, parameter in one.parameters.items()},
-            **{name: {"value": value, "interval90": [value, value], "unit": ""} for name, value in one.chosen.items()},
-        },
+        "parameters": {on_axes(f"effects.{one.key}.{name}", axes).name: facts for name, facts in found.items()},
         "rmse_before": one.rmse_before,
         "rmse_after": one.rmse_after,
         "holdout_rmse_before": one.holdout_before,

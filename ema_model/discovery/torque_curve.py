@@ -19,12 +19,11 @@ from ema_model.comparison.verdict import ORDER_OF_PRIMARY
 from ema_model.discovery.model_fit import Data, Fit
 from ema_model.discovery.remaining import residuals_left
 from ema_model.effects.user import UserEffect, torque_curve
-from ema_model.effects.user.curve import MOST_KNOTS
+from ema_model.effects.user.curve import MOST_KNOTS, OF_VARIABLE
 from ema_model.errors import InputError
 
 Array = NDArray[np.float64]
 
-VARIABLES = {"motor_angle": "theta", "motor_speed": "omega", "user_position": "user", "current": "q", "load": "load"}
 _BLOCKS_PER_KNOT = 20
 _LEAST_KNOTS = 4
 _SMOOTH = 1e-3  # of the mean knot's weight, on second differences: it bridges knots that no data reach
@@ -53,7 +52,7 @@ def with_curve(data: Data, found: Fit, explanation: Explanation) -> tuple[Actuat
     if not is_torque(explanation, found.actuator):
         raise InputError(
             f"a residual of {explanation.signal} over {explanation.variable} cannot be made a torque curve; "
-            f"variables are {', '.join(VARIABLES)}"
+            f"variables are {', '.join(OF_VARIABLE)}"
         )
     effect = curve_of(residuals_left(data, found), explanation, found.calibration.actuator)
     knots = {parameter.name: parameter.default for parameter in effect.parameters}
@@ -71,7 +70,9 @@ def with_curve(data: Data, found: Fit, explanation: Explanation) -> tuple[Actuat
 
 def is_torque(explanation: Explanation, actuator: Actuator) -> bool:
     """Whether a torque at the shaft can stand for what an explanation has found."""
-    return explanation.variable in VARIABLES and _torque_per_unit(_inside(explanation, actuator), actuator) is not None
+    return (
+        explanation.variable in OF_VARIABLE and _torque_per_unit(_inside(explanation, actuator), actuator) is not None
+    )
 
 
 def curve_of(residuals: Residuals, explanation: Explanation, actuator: Actuator) -> UserEffect:
@@ -99,7 +100,7 @@ def curve_of(residuals: Residuals, explanation: Explanation, actuator: Actuator)
     best = min(curves, key=lambda one: one.chi2)
     if best.chi2 > (1.0 - _FINER) * curves[0].chi2:
         best = curves[0]  # the simplest
-    return torque_curve(factor * best.knots, best.low, best.high, VARIABLES[explanation.variable], best.modulator)
+    return torque_curve(factor * best.knots, best.low, best.high, OF_VARIABLE[explanation.variable], best.modulator)
 
 
 def _inside(explanation: Explanation, actuator: Actuator) -> str:

@@ -12,8 +12,10 @@ from typing import TypeVar
 
 from ema_model.effects.effect import Effect, Parameter
 from ema_model.errors import InputError
+from ema_model.quantities.axes import ROTARY, Axes
+from ema_model.quantities.sides import MOTOR, NEITHER, USER
 
-__all__ = ["CATALOGUE", "Effect", "Parameter", "catalogue_name", "find", "register"]
+__all__ = ["CATALOGUE", "MOTOR", "NEITHER", "USER", "Effect", "Parameter", "catalogue_name", "find", "register"]
 
 AnyEffect = TypeVar("AnyEffect", bound=Effect)
 
@@ -25,8 +27,8 @@ CATALOGUE: dict[str, Effect] = {
 _OF_THE_USER: dict[str, Effect] = {}  # made at run time by `ema_model.effects.user`; not part of the catalogue
 
 
-def find(name: str) -> Effect:
-    """The effect of that name, of the catalogue or registered; InputError lists the catalogue's names.
+def find(name: str, axes: Axes = ROTARY) -> Effect:
+    """The effect of that name, of the catalogue or registered, on these axes; InputError lists the catalogue's names.
 
     A model may hold an effect several times, as cogging at several orders: the second is `cogging_torque_2`.
     """
@@ -35,8 +37,8 @@ def find(name: str) -> Effect:
         again = CATALOGUE.get(catalogue_name(name))
         if again is None:
             raise InputError(f"no effect {name!r}; effects are {', '.join(CATALOGUE)}")
-        return replace(again, name=name)
-    return effect
+        effect = replace(again, name=name)
+    return effect.on(axes)
 
 
 def catalogue_name(name: str) -> str:

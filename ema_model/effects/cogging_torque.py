@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ema_model.effects.effect import Effect, Parameter
+from ema_model.effects.effect import MOTOR, NEITHER, Effect, Parameter
 from ema_model.physics.elementary import sine
 from ema_model.physics.jit import scalar
 
@@ -26,9 +26,18 @@ EFFECT = Effect(
         "and the current shows it against the motor's angle."
     ),
     parameters=(
-        Parameter("amplitude_Nm", "amplitude A", 0.012, 0.0, 0.3),
-        Parameter("order", "periods h in each turn of the motor", 12.0, 1.0, 96.0, integer=True),
-        Parameter("phase_rad", "phase φ", 0.0, -math.pi, math.pi),
+        Parameter("amplitude_Nm", "amplitude A", 0.012, 0.0, 0.3, side=MOTOR, linear=(10.0, 0.0, 1e4)),
+        Parameter(
+            "order",
+            "periods h in each turn of the motor",
+            12.0,
+            1.0,
+            96.0,
+            integer=True,
+            per=MOTOR,
+            linear=(200.0, 1.0, 2000.0),
+        ),
+        Parameter("phase_rad", "phase φ", 0.0, -math.pi, math.pi, side=NEITHER),
     ),
     severities=(0.006, 0.012, 0.024),
     places=(shaft_torque,),

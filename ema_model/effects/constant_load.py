@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ema_model.effects.effect import Effect, Parameter
+from ema_model.effects.effect import USER, Effect, Parameter
 from ema_model.physics.jit import scalar
 
 
@@ -20,7 +20,17 @@ EFFECT = Effect(
         "Something pulls at the user with the same torque all the time: a weight, a preload, the wind. It opposes "
         "the motion one way and helps it the other, so the motor's mean current is off zero even at rest."
     ),
-    parameters=(Parameter("torque_Nm", "torque T_0, positive opposes positive motion", 6.0, -1e6, 1e6),),
+    parameters=(
+        Parameter(
+            "torque_Nm",
+            "torque T_0, positive opposes positive motion",
+            6.0,
+            -1e6,
+            1e6,
+            side=USER,
+            linear=(100.0, -1e6, 1e6),
+        ),
+    ),
     severities=(3.0, 6.0, 12.0),
     places=(shaft_torque,),
     shows="as a constant offset of the current",

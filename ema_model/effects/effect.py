@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
-from ema_model.errors import InputError
+from ema_model.errors import InputError, quoted
+from ema_model.quantities.axes import ROTARY, Axes
+from ema_model.quantities.si import linear_unit
+from ema_model.quantities.sides import MOTOR, NEITHER, USER, Side
+from ema_model.quantities.titles import labelled, parameter_title, unit_of
+
+__all__ = ["ADVANCE", "MOTOR", "NEITHER", "PLACES", "USER", "Effect", "Parameter"]  # what effects' files need
 
 # Where effects can act: the arguments of each place.  The first is the value that the base model, or the
 # effect before, has found there; an effect's function returns it changed.
@@ -33,7 +39,10 @@ ADVANCE = (
 
 @dataclass(frozen=True)
 class Parameter:
-    """One number of an effect; the unit ends its name (a ratio or an order has none)."""
+    """One number of an effect; the unit ends its name (a ratio or an order has none).
+
+    What a linear axis measures in other units says where it sits; ValueError where that is left open.
+    """
 
     name: str
     meaning: str
@@ -41,6 +50,49 @@ class Parameter:
     low: float
     high: float
     integer: bool = False
+    side: Side | None = None  # of the transmission, or NEITHER for an angle that is of no axis
+    per: Side | None = None  # of a number without a unit that is rad/rad: the side whose angle it is counted by
+    linear: tuple[float, float, float] | None = None  # default, low and high where the side's axis is linear
+    unit: str = ""  # as shown; the name tells it where it ends in one
+    shown: str = ""  # the name in files; `on` fills it in
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "unit", self.unit or unit_of(self.name))
+        object.__setattr__(self, "shown", self.shown or self.name)
+        if self.side is None and linear_unit(self.unit) != self.unit:
+            raise ValueError(f"parameter {self.name}: say where it sits, side=MOTOR, USER or NEITHER")
+
+    def on(self, axes: Axes) -> Parameter:
+        """The parameter as these axes show it: its name, unit, default and range."""
+        range_ = (self.default, self.low, self.high)
+        if self.linear is not None and (axes.is_linear(self.side) or axes.is_linear(self.per)):
+            range_ = self.linear
+        default, low, high = range_
+        return replace(
+            self,
+            default=default,
+            low=low,
+            high=high,
+            unit=axes.unit(self.unit, self.side, self.per),
+            shown=axes.name(self.name, self.side),
+        )
+
+    @property
+    def title(self) -> str:
+        """'Amplitude'."""
+        return parameter_title(self.shown)
+
+    @property
+    def label(self) -> str:
+        """'Amplitude [N·m]'."""
+        return labelled(self.shown, self.unit)
+
+    def check(self, value: float, where: str) -> None:
+        """Raises InputError for a value out of its range, or one that is not whole where it must be."""
+        if not (math.isfinite(value) and self.low <= value <= self.high):
+            raise InputError(f"{where}: {self.shown} = {value:g} is outside {self.low:g} … {self.high:g}")
+        if self.integer and value != round(value):
+            raise InputError(f"{where}: {self.shown} must be a whole number, not {value:g}")
 
 
 @dataclass(frozen=True)
@@ -77,15 +129,30 @@ class Effect:
         """Settings with which it does nothing, all parameters in order; they may lie outside what a user may set."""
         return {p.name: p.default for p in self.parameters} | {self.parameters[0].name: self.nothing}
 
+    def on(self, axes: Axes) -> Effect:
+        """The effect as these axes show it: its parameters' names, units and ranges, and how strong it usually is."""
+        if axes == ROTARY:
+            return self
+        parameters = tuple(parameter.on(axes) for parameter in self.parameters)
+        usual = self.severities
+        if parameters and parameters[0].default != self.parameters[0].default:
+            usual = tuple(one * parameters[0].default / usual[1] for one in usual)
+        return replace(self, parameters=parameters, severities=usual)
+
+    def inside(self, given: Mapping[str, Any]) -> dict[str, Any]:
+        """Entries of files and people by the parameters' names inside; InputError for a name that it does not have."""
+        names = {parameter.shown: parameter.name for parameter in self.parameters}
+        for name in given:
+            if name not in names:
+                raise InputError(f"effect {self.name} has no parameter {quoted(name)!r}; it has {', '.join(names)}")
+        return {names[name]: value for name, value in given.items()}
+
     def settings(self, given: dict[str, float]) -> dict[str, float]:
         """All parameters, in order, those not given at their default; InputError for names and values."""
         known = {parameter.name: parameter for parameter in self.parameters}
         for name, value in given.items():
             if name not in known:
-                raise InputError(f"effect {self.name} has no parameter {name!r}; it has {', '.join(known)}")
-            p = known[name]
-            if not (math.isfinite(value) and p.low <= value <= p.high):
-                raise InputError(f"effect {self.name}: {name} = {value:g} is outside {p.low:g} … {p.high:g}")
-            if p.integer and value != round(value):
-                raise InputError(f"effect {self.name}: {name} must be a whole number, not {value:g}")
+                shown = ", ".join(parameter.shown for parameter in self.parameters)
+                raise InputError(f"effect {self.name} has no parameter {name!r}; it has {shown}")
+            known[name].check(value, f"effect {self.name}")
         return {name: float(given.get(name, p.default)) for name, p in known.items()}

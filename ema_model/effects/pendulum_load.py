@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ema_model.effects.effect import Effect, Parameter
+from ema_model.effects.effect import USER, Effect, Parameter
 from ema_model.physics.elementary import sine
 from ema_model.physics.jit import scalar
 
@@ -25,8 +25,8 @@ EFFECT = Effect(
         "current shows it against the user's position, whether the axis moves or stands."
     ),
     parameters=(
-        Parameter("moment_Nm", "moment m g l", 0.5, 0.0, 1e4),
-        Parameter("angle_rad", "angle θ_0 at which the arm hangs", 0.0, -math.pi, math.pi),
+        Parameter("moment_Nm", "moment m g l", 0.5, 0.0, 1e4, side=USER, linear=(100.0, 0.0, 1e6)),
+        Parameter("angle_rad", "angle θ_0 at which the arm hangs", 0.0, -math.pi, math.pi, side=USER),
     ),
     severities=(500.0, 1000.0, 2000.0),
     places=(shaft_torque,),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ema_model.effects.effect import Effect, Parameter
+from ema_model.effects.effect import USER, Effect, Parameter
 from ema_model.physics.jit import scalar
 
 
@@ -21,7 +21,9 @@ EFFECT = Effect(
         "reading is right, so the user, and with it the motor, stands off by the bias, with the opposite sign. "
         "The reading itself looks perfect: only against the motor's angle is the offset seen."
     ),
-    parameters=(Parameter("bias_rad", "offset b of the reading", 3e-5, -0.1, 0.1),),
+    parameters=(
+        Parameter("bias_rad", "offset b of the reading", 3e-5, -0.1, 0.1, side=USER, linear=(1e-5, -0.1, 0.1)),
+    ),
     severities=(1e-5, 3e-5, 1e-4),
     places=(position_reading,),
     shows="in the motor angle against the user position, as a constant offset",

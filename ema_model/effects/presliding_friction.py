@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ema_model.effects.effect import Effect, Parameter
+from ema_model.effects.effect import MOTOR, Effect, Parameter
 from ema_model.physics.elementary import decay
 from ema_model.physics.jit import scalar
 
@@ -46,8 +46,16 @@ EFFECT = Effect(
         "that of the base model (g: static at rest, dynamic in motion). A softer spring shows more."
     ),
     parameters=(
-        Parameter("stiffness_Nm_rad", "bristles' stiffness σ_0 at the motor", 8.0, 1.0, 200.0),
-        Parameter("damping_Nms_rad", "bristles' damping σ_1", 0.01, 0.0, 0.1),
+        Parameter(
+            "stiffness_Nm_rad",
+            "bristles' stiffness σ_0 at the motor",
+            8.0,
+            1.0,
+            200.0,
+            side=MOTOR,
+            linear=(1e6, 1e3, 1e10),
+        ),
+        Parameter("damping_Nms_rad", "bristles' damping σ_1", 0.01, 0.0, 0.1, side=MOTOR, linear=(1e3, 0.0, 1e7)),
     ),
     severities=(20.0, 8.0, 3.0),
     places=(friction,),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ema_model.effects.effect import Effect, Parameter
+from ema_model.effects.effect import MOTOR, NEITHER, USER, Effect, Parameter
 from ema_model.physics.elementary import sine
 from ema_model.physics.jit import scalar
 
@@ -27,9 +27,17 @@ EFFECT = Effect(
         "moves the motor to make up for it, so the user follows the command and the motor's angle wobbles."
     ),
     parameters=(
-        Parameter("amplitude_rad", "amplitude A at the user", 1e-5, 0.0, 1e-2),
-        Parameter("period_rad", "motor angle p after which it repeats", _TURN, 0.1, 1000.0),
-        Parameter("phase_rad", "phase φ", 0.0, -math.pi, math.pi),
+        Parameter("amplitude_rad", "amplitude A at the user", 1e-5, 0.0, 1e-2, side=USER),
+        Parameter(
+            "period_rad",
+            "motor angle p after which it repeats",
+            _TURN,
+            0.1,
+            1000.0,
+            side=MOTOR,
+            linear=(0.02, 1e-4, 10.0),
+        ),
+        Parameter("phase_rad", "phase φ", 0.0, -math.pi, math.pi, side=NEITHER),
     ),
     severities=(5e-6, 1e-5, 2e-5),
     places=(user_position,),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ema_model.effects.effect import Effect, Parameter
+from ema_model.effects.effect import MOTOR, Effect, Parameter
 from ema_model.physics.elementary import decay
 from ema_model.physics.jit import scalar
 
@@ -23,7 +23,11 @@ EFFECT = Effect(
         "more and more of the load, so friction falls from its static to its sliding value over a band of speeds. "
         "The base model lets it fall at once. The difference is felt just after each reversal, while the motor is slow."
     ),
-    parameters=(Parameter("speed_rad_s", "speed ω_s over which friction falls", 10.0, 0.1, 200.0),),
+    parameters=(
+        Parameter(
+            "speed_rad_s", "speed ω_s over which friction falls", 10.0, 0.1, 200.0, side=MOTOR, linear=(5e-3, 1e-5, 1.0)
+        ),
+    ),
     severities=(3.0, 10.0, 25.0),
     places=(moving_friction,),
     shows="in the current just after reversals and at low speed",

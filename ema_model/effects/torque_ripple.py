@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ema_model.effects.effect import Effect, Parameter
+from ema_model.effects.effect import MOTOR, NEITHER, Effect, Parameter
 from ema_model.physics.elementary import sine
 from ema_model.physics.jit import scalar
 
@@ -28,8 +28,17 @@ EFFECT = Effect(
     ),
     parameters=(
         Parameter("ratio", "amplitude a, per mean torque", 0.06, 0.0, 0.9),
-        Parameter("order", "periods h in each turn of the motor", 12.0, 1.0, 96.0, integer=True),
-        Parameter("phase_rad", "phase φ", 0.0, -math.pi, math.pi),
+        Parameter(
+            "order",
+            "periods h in each turn of the motor",
+            12.0,
+            1.0,
+            96.0,
+            integer=True,
+            per=MOTOR,
+            linear=(200.0, 1.0, 2000.0),
+        ),
+        Parameter("phase_rad", "phase φ", 0.0, -math.pi, math.pi, side=NEITHER),
     ),
     severities=(0.03, 0.06, 0.12),
     places=(electric_torque,),

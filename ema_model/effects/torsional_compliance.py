@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ema_model.effects.effect import Effect, Parameter
+from ema_model.effects.effect import USER, Effect, Parameter
 from ema_model.physics.jit import scalar
 
 
@@ -51,9 +51,11 @@ EFFECT = Effect(
         "user comes on top of the base model's, which has it in the motor's alone."
     ),
     parameters=(
-        Parameter("stiffness_Nm_rad", "stiffness K at the user", 28400.0, 100.0, 1e6),
-        Parameter("damping_Nms_rad", "damping C at the user", 60.0, 0.0, 1e4),
-        Parameter("inertia_kgm2", "inertia J_u of the user", 0.2, 1e-3, 100.0),
+        Parameter(
+            "stiffness_Nm_rad", "stiffness K at the user", 28400.0, 100.0, 1e6, side=USER, linear=(1.42e6, 1e3, 1e12)
+        ),
+        Parameter("damping_Nms_rad", "damping C at the user", 60.0, 0.0, 1e4, side=USER, linear=(3000.0, 0.0, 1e8)),
+        Parameter("inertia_kgm2", "inertia J_u of the user", 0.2, 1e-3, 100.0, side=USER, linear=(10.0, 1e-3, 1e5)),
     ),
     severities=(64000.0, 28400.0, 7100.0),  # the mode at 90, 60, 30 Hz
     places=(user_position, shaft_torque),

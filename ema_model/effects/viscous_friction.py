@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ema_model.effects.effect import Effect, Parameter
+from ema_model.effects.effect import MOTOR, Effect, Parameter
 from ema_model.physics.jit import scalar
 
 
@@ -21,7 +21,17 @@ EFFECT = Effect(
         "proportion to speed. Cold makes grease stiff: the same actuator may drag several times as much in winter. "
         "The base model has some; the effect adds to it."
     ),
-    parameters=(Parameter("coefficient_Nms_rad", "drag C beyond the base model's", 7e-5, 0.0, 5e-3),),
+    parameters=(
+        Parameter(
+            "coefficient_Nms_rad",
+            "drag C beyond the base model's",
+            7e-5,
+            0.0,
+            5e-3,
+            side=MOTOR,
+            linear=(10.0, 0.0, 1e5),
+        ),
+    ),
     severities=(3e-5, 7e-5, 1.5e-4),
     places=(shaft_torque,),
     shows="in the current, in proportion to speed",

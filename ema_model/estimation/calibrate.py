@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ema_model.actuator import Actuator
+from ema_model.actuator.naming import on_axes
 from ema_model.estimation.floor import CORRELATED_S, Floor
 from ema_model.estimation.problem import BOUND, Problem, Unknown
 from ema_model.models import Plant
 from ema_model.quantities.axes import Axes
-from ema_model.quantities.titles import unit_of
 
 Array = NDArray[np.float64]
 
@@ -230,7 +230,7 @@ def _calibrated(unknown: Unknown, x: float, sigma: float, axes: Axes) -> Calibra
     half = _Z90 * unknown.sigma * min(1.0, float(sigma))  # never less sure than the file itself
     at_bound = bool(x < unknown.low + 0.01 or x > unknown.high - 0.01)
     return Calibrated(
-        value, unknown.nominal, (value - half, value + half), unit_of(axes.path(unknown.name)), float(x), at_bound
+        value, unknown.nominal, (value - half, value + half), on_axes(unknown.name, axes).unit, float(x), at_bound
     )
 
 

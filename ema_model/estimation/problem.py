@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ema_model.actuator import Actuator
+from ema_model.actuator.naming import on_axes
 from ema_model.actuator.parameters import low_limit
 from ema_model.effects import find
 from ema_model.errors import InputError
@@ -149,13 +150,13 @@ def unknown_of(actuator: Actuator, name: str) -> Unknown:
         nominal = float(actuator.k[NAMES.index(name)])
         return Unknown(name, nominal, _K_SIGMA, -nominal / _K_SIGMA, (1.0 - nominal) / _K_SIGMA)
     if name not in actuator.tolerances:
-        known = ", ".join(actuator.tolerances)
+        known = ", ".join(on_axes(path, actuator.axes).path for path in actuator.tolerances)
         raise InputError(f"{name} cannot be calibrated: the actuator's file gives it no tolerance; free may be {known}")
     nominal, sigma = actuator.value(name), actuator.tolerances[name].sigma
     low, high = low_limit(name), math.inf
     if name.startswith("effects."):
         _, effect, parameter = name.split(".")
-        low, high = next((p.low, p.high) for p in find(effect).parameters if p.name == parameter)
+        low, high = next((p.low, p.high) for p in find(effect, actuator.axes).parameters if p.name == parameter)
     # Zero itself is no inertia.
     low = low + 1e-3 * abs(nominal) if low == 0.0 else low
     return Unknown(name, nominal, sigma, max(-BOUND, (low - nominal) / sigma), min(BOUND, (high - nominal) / sigma))

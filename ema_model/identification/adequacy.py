@@ -13,9 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ema_model.actuator.naming import on_axes
 from ema_model.estimation.floor import CORRELATED_S
 from ema_model.identification.fit import Fitted
-from ema_model.quantities.titles import in_sentence, parameter_title
+from ema_model.quantities.titles import in_sentence
 from ema_model.recordings import SIGNALS as SIGNAL_NAMES
 
 Array = NDArray[np.floating]
@@ -46,7 +47,7 @@ def adequacy(found: Fitted) -> Adequacy:
             return Adequacy(False, ratio, f"the {title} is left {ratio:.1f} × its floor")
     axes = found.problem.plant.actuator.axes
     edge = [
-        in_sentence(parameter_title(axes.path(name)))
+        in_sentence(on_axes(name, axes).title)
         for name, x in zip(found.problem.names, found.x)
         if abs(x) > _EDGE and "." in name and not name.startswith("effects.")
     ]

@@ -45,7 +45,9 @@ class ClosedLoop:
         if not measurements:
             raise InputError("one recording or more is needed")
         self.actuator = actuator
-        self.effects = {name: find(name).settings(dict(given)) for name, given in (effects or {}).items()}
+        self.effects = {
+            name: find(name, actuator.axes).settings(dict(given)) for name, given in (effects or {}).items()
+        }
         self.stack = (
             own_stack(actuator, self.effects, circuit)
             if own_kernels

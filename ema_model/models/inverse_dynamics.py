@@ -85,7 +85,9 @@ class InverseDynamics:
         if not measurements:
             raise InputError("one recording or more is needed")
         self.actuator = actuator
-        self.effects = {name: find(name).settings(dict(given)) for name, given in (effects or {}).items()}
+        self.effects = {
+            name: find(name, actuator.axes).settings(dict(given)) for name, given in (effects or {}).items()
+        }
         self.stack = stack_at_hand(actuator, self.effects, "reduced", "currents")
         self.recorded = list(measurements)  # before they were put on an even grid
         self.measurements = [m if m.is_map else on_even_grid(m) for m in measurements]
@@ -152,7 +154,8 @@ def _stretches(
     measurement.require("motor_position_rad")
     target = next((name for name in ("current_A", "motor_torque_Nm") if name in measurement), None)
     if target is None:
-        raise InputError(f"{quoted(measurement.name)}: nothing to compare; current_A or motor_torque_Nm is needed")
+        wanted = f"current_A or {measurement.shown('motor_torque_Nm')}"
+        raise InputError(f"{quoted(measurement.name)}: nothing to compare; {wanted} is needed")
     values = {path: value for rule in actuator.rules_for(measurement.name) for path, value in rule.values.items()}
     period = measurement.sample_period_s
     if not measurement.is_map:

@@ -86,7 +86,8 @@ def cut(
     """
     measurement.require("command_rad")
     if not any(name in measurement for name in COMPARED):
-        raise InputError(f"{quoted(measurement.name)}: nothing to compare; one of {', '.join(COMPARED)} is needed")
+        wanted = ", ".join(measurement.shown(name) for name in COMPARED)
+        raise InputError(f"{quoted(measurement.name)}: nothing to compare; one of {wanted} is needed")
     period = measurement.sample_period_s
     samples = max(1, round(block_s / period))
     steps = steps_per_sample(period, actuator.step_s)

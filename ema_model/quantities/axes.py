@@ -11,36 +11,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from ema_model.quantities.si import linear_name, linear_unit
+from ema_model.quantities.sides import MOTOR, USER, Side
+from ema_model.quantities.signals import SIGNALS
+
 KINDS = ("rotary", "linear")
-_UNITS = {
-    "_Nms2_rad": "_Ns2_m",
-    "_Nms_rad": "_Ns_m",
-    "_Nm_rad": "_N_m",
-    "_Nm_A": "_N_A",
-    "_kgm2": "_kg",
-    "_rad_s": "_m_s",
-    "_1_rad": "_1_m",
-    "_rad": "_m",
-    "_Nm": "_N",
-}
-_SHOWN = {
-    "N·m·s²/rad": "N·s²/m",
-    "N·m·s/rad": "N·s/m",
-    "N·m/rad": "N/m",
-    "N·m/A": "N/A",
-    "kg·m²": "kg",
-    "rad/s²": "m/s²",
-    "rad/s": "m/s",
-    "1/rad": "1/m",
-    "rad": "m",
-    "N·m": "N",
-}
-# Parameters at the user; what else is mechanical belongs to the motor.
-_USER_PARAMETERS = frozenset(
-    "integrator_window_rad gain_1_rad backlash_rad stop_low_rad stop_high_rad stiffness_Nm_rad offset_Nm torque_Nm "
-    "moment_Nm angle_rad".split()
-)
-_USER_SIGNALS = frozenset("command_rad user_position_rad load_torque_Nm".split())
 
 
 @dataclass(frozen=True)
@@ -50,24 +25,31 @@ class Axes:
     motor: str = "rotary"
     user: str = "rotary"
 
-    def parameter(self, name: str) -> str:
-        """The name in files of the parameter that is `name` inside."""
-        return linear_name(name) if self._is_linear(name in _USER_PARAMETERS) else name
+    def is_linear(self, side: Side | None) -> bool:
+        """Whether what sits at that side is a length and not an angle; what has no side never is."""
+        return (side == MOTOR and self.motor == "linear") or (side == USER and self.user == "linear")
 
-    def path(self, path: str) -> str:
-        """The same for "section.parameter"; names without a section stay."""
-        section, dot, name = path.rpartition(".")
-        return f"{section}{dot}{self.parameter(name)}" if dot else path
+    def name(self, name: str, side: Side | None) -> str:
+        """The name in files of what is `name` inside: inertia_kgm2 or mass_kg."""
+        return linear_name(name) if self.is_linear(side) else name
+
+    def unit(self, unit: str, side: Side | None, per: Side | None = None) -> str:
+        """The unit, as shown, of what has `unit` on rotary axes.
+
+        per: the side whose angle stands below the line of what rotary axes leave out as rad/rad: of a gear ratio, the
+        user's angle per motor's; of an order, periods per turn.
+        """
+        if per is None:
+            return linear_unit(unit) if self.is_linear(side) else unit
+        above, below = ("m" if self.is_linear(one) else "rad" for one in (side, per))
+        if above == below:
+            return unit
+        return f"{above}/{below}" if not unit else unit.replace("1/", f"{above}/({below}·") + ")"
 
     def signal(self, name: str) -> str:
         """The name in recordings of the signal that is `name` inside."""
-        return linear_name(name) if self._is_linear(name in _USER_SIGNALS) else name
-
-    def variable_unit(self, variable: str) -> str:
-        """The unit, as shown, of a variable that residuals are held against."""
-        rotary = _VARIABLE_UNITS[variable]
-        user = variable in ("user_position", "load")
-        return _SHOWN.get(rotary, rotary) if self._is_linear(user) else rotary
+        signal = SIGNALS.get(name)
+        return name if signal is None else self.name(name, signal.side)
 
     def inside(self, signals: Mapping[str, Any]) -> dict[str, Any]:
         """Signals by their names inside; those of the other kind of axis are left out."""
@@ -81,27 +63,6 @@ class Axes:
         """Signals by the names that recordings have."""
         return {self.signal(name): values for name, values in signals.items()}
 
-    def _is_linear(self, of_user: bool) -> bool:
-        return (self.user if of_user else self.motor) == "linear"
 
-
-ROTARY_SIGNALS = _USER_SIGNALS | {"motor_position_rad", "motor_speed_rad_s", "motor_torque_Nm"}
-_VARIABLE_UNITS = {
-    "motor_angle": "rad",
-    "user_position": "rad",
-    "motor_speed": "rad/s",
-    "acceleration": "rad/s²",
-    "current": "A",
-    "load": "N·m",
-    "time": "s",
-    "temperature": "°C",
-}
-
-
-def linear_name(name: str) -> str:
-    """The linear counterpart of a rotary name: inertia_kgm2 → mass_kg, load_torque_Nm → load_force_N."""
-    for rotary, linear in _UNITS.items():
-        if name.endswith(rotary):
-            name = name.removesuffix(rotary) + linear
-            break
-    return name.replace("inertia", "mass").replace("torque", "force")
+ROTARY_SIGNALS = {name for name, signal in SIGNALS.items() if signal.side and linear_name(name) != name}
+ROTARY = Axes()

@@ -9,9 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-_PREFIXED = frozenset(("rad", "m", "A", "V", "N·m", "N", "rad/s", "m/s", "s"))
+from ema_model.quantities.si import BY_SHOWN
+
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-_SMALLEST = 0.3  # shown as it is; what is smaller gets the next prefix
+_SMALLEST = 0.09995  # reads as 0.1, and is shown as it is; what is smaller gets the next prefix
+_LARGEST = 9995.0  # likewise, from which on a kilo is taken
 
 
 def as_number(value: Any) -> float:
@@ -34,6 +36,20 @@ def number(value: float, digits: int = 3) -> str:
     return f"{value:.{min(decimals, 8)}f}".replace("-", "−")
 
 
+def prefixed(largest: float, unit: str) -> tuple[float, str]:
+    """The factor to the prefix in which numbers up to `largest` read well, and the unit with it: 1000, 'mA'.
+
+    A number as large as 0.1 needs none: 0.2 A, but 35 mA.
+    """
+    known = BY_SHOWN.get(unit)
+    prefixes = known.prefixes if known is not None and largest > 0.0 else ""
+    if "k" in prefixes and largest >= _LARGEST:
+        return 1e-3, f"k{unit}"
+    if "m" not in prefixes or largest >= _SMALLEST:
+        return 1.0, unit
+    return (1e3, f"m{unit}") if 1e3 * largest >= _SMALLEST else (1e6, f"µ{unit}")
+
+
 @dataclass(frozen=True)
 class Quantity:
     """shown = factor · value in SI units."""
@@ -54,16 +70,22 @@ class Quantity:
         return f"{self.title} [{self.unit}]" if self.unit else self.title
 
     def scaled(self, values: ArrayLike) -> Quantity:
-        """With milli or micro where the largest of the values (in SI units) asks for it."""
+        """With the prefix that the largest of the values (in SI units) asks for."""
         size = np.abs(np.asarray(values, dtype=float) * self.factor)
-        largest = float(np.max(size[np.isfinite(size)], initial=0.0))
-        if self.unit not in _PREFIXED or largest == 0.0:
-            return self
-        for factor, prefix in ((1.0, ""), (1e3, "m")):
-            if largest * factor >= _SMALLEST:
-                return replace(self, unit=prefix + self.unit, factor=self.factor * factor)
-        return replace(self, unit="µ" + self.unit, factor=self.factor * 1e6)
+        factor, unit = prefixed(float(np.max(size[np.isfinite(size)], initial=0.0)), self.unit)
+        return replace(self, unit=unit, factor=self.factor * factor)
 
     def text(self, value: float) -> str:
         """'35.2 mN·m', three digits."""
         return f"{number(value * self.factor)} {self.unit}".strip()
+
+
+def with_uncertainty(value: float, half: float, unit: str) -> str:
+    """'12.2 ± 0.70 mN·m': half the width of an interval with two digits."""
+    shown = Quantity("", unit).scaled(value)
+    return f"{number(shown.factor * value)} ± {number(shown.factor * half, 2)} {shown.unit}".rstrip()
+
+
+def amount(value: float, unit: str) -> str:
+    """A size with its unit, prefixed so that it reads well: 0.0352 N·m → '35.2 mN·m'."""
+    return Quantity("", unit).scaled(value).text(value)

@@ -6,6 +6,8 @@ import re
 from dataclasses import dataclass
 from typing import Literal
 
+from ema_model.quantities.sides import MOTOR, USER, Side
+
 Kind = Literal["time", "position", "speed", "current", "torque", "force", "voltage", "ratio", "temperature", "state"]
 
 
@@ -13,7 +15,8 @@ Kind = Literal["time", "position", "speed", "current", "torque", "force", "volta
 class Signal:
     """One canonical column; `unit` is as shown to people, `name` ends in its plain spelling.
 
-    A `state` is a whole number that is held between samples; the other kinds are interpolated.
+    A `state` is a whole number that is held between samples; the other kinds are interpolated.  What moves or pushes
+    says at which side: a linear axis gives it another name and unit.
     """
 
     name: str
@@ -21,33 +24,34 @@ class Signal:
     symbol: str
     unit: str
     kind: Kind
+    side: Side | None = None
 
 
 _ALL = (
     Signal("time_s", "Time", "t", "s", "time"),
-    Signal("command_rad", "Command", "θ_cmd", "rad", "position"),
-    Signal("user_position_rad", "User position", "θ_u", "rad", "position"),
-    Signal("motor_position_rad", "Motor position", "θ_m", "rad", "position"),
-    Signal("motor_speed_rad_s", "Motor speed", "ω_m", "rad/s", "speed"),
+    Signal("command_rad", "Command", "θ_cmd", "rad", "position", USER),
+    Signal("user_position_rad", "User position", "θ_u", "rad", "position", USER),
+    Signal("motor_position_rad", "Motor position", "θ_m", "rad", "position", MOTOR),
+    Signal("motor_speed_rad_s", "Motor speed", "ω_m", "rad/s", "speed", MOTOR),
     Signal("current_A", "Equivalent current", "I_eq", "A", "current"),
     Signal("phase_a_current_A", "Phase A current", "I_A", "A", "current"),
     Signal("phase_b_current_A", "Phase B current", "I_B", "A", "current"),
     Signal("phase_c_current_A", "Phase C current", "I_C", "A", "current"),
-    Signal("motor_torque_Nm", "Motor torque", "T_m", "N·m", "torque"),
+    Signal("motor_torque_Nm", "Motor torque", "T_m", "N·m", "torque", MOTOR),
     Signal("bus_voltage_V", "Bus voltage", "V_bus", "V", "voltage"),
     Signal("motor_voltage_V", "Motor voltage", "V_m", "V", "voltage"),
     Signal("duty", "Duty", "d", "", "ratio"),
     Signal("drive_enabled", "Drive enabled", "on", "", "state"),
-    Signal("load_torque_Nm", "Load torque", "T_L", "N·m", "torque"),
+    Signal("load_torque_Nm", "Load torque", "T_L", "N·m", "torque", USER),
     Signal("temperature_C", "Temperature", "ϑ", "°C", "temperature"),
     Signal("segment", "Segment", "seg", "", "state"),
     # linear axes
-    Signal("command_m", "Command", "x_cmd", "m", "position"),
-    Signal("user_position_m", "User position", "x_u", "m", "position"),
-    Signal("motor_position_m", "Motor position", "x_m", "m", "position"),
-    Signal("motor_speed_m_s", "Motor speed", "v_m", "m/s", "speed"),
-    Signal("motor_force_N", "Motor force", "F_m", "N", "force"),
-    Signal("load_force_N", "Load force", "F_L", "N", "force"),
+    Signal("command_m", "Command", "x_cmd", "m", "position", USER),
+    Signal("user_position_m", "User position", "x_u", "m", "position", USER),
+    Signal("motor_position_m", "Motor position", "x_m", "m", "position", MOTOR),
+    Signal("motor_speed_m_s", "Motor speed", "v_m", "m/s", "speed", MOTOR),
+    Signal("motor_force_N", "Motor force", "F_m", "N", "force", MOTOR),
+    Signal("load_force_N", "Load force", "F_L", "N", "force", USER),
 )
 SIGNALS: dict[str, Signal] = {signal.name: signal for signal in _ALL}
 

@@ -2,55 +2,28 @@
 
 from __future__ import annotations
 
-_UNITS = {
-    "Nms2_rad": "N·m·s²/rad",
-    "Nms_rad": "N·m·s/rad",
-    "Ns2_m": "N·s²/m",
-    "Nm_rad": "N·m/rad",
-    "Nm_A": "N·m/A",
-    "Ns_m": "N·s/m",
-    "kgm2": "kg·m²",
-    "rad_s": "rad/s",
-    "1_rad": "1/rad",
-    "N_m": "N/m",
-    "N_A": "N/A",
-    "m_s": "m/s",
-    "1_m": "1/m",
-    "1_s": "1/s",
-    "Ohm": "Ω",
-    "rad": "rad",
-    "Nm": "N·m",
-    "Hz": "Hz",
-    "kg": "kg",
-    "N": "N",
-    "m": "m",
-    "H": "H",
-    "V": "V",
-    "A": "A",
-    "s": "s",
-}
+from ema_model.quantities.si import of_name, without_unit
+
 _PROPER = frozenset(("Stribeck",))
 
 
 def parameter_title(path: str) -> str:
     """'Motor inertia' of 'motor.inertia_kgm2', 'Amplitude' of 'amplitude_rad'."""
     section, _, name = path.rpartition(".")
-    words = f"{section.replace('.', ' ')} {name.removesuffix(f'_{_ending(name)}')}".replace("_", " ").strip()
+    words = f"{section.replace('.', ' ')} {without_unit(name)}".replace("_", " ").strip()
     return words[:1].upper() + words[1:]
 
 
-def unit_of(path: str) -> str:
-    """'kg·m²' of 'motor.inertia_kgm2'; a name without a unit is a number.
-
-    The starts of a recording ("play 0") are angles.
-    """
-    return "rad" if " " in path else _UNITS.get(_ending(path), "")
+def unit_of(name: str) -> str:
+    """'kg·m²' of 'motor.inertia_kgm2'; a name without a unit is a number."""
+    unit = of_name(name)
+    return "" if unit is None else unit.shown
 
 
-def labelled(path: str) -> str:
-    """'Amplitude [rad]' of 'amplitude_rad'."""
-    unit = unit_of(path)
-    return f"{parameter_title(path)} [{unit}]" if unit else parameter_title(path)
+def labelled(name: str, unit: str | None = None) -> str:
+    """'Amplitude [rad]' of 'amplitude_rad'; `unit`: where it is another than the name says."""
+    unit = unit_of(name) if unit is None else unit
+    return f"{parameter_title(name)} [{unit}]" if unit else parameter_title(name)
 
 
 def in_sentence(title: str) -> str:
@@ -58,7 +31,3 @@ def in_sentence(title: str) -> str:
     if title[1:2].isupper() or title.partition(" ")[0] in _PROPER:
         return title
     return title[:1].lower() + title[1:]
-
-
-def _ending(name: str) -> str:
-    return next((ending for ending in _UNITS if name.endswith(f"_{ending}")), "")

@@ -129,6 +129,5 @@ def check_needed(measurement: Measurement, *names: str) -> None:
         if not values.size or np.all(values == values[0]):
             value = f"is constant ({values[0]:g})" if values.size else "is empty"
             where = f"{quoted(measurement.name)}: " if measurement.name else ""
-            raise InputError(
-                f"{where}column {quoted(name)!r} {value}, but it must vary here; record it while the axis moves"
-            )
+            column = quoted(measurement.shown(name))
+            raise InputError(f"{where}column {column!r} {value}, but it must vary here; record it while the axis moves")

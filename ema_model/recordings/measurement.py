@@ -146,12 +146,16 @@ class Measurement:
         note = f"{keep.sum()} of {keep.size} samples are in the chosen window and segments; the others are left aside"
         return replace(self, signals=cut, notes=self.notes if keep.all() else (*self.notes, note))
 
+    def shown(self, name: str) -> str:
+        """The name in files of a signal, by its name here."""
+        return name if self.axes is None else self.axes.signal(name)
+
     def require(self, *names: str) -> None:
         """Raises InputError if any of these signals is missing; it names them and those present."""
-        missing = [name for name in names if name not in self.signals]
+        missing = [self.shown(name) for name in names if name not in self.signals]
         if missing:
             where = shown(self.name, 100) or "the recording"
-            present = listed(self.signals)
+            present = listed([self.shown(name) for name in self.signals])
             raise InputError(f"{where}: column {', '.join(missing)} is needed; add it (present: {present})")
 
     def resampled(self, period_s: float) -> Measurement:

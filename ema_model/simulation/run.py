@@ -13,6 +13,7 @@ from ema_model.commands import Command, command
 from ema_model.effects import find
 from ema_model.errors import InputError, quoted
 from ema_model.physics.rows import LANES
+from ema_model.quantities.axes import Axes
 from ema_model.recordings import Measurement
 from ema_model.simulation.one_stack import stack_at_hand
 from ema_model.simulation.pack import initial_reference_state, initial_state, monitor_rows, reference_rows
@@ -103,7 +104,7 @@ def simulate_reference(
     motor speed, at a place in the play (rad at the motor), and with a speed loop's integral action, all 0 unless given.
     Raises InputError for settings of effects that do not exist, FloatingPointError if the model diverges.
     """
-    effects = {name: find(name).settings(dict(given)) for name, given in (effects or {}).items()}
+    effects = {name: find(name, actuator.axes).settings(dict(given)) for name, given in (effects or {}).items()}
     if not actuator.has_reference_model:
         raise InputError(
             f"{quoted(actuator.name)}: the reference model is of a cascade with a hysteresis inverter; "
@@ -136,7 +137,7 @@ def simulate_reference(
     if voltages:
         for column, name in enumerate(("leg_a_voltage_V", "leg_b_voltage_V", "leg_c_voltage_V"), 8):
             signals[name] = np.concatenate([[0.0], result[:, column]])
-    return Measurement(_finite(signals, "the reference model"), name="reference model")
+    return Measurement(_finite(signals, "the reference model", actuator.axes), name="reference model")
 
 
 def simulate_monitor(
@@ -149,7 +150,7 @@ def simulate_monitor(
     start_rad: float | None = None,
 ) -> Measurement:
     """The Monitor Model's signals; raises as `simulate_reference`."""
-    effects = {name: find(name).settings(dict(given)) for name, given in (effects or {}).items()}
+    effects = {name: find(name, actuator.axes).settings(dict(given)) for name, given in (effects or {}).items()}
     if actuator.controller.kind == "unknown":
         raise InputError(f"{quoted(actuator.name)}: its controller is not known, so that no command can be simulated")
     stack = stack_at_hand(actuator, effects, circuit, "traces")
@@ -172,7 +173,7 @@ def simulate_monitor(
         result,
     )
     signals = _signals(run, actuator, result[0, :, :, 0], start)
-    return Measurement(_finite(signals, "the monitor model"), name="monitor model")
+    return Measurement(_finite(signals, "the monitor model", actuator.axes), name="monitor model")
 
 
 def _signals(run: Run, actuator: Actuator, result: Array, start_rad: float) -> dict[str, Array]:
@@ -199,9 +200,11 @@ def _signals(run: Run, actuator: Actuator, result: Array, start_rad: float) -> d
     return signals
 
 
-def _finite(signals: dict[str, Array], what: str) -> dict[str, Array]:
+def _finite(signals: dict[str, Array], what: str, axes: Axes) -> dict[str, Array]:
     for name, values in signals.items():
         if not np.all(np.isfinite(values)):
             at = signals["time_s"][int(np.argmin(np.isfinite(values)))]
-            raise FloatingPointError(f"{what} diverged: {name} is not finite from {at:g} s on; check the settings")
+            raise FloatingPointError(
+                f"{what} diverged: {axes.signal(name)} is not finite from {at:g} s on; check the settings"
+            )
     return signals

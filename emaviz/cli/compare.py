@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 
 from ema_model.actuator import save_actuator
+from ema_model.actuator.naming import on_axes
 from ema_model.comparison import Comparison, as_dict, compare
 from ema_model.errors import InputError
-from ema_model.recordings import SIGNALS
+from ema_model.quantities.numbers import Quantity, number
+from ema_model.quantities.shown import of_residual, of_signal
 from emaviz.cli import files, options, output
 from emaviz.text.comparison import held_out
 
@@ -52,7 +55,7 @@ def run(arguments: argparse.Namespace) -> int:
             measurements,
             actuator,
             k=options.faults_of(arguments, actuator.faults),
-            effects=options.effects_of(arguments),
+            effects=options.effects_of(arguments, actuator.axes),
             calibrate=arguments.calibrate,
             free=arguments.free,
             signals=options.weights_of(arguments.signals),
@@ -88,19 +91,21 @@ def _record(result: Comparison, arguments: argparse.Namespace) -> None:
 
 def text(result: Comparison) -> str:
     """The answer as the terminal shows it: the sentences, the errors, the explanations, the calibration."""
+    axes = result.actuator.axes
     lines = [*result.sentences, *(f"! {warning}" for warning in result.warnings), ""]
     lines.append(f"{'signal':22}{'rms error':>12}{'initially':>12}{'floor':>12}{'mean |e|':>12}")
     for name, error in result.signals.items():
+        shown = error.quantity(of_signal(name, axes))
         numbers = (error.rmse, error.rmse_initial, error.noise_floor, error.mean_absolute)
-        lines.append(f"{name:22}" + "".join(f"{number:12.4g}" for number in numbers) + f"  {SIGNALS[name].unit}")
+        lines.append(f"{name:22}{_columns(numbers, shown)}  {shown.unit}")
     if len(result.recordings) > 1:
         lines += ["", f"{'recording':34}{'rms error':>12}{'floor':>12}{'mean |e|':>12}  of {result.primary}"]
         for one in result.recordings:
             if result.primary in one.errors:
                 error = one.errors[result.primary]
-                lines.append(
-                    f"{one.name[:33]:34}{error.rmse:12.4g}{error.noise_floor:12.4g}{error.mean_absolute:12.4g}"
-                )
+                shown = error.quantity(of_signal(result.primary, axes))
+                columns = _columns((error.rmse, error.noise_floor, error.mean_absolute), shown)
+                lines.append(f"{one.name[:33]:34}{columns}  {shown.unit}")
     if result.holdout:
         lines += ["", *(held_out(one) for one in result.holdout)]
     if result.explained_by:
@@ -110,8 +115,9 @@ def text(result: Comparison) -> str:
             mark = "" if one.significant else "   within noise"
             lines.append(f"  {one.variable + modulator:28}{100.0 * one.r2:6.1f} %{mark}")
     if result.orders:
-        unit = SIGNALS[result.primary].unit
-        found = ", ".join(f"{one.order} ({one.amplitude:.3g} {unit})" for one in result.orders[:8])
+        told = of_residual(result.primary, axes, result.residuals.torque_constant)
+        shown = told.scaled(result.orders[0].amplitude)
+        found = ", ".join(f"{one.order} ({shown.text(one.amplitude)})" for one in result.orders[:8])
         lines += ["", f"orders per revolution: {found}"]
     if result.calibration is not None and result.calibration.parameters:
         state = "converged" if result.calibration.converged else "NOT converged"
@@ -119,6 +125,10 @@ def text(result: Comparison) -> str:
         for name, one in result.calibration.parameters.items():
             half = 0.5 * (one.interval90[1] - one.interval90[0])
             bound = "  at its bound" if one.at_bound else ""
-            shown = result.actuator.axes.path(name)
-            lines.append(f"  {shown:38}{one.value:12.5g}{half:12.2g}{one.z:7.2f}  {one.unit}{bound}")
+            path = on_axes(name, axes).path
+            lines.append(f"  {path:38}{one.value:12.5g}{half:12.2g}{one.z:7.2f}  {one.unit}{bound}")
     return "\n".join(lines)
+
+
+def _columns(values: Sequence[float], shown: Quantity) -> str:
+    return "".join(f"{number(shown.factor * value):>12}" for value in values)

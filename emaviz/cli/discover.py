@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 
 from ema_model.actuator import save_actuator
+from ema_model.actuator.naming import on_axes
 from ema_model.comparison.summary import plain
 from ema_model.discovery import Discovery, as_dict, discover, verified
 from ema_model.effects import find
@@ -81,7 +82,8 @@ def text(found: Discovery) -> str:
     for one in found.effects:
         effect = find(one.name)
         lines += ["", f"{effect.title}: {effect.equation}"]
-        lines += [f"  {name:24}  {told}" for name, told in settings(found, one).items()]
+        names = {name: on_axes(f"effects.{one.key}.{name}", found.actuator.axes).name for name in one.parameters}
+        lines += [f"  {names.get(name, name):24}  {told}" for name, told in settings(found, one).items()]
         if one.same_as:
             lines.append(f"  these recordings cannot tell it from {', '.join(one.same_as)}")
     if found.faults:
@@ -97,7 +99,7 @@ def text(found: Discovery) -> str:
             why = f"   {candidate.untestable_reason}" if candidate.untestable_reason else ""
             lines.append(f"  {candidate.name:32}{candidate.predicted_drop:10.0f}{drop:>10}{why}")
     if found.parameters_outside_tolerance:
-        outside = ", ".join(found.actuator.axes.path(name) for name in found.parameters_outside_tolerance)
+        outside = ", ".join(on_axes(name, found.actuator.axes).path for name in found.parameters_outside_tolerance)
         lines += ["", f"outside their tolerance: {outside}"]
     if found.unknown is not None:
         lines += ["", found.unknown.sentence]

@@ -7,7 +7,8 @@ import textwrap
 from dataclasses import asdict
 from typing import Any
 
-from ema_model.effects import CATALOGUE, Effect, find
+from ema_model.effects import CATALOGUE, Effect, Parameter, find
+from ema_model.quantities.axes import Axes
 from emaviz.cli.options import add_json
 from emaviz.cli.output import configuration, write_json
 
@@ -38,7 +39,8 @@ def explain(effect: Effect) -> str:
     lines = [effect.title, f"  {effect.equation}", "", textwrap.fill(effect.explanation, 92), "", "Parameters"]
     width = max(len(p.name) for p in effect.parameters)
     lines += [
-        f"  {p.name:{width}}  {p.meaning}; {p.low:g} … {p.high:g}, default {p.default:g}" for p in effect.parameters
+        f"  {p.name:{width}}  {p.meaning}; {p.low:g} … {p.high:g}, default {p.default:g}{_on_a_linear_axis(p)}"
+        for p in effect.parameters
     ]
     severities = ", ".join(f"{value:g}" for value in effect.severities)
     lines += [
@@ -50,6 +52,15 @@ def explain(effect: Effect) -> str:
         f"Source        {effect.source}",
     ]
     return "\n".join(lines)
+
+
+def _on_a_linear_axis(parameter: Parameter) -> str:
+    """What it is called where the side that it sits at is linear, and its range there."""
+    there = parameter.on(Axes("linear", "linear"))
+    if there.unit == parameter.unit:
+        return ""
+    whose = parameter.per or parameter.side
+    return f" (where the {whose}'s axis is linear: {there.shown}, {there.low:g} … {there.high:g} {there.unit})"
 
 
 def _facts(effect: Effect) -> dict[str, Any]:

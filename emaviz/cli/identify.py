@@ -10,11 +10,13 @@ import numpy as np
 
 from ema_model import faults
 from ema_model.actuator import Actuator, save_actuator
+from ema_model.actuator.naming import on_axes
 from ema_model.actuator.readings import readings, sentences
 from ema_model.discovery.model_fit import with_effect
 from ema_model.errors import InputError
 from ema_model.identification.objective import Objective
 from ema_model.identification.run import ALGORITHMS, ROBUST, Identification, Progress, identify
+from ema_model.quantities.numbers import amount
 from ema_model.recordings import Measurement
 from ema_model.simulation.plant import FITNESSES, simulated
 from ema_model.simulation.sensors import Sensors
@@ -48,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Fits, records and prints."""
     actuator = options.actuator_of(arguments)
-    for name, settings in options.effects_of(arguments).items():
+    for name, settings in options.effects_of(arguments, actuator.axes).items():
         actuator = with_effect(actuator, name, settings)
     truth = options.faults_of(arguments) if arguments.fault or not arguments.files else None
     progress = output.Progress()
@@ -99,7 +101,7 @@ def run(arguments: argparse.Namespace) -> int:
     if unseen and holdout_rmse is None:
         print("the model diverges on what was not fitted")
     elif holdout_rmse is not None:
-        print(f"rmse {holdout_rmse:.4f} A on what was not fitted: {', '.join(one.name for one in unseen)}")
+        print(f"rmse {amount(holdout_rmse, 'A')} on what was not fitted: {', '.join(one.name for one in unseen)}")
     if arguments.report:
         from emaviz.report import write_identification_report  # plotly takes a second to import
 
@@ -131,7 +133,7 @@ def result(answer: Identification, actuator: Actuator, holdout_rmse: float | Non
         "algorithm": answer.algorithm,
         "polished": answer.polished,
         "searched_k": answer.searched_k,
-        "parameters": {actuator.axes.path(path): value for path, value in answer.parameters.items()},
+        "parameters": {on_axes(path, actuator.axes).path: value for path, value in answer.parameters.items()},
         "holdout_rmse": holdout_rmse,
         "history": {"rmse": answer.rmse_history, "k": answer.k_history},
     }
@@ -178,7 +180,7 @@ def _table(answer: Identification, actuator: Actuator) -> str:
     lines += sure.warnings
     error = "" if answer.truth is None else f", Err {answer.error_percent:.2f} %"
     lines.append(
-        f"rmse {answer.rmse:.4f} A{error}; {answer.evaluations} simulations in {answer.elapsed_s:.2f} s "
+        f"rmse {amount(answer.rmse, 'A')}{error}; {answer.evaluations} simulations in {answer.elapsed_s:.2f} s "
         f"({answer.algorithm}), compiled in {answer.compile_s:.1f} s"
     )
     return "\n".join(lines)

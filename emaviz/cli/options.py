@@ -15,6 +15,7 @@ from ema_model.commands import COMMANDS, Command, Recorded, command
 from ema_model.effects import find
 from ema_model.effects.user.entries import kind_of, read_entries
 from ema_model.errors import InputError, quoted
+from ema_model.quantities.axes import Axes
 from ema_model.recordings import Measurement, read
 from ema_model.recordings.read import COMMAND_ALONE, Needs
 from ema_model.simulation.run import Run
@@ -182,14 +183,15 @@ def faults_of(arguments: argparse.Namespace, known: Mapping[str, float] | None =
     return faults.vector({**(known or {}), **dict(_pair(text, "--fault") for text in arguments.fault)})
 
 
-def effects_of(arguments: argparse.Namespace) -> dict[str, dict[str, float]]:
-    """Effects from --effect NAME:param=value,…, or user_torque:expression=…,param=value,…"""
+def effects_of(arguments: argparse.Namespace, axes: Axes) -> dict[str, dict[str, float]]:
+    """Effects from --effect NAME:param=value,…, or user_torque:expression=…,param=value,…; names are the axes'."""
     effects: dict[str, dict[str, float]] = {}
     for text in arguments.effect:
         name, _, rest = text.partition(":")
         parts = split_at_commas(rest)
         if (kind := kind_of(name)) is None:
-            effect, given = find(name), dict(_pair(part, f"--effect {quoted(name)}") for part in parts)
+            effect = find(name, axes)
+            given = effect.inside(dict(_pair(part, f"--effect {quoted(name)}") for part in parts))
         else:
             try:
                 effect, given = read_entries(kind, dict(_user_entry(part) for part in parts))

@@ -39,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Simulates, records with the sensors' accuracy, writes."""
     actuator = options.actuator_of(arguments)
-    k, effects = options.faults_of(arguments, actuator.faults), options.effects_of(arguments)
+    k, effects = options.faults_of(arguments, actuator.faults), options.effects_of(arguments, actuator.axes)
     asked = options.run_of(arguments, actuator, arguments.sample_rate)
     sensors = Sensors(arguments.noise_current, arguments.encoder_bits)
     try:

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import plotly.graph_objects as go
 
+from ema_model.actuator.naming import on_axes
 from ema_model.comparison.result import Comparison, Region
 from ema_model.faults import NAMES
 from ema_model.quantities.numbers import number
-from ema_model.quantities.titles import parameter_title
 from emaviz.figures import theme
 
 _BOUND = 3.0
@@ -37,7 +37,7 @@ def scores(comparison: Comparison) -> list[Score]:
         return []
     found = []
     for path, fitted in comparison.calibration.parameters.items():
-        name = path if path in NAMES else parameter_title(comparison.actuator.axes.path(path))
+        name = path if path in NAMES else on_axes(path, comparison.actuator.axes).title
         low, high = fitted.interval90
         found.append(
             Score(

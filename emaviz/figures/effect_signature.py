@@ -8,10 +8,11 @@ from urllib.parse import quote
 import numpy as np
 import viser
 
+from ema_model.quantities.axes import Axes
 from ema_model.simulation.with_effect import SHOWN, WithEffect
 from emaviz.colours import DIFFERENCE, MONITOR, REFERENCE
 from emaviz.figures.decimate import envelope
-from emaviz.figures.signals import CHARTS, legend, time_axis, value_axis
+from emaviz.figures.signals import charts, legend, time_axis, value_axis
 from emaviz.text.html import add_html
 
 _POINTS, _SMALL_POINTS = 800, 160
@@ -21,11 +22,11 @@ _WIDTH, _HEIGHT = 120, 44  # of a small picture, pixels
 class EffectCharts:
     """A chart for each signal, and one of what changes in it."""
 
-    def __init__(self, gui: viser.GuiApi, height: int = 118) -> None:
+    def __init__(self, gui: viser.GuiApi, axes: Axes, height: int = 118) -> None:
         empty = np.array([0.0, 1.0])
         add_html(gui, legend((REFERENCE, "without"), (MONITOR, "with the effect"), (DIFFERENCE, "difference, below")))
         self._charts: list[tuple[Any, Any, Any]] = []
-        for chart in (one for one in CHARTS if one.signal in SHOWN):
+        for chart in (one for one in charts(axes) if one.signal in SHOWN):
             both = gui.add_uplot(
                 data=(empty, empty, empty),
                 series=({}, _line("without", REFERENCE, 1.5), _line("with", MONITOR, 1.5)),

@@ -5,7 +5,8 @@ from __future__ import annotations
 import plotly.graph_objects as go
 
 from ema_model.comparison.result import Comparison, Region
-from emaviz.figures import quantity, theme
+from ema_model.quantities.variables import MODULATORS, variable_title
+from emaviz.figures import theme
 
 _PALE = 0.3
 
@@ -27,7 +28,7 @@ def figure(
     variables = sorted(best, key=lambda v: best[v])
     chart = theme.new(title, "Share of the residual told ahead [%]", "", dark=dark)
     names = {v: _name(v, highlight) for v in variables}
-    for modulator in reversed(quantity.MODULATOR_TITLES):
+    for modulator in reversed(MODULATORS):
         bars = {e.variable: e for e in found if e.modulator == modulator}
         if not bars:
             continue
@@ -37,8 +38,8 @@ def figure(
                 y=[names[e.variable] for e in shown],
                 x=[100.0 * max(e.r2, 0.0) for e in shown],
                 orientation="h",
-                name=quantity.MODULATOR_TITLES[modulator],
-                legendrank=list(quantity.MODULATOR_TITLES).index(modulator),
+                name=MODULATORS[modulator].title,
+                legendrank=list(MODULATORS).index(modulator),
                 marker={
                     "color": theme.MODULATORS[modulator],
                     "opacity": [1.0 if e.significant else _PALE for e in shown],
@@ -55,5 +56,5 @@ def figure(
 
 
 def _name(variable: str, highlight: Region | None) -> str:
-    title = quantity.variable_title(variable)
+    title = variable_title(variable)
     return f"<b>▶ {title}</b>" if highlight is not None and highlight.variable == variable else title

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import plotly.graph_objects as go
 
 from ema_model.comparison.explain import Explanation
-from emaviz.figures import quantity, theme
+from ema_model.quantities.variables import variable_title
+from emaviz.figures import theme
 
 _PALE = 0.3
 _TITLE = "What the residual depends on"
@@ -25,7 +26,7 @@ def figure(before: Sequence[Explanation], now: Sequence[Explanation], *, dark: b
     if not order:
         return theme.missing(_TITLE, "no variable to explain it with is known", dark=dark)
     variables = sorted(order, key=lambda variable: order[variable])  # a horizontal bar chart counts from the bottom
-    titles = [quantity.variable_title(variable) for variable in variables]
+    titles = [variable_title(variable) for variable in variables]
     chart = theme.new(_TITLE, "Share of the residual told ahead [%]", "", dark=dark)
     for (name, found), colour in zip(reversed(runs.items()), (theme.MEASURED, theme.MODEL)):
         known = [found.get(variable) for variable in variables]

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ema_model.faults import FAULTS
 from ema_model.identification.landscape import Landscape, Way
 from ema_model.identification.run import ALGORITHMS as TITLES
+from ema_model.quantities.numbers import amount
 from emaviz.colours import TRUTH
 from emaviz.figures import theme
 from emaviz.figures.convergence import colour
@@ -71,18 +72,18 @@ def sentences(found: Mapping[str, Way]) -> Sequence[str]:
     said = []
     for name, way in found.items():
         title = TITLES.get(name, name)
+        end, answer, highest = (amount(rmse, "A") for rmse in (way.rmse_A, way.answer_A, way.highest_A))
         if way.is_trap:
             said.append(
-                f"{title} ended in a trap: its rmse is {way.rmse_A:.3g} A there, and on the straight way to the answer "
-                f"({way.answer_A:.3g} A) it rises to {way.highest_A:.3g} A first."
+                f"{title} ended in a trap: its rmse is {end} there, and on the straight way to the answer ({answer}) "
+                f"it rises to {highest} first."
             )
         elif way.is_worse:
             said.append(
-                f"{title} had not settled: from its end ({way.rmse_A:.3g} A) the error falls all the way to the answer "
-                f"({way.answer_A:.3g} A)."
+                f"{title} had not settled: from its end ({end}) the error falls all the way to the answer ({answer})."
             )
         else:
-            said.append(f"{title} ended at the answer: {way.rmse_A:.3g} A.")
+            said.append(f"{title} ended at the answer: {end}.")
     return said
 
 

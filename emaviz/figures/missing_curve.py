@@ -7,8 +7,9 @@ import plotly.graph_objects as go
 
 from ema_model.discovery import Discovery
 from ema_model.quantities.numbers import Quantity
-from ema_model.recordings import SIGNALS
-from emaviz.figures import quantity, theme
+from ema_model.quantities.shown import of_residual
+from ema_model.quantities.variables import of_variable
+from emaviz.figures import theme
 
 
 def figure(found: Discovery, *, dark: bool = False) -> go.Figure:
@@ -16,7 +17,7 @@ def figure(found: Discovery, *, dark: bool = False) -> go.Figure:
     unknown = found.unknown
     if unknown is None:
         return theme.missing("What is left", "nothing that a variable explains", dark=dark)
-    axis, shown = _axis(found), _residual(found)
+    axis, shown = of_variable(unknown.variable, found.actuator.axes), _residual(found)
     axis, shown = axis.scaled(unknown.centres), shown.scaled(unknown.curve)
     title = f"{shown.title} against {axis.title[0].lower()}{axis.title[1:]}"
     chart = theme.new(title, axis.label, shown.label, dark=dark)
@@ -41,25 +42,10 @@ def figure(found: Discovery, *, dark: bool = False) -> go.Figure:
     return chart
 
 
-def _axis(found: Discovery) -> Quantity:
-    assert found.unknown is not None
-    unit = found.actuator.axes.variable_unit(found.unknown.variable)
-    title = quantity.variable_title(found.unknown.variable)
-    if found.unknown.variable == "motor_angle" and unit == "rad":
-        return Quantity(title, "°", 180.0 / np.pi)
-    return Quantity(title, unit)
-
-
 def _residual(found: Discovery) -> Quantity:
     assert found.unknown is not None
     modulator = found.unknown.modulator
-    if found.unknown.signal == "current_A":
-        constant = found.actuator.motor.torque_constant_Nm_A
-        what, unit = ("force", "N") if found.actuator.axes.motor == "linear" else ("torque", "N·m")
-        told = Quantity(f"Residual {what}", unit, constant)
-    else:
-        signal = SIGNALS[found.unknown.signal]
-        told = Quantity(f"Residual {signal.title[0].lower()}{signal.title[1:]}", signal.unit)
+    told = of_residual(found.unknown.signal, found.actuator.axes, found.actuator.motor.torque_constant_Nm_A)
     if modulator == "current":  # a share of the current or torque, which has no unit of its own
         return Quantity(f"{told.title} / current", f"{told.unit}/A", told.factor)
     return Quantity(f"{told.title}, with the motion", told.unit, told.factor) if modulator == "sign_speed" else told

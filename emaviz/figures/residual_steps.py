@@ -7,8 +7,8 @@ import plotly.graph_objects as go
 
 from ema_model.discovery.tracks import Track
 from ema_model.estimation.floor import BAND_SIGMAS
-from ema_model.quantities.numbers import Quantity
-from ema_model.recordings import SIGNALS
+from ema_model.quantities.axes import ROTARY
+from ema_model.quantities.shown import of_residual
 from emaviz.figures import floor_band, theme
 from emaviz.figures.lines import line
 
@@ -17,13 +17,12 @@ BEFORE, AFTER = theme.MODEL, theme.MEASURED
 
 def figure(track: Track, signal: str, first: int = 0, last: int = -1, *, dark: bool = False) -> go.Figure:
     """The residual of two steps of the ladder: the first and the last one, unless told otherwise."""
-    told = SIGNALS[signal]
-    title = told.title.removeprefix("Equivalent ")
-    title = f"Residual {title[0].lower()}{title[1:]}"
+    told = of_residual(signal, ROTARY)  # by the name in files, which says all
+    title = told.title
     if signal not in track.measured:
         return theme.missing(title, "not recorded here", dark=dark)
     before, after = track.residual(signal, first), track.residual(signal, last)
-    shown = Quantity(title, told.unit, symbol=f"Δ{told.symbol}").scaled(before)
+    shown = told.scaled(before)
     chart = theme.new(f"{title} (measured − model)", "Time [s]", shown.short_label, dark=dark)
     sigma = BAND_SIGMAS * shown.factor * track.sigma[signal]
     floor_band.below(chart, track.time_s, sigma)

@@ -8,8 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ema_model.quantities.axes import ROTARY, Axes
+from ema_model.quantities.sides import MOTOR, USER, Side
 from ema_model.recordings import Measurement
-from emaviz.figures.signals import CHARTS
+from emaviz.figures.signals import charts
 from emaviz.text.html import Html, html, joined
 
 _MISSING = "–"
@@ -17,19 +19,21 @@ _MISSING = "–"
 
 @dataclass(frozen=True)
 class Metric:
-    """A row of the table."""
+    """A row of the table; `side`: whose axis it is of."""
 
     name: str
     unit: str
+    side: Side | None = None
+    prefix: str = ""
 
 
 METRICS = (
     Metric("peak current", "A"),
     Metric("rms current", "A"),
-    Metric("largest following error", "mrad"),
-    Metric("rms following error", "mrad"),
-    Metric("rise time 10–90 %", "ms"),
-    Metric("peak speed", "rad/s"),
+    Metric("largest following error", "rad", USER, "m"),
+    Metric("rms following error", "rad", USER, "m"),
+    Metric("rise time 10–90 %", "s", prefix="m"),
+    Metric("peak speed", "rad/s", MOTOR),
 )
 
 
@@ -65,23 +69,26 @@ def rise_time_s(run: Measurement) -> float:
     return float(times[1] - times[0])
 
 
-def differences(reference: Measurement, monitor: Measurement) -> dict[str, tuple[float, str]]:
+def differences(reference: Measurement, monitor: Measurement, axes: Axes = ROTARY) -> dict[str, tuple[float, str]]:
     """RMSE of monitor − reference for each chart: by its title, the number and its unit."""
     return {
         chart.title: (chart.difference_scale * _rms(monitor[chart.signal] - reference[chart.signal]),
                       chart.difference_unit)
-        for chart in CHARTS
+        for chart in charts(axes)
     }  # fmt: skip
 
 
 def table(
-    runs: Mapping[str, Mapping[str, float]], errors: Mapping[str, Mapping[str, tuple[float, str]]], colours: list[str]
+    runs: Mapping[str, Mapping[str, float]],
+    errors: Mapping[str, Mapping[str, tuple[float, str]]],
+    colours: list[str],
+    axes: Axes = ROTARY,
 ) -> Html:
     """HTML: the metrics of each run, and below the differences of each pair of runs."""
     right = "text-align:right;font-weight:600"
     heads = joined(html('<th style="{};color:{}">{}</th>', right, colour, name) for name, colour in zip(runs, colours))
     rows = joined(
-        html("<tr><td>{} [{}]</td>", metric.name, metric.unit)
+        html("<tr><td>{} [{}{}]</td>", metric.name, metric.prefix, axes.unit(metric.unit, metric.side))
         + joined(html('<td style="text-align:right">{}</td>', _shown(run[metric.name])) for run in runs.values())
         + html("</tr>")
         for metric in METRICS

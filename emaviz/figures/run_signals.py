@@ -5,10 +5,11 @@ from __future__ import annotations
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
+from ema_model.quantities.axes import ROTARY, Axes
 from ema_model.recordings import Measurement
 from emaviz.colours import COMMAND, GHOST, MONITOR, REFERENCE
 from emaviz.figures.lines import line
-from emaviz.figures.signals import CHARTS, at
+from emaviz.figures.signals import at, charts
 from emaviz.figures.theme import DARK, LIGHT
 
 _POINTS = 2500
@@ -20,13 +21,15 @@ def figure(
     ghost: Measurement | None = None,
     window_s: tuple[float, float] | None = None,
     *,
+    axes: Axes = ROTARY,
     dark: bool = False,
 ) -> go.Figure:
     """Reference, monitor and a frozen run over time, from and to the window's times."""
-    drawn = make_subplots(rows=len(CHARTS), cols=1, shared_xaxes=True, vertical_spacing=0.045)
+    every = charts(axes)
+    drawn = make_subplots(rows=len(every), cols=1, shared_xaxes=True, vertical_spacing=0.045)
     theme = DARK if dark else LIGHT
     time = reference.time_s
-    for row, chart in enumerate(CHARTS, 1):
+    for row, chart in enumerate(every, 1):
         lines = [
             ("reference model (the plant)", REFERENCE, "solid", reference[chart.signal]),
             ("monitor model", MONITOR, "solid", monitor[chart.signal]),
@@ -44,7 +47,7 @@ def figure(
                 row=row, col=1,
             )  # fmt: skip
         drawn.update_yaxes(title_text=f"{chart.title}<br>[{chart.unit}]", row=row, col=1)
-    drawn.update_xaxes(title_text="time [s]", row=len(CHARTS), col=1)
+    drawn.update_xaxes(title_text="time [s]", row=len(every), col=1)
     if window_s is not None:
         drawn.update_xaxes(range=list(window_s))
     drawn.update_layout(

@@ -9,6 +9,8 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
+from ema_model.quantities.axes import ROTARY, Axes
+from ema_model.quantities.shown import of_signal
 from ema_model.recordings import Measurement
 from emaviz.colours import COMMAND, DIFFERENCE, GHOST, MONITOR, PHASES, REFERENCE
 from emaviz.figures.decimate import envelope
@@ -22,23 +24,42 @@ _GREY = "#868e96"
 
 @dataclass(frozen=True)
 class SignalChart:
-    """What one chart shows, and in which units."""
+    """What one chart shows, and in which units: a fixed prefix, so that the axis stands still while one drags."""
 
     signal: str
     title: str
     unit: str
-    scale: float = 1.0
-    difference_unit: str = ""
-    difference_scale: float = 1.0
-    with_command: bool = False
+    scale: float
+    difference_unit: str
+    difference_scale: float
+    with_command: bool
 
 
-CHARTS = (
-    SignalChart("current_A", "Equivalent current", "A", difference_unit="A"),
-    SignalChart("user_position_rad", "User position", "mrad", 1e3, "µrad", 1e6, with_command=True),
-    SignalChart("motor_position_rad", "Motor position", "rad", 1.0, "mrad", 1e3),
-    SignalChart("motor_speed_rad_s", "Motor speed", "rad/s", difference_unit="rad/s"),
-)
+_SCALES = {"": 1.0, "m": 1e3, "µ": 1e6}
+_PREFIXES = {  # of the signal, and of a difference in it
+    "current_A": ("", ""),
+    "user_position_rad": ("m", "µ"),
+    "motor_position_rad": ("", "m"),
+    "motor_speed_rad_s": ("", ""),
+}
+
+
+def charts(axes: Axes = ROTARY) -> tuple[SignalChart, ...]:
+    """A chart for each signal of a run, in the units of these axes."""
+    return tuple(
+        SignalChart(
+            name,
+            (signal := of_signal(name, axes)).title,
+            f"{prefix}{signal.unit}",
+            _SCALES[prefix],
+            f"{finer}{signal.unit}",
+            _SCALES[finer],
+            with_command=name == "user_position_rad",
+        )
+        for name, (prefix, finer) in _PREFIXES.items()
+    )
+
+
 PHASE_SIGNALS = ("phase_a_current_A", "phase_b_current_A", "phase_c_current_A")
 
 
@@ -54,7 +75,7 @@ def legend(*names: tuple[str, str]) -> Html:
 class LiveSignals:
     """The charts in a panel of the page."""
 
-    def __init__(self, gui: viser.GuiApi, height: int = 132) -> None:
+    def __init__(self, gui: viser.GuiApi, axes: Axes, height: int = 132) -> None:
         empty = np.array([0.0, 1.0])
         add_html(
             gui,
@@ -67,9 +88,10 @@ class LiveSignals:
             ),
         )
         self._charts: list[tuple[SignalChart, Any]] = []
-        for chart in CHARTS:
+        every = charts(axes)
+        for chart in every:
             count = 6 + chart.with_command
-            last = chart is CHARTS[-1]
+            last = chart is every[-1]
             handle = gui.add_uplot(
                 data=tuple(empty for _ in range(count)),
                 series=_series(chart),

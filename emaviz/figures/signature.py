@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
@@ -10,11 +12,11 @@ from ema_model.comparison.residuals import Residuals
 from ema_model.discovery import Candidate
 from ema_model.discovery.snapshot import Look
 from ema_model.quantities.numbers import Quantity
+from ema_model.quantities.shown import of_residual
 from ema_model.quantities.titles import in_sentence
-from ema_model.recordings import SIGNALS
+from ema_model.quantities.variables import is_turn, of_variable
 from emaviz.figures import theme
 from emaviz.figures.binned import Binned, binned, edges_for
-from emaviz.figures.quantity import variable_title
 from emaviz.text.discovery import effect_title
 
 Array = NDArray[np.float64]
@@ -71,10 +73,7 @@ def _over_time(look: Look, one: Candidate, title: str, signal: str, change: Arra
     part = np.flatnonzero(residuals.run == residuals.run[middle])
     part = part[np.abs(part - middle) <= _SHOWN // 2]
     values = residuals.values[signal][part]
-    quantity = Quantity(
-        "Residual " + in_sentence(SIGNALS[signal].title.removeprefix("Equivalent ")), SIGNALS[signal].unit
-    )
-    shown = quantity.scaled(values)
+    shown = of_residual(signal, look.found.actuator.axes).scaled(values)
     chart = theme.new(title, "Time [s], where it would show most", shown.label, dark=dark)
     for name, line, style in (
         ("measured − model", values, {"color": theme.MEASURED, "width": 1}),
@@ -128,23 +127,14 @@ def _edges(variable: str, x: Array, one: Candidate) -> Array:
 
 
 def _axis(look: Look, variable: str, one: Candidate) -> Quantity:
-    unit = look.found.actuator.axes.variable_unit(variable)
-    title = variable_title(variable)
-    if variable == "motor_angle" and unit == "rad":
-        parts = round(_TURN / _period(one))
-        return Quantity(title if parts == 1 else f"{title}, folded {parts} times", "°", 180.0 / np.pi)
-    return Quantity(title, unit)
+    axis = of_variable(variable, look.found.actuator.axes)
+    parts = round(_TURN / _period(one)) if is_turn(variable, look.found.actuator.axes) else 1
+    return axis if parts == 1 else replace(axis, title=f"{axis.title}, folded {parts} times")
 
 
 def _shown(look: Look, signal: str, *lines: Binned) -> Quantity:
     values = np.concatenate([line.mean for line in lines])
-    constant = look.residuals.torque_constant
-    if signal == "current_A" and constant is not None:
-        linear = look.found.actuator.axes.motor == "linear"
-        told = Quantity("Missing force" if linear else "Missing torque", "N" if linear else "N·m", constant)
-    else:
-        told = Quantity(f"Residual {in_sentence(SIGNALS[signal].title)}", SIGNALS[signal].unit)
-    return told.scaled(values)
+    return of_residual(signal, look.found.actuator.axes, look.residuals.torque_constant).scaled(values)
 
 
 def _add_left(chart: go.Figure, left: Binned, axis: Quantity, shown: Quantity) -> None:

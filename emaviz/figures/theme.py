@@ -11,6 +11,7 @@ from typing import Any
 
 import plotly.graph_objects as go
 
+from ema_model.estimation.floor import BAND_SIGMAS
 from emaviz.colours import ALGORITHMS, COMMAND, DIFFERENCE, MONITOR, REFERENCE
 
 MEASURED = REFERENCE
@@ -24,7 +25,7 @@ EDGE = "#868e96"
 SHADE = "rgba(224,49,49,0.16)"
 MARK = "#c2255c"
 POINTS = 4000  # of a trace, at most
-FLOOR_NAME = "floor ±2σ"
+FLOOR_NAME = f"floor ±{BAND_SIGMAS:g}σ"
 _MOST_SHADES = 150
 _FONT = "system-ui, 'Segoe UI', Helvetica, Arial, sans-serif"
 

@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ema_model.actuator.naming import on_axes
 from ema_model.comparison.result import Compared, Comparison
 from ema_model.comparison.summary import as_dict
 from ema_model.errors import InputError
 from ema_model.estimation.floor import BAND_SIGMAS
+from ema_model.quantities.shown import of_signal
 from emaviz.recording.errors import RecordingError
 from emaviz.recording.markdown import escaped
 from emaviz.recording.style import COMPARISON, plain
@@ -146,7 +148,9 @@ def _answer(comparison: Comparison) -> str:
     lines += [f"- ⚠ {escaped(warning)}" for warning in comparison.warnings]
     lines += ["", "| signal | rmse | before calibration | floor |", "|---|---|---|---|"]
     for name, error in comparison.signals.items():
-        lines.append(f"| {escaped(name)} | {error.rmse:.4g} | {error.rmse_initial:.4g} | {error.noise_floor:.4g} |")
+        shown = error.quantity(of_signal(name, comparison.actuator.axes))
+        row = " | ".join(shown.text(value) for value in (error.rmse, error.rmse_initial, error.noise_floor))
+        lines.append(f"| {escaped(name)} | {row} |")
     return "\n".join(lines)
 
 
@@ -182,7 +186,7 @@ def _configuration(
             "|---|---|---|---|---|",
         ]
         for path, found in fit.parameters.items():
-            name = comparison.actuator.axes.path(path)
+            name = on_axes(path, comparison.actuator.axes).path
             low, high = found.interval90
             lines.append(
                 f"| {escaped(name)} | {found.value:.5g} | {low:.5g} … {high:.5g} | {found.unit} | {found.z:.2f} |"

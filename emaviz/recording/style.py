@@ -29,7 +29,11 @@ COMPARISON = "/comparison"
 GROUPS = ("reference", "monitor", "measurement", "initial", "residual", "floor_high", "floor_low")
 GROUP_TITLES = {"reference": "RM", "monitor": "MM", "measurement": "Measured", "residual": "Residual"}
 # Of a comparison: the model before calibration, and the edges between which a perfect one would leave its residual.
-GROUP_TITLES |= {"initial": "MM before calibration", "floor_high": "Floor +2σ", "floor_low": "Floor −2σ"}
+GROUP_TITLES |= {
+    "initial": "MM before calibration",
+    "floor_high": "Floor, upper edge",
+    "floor_low": "Floor, lower edge",
+}
 GROUP_COLOURS: dict[str, Colour] = {
     "reference": _rgba(colours.REFERENCE, 200),
     "monitor": _rgba(colours.MONITOR),

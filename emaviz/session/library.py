@@ -45,7 +45,7 @@ class Library:
         """Simulates soon; of several requests the last one counts.  InputError for a setting out of range."""
         if run not in RUNS:
             raise InputError(f"no run {quoted(run, 40)!r}; runs are {', '.join(RUNS)}")
-        full = find(name).settings(dict(settings))
+        full = find(name, self.session.actuator.axes).settings(dict(settings))
 
         def job() -> None:
             self._say("Simulating; the first time, the library is compiled, which takes some seconds …")
@@ -61,7 +61,8 @@ class Library:
         return self.session.worker.start(self._steps())
 
     def _steps(self) -> Steps:
-        for i, effect in enumerate(CATALOGUE.values()):
+        for i, name in enumerate(CATALOGUE):
+            effect = find(name, self.session.actuator.axes)
             self._say(f"Running {in_sentence(effect.title)} … {i + 1} of {len(CATALOGUE)}")
             settings = effect.settings({effect.parameters[0].name: effect.severities[1]})
             found: list[WithEffect] = []

@@ -63,7 +63,7 @@ class Session:
     def __init__(self, actuator: Actuator, folder: Path) -> None:
         self.actuator = actuator
         self.folder = folder
-        self.settings = Settings(k=actuator.k)  # the plant, as its file knows this unit
+        self.settings = Settings(axes=actuator.axes, k=actuator.k)  # the plant, as its file knows this unit
         self.events = Events()
         self.identified: Identification | None = None
         self.simulation: Simulation | None = None

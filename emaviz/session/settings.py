@@ -16,6 +16,8 @@ from ema_model.effects import find
 from ema_model.errors import InputError, quoted
 from ema_model.faults import HEALTHY, physical
 from ema_model.identification.run import ALGORITHMS
+from ema_model.quantities.axes import ROTARY, Axes
+from ema_model.quantities.sides import MOTOR, USER
 from ema_model.simulation.plant import FITNESSES
 from ema_model.simulation.run import Run
 from ema_model.simulation.sensors import Sensors
@@ -36,6 +38,7 @@ _PLAIN = (
 class Settings:
     """Everything that the controls set; only the setters below change it."""
 
+    axes: Axes = ROTARY  # of the actuator, which are not saved
     k: NDArray[np.float64] = field(default_factory=lambda: HEALTHY.copy())
     command: str = "chirp"
     command_settings: dict[str, dict[str, Any]] = field(default_factory=lambda: {name: {} for name in COMMANDS})
@@ -81,7 +84,7 @@ class Settings:
         """Load on the user shaft, N·m."""
         load = number(value, "load torque")
         if abs(load) > 1000.0:
-            raise InputError(f"the load torque must lie between −1000 and 1000 N·m, not {load:g}")
+            raise InputError(f"the load must lie between −1000 and 1000 {self.axes.unit('N·m', USER)}, not {load:g}")
         self.load_torque_Nm = load
 
     def set_noise(self, value: Any) -> None:
@@ -94,11 +97,11 @@ class Settings:
 
     def set_start_offset(self, value: Any) -> None:
         """Where both models start, rad of the user from the command's start."""
-        self.start_offset_rad = _within(value, "start angle", _LARGEST_OFFSET_RAD, "rad")
+        self.start_offset_rad = _within(value, "start angle", _LARGEST_OFFSET_RAD, self.axes.unit("rad", USER))
 
     def set_start_speed(self, value: Any) -> None:
         """Motor speed with which the plant starts, rad/s."""
-        self.start_speed_rad_s = _within(value, "start speed", _FASTEST_START_RAD_S, "rad/s")
+        self.start_speed_rad_s = _within(value, "start speed", _FASTEST_START_RAD_S, self.axes.unit("rad/s", MOTOR))
 
     def set_start_side(self, value: Any) -> None:
         """Where in its play the plant starts: −1 and 1 are its two sides."""
@@ -106,7 +109,7 @@ class Settings:
 
     def set_effect(self, name: Any, parameter: str | None = None, value: Any = None) -> None:
         """Hides an effect in the plant, or changes one of its parameters; InputError leaves the old one."""
-        effect = find(str(name))
+        effect = find(str(name), self.axes)
         tried = dict(self.effects.get(effect.name) or effect.settings({}))
         if parameter is not None:
             tried[parameter] = number(value, parameter)
@@ -171,7 +174,7 @@ class Settings:
         """Takes what `saved` gave; InputError, and nothing is changed, if anything in it makes no sense."""
         if not isinstance(saved, dict):
             raise InputError("the session's settings are damaged; save it anew")
-        new = Settings()
+        new = Settings(axes=self.axes)
         try:
             for index, value in enumerate(saved.get("k", HEALTHY)):
                 new.set_fault(index, value)

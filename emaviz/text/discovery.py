@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from ema_model.actuator.naming import on_axes
 from ema_model.actuator.readings import sentences as phrases_of
 from ema_model.discovery import Discovery, Verified
 from ema_model.discovery.result import Added, Rung
@@ -12,9 +13,10 @@ from ema_model.errors import InputError
 from ema_model.estimation import Calibrated
 from ema_model.faults import BY_NAME, FAULTS, NAMES
 from ema_model.quantities.axes import Axes
-from ema_model.quantities.numbers import number
-from ema_model.quantities.titles import in_sentence, parameter_title
-from ema_model.recordings import SIGNALS
+from ema_model.quantities.numbers import amount, number, with_uncertainty
+from ema_model.quantities.shown import of_signal
+from ema_model.quantities.sides import USER
+from ema_model.quantities.titles import in_sentence
 from emaviz.text.run import run_in_words
 
 VERDICTS = {
@@ -61,7 +63,7 @@ def sentences(found: Discovery) -> list[str]:
             rivals = _listed([in_sentence(effect_title(name)) for name in one.same_as])
             told.append(f"These recordings cannot tell {in_sentence(effect_title(one.name))} from {rivals}.")
     if found.parameters_outside_tolerance:
-        outside = _listed([parameter(found.actuator.axes, path) for path in found.parameters_outside_tolerance])
+        outside = _listed([on_axes(path, found.actuator.axes).title for path in found.parameters_outside_tolerance])
         whose = "its" if len(found.parameters_outside_tolerance) == 1 else "their"
         told.append(f"Outside {whose} tolerance: {outside}.")
     if found.unknown is not None:
@@ -87,11 +89,12 @@ def next_experiment(found: Discovery) -> list[str]:
     best = found.next_experiment
     if best is None:
         return []
-    asked = f"Record {run_in_words(best.command, best.settings, best.duration_s)}"
+    axes = found.actuator.axes
+    asked = f"Record {run_in_words(best.command, best.settings, best.duration_s, axes)}"
     if best.load_torque_Nm:
-        asked += f", under a load of {number(best.load_torque_Nm)} N·m at the user"
+        asked += f", under a load of {amount(best.load_torque_Nm, axes.unit('N·m', USER))} at the user"
     if best.add_signal:
-        names = [in_sentence(SIGNALS[name].title) if name in SIGNALS else name for name in best.add_signal.split(", ")]
+        names = [in_sentence(of_signal(name, axes).title) for name in best.add_signal.split(", ")]
         asked += f", and measure the {_listed(names)} as well"
     rivals = _listed([in_sentence(effect_title(name)) for name in best.separates])
     return [f"{asked}.", f"It would tell {rivals} apart: χ² of {best.expected_chi2:.0f} is expected between them."]
@@ -124,23 +127,14 @@ def rung_title(label: str, axes: Axes) -> str:
         return f"{sign} {effect_title(name)}"
     path, outside, _ = label.partition(" outside its tolerance")
     if outside:
-        return f"{parameter(axes, path)} freed"
+        return f"{on_axes(path, axes).title} freed"
     return label[:1].upper() + label[1:]
 
 
-def parameter(axes: Axes, path: str) -> str:
-    """'Motor inertia' of 'motor.inertia_kgm2', by the name that the actuator's axes give it."""
-    section, _, rest = path.partition(".")
-    if section != "effects":
-        return parameter_title(axes.path(path))
-    effect, _, name = rest.partition(".")
-    return f"{effect_title(effect)}: {in_sentence(parameter_title('.' + name))}"
-
-
 def value(one: Calibrated) -> str:
-    """'0.0122 ± 0.0007 N·m': with half of the 90 % interval."""
+    """'12.2 ± 0.70 mN·m': with half of the 90 % interval."""
     half = 0.5 * (one.interval90[1] - one.interval90[0])
-    return f"{number(one.value)} ± {number(half, 2)} {one.unit}".rstrip()
+    return with_uncertainty(one.value, half, one.unit)
 
 
 def settings(found: Discovery, one: Added) -> dict[str, str]:

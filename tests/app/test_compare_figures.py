@@ -12,6 +12,7 @@ from plotly.offline import get_plotlyjs
 from support.comparison_by_hand import comparison as by_hand
 
 from ema_model.quantities.numbers import number
+from ema_model.quantities.variables import MODULATORS, variable_title
 from emaviz.figures import (
     calibration_scores,
     explained,
@@ -155,11 +156,9 @@ def test_a_mean_for_each_direction_where_direction_explains(comparison):
 def test_what_noise_could_have_made_is_pale(comparison):
     for trace in explained.figure(comparison).data:
         for name, opacity in zip(trace.y, trace.marker.opacity):
-            modulator = next(m for m, title in quantity.MODULATOR_TITLES.items() if title == trace.name)
+            modulator = next(m for m, one in MODULATORS.items() if one.title == trace.name)
             (found,) = (
-                e
-                for e in comparison.explained_by
-                if quantity.variable_title(e.variable) == name and e.modulator == modulator
+                e for e in comparison.explained_by if variable_title(e.variable) == name and e.modulator == modulator
             )
             assert (opacity == 1.0) == found.significant
 

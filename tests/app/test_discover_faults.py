@@ -45,7 +45,7 @@ def test_start_takes_the_fault_into_the_model(worn):
     assert [rung.label for rung in look.found.ladder] == ["calibrated", "fault k2 backlash"]
     assert look.rmse < 1.1 < look.found.ladder[0].rmse
     assert headline(look.found) == "No physics is missing: the actuator has the fault k2 backlash."
-    assert "k2 backlash" in faults(look.found)["k2"] and "µrad" in faults(look.found)["k2"]
+    assert "k2 backlash" in faults(look.found)["k2"] and "mrad" in faults(look.found)["k2"]
     assert any("k2 backlash" in text for text in sentences(look.found))
     assert "#2b8a3e" in answer(look), "at the floor"
 

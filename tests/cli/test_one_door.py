@@ -12,6 +12,7 @@ from support.on_page import wait_until
 
 from ema_model.actuator import load_actuator, shipped
 from ema_model.commands import command
+from ema_model.quantities.numbers import amount
 from ema_model.recordings import Measurement, read, write_measurement
 from ema_model.simulation.run import Run, simulate_reference
 from emaviz.cli import compare, discover, identify, main, simulate
@@ -241,7 +242,7 @@ def test_identify_takes_what_compare_takes_and_shares_its_options(rig, tmp_path,
     fitted = load_actuator(model)
     assert result["parameters"] and fitted.value("motor.inertia_kgm2") == result["parameters"]["motor.inertia_kgm2"]
     text = report.read_text(encoding="utf-8")
-    numbers = (f"{result['k'][7]:.4f}", f"{result['holdout_rmse']:.4f} A")
+    numbers = (f"{result['k'][7]:.4f}", amount(result["holdout_rmse"], "A"))
     assert all(told in text for told in ("Faults", "friction factor", "Convergence", *numbers))
 
 

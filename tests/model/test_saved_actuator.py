@@ -107,7 +107,7 @@ def test_a_place_that_cannot_be_written_is_one_line(tmp_path):
         (("gain_1_m", "gain_1_rad"), "[controller] has no parameter 'gain_1_rad'"),
         (("[effects.hinge_moment]", "[effects.rust]"), "[effects] no effect 'rust'"),
         (("stiffness_N_m", "stiffness_Nm_rad"), "has no 'stiffness_Nm_rad'"),
-        (("stiffness_N_m = 1000.0", "stiffness_N_m = 1e9"), "is outside"),
+        (("stiffness_N_m = 1000.0", "stiffness_N_m = 1e10"), "stiffness_N_m = 1e+10 is outside"),
         (("[axes]", "[recordings]\nmapping = 3\n[axes]"), "mapping must be a list of texts"),
         (("[axes]", "[[recordings.where]]\nset = {}\n[axes]"), "needs match"),
         (("[axes]", '[[recordings.where]]\nmatch = "*"\nset = { "motor.colour" = 1 }\n[axes]'), "no parameter"),

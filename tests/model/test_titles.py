@@ -23,7 +23,7 @@ from ema_model.recordings import SIGNALS
         ("delay_s", "Delay", "s"),
         ("motor.mass_kg", "Motor mass", "kg"),
         ("motor.pole_pairs", "Motor pole pairs", ""),
-        ("play 0", "Play 0", "rad"),
+        ("play 0", "Play 0", ""),
     ],
 )
 def test_a_name_ends_with_its_unit(path, title, unit):

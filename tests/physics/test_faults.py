@@ -113,7 +113,7 @@ def test_readings_and_sentences():
     assert r["backlash_rad"] == pytest.approx(1e-3)
     assert r["position_gain_1_s"] == pytest.approx(5e4)
     assert len(sentences(k, ACTUATOR)) == len(FAULTS)
-    assert "1000 µrad" in sentences(k, ACTUATOR)[1]
+    assert "1.00 mrad" in sentences(k, ACTUATOR)[1]
 
 
 @pytest.mark.parametrize("name", ["k0", "k9", "K1", "friction", ""])

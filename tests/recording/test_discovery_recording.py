@@ -75,7 +75,7 @@ def test_ladder_has_a_row_for_each_step(found, written):
 def test_words_tell_the_verdict_the_effect_and_the_candidates(found, written):
     [verdict] = _columns(written, "/discovery/verdict", "TextDocument:text")
     value = found.calibration.parameters["effects.cogging_torque.amplitude_Nm"].value
-    for told in ("The model lacks cogging torque.", f"{value:.3g}"[:6], "N·m", "| 12 |", "± ", "+ Cogging torque"):
+    for told in ("The model lacks cogging torque.", f"{1e3 * value:.1f} ± ", "mN·m", "| 12 |", "+ Cogging torque"):
         assert told in verdict[0], told
     [ranking] = _columns(written, "/discovery/candidates", "TextDocument:text")
     assert "| 1 | Cogging torque |" in ranking[0] and "Dead time: these recordings cannot show it" in ranking[0]

@@ -151,7 +151,7 @@ def test_noise_on_a_smooth_signal(noise):
 def test_constant_signals_are_named():
     found = health(made(duty=np.sin(times()), bus_voltage_V=np.full(4000, 48.0)))
     constant = found.of("constant")
-    assert constant is not None and constant.signal == "bus_voltage_V" and "48 V" in constant.sentence
+    assert constant is not None and constant.signal == "bus_voltage_V" and "48.0 V" in constant.sentence
 
 
 @pytest.mark.parametrize("limit", [0.5, 0.8, 0.9])

@@ -69,7 +69,7 @@ def test_each_effect_has_equation_cause_parameters_and_rivals(report, found):
 def test_ladder_tells_every_signal_in_its_unit(report, found):
     text = _section(report, "ladder")
     assert f"{found.ladder[-1].holdout_rmse:.3f}" in text
-    assert f"{1e3 * found.ladder[-1].signals['current_A']:.0f} mA" in text and "mrad" in text
+    assert f"{found.ladder[-1].signals['current_A']:.3f} A" in text and "mrad" in text
 
 
 def test_candidates_that_cannot_be_shown_are_told(report):

@@ -7,16 +7,18 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ema_model.effects import Parameter, register
+from ema_model.effects import MOTOR, Parameter, register
 from ema_model.effects.effect import PLACES
 from ema_model.effects.user.module import generated_module
 from ema_model.effects.user.torque import RANGE
 from ema_model.effects.user.user_effect import UserEffect
 from ema_model.errors import InputError, quoted
+from ema_model.quantities.variables import VARIABLES
 
 MOST_KNOTS = 24
 _ARGUMENTS = {"theta": "theta", "omega": "omega", "user": "user", "q": "current", "load": "load"}
-_UNITS = {"theta": "rad", "omega": "rad/s", "user": "rad", "q": "A", "load": "N·m"}
+OF_VARIABLE = {"motor_angle": "theta", "motor_speed": "omega", "user_position": "user", "current": "q", "load": "load"}
+_UNITS = {name: VARIABLES[variable].unit for variable, name in OF_VARIABLE.items()}
 _SYMBOLS = {"theta": "θ", "omega": "ω", "user": "θ_user", "q": "q", "load": "T_load"}
 _FACTORS = {"1": "", "sign_speed": " * sign_of(omega)", "current": " * current"}
 _SHOWN = {"1": "", "sign_speed": " sgn ω", "current": " q"}
@@ -57,7 +59,12 @@ def torque_curve(
             ),
             parameters=tuple(
                 Parameter(
-                    f"knot_{j:02d}", f"{unit} at {symbol} = {low + j * distance:.4g} {_UNITS[variable]}", value, *RANGE
+                    f"knot_{j:02d}",
+                    f"{unit} at {symbol} = {low + j * distance:.4g} {_UNITS[variable]}",
+                    value,
+                    *RANGE,
+                    side=MOTOR,
+                    unit=unit,
                 )
                 for j, value in enumerate(knots)
             ),

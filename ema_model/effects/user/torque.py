@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from ema_model.effects import Parameter, register
+from ema_model.effects import NEITHER, Parameter, register
 from ema_model.effects.effect import ADVANCE, PLACES
 from ema_model.effects.user.expression import VARIABLES, Expression, Node, parse
 from ema_model.effects.user.module import generated_module
@@ -74,7 +74,7 @@ def user_torque(text: str, ranges: Mapping[str, tuple[float, float]] | None = No
 
 def _parameter(name: str, limits: tuple[float, float]) -> Parameter:
     low, high = (float(limit) for limit in limits)
-    return Parameter(name, "in the user's expression", min(max(1.0, low), high), low, high)
+    return Parameter(name, "in the user's expression", min(max(1.0, low), high), low, high, side=NEITHER)
 
 
 def kernels(expression: Expression) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -51,12 +51,13 @@ class Health:
 def health(
     measurement: Measurement, *, current_limit_A: float | None = None, pole_pairs: float | None = None
 ) -> Health:
-    """The health card of a recording; checks whose signals are missing are left out.
+    """The health card of a recording, by the names in files; checks whose signals are missing are left out.
 
     The current's limit is taken from the side file where it is not given; without one flat tops are sought.
     """
     limit = current_limit_A or measurement.side.sensors.get("current_limit_A")
-    return Health(measurement.name, tuple(_findings(measurement, limit, pole_pairs)))
+    found = _findings(measurement, limit, pole_pairs)
+    return Health(measurement.name, tuple(replace(f, signal=f.signal and measurement.shown(f.signal)) for f in found))
 
 
 def _findings(measurement: Measurement, limit: float | None, pole_pairs: float | None) -> Iterator[Finding]:

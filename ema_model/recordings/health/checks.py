@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from ema_model.quantities.numbers import amount
 from ema_model.quantities.signals import SIGNALS
 from ema_model.quantities.titles import in_sentence
 from ema_model.recordings.equivalent_current import PHASES
@@ -57,30 +58,30 @@ def sampling(measurement: Measurement) -> Iterator[Finding]:
 def sensors(measurement: Measurement) -> Iterator[Finding]:
     """Quantisation and noise of each measured signal."""
     for name in measurement:
-        signal = SIGNALS.get(name)
+        signal = SIGNALS.get(measurement.shown(name))
         if signal is None or signal.kind in ("time", "state") or name.startswith("command"):
             continue
-        unit = f" {signal.unit}" if signal.unit else ""
         values = measurement[name]
         if np.all(values == values[0]):
-            yield Finding("constant", "note", f"{signal.title} is constant, {values[0]:.4g}{unit}.", {}, name)
+            yield Finding(
+                "constant", "note", f"{signal.title} is constant, {amount(values[0], signal.unit)}.", {}, name
+            )
             continue
         blocks = estimates.sample_blocks(values, measurement.runs)
         step = estimates.quantisation_step(blocks)
         spread = float(np.std(values))
         if step:
             coarse = step > 0.05 * spread
-            sentence = f"{signal.title} comes in steps of {step:.4g}{unit}."
+            sentence = f"{signal.title} comes in steps of {amount(step, signal.unit)}."
             yield Finding("quantisation", "note" if coarse else "good", sentence, {"step": step}, name)
         noise = estimates.noise_rms(blocks)
         if measurement.is_map or not np.isfinite(noise):
             continue
         if noise < step / np.sqrt(12.0):
-            sentence = f"{signal.title}: noise is below what its steps show, {step:.4g}{unit}."
+            sentence = f"{signal.title}: noise is below what its steps show, {amount(step, signal.unit)}."
         else:
-            sentence = (
-                f"{signal.title}: noise about {noise:.3g}{unit} rms, {100.0 * noise / spread:.2g} % of its spread."
-            )
+            size = amount(noise, signal.unit)
+            sentence = f"{signal.title}: noise about {size} rms, {100.0 * noise / spread:.2g} % of its spread."
         severity = "good" if noise < 0.1 * spread else "note" if noise < 0.5 * spread else "warning"
         yield Finding("noise", severity, sentence, {"noise_rms": noise, "spread": spread}, name)
 
@@ -92,14 +93,14 @@ def saturation(measurement: Measurement, limit: float | None) -> Iterator[Findin
     values = measurement["current_A"]
     if limit:
         share = float(np.mean(np.abs(values) >= 0.98 * limit))
-        sentence = f"The current is at its limit of {limit:.4g} A for {100.0 * share:.3g} % of the time."
+        sentence = f"The current is at its limit of {amount(limit, 'A')} for {100.0 * share:.3g} % of the time."
         severity = "good" if share < 0.001 else "note" if share < 0.1 else "warning"
         yield Finding("saturation", severity, sentence, {"share": share, "limit_A": limit}, "current_A")
         return
     noise = estimates.noise_rms(estimates.sample_blocks(values, measurement.runs))
     level, share = estimates.flat_tops(values, noise)
     if share:
-        sentence = f"The current seems cut off at {level:.4g} A, for {100.0 * share:.3g} % of the time."
+        sentence = f"The current seems cut off at {amount(level, 'A')}, for {100.0 * share:.3g} % of the time."
         yield Finding("saturation", "note", sentence, {"share": share, "limit_A": level}, "current_A")
     else:
         sentence = "The current shows no flat tops, so no saturation is seen."
@@ -199,7 +200,8 @@ def phases(measurement: Measurement, pole_pairs: float | None) -> Iterator[Findi
         noisy = float(np.nan_to_num(np.linalg.norm(noise)))
         excess = max(0.0, left**2 - (1.2 * noisy) ** 2) ** 0.5
         severity = "good" if excess < 0.05 * rms else "note" if excess < 0.3 * rms else "warning"
-        sentence = f"The three phase currents add to {left:.3g} A rms, where zero is expected of {rms:.3g} A each."
+        sum_, each = amount(left, "A"), amount(rms, "A")
+        sentence = f"The three phase currents add to {sum_} rms, where zero is expected of {each} each."
         yield Finding("phase_sum", severity, sentence, {"sum_rms_A": left, "rms_A": rms})
     if "motor_position_rad" not in measurement:
         return

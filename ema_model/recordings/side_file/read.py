@@ -17,6 +17,7 @@ from ema_model.files.limits import TEXT_BYTES
 from ema_model.files.refusal import listed, reason, refusal, shown
 from ema_model.files.toml_text import toml_of
 from ema_model.files.user_file import open_user_file
+from ema_model.quantities.si import of_name, without_unit
 from ema_model.quantities.signals import SIGNALS
 from ema_model.recordings.columns.mapping import ColumnMapping, MappedColumn, parse_mapping
 
@@ -32,10 +33,8 @@ _COLUMN_KEYS = ("column", "unit", *_NUMBERS)
 
 def stated(name: str, what: str) -> str:
     """The name of a signal's accuracy: motor_speed_rad_s and noise give motor_speed_noise_rad_s."""
-    unit = {"rad": "rad", "rad/s": "rad_s", "m": "m", "m/s": "m_s", "N·m": "Nm", "°C": "C"}
-    ending = unit.get(SIGNALS[name].unit, SIGNALS[name].unit)
-    stem = name.removesuffix(f"_{ending}") if ending else name
-    return "_".join(part for part in (stem, what, ending) if part)
+    unit = of_name(name)
+    return "_".join([without_unit(name), what, *([unit.ending] if unit else [])])
 
 
 _MEASURED = [name for name, signal in SIGNALS.items() if signal.kind not in ("time", "state")]

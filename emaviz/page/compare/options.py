@@ -6,7 +6,7 @@ from typing import Any
 
 import viser
 
-from ema_model.quantities.titles import parameter_title, unit_of
+from ema_model.actuator.naming import on_axes
 from ema_model.recordings import SIGNALS
 from emaviz.page.page import Page
 from emaviz.session.compare.comparing import COMPARABLE, Comparing
@@ -102,13 +102,12 @@ class AskedControls:
         for box in self._free:
             box.remove()
         self._free = []
-        gui = self._page.server.gui
+        gui, actuator = self._page.server.gui, self._comparing.actuator
         with self._free_folder:
-            for path, tolerance in self._comparing.actuator.tolerances.items():
-                hint = (
-                    f"{path}: {self._comparing.actuator.value(path):.4g} ± {tolerance.sigma:.2g} {unit_of(path)} (1 σ)"
-                )
-                box = gui.add_checkbox(parameter_title(path), path in self._comparing.free, hint=hint)
+            for path, tolerance in actuator.tolerances.items():
+                one, value = on_axes(path, actuator.axes), actuator.value(path)
+                hint = f"{one.path}: {value:.4g} ± {tolerance.sigma:.2g} {one.unit}".rstrip() + " (1 σ)"
+                box = gui.add_checkbox(one.title, path in self._comparing.free, hint=hint)
                 box.on_update(lambda _, path=path, box=box: self._set_free(path, bool(box.value)))
                 self._free.append(box)
 

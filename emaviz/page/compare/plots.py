@@ -9,8 +9,8 @@ from typing import Any
 import plotly.graph_objects as go
 import viser
 
-from ema_model.comparison.residuals import VARIABLES
 from ema_model.comparison.result import Comparison, Region
+from ema_model.quantities.variables import VARIABLES
 from emaviz.figures import (
     calibration_scores,
     explained,
@@ -26,6 +26,7 @@ from emaviz.page.page import Page
 from emaviz.text.html import add_html
 
 _CONFIG = {"displayModeBar": False}
+_FIRST = next(iter(VARIABLES))
 _EMPTY = "–"
 
 
@@ -122,7 +123,7 @@ class ComparePlots:
         return self._titles.get(str(self._signal.value))
 
     def _draw_against(self, view: View) -> go.Figure:
-        variable = self._variables.get(str(self._variable.value), VARIABLES[0])
+        variable = self._variables.get(str(self._variable.value), _FIRST)
         return residual_against.figure(view.comparison, variable, self._chosen(), highlight=view.region)
 
     def _add(self, draw: Callable[[View], go.Figure], aspect: float) -> _Plot:

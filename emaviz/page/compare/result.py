@@ -9,8 +9,8 @@ import numpy as np
 import viser
 
 from ema_model.comparison.result import Comparison, Region
-from ema_model.recordings import SIGNALS
-from emaviz.figures import mapped_columns
+from ema_model.quantities.numbers import number
+from emaviz.figures import mapped_columns, quantity
 from emaviz.page.compare.plots import ComparePlots, View
 from emaviz.page.page import Page
 from emaviz.session.opened import Opened
@@ -127,7 +127,7 @@ class ResultPanel:
         with self._answer:
             for i, region in enumerate(comparison.worst_regions):
                 button = self._page.server.gui.add_button(
-                    region.sentence, icon=viser.Icon.FOCUS_2, hint=_details(region)
+                    region.sentence, icon=viser.Icon.FOCUS_2, hint=_details(comparison, region)
                 )
                 button.on_click(lambda _, i=i: self._page.screen.post("region", lambda: self.select(i)))
                 self._buttons.append(button)
@@ -186,25 +186,23 @@ def headline(comparison: Comparison) -> Html:
     colour = "#2b8a3e" if comparison.adequate else "#e03131"
     rows = []
     for name, error in comparison.signals.items():
-        signal = SIGNALS[name]
-        scale, unit = _readable_unit(max(error.rmse, error.rmse_initial), signal.unit)
+        shown = error.quantity(quantity.of_signal(comparison, name))
         ratio = error.rmse / error.noise_floor if error.noise_floor > 0.0 else np.inf
         shade = "#2b8a3e" if ratio < 1.2 else "#e8590c" if ratio < 2.0 else "#e03131"
         before = (
-            html('<td style="text-align:right;opacity:.65">{:.3g}</td>', scale * error.rmse_initial)
+            html('<td style="text-align:right;opacity:.65">{}</td>', number(shown.factor * error.rmse_initial))
             if comparison.calibration is not None
             else ""
         )
         rows.append(
             html(
-                '<tr><td>{} [{}]</td>{}<td style="text-align:right">'
-                '{:.3g}</td><td style="text-align:right">{:.3g}</td>'
+                '<tr><td>{}</td>{}<td style="text-align:right">'
+                '{}</td><td style="text-align:right">{}</td>'
                 '<td style="text-align:right;color:{}"><b>{:.2f} ×</b></td></tr>',
-                signal.title,
-                unit,
+                shown.label,
                 before,
-                scale * error.rmse,
-                scale * error.noise_floor,
+                number(shown.factor * error.rmse),
+                number(shown.factor * error.noise_floor),
                 shade,
                 ratio,
             )
@@ -228,17 +226,10 @@ def headline(comparison: Comparison) -> Html:
     )
 
 
-def _readable_unit(largest: float, unit: str) -> tuple[float, str]:
-    """Thousandths or millionths where the number is small: the factor, and the unit's name."""
-    for scale, prefix in ((1.0, ""), (1e3, "m"), (1e6, "µ")):
-        if largest * scale >= 0.1:
-            return scale, prefix + unit
-    return 1e6, "µ" + unit
-
-
-def _details(region: Region) -> str:
-    unit = SIGNALS[region.signal].unit
+def _details(comparison: Comparison, region: Region) -> str:
+    axis = quantity.of_variable(comparison, region.variable).scaled([region.low, region.high])
+    shown = quantity.of_residual(comparison, region.signal).scaled(region.rmse)
     return (
-        f"{region.variable.replace('_', ' ')} from {region.low:.4g} to {region.high:.4g}: "
-        f"error {region.rmse:.3g} {unit} rms, {region.excess:.1f} times the floor"
+        f"{axis.title} from {number(axis.factor * region.low)} to {axis.text(region.high)}: "
+        f"error {shown.text(region.rmse)} rms, {region.excess:.1f} times the floor"
     )

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from ema_model.discovery import Candidate
 from ema_model.discovery.snapshot import Look
 from ema_model.effects import find
-from ema_model.quantities.numbers import Quantity, number
-from ema_model.quantities.titles import in_sentence, parameter_title, unit_of
+from ema_model.quantities.numbers import amount, number, with_uncertainty
+from ema_model.quantities.titles import in_sentence
 from emaviz.text.discovery import effect_title
 from emaviz.text.html import Html, html, unescaped
 
@@ -52,14 +52,10 @@ def label(look: Look, one: Candidate) -> str:
 
 def strength(look: Look, one: Candidate) -> str:
     """'Amplitude 20.4 ± 0.8 mN·m, order 14', as the residual suggests it."""
-    effect = find(one.name)
-    first = effect.parameters[0]
+    first = find(one.name, look.found.actuator.axes).parameters[0]
     value, half = one.settings[first.name], look.uncertainty(one)
-    shown = Quantity("", unit_of(first.name)).scaled([value])
-    told = f"{in_sentence(parameter_title(first.name))} {number(shown.factor * value)}"
-    if half is not None:
-        told += f" ± {number(shown.factor * half, 2)}"
-    told = f"{told} {shown.unit}".rstrip()
+    size = amount(value, first.unit) if half is None else with_uncertainty(value, half, first.unit)
+    told = f"{in_sentence(first.title)} {size}"
     order = one.settings.get("order")
     return told if order is None else f"{told}, order {order:g}"
 

@@ -12,7 +12,7 @@ from ema_model.discovery import Candidate
 from ema_model.discovery.snapshot import Look
 from ema_model.effects import Effect, find
 from ema_model.quantities.numbers import Quantity, number
-from ema_model.quantities.titles import in_sentence, parameter_title, unit_of
+from ema_model.quantities.titles import in_sentence
 from emaviz.figures import signature
 from emaviz.page.discover import cards
 from emaviz.page.page import Page
@@ -69,7 +69,7 @@ class EffectView:
         self._drawn = (look, one.name)
         self._folder.label = effect_title(one.name)
         self._head.content = head(look, one)
-        self._text.content = about(find(one.name))
+        self._text.content = about(find(one.name, look.found.actuator.axes))
         self._untestable = bool(one.untestable_reason)
         self._enable()
         self._plot.visible = not self._untestable
@@ -122,6 +122,6 @@ def about(effect: Effect, equation: bool = True) -> Html:
 def typical(effect: Effect) -> str:
     """'Amplitude 6, 12, 24 mN·m: slight, clear, strong.'"""
     first = effect.parameters[0]
-    shown = Quantity("", unit_of(first.name)).scaled(effect.severities)
+    shown = Quantity("", first.unit).scaled(effect.severities)
     values = ", ".join(number(shown.factor * one, 2) for one in effect.severities)
-    return f"{parameter_title(first.name)} {values} {shown.unit}".rstrip() + ": slight, clear, strong"
+    return f"{first.title} {values} {shown.unit}".rstrip() + ": slight, clear, strong"

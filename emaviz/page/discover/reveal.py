@@ -11,8 +11,8 @@ from ema_model.discovery import Discovery
 from ema_model.discovery.result import Added
 from ema_model.effects import CATALOGUE, find
 from ema_model.faults import BY_NAME, NAMES
-from ema_model.quantities.numbers import Quantity, number
-from ema_model.quantities.titles import in_sentence, parameter_title, unit_of
+from ema_model.quantities.numbers import amount
+from ema_model.quantities.titles import in_sentence
 from emaviz.page.discover.cards import BOX
 from emaviz.text.discovery import effect_title, fitted_of, value
 from emaviz.text.html import Html, html, joined
@@ -91,17 +91,12 @@ def _effect(name: str, given: dict[str, float], found: Discovery, added: tuple[A
     one = next((one for one in own if order is None or one.chosen.get("order") == order), own[0] if own else None)
     if one is None:
         return _row(False, title, "not found")
-    first = find(name).parameters[0]
+    first = find(name, found.actuator.axes).parameters[0]
     fitted = fitted_of(found, one, first.name)
     low, high = fitted.interval90
     inside = low <= given[first.name] <= high
     near = inside or abs(fitted.value - given[first.name]) <= _NEAR * abs(given[first.name])
-    shown = Quantity("", unit_of(first.name)).scaled([given[first.name]])
-    half = number(shown.factor * 0.5 * (high - low), 2)
-    told = (
-        f"{in_sentence(parameter_title(first.name))} {shown.text(given[first.name])} in truth, "
-        f"{number(shown.factor * fitted.value)} ± {half} {shown.unit} found".rstrip()
-    )
+    told = f"{in_sentence(first.title)} {amount(given[first.name], first.unit)} in truth, {value(fitted)} found"
     if order is not None:
         told += f"; order {order:g} in truth, {one.chosen.get('order', 0.0):g} found"
     return _row(near and (order is None or one.chosen.get("order") == order), title, told)

@@ -33,7 +33,7 @@ class ChartsPanel:
                 "Freeze this run", icon=viser.Icon.SNOWFLAKE, color="gray", hint="Keeps it as a dashed line"
             )
             self._melt = gui.add_button("Drop the frozen run", icon=viser.Icon.X, color="gray", visible=False)
-            self.signals = LiveSignals(gui)
+            self.signals = LiveSignals(gui, page.session.actuator.axes)
             self._range = gui.add_multi_slider(
                 "Shown [%]", 0, 100, 1, (0, 100), min_range=1, hint="Of the run; zooms all charts, in full resolution"
             )
@@ -72,19 +72,19 @@ class ChartsPanel:
         simulation, ghost = self._simulation, self.ghost
         if simulation is None:
             return
-        frozen = ghost.reference if ghost is not None else None
+        frozen, axes = ghost.reference if ghost is not None else None, self._page.session.actuator.axes
         runs = {
             "plant": metrics(simulation.reference, simulation.command),
             "monitor": metrics(simulation.monitor, simulation.command),
         }
-        errors = {"monitor − plant": differences(simulation.reference, simulation.monitor)}
+        errors = {"monitor − plant": differences(simulation.reference, simulation.monitor, axes)}
         if ghost is not None:
             runs["frozen plant"] = metrics(ghost.reference, ghost.command)
-            errors["frozen run's"] = differences(ghost.reference, ghost.monitor)
+            errors["frozen run's"] = differences(ghost.reference, ghost.monitor, axes)
         with self._page.server.atomic():
             if all(name in simulation.reference for name in PHASE_SIGNALS):
                 self._phases.show(simulation.reference, simulation.monitor, frozen, self.window_s)
-            self._table.content = table(runs, errors, [REFERENCE, MONITOR, GHOST])
+            self._table.content = table(runs, errors, [REFERENCE, MONITOR, GHOST], axes)
 
     def _zoom(self) -> None:
         low, high = (min(max(float(value), 0.0), 100.0) / 100.0 for value in self._range.value)

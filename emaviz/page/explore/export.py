@@ -75,7 +75,11 @@ class ExportControls:
     def _show_plot(self, client: viser.ClientHandle) -> None:
         run, ghost = self._run(), self._ghost()
         figure = run_signals.figure(
-            run.reference, run.monitor, ghost.reference if ghost is not None else None, self._window_s()
+            run.reference,
+            run.monitor,
+            ghost.reference if ghost is not None else None,
+            self._window_s(),
+            axes=self._page.session.actuator.axes,
         )
         saved = {"format": "png", "filename": _NAME, "width": 1200, "height": 1000, "scale": 2}
         modal = client.gui.add_modal("Plot")

@@ -8,7 +8,8 @@ from typing import Any
 import viser
 
 from ema_model.effects import CATALOGUE, find
-from ema_model.quantities.titles import labelled
+from ema_model.quantities.shown import of_signal
+from ema_model.quantities.sides import USER
 from emaviz.page.page import Page
 from emaviz.text.html import Html, add_html, html, said
 
@@ -21,7 +22,8 @@ class PlantControls:
     def __init__(self, page: Page) -> None:
         self._page = page
         self._reads: list[tuple[Any, Callable[[], Any]]] = []  # controls, and what the session holds for them
-        gui, settings = page.server.gui, page.session.settings
+        gui, settings, axes = page.server.gui, page.session.settings, page.session.actuator.axes
+        away = "Distance" if axes.is_linear(USER) else "Angle"
         with gui.add_folder("Sensor noise", expand_by_default=False):
             self._listen(
                 gui.add_number("Current noise [A]", 0.0, min=0.0, max=50.0, step=0.05, hint="White, rms"),
@@ -35,13 +37,17 @@ class PlantControls:
             )
         with gui.add_folder("State at the start", expand_by_default=False):
             self._listen(
-                gui.add_number("Angle off the command [mrad]", 0.0, min=-500.0, max=500.0, step=1.0),
+                gui.add_number(
+                    f"{away} off the command [m{axes.unit('rad', USER)}]", 0.0, min=-500.0, max=500.0, step=1.0
+                ),
                 lambda value: settings.set_start_offset(1e-3 * float(value)),
                 lambda: 1e3 * settings.start_offset_rad,
             )
             hint = "Of the plant; the monitor starts at rest.  An identification starts at rest, too."
             self._listen(
-                gui.add_number("Motor speed [rad/s]", 0.0, min=-1000.0, max=1000.0, step=10.0, hint=hint),
+                gui.add_number(
+                    of_signal("motor_speed_rad_s", axes).label, 0.0, min=-1000.0, max=1000.0, step=10.0, hint=hint
+                ),
                 settings.set_start_speed,
                 lambda: settings.start_speed_rad_s,
             )
@@ -84,15 +90,15 @@ class PlantControls:
             self._choice.value = _NONE
             self._chosen()
 
-    @staticmethod
-    def _clear(name: str) -> tuple[str, float]:
+    def _clear(self, name: str) -> tuple[str, float]:
         """The first parameter at its clear severity."""
-        effect = find(name)
+        effect = find(name, self._page.session.actuator.axes)
         return effect.parameters[0].name, effect.severities[1]
 
     def _show(self, name: str) -> None:
         """The parameters of an effect that is in the plant now."""
-        gui, session, effect = self._page.server.gui, self._page.session, find(name)
+        gui, session = self._page.server.gui, self._page.session
+        effect = find(name, session.actuator.axes)
         with self._folder:
             folder = gui.add_folder(effect.title)
         self._shown[name] = folder
@@ -101,7 +107,7 @@ class PlantControls:
                 value = session.settings.effects[name][parameter.name]
                 span = parameter.high - parameter.low
                 entry = gui.add_number(
-                    labelled(parameter.name),
+                    parameter.label,
                     int(value) if parameter.integer else value,
                     min=parameter.low,
                     max=parameter.high,

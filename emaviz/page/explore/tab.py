@@ -13,6 +13,8 @@ import viser
 from ema_model.actuator.readings import sentences
 from ema_model.commands import COMMANDS
 from ema_model.faults import FAULTS, HEALTHY
+from ema_model.quantities.shown import of_signal
+from ema_model.quantities.sides import USER
 from ema_model.quantities.titles import labelled
 from emaviz.page.explore.first_visit import StartHere
 from emaviz.page.explore.plant import PlantControls
@@ -48,7 +50,9 @@ class ExplorePanel:
             self._groups = {name: self._command_settings(name) for name in COMMANDS}
             self._show_group()
             duration = gui.add_number("Duration [s]", 0.5, min=0.01, max=5.0, step=0.01)
-            load = gui.add_number("Load torque [N·m]", 0.0, min=-1000.0, max=1000.0, step=1.0)
+            load = gui.add_number(
+                of_signal("load_torque_Nm", page.session.actuator.axes).label, 0.0, min=-1000.0, max=1000.0, step=1.0
+            )
         self._plant = PlantControls(page)
         with gui.add_folder("Monitor model"):
             self.monitor = gui.add_dropdown(
@@ -152,7 +156,7 @@ class ExplorePanel:
         inputs = []
         for f in fields(COMMANDS[name]):
             default: Any = f.default
-            label = labelled(f.name)
+            label = labelled(self._page.session.actuator.axes.name(f.name, USER))
             if isinstance(default, tuple):
                 entry = self._page.server.gui.add_text(label, "+".join(f"{value:g}" for value in default))
             else:

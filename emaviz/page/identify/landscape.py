@@ -12,6 +12,7 @@ from ema_model.errors import InputError
 from ema_model.faults import FAULTS
 from ema_model.identification.landscape import POINTS, Landscape, Way, extent, slices, ways
 from ema_model.identification.run import ALGORITHMS
+from ema_model.quantities.numbers import amount
 from emaviz.figures import landscape as drawn
 from emaviz.page.identify.swarm import telling
 from emaviz.page.page import Page
@@ -153,7 +154,7 @@ class LandscapeView:
         stopped = "" if found.share == 1.0 else f"Stopped at {100.0 * found.share:.0f} %. "
         held = ", ".join(f"{FAULTS[i].name} {found.through[i]:.3f}" for i in range(8) if i not in (found.x, found.y))
         known = found.rmse_A[np.isfinite(found.rmse_A)]
-        range_ = f" From {known.min():.3g} to {known.max():.3g} A." if len(known) else ""
+        range_ = f" From {amount(known.min(), 'A')} to {amount(known.max(), 'A')}." if len(known) else ""
         self._said.content = _note(f"{stopped}Held: {held}.{range_}")
         said = drawn.sentences(self._ways)
         self._words.content = joined(html("<div {}>{}</div>", _BOX, line) for line in said)

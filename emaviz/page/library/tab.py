@@ -8,7 +8,6 @@ from typing import Any
 import viser
 
 from ema_model.effects import CATALOGUE, Effect, find
-from ema_model.quantities.titles import labelled
 from ema_model.simulation.with_effect import WithEffect
 from emaviz.figures.effect_signature import EffectCharts, small_picture
 from emaviz.page.discover import cards
@@ -108,12 +107,12 @@ class EffectPage:
         self._run = gui.add_dropdown("Run", tuple(RUNS))
         self._place = gui.add_folder("What each parameter does")
         self._status = add_html(gui)
-        self._charts = EffectCharts(gui)
+        self._charts = EffectCharts(gui, page.session.actuator.axes)
         self._run.on_update(lambda event: event.client and self._ask())
 
     def open(self, name: str) -> None:
         """Shows an effect, and runs it; on the screen's thread."""
-        effect = find(name)
+        effect = find(name, self._page.session.actuator.axes)
         self._name = name
         self._title.content = html(
             '<div {}><span style="font-size:17px;font-weight:600">{}</span>'
@@ -155,10 +154,10 @@ class EffectPage:
             low, high = max(one.low, -most), min(one.high, most)
         low, high = min(low, middle), max(high, middle)
         if one.integer:
-            slider = gui.add_slider(labelled(one.name), int(one.low), int(min(one.high, 48)), 1, int(middle))
+            slider = gui.add_slider(one.label, int(one.low), int(min(one.high, 48)), 1, int(middle))
         else:
             step = float(f"{(high - low) / 400.0:.0e}")
-            slider = gui.add_slider(labelled(one.name), low, high, step, middle, hint=one.meaning)
+            slider = gui.add_slider(one.label, low, high, step, middle, hint=one.meaning)
         slider.on_update(lambda event: event.client and self._ask())
         return slider
 

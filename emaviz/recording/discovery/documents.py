@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ema_model.actuator.naming import on_axes
 from ema_model.discovery import Discovery
 from ema_model.discovery.tracks import Track
 from ema_model.effects import find
@@ -29,7 +30,8 @@ def verdict(found: Discovery) -> str:
         lines += ["", f"## {escaped(effect.title)}", "", f"{escaped(effect.equation)}", ""]
         lines += ["| parameter | value ± half of the 90 % interval |", "|---|---|"]
         for name, told in words.settings(found, one).items():
-            lines.append(f"| {escaped(name)} | {escaped(told)} |")
+            shown = on_axes(f"effects.{one.key}.{name}", found.actuator.axes).name
+            lines.append(f"| {escaped(shown)} | {escaped(told)} |")
         if one.same_as:
             same = ", ".join(in_sentence(words.effect_title(name)) for name in one.same_as)
             lines += ["", f"Not to be told from {escaped(same)} by these recordings."]
@@ -80,6 +82,6 @@ def configuration(
     lines += ["| parameter | value | 90 % interval | unit | z [σ] |", "|---|---|---|---|---|"]
     for path, one in fit.parameters.items():
         low, high = one.interval90
-        name = escaped(found.actuator.axes.path(path))
+        name = escaped(on_axes(path, found.actuator.axes).path)
         lines.append(f"| {name} | {one.value:.5g} | {low:.5g} … {high:.5g} | {one.unit} | {one.z:.2f} |")
     return "\n".join(lines) + "\n"

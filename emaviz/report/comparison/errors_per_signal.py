@@ -51,7 +51,7 @@ def _table(comparison: Comparison, errors: Mapping[str, SignalError], what: str,
     for name, error in errors.items():
         shown = quantity.of_signal(comparison, signal or name)
         label = name if signal else shown.title
-        shown = shown.scaled([error.rmse, error.noise_floor])
+        shown = error.quantity(shown)
         ratio = error.rmse / error.noise_floor if error.noise_floor > 0.0 else float("nan")
         values = [error.rmse_initial, *([error.rmse] if calibrated else []), error.noise_floor]
         rows.append(

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ema_model.comparison.residuals import VARIABLES
 from ema_model.comparison.result import Comparison
+from ema_model.quantities.variables import VARIABLES
 from emaviz.figures import explained, order_spectrum, quantity, residual_against, residual_polar
 from emaviz.report.markup import folded, paragraph, table
 from emaviz.report.section import Figures, Section, pair

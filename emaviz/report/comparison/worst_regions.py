@@ -7,6 +7,7 @@ import numpy as np
 from ema_model.comparison.result import Comparison, Region
 from ema_model.quantities.numbers import number
 from ema_model.quantities.titles import in_sentence
+from ema_model.quantities.variables import variable_title
 from emaviz.figures import quantity, residual_against, residual_time
 from emaviz.figures.region_blocks import time_ranges
 from emaviz.report.markup import escape, link, paragraph
@@ -32,7 +33,7 @@ class WorstRegions(Section[Comparison]):
 def _card(comparison: Comparison, figures: Figures, index: int, region: Region) -> str:
     recording, time_s = worst_moment(comparison, region)
     name = comparison.recordings[recording].name or f"recording {recording + 1}"
-    variable = quantity.variable_title(region.variable)
+    variable = variable_title(region.variable)
     window = _around(comparison, region, recording, time_s)
     against = residual_against.figure(comparison, region.variable, region.signal, highlight=region)
     over_time = residual_time.figure(

@@ -44,15 +44,15 @@ def _known(effect: Effect) -> str:
 
 
 def _parameters(told: Told, one: Added) -> str:
-    meanings = {parameter.name: parameter.meaning for parameter in find(one.name).parameters}
+    known = {parameter.name: parameter for parameter in find(one.name, told.found.actuator.axes).parameters}
     rows = []
     for name, setting in one.chosen.items():
-        rows.append([meanings.get(name, ""), name, f"{setting:g}", "chosen", "–"])
+        rows.append([known[name].meaning, known[name].shown, f"{setting:g}", "chosen", known[name].unit or "–"])
     for name in one.parameters:
         fitted = fitted_of(told.found, one, name)
         low, high = (number(edge) for edge in fitted.interval90)
         value = number(fitted.value)
-        rows.append([meanings.get(name, ""), name, value, f"{low} … {high}", fitted.unit or "–"])
+        rows.append([known[name].meaning, known[name].shown, value, f"{low} … {high}", fitted.unit or "–"])
     return table(["Parameter", "name", "value", "90 % interval", "unit"], rows, text_columns=2)
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from ema_model.actuator.naming import on_axes
 from ema_model.faults import NAMES
 from ema_model.quantities.numbers import number
 from ema_model.quantities.titles import in_sentence
 from emaviz.report.discovery.subject import Told
 from emaviz.report.markup import bullets, paragraph, table
 from emaviz.report.section import Figures, Section
-from emaviz.text.discovery import parameter
 
 _MARK = "\x1e"  # before a parameter at its bound
 
@@ -24,7 +24,7 @@ class Calibrated(Section[Told]):
         fit, axes = subject.found.calibration, subject.found.actuator.axes
 
         def named(path: str) -> str:
-            return path if path in NAMES else parameter(axes, path)
+            return path if path in NAMES else on_axes(path, axes).title
 
         how = "It has converged" if fit.converged else "It has not converged: its values are not to be trusted"
         told = f"{how}; χ² per value {number(fit.chi2_per_value)}, {fit.evaluations} evaluations."

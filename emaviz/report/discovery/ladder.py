@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ema_model.quantities.numbers import Quantity, number
-from ema_model.recordings import SIGNALS
+from ema_model.quantities.numbers import number
+from ema_model.quantities.shown import of_signal
 from emaviz.figures import error_ladder
 from emaviz.report.discovery.subject import Told
 from emaviz.report.markup import paragraph, table
@@ -22,7 +22,7 @@ class Ladder(Section[Told]):
         found = subject.found
         held = any(rung.holdout_rmse is not None for rung in found.ladder)
         shown = {
-            name: _quantity(found.actuator.axes.signal(name)).scaled([rung.signals[name] for rung in found.ladder])
+            name: of_signal(name, found.actuator.axes).scaled([rung.signals[name] for rung in found.ladder])
             for name in found.ladder[0].signals
         }
         heads = ["Step", "fitted / floor", *(["held out / floor"] if held else [])]
@@ -38,8 +38,3 @@ class Ladder(Section[Told]):
             + table(heads, rows)
             + paragraph(FLOOR_NOTE, "small")
         )
-
-
-def _quantity(name: str) -> Quantity:
-    signal = SIGNALS.get(name)
-    return Quantity(name, "") if signal is None else Quantity(signal.title, signal.unit)

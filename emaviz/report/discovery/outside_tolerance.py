@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from ema_model.actuator.naming import on_axes
 from ema_model.quantities.numbers import number
 from emaviz.report.discovery.subject import Told
 from emaviz.report.markup import paragraph, table
 from emaviz.report.section import Figures, Section
-from emaviz.text.discovery import parameter
 
 _NOTE = (
     "Nothing new has to act for these: a value of the actuator's file is wrong, or the part is another than the file "
@@ -29,9 +29,11 @@ class OutsideTolerance(Section[Told]):
         for path in found.parameters_outside_tolerance:
             one = found.calibration.parameters.get(path)
             if one is None:
-                rows.append([parameter(found.actuator.axes, path), "", "", "", ""])
+                rows.append([on_axes(path, found.actuator.axes).title, "", "", "", ""])
                 continue
             moved = f"{one.z:+.2f}".replace("-", "−")
-            rows.append([parameter(found.actuator.axes, path), one.unit, number(one.initial), number(one.value), moved])
+            rows.append(
+                [on_axes(path, found.actuator.axes).title, one.unit, number(one.initial), number(one.value), moved]
+            )
         heads = ["Parameter", "unit", "file", "calibrated", "distance [σ]"]
         return table(heads, rows, text_columns=2) + paragraph(_NOTE, "small")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ema_model.quantities.numbers import amount
 from emaviz.figures import identified_fit
 from emaviz.report.identification.subject import Identified
 from emaviz.report.markup import paragraph
@@ -17,8 +18,8 @@ class Fit(Section[Identified]):
     def body(self, subject: Identified, figures: Figures) -> str:
         """Always there."""
         held = subject.holdout_rmse
-        beside = "" if held is None else f"; {held:.4f} A on the recordings that were not fitted"
-        parts = [paragraph(f"The current is off by {subject.answer.rmse:.4f} A (rms){beside}.")]
+        beside = "" if held is None else f"; {amount(held, 'A')} on the recordings that were not fitted"
+        parts = [paragraph(f"The current is off by {amount(subject.answer.rmse, 'A')} (rms){beside}.")]
         for chart in identified_fit.figures(subject.objective, subject.answer.k):
             parts.append(figures.place(chart, 320))
         return "".join(parts)

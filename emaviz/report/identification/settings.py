@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ema_model.actuator.naming import on_axes
 from ema_model.quantities.numbers import number
 from emaviz import __version__
 from emaviz.report.identification.subject import Identified
@@ -22,7 +23,7 @@ class Settings(Section[Identified]):
         rows = [[name.replace("_", " "), value] for name, value in ({"actuator": actuator.name} | given).items()]
         made = table(["Setting", "value"], [*rows, ["emaviz", __version__]], text_columns=2)
         moved = [
-            [actuator.axes.path(path), number(float(actuator.value(path)), 4), number(value, 4)]
+            [on_axes(path, actuator.axes).path, number(float(actuator.value(path)), 4), number(value, 4)]
             for path, value in subject.answer.parameters.items()
         ]
         return made + (table(["Moved beside k", "file", "fitted"], moved) if moved else "")

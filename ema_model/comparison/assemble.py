@@ -12,7 +12,7 @@ from ema_model.actuator import Actuator
 from ema_model.comparison.residuals import Adjustable, Residuals, join
 from ema_model.effects import find
 from ema_model.estimation import Calibration, Floor
-from ema_model.models import Plant, Stretch, Window
+from ema_model.models import Model, Window
 from ema_model.simulation.pack import reduced_circuit
 
 Array = NDArray[np.float64]
@@ -23,7 +23,7 @@ _SLOPE_S = 2e-3  # over which the model's speed is differentiated
 
 
 def residuals_of(
-    plant: Plant,
+    plant: Model,
     floors: Sequence[Floor],
     model: Sequence[dict[str, Array]],
     known: Sequence[dict[str, Array]],
@@ -38,7 +38,7 @@ def residuals_of(
     parts = []
     for window, one, signals, error in zip(plant.windows, floors, model, known):
         names = [name for name in window.measured if name in signals]
-        variables = _variables(window, signals, actuator, _first_time(plant, window))
+        variables = _variables(window, signals, actuator, float(plant.measurements[window.recording].time_s[0]))
         blocks = window.blocks
         parts.append(
             Residuals(
@@ -86,16 +86,10 @@ def _saturated(signals: dict[str, Array], actuator: Actuator) -> NDArray[np.bool
     return saturated
 
 
-def _first_time(plant: Plant, window: Window | Stretch) -> float:
-    return float(plant.measurements[window.recording].time_s[0])
-
-
-def _variables(
-    window: Window | Stretch, signals: dict[str, Array], actuator: Actuator, start_s: float
-) -> dict[str, Array]:
+def _variables(window: Window, signals: dict[str, Array], actuator: Actuator, start_s: float) -> dict[str, Array]:
     """All that were recorded, positions as measured, the rest from the model, which has no noise."""
     tau = actuator.transmission.gear_ratio
-    if isinstance(window, Stretch):
+    if window.command is None:
         angle, speed = window.context["motor_position_rad"], window.context["motor_speed_rad_s"]
         acceleration = window.context["acceleration_rad_s2"]
         moves = bool(np.any(speed))

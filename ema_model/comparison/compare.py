@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,10 +17,10 @@ from ema_model.effects import find
 from ema_model.errors import InputError, quoted
 from ema_model.estimation import Calibration, Floor, floor
 from ema_model.estimation import calibrate as fit
-from ema_model.estimation.calibrate import SIGNALS
 from ema_model.estimation.floor import twin_error
+from ema_model.estimation.problem import SIGNALS
 from ema_model.faults import named
-from ema_model.models import ClosedLoop, Plant, Stretch, Window, plant_for
+from ema_model.models import Model, model_for
 from ema_model.models.stretches import evaluation_stretches, fit_stretches
 from ema_model.recordings import Measurement
 from ema_model.recordings.health.card import health
@@ -72,9 +71,9 @@ def compare(
         free = [path_inside(path, actuator.tolerances, actuator.axes) for path in free]
     compile_behind(actuator)  # who compares an improved model does so again
     tell("measuring the model's floor")
-    fitted = plant_for(recordings, actuator, stretches=fit_stretches(recordings, actuator))
+    fitted = model_for(recordings, actuator, stretches=fit_stretches(recordings, actuator))
     sensors = [_stated(m, actuator) for m in measurements]
-    floors = [floor(fitted, window, stated=sensors[window.recording]) for window in fitted.windows]
+    floors = [floor(fitted, i, stated=sensors[window.recording]) for i, window in enumerate(fitted.windows)]
     tell("calibrating" if calibrate else "simulating")
     calibration = fit(
         fitted,
@@ -85,7 +84,10 @@ def compare(
     )
     tell("looking where it fails")
     plant, floors, before, after = _everywhere(recordings, fitted, floors, calibration, actuator)
-    known = [known_error(plant, window, calibration) if plant is fitted else {} for window in plant.windows]
+    known = [
+        twin_error(plant, i, calibration.actuator, calibration.k) if plant is fitted else {}
+        for i in range(len(plant.windows))
+    ]
     residuals = residuals_of(
         plant, floors, after, known, calibration.actuator, calibration if plant is fitted else None
     )
@@ -154,34 +156,26 @@ def _stated(measurement: Measurement, actuator: Actuator) -> dict[str, dict[str,
     }
 
 
-def known_error(plant: Plant, window: Window | Stretch, calibration: Calibration) -> dict[str, Array]:
-    """What the model is known to be off by: its three-phase twin's difference, both as calibrated."""
-    if isinstance(window, Window) and isinstance(plant, ClosedLoop) and plant.actuator.has_reference_model:
-        return twin_error(plant, window, calibration.actuator, calibration.k)
-    return {}
-
-
 def _everywhere(
     measurements: Sequence[Measurement],
-    fitted: Plant,
+    fitted: Model,
     floors: list[Floor],
     calibration: Calibration,
     actuator: Actuator,
-) -> tuple[Plant, list[Floor], list[dict[str, Array]], list[dict[str, Array]]]:
+) -> tuple[Model, list[Floor], list[dict[str, Array]], list[dict[str, Array]]]:
     """The whole recordings, where the fit took only parts of them."""
     if fit_stretches(measurements, actuator) is None:
         return fitted, floors, calibration.before, calibration.signals
-    plant = plant_for(measurements, actuator, stretches=evaluation_stretches(measurements, actuator))
+    plant = model_for(measurements, actuator, stretches=evaluation_stretches(measurements, actuator))
     before, after, whole = [], [], []
     started = {window.first: i for i, window in enumerate(fitted.windows)}
-    for window in plant.windows:
+    for place, window in enumerate(plant.windows):
         i = started.get(window.first)
         for target, model, faults, start in (
             (before, actuator, actuator.k, (0.0, 0.0)),
             (after, calibration.actuator, calibration.k, calibration.start_of(i)),
         ):
-            signals: Any = plant.signals  # each plant knows its own windows
-            one = signals(window, model, faults, *start)
+            one = plant.signals(place, model, faults, *start)
             target.append({name: values[0] for name, values in one.items()})
         whole.append(
             _typical_floor(
@@ -208,7 +202,7 @@ def _compared(
     index: int,
     measurement: Measurement,
     card,
-    plant: Plant,
+    plant: Model,
     floors: Sequence[Floor],
     before: Sequence[dict[str, Array]],
     after: Sequence[dict[str, Array]],

@@ -18,9 +18,8 @@ from ema_model.discovery.refit import LEAST_BIC, Trial, pays, worth
 from ema_model.discovery.result import Candidate
 from ema_model.discovery.score import amounts_of, movable
 from ema_model.discovery.unknown import TEETH
-from ema_model.estimation.problem import unknown_of
+from ema_model.estimation.unknowns import to_k, to_vector, unknowns_of
 from ema_model.faults import NAMES
-from ema_model.identification.unknowns import to_k, to_x
 
 Array = NDArray[np.float64]
 
@@ -34,7 +33,7 @@ _RIVAL = 0.3  # of the best effect's score, below which a fault is not refitted
 @dataclass(frozen=True)
 class _Scored:
     names: tuple[str, ...]
-    k: dict[str, float]
+    there: Array  # (names,), the eccentricity as a vector
     drop: float  # of χ², as predicted
 
 
@@ -74,7 +73,7 @@ def fault_for(
 def _scores(data: Data, current: Fit) -> list[_Scored]:
     """Each fault at the strength that suits best, beyond what the parameters can do; the most telling first."""
     left = [names for names in _FAULTS if names[0] not in current.faults]
-    known = to_x(current.calibration.k)
+    known = to_vector(current.calibration.k)
     lanes, tried = [known], []
     for names in left:
         for size in _SIZES:
@@ -86,8 +85,8 @@ def _scores(data: Data, current: Fit) -> list[_Scored]:
                 lanes[-1][NAMES.index(name)] += step
     k = to_k(np.stack(lanes))
     shown = [
-        current.plant.signals(window, current.calibration.actuator, k, *current.calibration.start_of(i))  # pyright: ignore[reportArgumentType]
-        for i, window in enumerate(current.plant.windows)
+        current.plant.signals(i, current.calibration.actuator, k, *current.calibration.start_of(i))
+        for i in range(len(current.plant.windows))
     ]
     signals = np.nan_to_num(data.over_floor(current.plant, shown))
     jacobian, gram = movable(current)
@@ -105,17 +104,14 @@ def _at(known: Array, names: tuple[str, ...], step: float, amounts: Array, energ
     there = known[at] + step * amounts
     there = there / max(1.0, math.hypot(*there)) if len(names) == 2 else np.clip(there, 0.0, 1.0)
     amounts = (there - known[at]) / step
-    x = known.copy()
-    x[at] = there
-    k = {name: float(to_k(x)[i]) for name, i in zip(names, at)}
-    return _Scored(names, k, float(2.0 * amounts @ toward - amounts @ energy @ amounts))
+    return _Scored(names, there, float(2.0 * amounts @ toward - amounts @ energy @ amounts))
 
 
 def _refitted(data: Data, current: Fit, one: _Scored, tell: Callable[[str], None]) -> Trial:
     """The fault free beside the parameters, from where they are and from the file's values."""
     tell(f"trying the fault {' and '.join(one.names)}")
-    unknowns = {name: unknown_of(current.actuator, name) for name in one.names}
-    guess = {name: (one.k[name] - unknown.nominal) / unknown.sigma for name, unknown in unknowns.items()}
+    unknowns = unknowns_of(current.actuator, one.names)
+    guess = {u.name: float(value - u.nominal) / u.sigma for u, value in zip(unknowns, one.there)}
     kept = {name: x for name, x in current.starts.items() if name.startswith(("effects.", "k"))}
     faults = (*current.faults, *one.names)
     fits = [fit(data, current.actuator, {**start, **guess}, tell, faults) for start in (current.starts, kept)]

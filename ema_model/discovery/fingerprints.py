@@ -90,10 +90,7 @@ def _changes(data: Data, found: Fit, lanes: list[Lane]) -> Array:
     plant = data.plant(replace(actuator, effects=resting))
     model = replace(actuator, effects=varied)
     k = np.tile(found.calibration.k, (len(lanes) + 1, 1))
-    shown = [
-        plant.signals(window, model, k, *found.calibration.start_of(i))  # pyright: ignore[reportArgumentType]
-        for i, window in enumerate(plant.windows)
-    ]
+    shown = [plant.signals(i, model, k, *found.calibration.start_of(i)) for i in range(len(plant.windows))]
     signals = data.over_floor(plant, shown)
     return signals[1:] - signals[0]
 

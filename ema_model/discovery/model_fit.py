@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ema_model.actuator import Actuator, Tolerance
 from ema_model.effects import find
 from ema_model.estimation import Calibration, Floor, calibrate, default_free, floor
-from ema_model.models import Plant, plant_for
+from ema_model.models import Model, model_for
 from ema_model.recordings import Measurement
 
 Array = NDArray[np.float64]
@@ -31,11 +31,11 @@ class Data:
     floors: Sequence[Floor]
     signals: Mapping[str, float]
 
-    def plant(self, actuator: Actuator) -> Plant:
+    def plant(self, actuator: Actuator) -> Model:
         """The recordings beside this actuator's model."""
-        return plant_for(self.measurements, actuator, stretches=self.stretches)
+        return model_for(self.measurements, actuator, stretches=self.stretches)
 
-    def over_floor(self, plant: Plant, shown: Sequence[Mapping[str, Array]]) -> Array:
+    def over_floor(self, plant: Model, shown: Sequence[Mapping[str, Array]]) -> Array:
         """Signals of each window of the plant, (…, blocks), over the floor, in a residual's order: (…, values)."""
         parts = [
             signals[name] * (weight / one.fit_sigma(name))
@@ -48,7 +48,7 @@ class Data:
     def beside(self, found: Fit) -> Data:
         """The data with the model's floor at a calibrated model as well, where that is greater."""
         plant = self.plant(found.calibration.actuator)
-        again = [floor(plant, window) for window in plant.windows]
+        again = [floor(plant, place) for place in range(len(plant.windows))]
         return replace(self, floors=[one.beside(other) for one, other in zip(self.floors, again)])
 
 
@@ -57,7 +57,7 @@ class Fit:
     """A calibrated model."""
 
     actuator: Actuator  # as it went in: with effects, their suggested settings and tolerances
-    plant: Plant
+    plant: Model
     calibration: Calibration
     starts: dict[str, float]  # x by name
     faults: tuple[str, ...] = ()  # k1 … k8 that move beside the parameters
@@ -89,8 +89,8 @@ def gather(
     stretches: Sequence[list[slice] | None] | None,
 ) -> Data:
     """The data with the floors of the bare model."""
-    plant = plant_for(measurements, actuator, stretches=stretches)
-    return Data(measurements, stretches, [floor(plant, window) for window in plant.windows], signals)
+    plant = model_for(measurements, actuator, stretches=stretches)
+    return Data(measurements, stretches, [floor(plant, place) for place in range(len(plant.windows))], signals)
 
 
 def with_effect(actuator: Actuator, name: str, settings: Mapping[str, float]) -> Actuator:
@@ -156,7 +156,7 @@ def resimulated(data: Data, actuator: Actuator) -> tuple[float, dict[str, float]
     return ratio if math.isfinite(ratio) else math.inf, rms_by_signal(data, plant, calibration.signals)
 
 
-def rms_by_signal(data: Data, plant: Plant, shown: Sequence[Mapping[str, Array]]) -> dict[str, float]:
+def rms_by_signal(data: Data, plant: Model, shown: Sequence[Mapping[str, Array]]) -> dict[str, float]:
     """rms of model − measurement, in the signals' units."""
     parts: dict[str, list[Array]] = {}
     for window, signals in zip(plant.windows, shown):
@@ -166,7 +166,7 @@ def rms_by_signal(data: Data, plant: Plant, shown: Sequence[Mapping[str, Array]]
     return {name: float(np.sqrt(np.mean(np.concatenate(part) ** 2))) for name, part in parts.items()}
 
 
-def floor_ratio(data: Data, plant: Plant, shown: Sequence[Mapping[str, Array]]) -> float:
+def floor_ratio(data: Data, plant: Model, shown: Sequence[Mapping[str, Array]]) -> float:
     """rms of measurement − model in units of the floor, pooled over windows and signals: 1 is the floor.
 
     A standstill counts as 25 ms of motion do.

@@ -17,11 +17,10 @@ from ema_model.actuator import Actuator
 from ema_model.commands import command
 from ema_model.discovery.model_fit import Data, Fit
 from ema_model.discovery.result import Experiment
-from ema_model.estimation import default_free
-from ema_model.estimation.calibrate import SIGNALS
+from ema_model.estimation.calibrate import problem_of
 from ema_model.estimation.floor import Floor, floor
-from ema_model.estimation.problem import Problem
-from ema_model.models import ClosedLoop, Window
+from ema_model.estimation.problem import SIGNALS, Problem
+from ema_model.models import ClosedLoop, Model
 from ema_model.simulation.run import Run, simulate_monitor
 
 Array = NDArray[np.float64]
@@ -38,7 +37,7 @@ def next_experiment(data: Data, first: Fit, second: Fit) -> Experiment | None:
 
     None where no allowed experiment does, or where the actuator cannot be simulated.
     """
-    if not isinstance(first.plant, ClosedLoop):
+    if not first.plant.simulates_commands:
         return None
     rivals = _names(first, second)
     further = [name for name in SIGNALS[2:] if name not in data.signals or not _is_measured(first, name)]
@@ -59,7 +58,7 @@ def next_experiment(data: Data, first: Fit, second: Fit) -> Experiment | None:
 def allowed(data: Data, found: Fit) -> list[tuple[str, dict[str, float], float]]:
     """Commands within the range and speed of the recordings: name, settings, duration in s."""
     actuator = found.calibration.actuator
-    spans = [float(np.ptp(window.command)) for window in found.plant.windows if isinstance(window, Window)]
+    spans = [float(np.ptp(window.command)) for window in found.plant.windows if window.command is not None]
     reach = 0.5 * max([*spans, 1e-9])
     turns = _TURNS * 2.0 * math.pi * actuator.transmission.gear_ratio
     speeds = [
@@ -113,14 +112,14 @@ def expected_chi2(
     try:
         recording = simulate_monitor(run, first.calibration.actuator, first.calibration.k)
         plants = [ClosedLoop([recording], rival.actuator) for rival in (first, second)]
-        floors = [_floor(data, plants[0], window) for window in plants[0].windows]
+        floors = [_floor(data, plants[0], place) for place in range(len(plants[0].windows))]
         played, problem = (
-            Problem(plant, floors, default_free(plant.actuator), rival.calibration.k, signals)
+            problem_of(plant, floors, k=rival.calibration.k, signals=signals)
             for plant, rival in zip(plants, (first, second))
         )
         # Both models go the same way from the command to the blocks, so that the rivals alone make the difference.
-        as_played = played.residual(_fitted(first, played))
-        residual, jacobian = problem.linearised(_fitted(second, problem))
+        [as_played] = played.residuals(_fitted(first, played)[None, :])
+        [residual], [jacobian] = problem.jacobians(_fitted(second, problem)[None, :])
     except FloatingPointError:  # a command that this actuator does not stand
         return 0.0
     values = problem.values
@@ -148,8 +147,9 @@ def _information(found: Fit, names: Sequence[str]) -> Array:
     return information
 
 
-def _floor(data: Data, plant: ClosedLoop, window: Window) -> Floor:
+def _floor(data: Data, plant: Model, place: int) -> Floor:
     """The floor of a run to come: noise as recorded, the model's floor at least at its usual height."""
+    window = plant.windows[place]
     noise, model = {}, {}
     for name in window.measured:
         known = [one for one in data.floors if name in one.noise]
@@ -159,7 +159,7 @@ def _floor(data: Data, plant: ClosedLoop, window: Window) -> Floor:
         noise[name] = {"noise": usual / math.sqrt(window.block_s / window.samples_per_block)}
         height = max((float(np.median(one.model[name])) for one in known), default=0.0)
         model[name] = np.full(window.blocks, height)
-    found = floor(plant, window, stated=noise)
+    found = floor(plant, place, stated=noise)
     return found.beside(replace(found, model=model))
 
 

@@ -11,7 +11,7 @@ from scipy.optimize import lsq_linear
 
 from ema_model.actuator import Actuator
 from ema_model.discovery.model_fit import Data, Fit
-from ema_model.models import Plant
+from ema_model.models import Model
 
 Array = NDArray[np.float64]
 
@@ -25,7 +25,7 @@ class Preview:
     data: Data
     found: Fit
     name: str
-    plant: Plant
+    plant: Model
     jacobian: Array  # ∂residual/∂x, (values, unknowns), above the prior's, (unknowns, unknowns)
     basis: Array  # its Q, (values + unknowns, unknowns)
     triangle: Array  # and R
@@ -38,8 +38,8 @@ class Preview:
         calibration = self.found.calibration
         model = _with(calibration.actuator, self.name, settings)
         after = [
-            self.plant.signals(window, model, calibration.k, *calibration.start_of(i))  # pyright: ignore[reportArgumentType]
-            for i, window in enumerate(self.plant.windows)
+            self.plant.signals(i, model, calibration.k, *calibration.start_of(i))
+            for i in range(len(self.plant.windows))
         ]
         whole = self.data.over_floor(self.plant, after)[0] - self.data.over_floor(self.found.plant, calibration.signals)
         return whole + self._followed(whole) if np.all(np.isfinite(whole)) else whole

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from ema_model.comparison.assemble import residuals_of
-from ema_model.comparison.compare import known_error
 from ema_model.comparison.curves import orders_in
 from ema_model.comparison.explain import Explanation, advance_of, explain, used_blocks
 from ema_model.comparison.orders import Order
@@ -14,6 +13,7 @@ from ema_model.comparison.orders import orders as orders_of
 from ema_model.comparison.residuals import Residuals
 from ema_model.comparison.verdict import ORDER_OF_PRIMARY
 from ema_model.discovery.model_fit import Data, Fit
+from ema_model.estimation.floor import twin_error
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,8 @@ def left_by(data: Data, found: Fit) -> Left:
 
 def residuals_left(data: Data, found: Fit) -> Residuals:
     """The residuals of a fit beside the variables that may explain them."""
-    known = [known_error(found.plant, window, found.calibration) for window in found.plant.windows]
+    fitted, k = found.calibration.actuator, found.calibration.k
+    known = [twin_error(found.plant, place, fitted, k) for place in range(len(found.plant.windows))]
     return residuals_of(
         found.plant, data.floors, found.calibration.signals, known, found.calibration.actuator, found.calibration
     )

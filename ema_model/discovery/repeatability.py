@@ -15,7 +15,6 @@ from scipy.ndimage import uniform_filter1d
 from ema_model.actuator import Actuator
 from ema_model.discovery.model_fit import Data, Fit
 from ema_model.estimation.floor import CORRELATED_S
-from ema_model.models import ClosedLoop
 
 Array = NDArray[np.float64]
 
@@ -31,7 +30,7 @@ def with_divergence(data: Data, found: Fit) -> tuple[Data, float]:
     proportion: a recording without noise would show any change.
     """
     plant = found.plant
-    if not isinstance(plant, ClosedLoop):
+    if not plant.simulates_commands:
         return data, 0.0
     fitted = found.calibration.actuator
     inertia = fitted.value("motor.inertia_kgm2")
@@ -39,7 +38,7 @@ def with_divergence(data: Data, found: Fit) -> tuple[Data, float]:
     k = np.tile(found.calibration.k, (2, 1))
     floors, lost = [], []
     for i, (window, one) in enumerate(zip(plant.windows, data.floors)):
-        shown = plant.signals(window, neighbour, k, *found.calibration.start_of(i))
+        shown = plant.signals(i, neighbour, k, *found.calibration.start_of(i))
         width = max(3, round(CORRELATED_S / window.block_s) | 1)
         apart = {
             name: np.sqrt(np.maximum(uniform_filter1d((shown[name][1] - shown[name][0]) ** 2, width), 0.0))

@@ -12,7 +12,7 @@ from ema_model.actuator import Actuator
 from ema_model.comparison.explain import Explanation
 from ema_model.discovery.model_fit import Data
 from ema_model.estimation import Calibrated, Calibration, Floor
-from ema_model.models import Plant
+from ema_model.models import Model
 
 Array = NDArray[np.float64]
 
@@ -96,7 +96,7 @@ class Discovery:
     candidates: Sequence[Candidate]  # of the first search, best first
     parameters_outside_tolerance: Sequence[str]
     actuator: Actuator  # with the effects, as calibrated
-    plant: Plant  # the recordings as they were fitted: windows with their blocks
+    plant: Model  # the recordings as they were fitted: windows with their blocks
     floors: Sequence[Floor]  # of its windows
     data: Data  # what was fitted
     held: Data | None = None  # and what was held out

@@ -1,4 +1,4 @@
-"""Calibration: the actuator's own parameters, fitted to recordings within their tolerances."""
+"""What every fit shares — floors, unknowns with their priors, the problem, descent — and calibration, which is one."""
 
 from __future__ import annotations
 

@@ -3,27 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.actuator.naming import on_axes
+from ema_model.estimation.descent import Descent, LeastSquares, Robust, descend
 from ema_model.estimation.floor import CORRELATED_S, Floor
-from ema_model.estimation.problem import BOUND, Problem, Unknown
-from ema_model.models import Plant
-from ema_model.quantities.axes import Axes
+from ema_model.estimation.problem import Problem
+from ema_model.estimation.unknowns import ECCENTRICITY, K_SIGMA, Unknown, polar, starts_of, unknowns_of
+from ema_model.faults import named
+from ema_model.models import Model
 
 Array = NDArray[np.float64]
 
-SIGNALS = ("current_A", "motor_torque_Nm", "motor_position_rad", "user_position_rad")
 _Z90 = 1.645
 _OUTSIDE_Z = 2.99  # from which on a parameter stands at the edge of its tolerance
 _DRAWN = 192  # of the prior, from which further starts are taken
 _STARTS = 5
 _MISFIT = 25.0  # χ² per value, from which on the model misses by far
-_LONGEST = 40  # evaluations of a start
+_STEPS = 40  # of a start
+_TOGETHER = 2  # starts in one population
+_MOST_NUMBERS = 5e6  # of simulated values at once
+_NOTHING = 4.0  # χ²
 
 
 @dataclass(frozen=True)
@@ -76,7 +81,7 @@ class Calibration:
 
 
 def calibrate(
-    plant: Plant,
+    model: Model,
     floors: Sequence[Floor],
     *,
     free: Sequence[str] | None = None,
@@ -95,9 +100,7 @@ def calibrate(
     on_progress is told the evaluations so far, and may raise to stop.
     Raises InputError for a parameter that does not exist or has no tolerance.
     """
-    chosen = default_free(plant.actuator) if free is None else tuple(free)
-    weights = signals or dict.fromkeys(SIGNALS, 1.0)
-    problem = Problem(plant, floors, chosen, plant.actuator.k if k is None else k, weights)
+    problem = problem_of(model, floors, free=free, k=k, signals=signals)
     search = _Search(problem, on_progress)
     fit = search.solve(start)
     x = fit.x
@@ -106,28 +109,42 @@ def calibrate(
     covariance = root @ root.T * max(1.0, chi2)
     if chi2 > _MISFIT:  # errors of a wrong model last
         covariance *= max(1.0, CORRELATED_S / min(one.block_s for one in floors))
-    actuator, fitted_k = problem.actuator(x)
-    after, before = problem.simulate(x), problem.simulate(np.zeros(len(x)))
-    axes = plant.actuator.axes
-    found = {u.name: _calibrated(u, x[i], np.sqrt(covariance[i, i]), axes) for i, u in enumerate(problem.unknowns)}
+    fitted_k = problem.k(x)
+    actuator = replace(model.actuator.varied(problem.parameters(x)), faults=named(fitted_k))
+    found = _calibrated(problem, x, covariance)
+    chosen = tuple(u.name for u in problem.unknowns if u.kind in ("parameter", "fault"))
     return Calibration(
         converged=fit.converged,
-        parameters={name: one for name, one in found.items() if name in chosen},
+        parameters={name: found[name] for name in chosen},
         starts={name: one for name, one in found.items() if name not in chosen},
         actuator=actuator,
         k=fitted_k,
         residual=fit.residual,
         chi2_per_value=chi2,
-        signals=[{name: values[0] for name, values in one.items()} for one in after],
-        before=[{name: values[0] for name, values in one.items()} for one in before],
-        sensitivities=problem.split(fit.jacobian),
-        weighted_sensitivities=problem.split(fit.jacobian, weighted=True),
+        signals=_signals(problem, x),
+        before=_signals(problem, np.zeros(len(x))),
+        sensitivities=_split(problem, fit.jacobian, weighted=False),
+        weighted_sensitivities=_split(problem, fit.jacobian, weighted=True),
         x=x,
-        room=(problem.bounds[0] - x, problem.bounds[1] - x),
+        room=(problem.low - x, problem.high - x),
         evaluations=search.evaluations,
         confounded=_confounded(problem.unknowns, covariance),
         free=chosen,
     )
+
+
+def problem_of(
+    model: Model,
+    floors: Sequence[Floor],
+    *,
+    free: Sequence[str] | None = None,
+    k: ArrayLike | None = None,
+    signals: Mapping[str, float] | None = None,
+) -> Problem:
+    """What `calibrate` solves, and raises for."""
+    chosen = unknowns_of(model.actuator, default_free(model.actuator) if free is None else free)
+    starts = starts_of(model, floors, worn="k2" in [u.name for u in chosen])
+    return Problem(model, floors, [*chosen, *starts], signals, k)
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +153,6 @@ class _Found:
     residual: Array  # (values,)
     jacobian: Array
     chi2: float  # of the signals, per value
-    cost: float
     converged: bool
 
 
@@ -147,77 +163,54 @@ class _Search:
         self.problem = problem
         self.on_progress = on_progress
         self.evaluations = 0
-        self._at, self._jacobian = np.zeros(0), np.zeros((0, 0))  # of the last evaluation
-
-    def residual(self, x: Array) -> Array:
-        """Also keeps the Jacobian there, which an accepted step asks for next."""
-        self.evaluations += 1
-        if self.on_progress is not None:
-            self.on_progress(self.evaluations)
-        residual, self._jacobian = self.problem.linearised(x)
-        self._at = x.copy()
-        return residual
-
-    def jacobian(self, x: Array) -> Array:
-        """∂residual/∂x."""
-        return self._jacobian if np.array_equal(x, self._at) else self.problem.jacobian(x)
 
     def solve(self, start: Mapping[str, float] | None) -> _Found:
         """The best fit; where the model misses by far, one in which large errors count less."""
-        count = len(self.problem.unknowns)
-        if not count:
-            fun = self.problem.residual(np.zeros(0))
-            return _Found(np.zeros(0), fun, np.zeros((len(fun), 0)), float(fun @ fun) / self.problem.values, 0.0, True)
+        problem = self.problem
+        if not problem.count:
+            fun = problem.residuals(np.zeros((1, 0)))[0]
+            return _Found(np.zeros(0), fun, np.zeros((len(fun), 0)), float(fun @ fun) / problem.values, True)
         if start is not None:
-            starts = [np.array([start.get(u.name, 0.0) for u in self.problem.unknowns])]
+            starts = np.array([[start.get(u.name, 0.0) for u in problem.unknowns]])
         else:
-            starts = [np.zeros(count), *_promising(self.problem)]
-        found = self._from(starts, 1.0, "linear")
+            starts = np.concatenate([np.zeros((1, problem.count)), _promising(problem)])
+        found = self._from(problem, starts)
         if found.chi2 > _MISFIT:
-            scale = np.sqrt(found.chi2) / 3.0
-            found = self._from([found.x, *starts], scale, "soft_l1")
+            robust = Robust(problem, np.sqrt(found.chi2) / 3.0)
+            found = self._from(robust, np.concatenate([found.x[None, :], starts]))
         return found
 
-    def _from(self, starts: Sequence[Array], scale: float, loss: str) -> _Found:
-        from scipy.optimize import least_squares  # takes a third of a second to import
-
-        least, greatest = self.problem.bounds
-        # The singular values of the long Jacobian cost more than all else, but lsmr looks for its step in a plane.
-        solver = "exact" if len(least) == 1 else "lsmr"
-        fits, agree = [], len(starts) == 1
-        for start in starts:
-            fits.append(
-                least_squares(
-                    self.residual,
-                    np.clip(start, 0.98 * least, 0.98 * greatest),
-                    jac=self.jacobian,  # pyright: ignore[reportArgumentType]
-                    bounds=(least, greatest),
-                    max_nfev=_LONGEST,
-                    xtol=1e-4,
-                    ftol=5e-5,
-                    loss=loss,
-                    f_scale=scale,
-                    tr_solver=solver,
-                )
-            )
-            fits.sort(key=lambda fit: fit.cost)
+    def _from(self, problem: LeastSquares, starts: Array) -> _Found:
+        """A few starts go downhill together, and more only if these do not agree."""
+        together = max(1, min(_TOGETHER, int(_MOST_NUMBERS / (self.problem.values * (2 * problem.count + 1)))))
+        x, costs = np.zeros((0, problem.count)), np.zeros(0)
+        done, agree = np.zeros(0, dtype=bool), len(starts) == 1
+        for first in range(0, len(starts), together):
+            part = descend(problem, starts[first : first + together], _STEPS, partial(self._told, self.evaluations))
+            x, costs = np.concatenate([x, part.x]), np.concatenate([costs, part.cost])
+            done = np.concatenate([done, ~part.moving])
+            best, *others = np.sort(costs)
             # "At most a hundredth apart": two minima of the same depth are one answer, and none is deeper than nothing.
-            if fits[0].cost < 2.0 or (len(fits) > 1 and fits[1].cost < 1.01 * fits[0].cost + 2.0):
-                agree = True
+            agree |= bool(best < _NOTHING or (others and others[0] < 1.01 * best + _NOTHING))
+            if agree:
                 break
-        best = fits[0]
-        x = best.x
-        fun, jacobian = self.problem.linearised(x)  # the fit's own are weighted by its loss
-        chi2 = float(fun @ fun - x @ x) / self.problem.values
-        return _Found(x, fun[: self.problem.values], jacobian, chi2, float(best.cost), bool(best.status > 0 and agree))
+        at = int(np.argmin(costs))
+        residuals, jacobians = self.problem.jacobians(x[at][None, :])  # a robust problem's are weighted
+        fun = residuals[0]
+        chi2 = float(fun @ fun - x[at] @ x[at]) / self.problem.values
+        return _Found(x[at], fun[: self.problem.values], jacobians[0], chi2, bool(done[at] and agree))
+
+    def _told(self, before: int, descent: Descent) -> None:
+        self.evaluations = before + descent.evaluations
+        if self.on_progress is not None:
+            self.on_progress(self.evaluations)
 
 
 def _promising(problem: Problem) -> Array:
     """Starts of their own: the best of a population drawn from the prior, (starts, unknowns)."""
-    least, greatest = problem.bounds
-    drawn = np.random.default_rng(0).standard_normal((_DRAWN, len(least)))
-    drawn = np.clip(drawn, np.maximum(0.8 * least, -2.0), np.minimum(0.8 * greatest, 2.0))
-    return drawn[np.argsort(problem.costs(drawn))[:_STARTS]]
+    drawn = np.random.default_rng(0).standard_normal((_DRAWN, problem.count))
+    drawn = np.clip(drawn, np.maximum(0.8 * problem.low, -2.0), np.minimum(0.8 * problem.high, 2.0))
+    return drawn[np.argsort(np.sum(problem.residuals(drawn) ** 2, axis=1))[:_STARTS]]
 
 
 def default_free(actuator: Actuator) -> tuple[str, ...]:
@@ -225,13 +218,45 @@ def default_free(actuator: Actuator) -> tuple[str, ...]:
     return tuple(path for path, tolerance in actuator.tolerances.items() if tolerance.free)
 
 
-def _calibrated(unknown: Unknown, x: float, sigma: float, axes: Axes) -> Calibrated:
-    value = unknown.nominal + unknown.sigma * x
-    half = _Z90 * unknown.sigma * min(1.0, float(sigma))  # never less sure than the file itself
-    at_bound = bool(x < unknown.low + 0.01 or x > unknown.high - 0.01)
-    return Calibrated(
-        value, unknown.nominal, (value - half, value + half), on_axes(unknown.name, axes).unit, float(x), at_bound
-    )
+def _signals(problem: Problem, x: Array) -> list[dict[str, Array]]:
+    """The model's at one x, per window."""
+    shown = [problem.simulate(x[None, :], i) for i in range(len(problem.model.windows))]
+    return [{name: values[0] for name, values in one.items()} for one in shown]
+
+
+def _split(problem: Problem, jacobian: Array, *, weighted: bool) -> list[dict[str, Array]]:
+    """A Jacobian per window and signal, in the signals' own units unless weighted: (blocks, unknowns) each."""
+    parts: list[dict[str, Array]] = [{} for _ in problem.weights]
+    for i, name, rows in problem.parts():
+        parts[i][name] = jacobian[rows] if weighted else jacobian[rows] / problem.weights[i][name][:, None]
+    return parts
+
+
+def _calibrated(problem: Problem, x: Array, covariance: Array) -> dict[str, Calibrated]:
+    """What each unknown was found to be, by name; the eccentricity by its size and its angle."""
+    axes = problem.model.actuator.axes
+    found = {}
+    for i, u in enumerate(problem.unknowns):
+        value = float(u.nominal + u.sigma * x[i])
+        half = _Z90 * u.sigma * min(1.0, float(np.sqrt(covariance[i, i])))  # never less sure than the file itself
+        at_bound = bool(x[i] < u.low + 0.01 or x[i] > u.high - 0.01)
+        unit = on_axes(u.name, axes).unit
+        found[u.name] = Calibrated(value, u.nominal, (value - half, value + half), unit, float(x[i]), at_bound)
+    return {**found, **_eccentricity(problem, x, covariance)} if "k6" in found else found
+
+
+def _eccentricity(problem: Problem, x: Array, covariance: Array) -> dict[str, Calibrated]:
+    at = [next(i for i, u in enumerate(problem.unknowns) if u.name == name) for name in ("k6", "k7")]
+    along, across, size = polar(problem.vector(x)[list(ECCENTRICITY)], K_SIGMA**2 * covariance[np.ix_(at, at)])
+    k, file = problem.k(x), problem.model.actuator.k
+    turned = float((k[6] - file[6] + 0.5) % 1.0 - 0.5)
+    halves = _Z90 * min(K_SIGMA, along), min(0.5, _Z90 * across / max(2.0 * np.pi * size, 1e-9))
+    scores = float(k[5] - file[5]) / K_SIGMA, 2.0 * np.pi * float(file[5]) * turned / K_SIGMA
+    at_bounds = not 0.01 * K_SIGMA < k[5] < 1.0 - 0.01 * K_SIGMA, False
+    return {
+        name: Calibrated(float(k[i]), float(file[i]), (float(k[i]) - half, float(k[i]) + half), "", z, bool(at_bound))
+        for name, i, half, z, at_bound in zip(("k6", "k7"), ECCENTRICITY, halves, scores, at_bounds)
+    }
 
 
 def _confounded(unknowns: Sequence[Unknown], covariance: NDArray[np.floating]) -> tuple[tuple[str, str], ...]:
@@ -239,6 +264,3 @@ def _confounded(unknowns: Sequence[Unknown], covariance: NDArray[np.floating]) -
     correlation = np.abs(covariance / np.outer(scale, scale))
     pairs = [(i, j) for i in range(len(unknowns)) for j in range(i) if correlation[i, j] > 0.95]
     return tuple((unknowns[j].name, unknowns[i].name) for i, j in pairs)
-
-
-__all__ = ["BOUND", "SIGNALS", "Calibrated", "Calibration", "calibrate", "default_free"]

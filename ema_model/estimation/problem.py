@@ -1,176 +1,166 @@
-"""The least-squares problem of a calibration: unknowns in their own σ, residuals over their floor."""
+"""The least-squares problem of every fit: unknowns with their priors, a model that simulates them, weights."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ema_model.actuator import Actuator
-from ema_model.actuator.naming import on_axes
-from ema_model.actuator.parameters import low_limit
-from ema_model.effects import find
 from ema_model.errors import InputError
 from ema_model.estimation.floor import Floor
-from ema_model.faults import NAMES, named
-from ema_model.models import Plant
+from ema_model.estimation.unknowns import ECCENTRICITY, Unknown, to_k, to_vector
+from ema_model.models import Model
+from ema_model.models.closed_loop import LOAD
+from ema_model.models.model import Effects, Signals
 
 Array = NDArray[np.float64]
 
-BOUND = 3.0  # σ
-_STEP = 0.1  # σ, of the differences: beyond the roughness that stick and slip give
-_STEP_OF_K = 0.03  # of a k's: it spans far more
-_K_SIGMA = 0.29  # a k may be anywhere in [0, 1]
-_TURNED_SIGMA_RAD = 2e-3  # how well an encoder tells where the motor starts
+SIGNALS = ("current_A", "motor_torque_Nm", "motor_position_rad", "user_position_rad")  # that are fitted
 
 
-@dataclass(frozen=True)
-class Unknown:
-    """One number that the calibration moves: nominal + σ·x, low ≤ x ≤ high."""
+class Rig(NamedTuple):
+    """What `Model.signals` is asked for in one window, for one x or a population."""
 
-    name: str
-    nominal: float
-    sigma: float
-    low: float = -BOUND
-    high: float = BOUND
+    actuator: Actuator
+    k: Array
+    turned_rad: Any  # numbers, or (n,)
+    play_rad: Any
+    effects: Effects
 
 
 class Problem:
-    """Residuals and Jacobian of a plant for chosen unknowns.
+    """x (n, unknowns), each in σ of its prior → residuals (n, values + unknowns).
 
-    The residual holds every compared signal of every window over its floor, and x itself (the prior).
-    Derivatives are differences, one lane each, so that a Jacobian is one call of the kernel per window.
+    They are model − measurement of every compared signal of every window over its floor, and x over its prior.
+    signals: those to fit, with weights; all of `SIGNALS` without it.  k: of faults that do not move, (8,); without it,
+    the actuator's own.
     """
 
     def __init__(
-        self, plant: Plant, floors: Sequence[Floor], free: Sequence[str], k: ArrayLike, signals: Mapping[str, float]
+        self,
+        model: Model,
+        floors: Sequence[Floor],
+        unknowns: Sequence[Unknown],
+        signals: Mapping[str, float] | None = None,
+        k: ArrayLike | None = None,
     ) -> None:
-        self.plant = plant
-        self.k = np.asarray(k, dtype=float)
-        self.signals = [[name for name in signals if name in window.measured] for window in plant.windows]
-        self.weights = [
-            {name: signals[name] / one.fit_sigma(name) for name in names} for one, names in zip(floors, self.signals)
-        ]
-        self.unknowns = [*(unknown_of(plant.actuator, name) for name in free), *_starts(plant)]
-        self.values = sum(window.blocks * len(names) for window, names in zip(plant.windows, self.signals))
+        self.model = model
+        self.unknowns = list(unknowns)
+        self.count = len(self.unknowns)
+        self.low, self.high = np.array([u.low for u in unknowns]), np.array([u.high for u in unknowns])
+        self.base = np.array([u.is_base for u in unknowns], dtype=bool)
+        self.prior = np.ones(self.count)  # 1 over its σ, which is less than 1 for what is believed to be close
+        self._step = np.array([u.step for u in unknowns])
+        self._k = np.asarray(model.actuator.k if k is None else k, dtype=float)
+        self._nominal, self._sigma = (np.array([getattr(u, one) for u in unknowns]) for one in ("nominal", "sigma"))
+        self._faults = [(i, u.place) for i, u in enumerate(unknowns) if u.kind == "fault"]
+        self._eccentricity = [i for i, place in self._faults if place in ECCENTRICITY]  # both parts, or none
+        self._asked = signals or dict.fromkeys(SIGNALS, 1.0)
+        self.reweighted(floors)
         if not self.values:
-            raise InputError(f"none of the recordings has a signal of {', '.join(signals)}")
+            raise InputError(f"none of the recordings has a signal of {', '.join(self._asked)}")
 
-    @property
-    def bounds(self) -> tuple[Array, Array]:
-        """Least and greatest x."""
-        return np.array([u.low for u in self.unknowns]), np.array([u.high for u in self.unknowns])
-
-    def simulate(self, x: Array) -> list[dict[str, Array]]:
-        """Signals of a population of unknowns x (n, unknowns), per window: (n, blocks) each."""
-        k, actuator, starts = self._apply(np.atleast_2d(x))
-        signals: Any = self.plant.signals  # each plant knows its own windows
-        return [
-            signals(window, actuator, k, starts.get(f"turned {i}", 0.0), starts.get(f"play {i}", 0.0))
-            for i, window in enumerate(self.plant.windows)
+    def reweighted(self, floors: Sequence[Floor], added: Sequence[Mapping[str, Array]] = ()) -> None:
+        """Sets other floors, and what the model is known to lack, by window and signal, (blocks,), which is added."""
+        self.floors, self.added = list(floors), list(added)
+        self.weights = [
+            {name: weight / one.fit_sigma(name) for name, weight in self._asked.items() if name in window.measured}
+            for window, one in zip(self.model.windows, self.floors)
         ]
+        self.values = sum(len(values) for weights in self.weights for values in weights.values())
 
-    def residual(self, x: Array) -> Array:
-        """(values + unknowns,)"""
-        return self._residuals(x[None, :])[0]
+    def believe(self, spread: float) -> None:
+        """Takes the base parameters to be within `spread` of their tolerances."""
+        self.prior[self.base] = 1.0 / spread
 
-    def costs(self, x: Array) -> Array:
-        """Half the squared residual of each of a population x (n, unknowns): (n,)."""
-        return 0.5 * np.sum(self._residuals(x) ** 2, axis=1)
-
-    def jacobian(self, x: Array) -> Array:
-        """∂residual/∂x, (values + unknowns, unknowns), by central differences in one population."""
-        return self.linearised(x)[1]
-
-    def linearised(self, x: Array) -> tuple[Array, Array]:
-        """Residual and Jacobian in one population: together they cost little more than the residual alone."""
-        n = len(x)
-        points = np.repeat(x[None, :], 2 * n + 1, axis=0)
-        least, greatest = self.bounds
-        step = np.array([_STEP_OF_K if unknown.name in NAMES else _STEP for unknown in self.unknowns])
-        low, high = np.clip(x - step, least, greatest), np.clip(x + step, least, greatest)
-        points[np.arange(n), np.arange(n)] = low
-        points[n + np.arange(n), np.arange(n)] = high
-        residuals = self._residuals(points)
-        return residuals[2 * n], ((residuals[n : 2 * n] - residuals[:n]) / (high - low)[:, None]).T
-
-    def split(self, jacobian: Array, *, weighted: bool = False) -> list[dict[str, Array]]:
-        """A Jacobian per window and signal, in the signals' own units unless weighted: (blocks, unknowns) each."""
-        parts, row = [], 0
-        for window, weights in zip(self.plant.windows, self.weights):
-            part = {}
+    def residuals(self, x: Array) -> Array:
+        """(n, unknowns) → (n, values + unknowns)."""
+        parts = []
+        for i, (window, weights) in enumerate(zip(self.model.windows, self.weights)):
+            shown = self.simulate(x, i)
             for name, weight in weights.items():
-                rows = jacobian[row : row + window.blocks]
-                part[name] = rows if weighted else rows / weight[:, None]
-                row += window.blocks
-            parts.append(part)
-        return parts
-
-    def actuator(self, x: Array) -> tuple[Actuator, Array]:
-        """The actuator and k (8,) at one x."""
-        k, _, _ = self._apply(x[None, :])
-        values = {u.name: float(u.nominal + u.sigma * v) for u, v in zip(self.unknowns, x) if "." in u.name}
-        return replace(self.plant.actuator.varied(values), faults=named(k[0])), k[0]
-
-    def _residuals(self, x: Array) -> Array:
-        parts = [
-            (simulated[name] - window.measured[name]) * weights[name]
-            for window, weights, simulated in zip(self.plant.windows, self.weights, self.simulate(x))
-            for name in weights
-        ]
-        residuals = np.concatenate([*parts, x], axis=1)
+                error = shown[name] - window.measured[name]
+                if self.added:
+                    error += self.added[i][name]
+                parts.append(error * weight)
         # A run that diverges is a very bad one, but a number.
-        return np.nan_to_num(residuals, nan=1e6, posinf=1e6, neginf=-1e6)
+        return np.nan_to_num(np.concatenate([*parts, x * self.prior], axis=1), nan=1e6, posinf=1e6, neginf=-1e6)
 
-    def _apply(self, x: Array) -> tuple[Array, Actuator, dict[str, Array]]:
-        k = np.repeat(self.k[None, :], len(x), axis=0)
-        varied: dict[str, Array] = {}
-        starts: dict[str, Array] = {}
-        for column, unknown in enumerate(self.unknowns):
-            values = unknown.nominal + unknown.sigma * x[:, column]
-            if unknown.name in NAMES:
-                k[:, NAMES.index(unknown.name)] = values
-            elif "." in unknown.name:
-                varied[unknown.name] = values
-            else:
-                starts[unknown.name] = values
-        return k, self.plant.actuator.varied(varied), starts
+    def jacobians(self, x: Array) -> tuple[Array, Array]:
+        """Residuals (n, m) and their derivatives (n, m, unknowns) by central differences, all in one population."""
+        n, count = x.shape
+        low, high = np.repeat(x[:, None, :], count, axis=1), np.repeat(x[:, None, :], count, axis=1)
+        at = np.arange(count)
+        low[:, at, at] = np.maximum(x - self._step, self.low)
+        high[:, at, at] = np.minimum(x + self._step, self.high)
+        points = np.concatenate([x[:, None, :], low, high], axis=1).reshape(-1, count)
+        all_ = self.residuals(points).reshape(n, 2 * count + 1, -1)
+        width = (high[:, at, at] - low[:, at, at])[:, :, None]
+        slopes = (all_[:, 1 + count :] - all_[:, 1 : 1 + count]) / width
+        return all_[:, 0], np.swapaxes(slopes, 1, 2)
 
+    def parts(self) -> list[tuple[int, str, slice]]:
+        """Where the residuals of each window's signals stand: window, signal, rows."""
+        found, first = [], 0
+        for i, weights in enumerate(self.weights):
+            for name, values in weights.items():
+                found.append((i, name, slice(first, first + len(values))))
+                first += len(values)
+        return found
 
-def unknown_of(actuator: Actuator, name: str) -> Unknown:
-    """The unknown for "section.parameter", "effects.name.parameter" or k1…k8.
+    def over_sigma(self, window: int, name: str, values: Array) -> Array:
+        """Values (…, blocks) of a window's signal as residuals are: over σ."""
+        return values * self.weights[window][name]
 
-    Raises InputError for one without a tolerance, since nothing says how far it may go.
-    """
-    if name in NAMES:
-        nominal = float(actuator.k[NAMES.index(name)])
-        return Unknown(name, nominal, _K_SIGMA, -nominal / _K_SIGMA, (1.0 - nominal) / _K_SIGMA)
-    if name not in actuator.tolerances:
-        known = ", ".join(on_axes(path, actuator.axes).path for path in actuator.tolerances)
-        raise InputError(f"{name} cannot be calibrated: the actuator's file gives it no tolerance; free may be {known}")
-    nominal, sigma = actuator.value(name), actuator.tolerances[name].sigma
-    low, high = low_limit(name), math.inf
-    if name.startswith("effects."):
-        _, effect, parameter = name.split(".")
-        low, high = next((p.low, p.high) for p in find(effect, actuator.axes).parameters if p.name == parameter)
-    # Zero itself is no inertia.
-    low = low + 1e-3 * abs(nominal) if low == 0.0 else low
-    return Unknown(name, nominal, sigma, max(-BOUND, (low - nominal) / sigma), min(BOUND, (high - nominal) / sigma))
+    def clip(self, x: Array) -> Array:
+        """x inside its bounds, the eccentricity inside its disc."""
+        x = np.clip(x, self.low, self.high)
+        if len(self._eccentricity) == 2:
+            at = self._eccentricity
+            parts = self._nominal[at] + self._sigma[at] * x[..., at]
+            parts /= np.maximum(1.0, np.linalg.norm(parts, axis=-1, keepdims=True))
+            x[..., at] = (parts - self._nominal[at]) / self._sigma[at]
+        return x
 
+    def simulate(self, x: Array, window: int, *, even: bool = False) -> Signals:
+        """Signals of a window, by its place, for x (n, unknowns): (n, blocks) each; even: as of `Model.signals`."""
+        return self.model.signals(window, *self.rig(x, window), even=even)
 
-def _starts(plant: Plant) -> list[Unknown]:
-    """Where each window began: beyond what its first sample says."""
-    if not plant.starts:
-        return []
-    transmission = plant.actuator.transmission
-    play = 0.5 * transmission.backlash_rad / transmission.gear_ratio
-    return [
-        unknown
-        for i in range(len(plant.windows))
-        for unknown in (Unknown(f"turned {i}", 0.0, _TURNED_SIGMA_RAD), Unknown(f"play {i}", 0.0, play))
-        if unknown.sigma > 0.0
-    ]
+    def vector(self, x: Array) -> Array:
+        """The faults at x (…, unknowns), the eccentricity as a vector: (…, 8)."""
+        vector = np.tile(to_vector(self._k), (*x.shape[:-1], 1))
+        for column, place in self._faults:
+            vector[..., place] = self._nominal[column] + self._sigma[column] * x[..., column]
+        return vector
+
+    def k(self, x: Array) -> Array:
+        """The faults at x (…, unknowns): (…, 8)."""
+        return to_k(self.vector(x)) if self._faults else np.tile(self._k, (*x.shape[:-1], 1))
+
+    def at(self, k: ArrayLike) -> Array:
+        """x (…, unknowns) of faults (…, 8), all else as it is known: the inverse of `k`."""
+        vector = to_vector(k)
+        x = np.zeros((*vector.shape[:-1], self.count))
+        for column, place in self._faults:
+            x[..., column] = (vector[..., place] - self._nominal[column]) / self._sigma[column]
+        return x
+
+    def parameters(self, x: Array) -> dict[str, Any]:
+        """The actuator's values at x (…, unknowns), by path: numbers, or (n,)."""
+        values = (self._nominal + self._sigma * x).T
+        parameters = {u.name: one for u, one in zip(self.unknowns, values) if u.kind == "parameter"}
+        return parameters if x.ndim > 1 else {path: float(one) for path, one in parameters.items()}
+
+    def rig(self, x: Array, window: int) -> Rig:
+        """What a window is simulated with at x (unknowns,), or for a population (n, unknowns)."""
+        values = (self._nominal + self._sigma * x).T
+        places = {"turned": window, "play": window, "load": self.model.windows[window].recording}
+        own: dict[str, Any] = {u.kind: one for u, one in zip(self.unknowns, values) if places.get(u.kind) == u.place}
+        effects: Effects = self.model.effects
+        if "load" in own:
+            effects = {**effects, LOAD: {"torque_Nm": own["load"]}}
+        actuator = self.model.actuator.varied(self.parameters(x))
+        return Rig(actuator, self.k(x), own.get("turned", 0.0), own.get("play", 0.0), effects)

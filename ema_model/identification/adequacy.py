@@ -45,11 +45,11 @@ def adequacy(found: Fitted) -> Adequacy:
             ratio = max(size, slow)
             title = in_sentence(SIGNAL_NAMES[name].title)
             return Adequacy(False, ratio, f"the {title} is left {ratio:.1f} × its floor")
-    axes = found.problem.plant.actuator.axes
+    axes = found.problem.model.actuator.axes
     edge = [
-        in_sentence(on_axes(name, axes).title)
-        for name, x in zip(found.problem.names, found.x)
-        if abs(x) > _EDGE and "." in name and not name.startswith("effects.")
+        in_sentence(on_axes(one.name, axes).title)
+        for one, x in zip(found.problem.unknowns, found.x)
+        if abs(x) > _EDGE and one.is_base
     ]
     if edge:
         whose = "its" if len(edge) == 1 else "their"
@@ -66,7 +66,7 @@ def _sizes(found: Fitted) -> dict[str, tuple[float, float]]:
     means: dict[str, list[Array]] = {}
     for window, name, rows in found.problem.parts():
         values = found.residual[rows]
-        count = max(1, round(CORRELATED_S / found.problem.plant.windows[window].block_s))
+        count = max(1, round(CORRELATED_S / found.problem.model.windows[window].block_s))
         whole.setdefault(name, []).append(values)
         if len(values) >= 4 * count:
             folded = values[: len(values) // count * count].reshape(-1, count)
@@ -116,8 +116,8 @@ def _worst_shape(found: Fitted) -> tuple[str, float]:
 
 def _shapes(found: Fitted, windows: list[int]) -> list[tuple[str, Array]]:
     """What missing physics would look like in the current, by name: (blocks, few) each."""
-    traces = [found.problem.simulate(i, found.x[None, :]) for i in windows]
-    blocks = [found.problem.plant.windows[i].block_s for i in windows]
+    traces = [found.problem.simulate(found.x[None, :], i) for i in windows]
+    blocks = [found.problem.model.windows[i].block_s for i in windows]
 
     def joined(name: str) -> Array:
         return np.concatenate([one[name][0] for one in traces])

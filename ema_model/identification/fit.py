@@ -8,13 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ema_model.estimation.descent import Descent
-from ema_model.estimation.floor import floor
-from ema_model.faults import HEALTHY
+from ema_model.estimation.descent import descend
+from ema_model.estimation.floor import Floor, floor
+from ema_model.estimation.problem import Problem
+from ema_model.estimation.unknowns import K_SIGMA, Unknown, loads_of, starts_of, unknowns_of
+from ema_model.faults import HEALTHY, NAMES
 from ema_model.identification.model_bias import Twins, twins
-from ema_model.identification.problem import Problem, Weights
-from ema_model.identification.unknowns import FAULTS, LOAD, Nuisance, nuisances, to_k, to_x
 from ema_model.models import ClosedLoop
+from ema_model.models.closed_loop import LOAD
 
 Array = NDArray[np.float64]
 
@@ -23,7 +24,8 @@ _STEPS = 25  # of a refit
 _CLOSE = 40.0  # χ²: the search's weights are coarse, and basins this close may change their order
 _CANDIDATES = 3
 _RIVAL = 4.0  # χ², within which another basin may be the right one
-_SETTLED = 1e-3  # of x's faults, between two rounds
+FAULTS = len(NAMES)  # the first of an identification's unknowns
+_SETTLED = 1e-3 / K_SIGMA  # of x's faults, between two rounds
 _SPREADS = (0.0, 0.05, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0)
 
 
@@ -32,17 +34,18 @@ class Setting:
     """What is to be fitted: recordings, weights, what is not exactly known."""
 
     plant: ClosedLoop
-    weights: list[Weights]
-    nuisances: list[Nuisance]
-    parameters_known: bool
+    floors: list[Floor]
+    faults: list[Unknown]
+    others: list[Unknown]  # whatever else about the rig is not exactly known
 
     def coarse(self) -> Problem:
         """The faults alone, with the Monitor Model's own error in the weights: for the search."""
-        return Problem(self.plant, self.weights, [])
+        return Problem(self.plant, self.floors, self.faults)
 
     def problem(self, *, with_base: bool) -> Problem:
         """The faults and what is not exactly known, with the actuator's base parameters or without."""
-        return Problem(self.plant, self.weights, [n for n in self.nuisances if with_base or not n.is_base])
+        others = [one for one in self.others if with_base or not one.is_base]
+        return Problem(self.plant, self.floors, [*self.faults, *others])
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,15 +76,19 @@ def setting(objective: ClosedLoop, *, parameters_known: bool) -> Setting:
         )
         for given in (effects, objective.effects)
     )
-    floors = [floor(bare, window) for window in bare.windows]
-    unknown = nuisances(plant, floors, parameters_known=parameters_known)
-    return Setting(plant, [Weights(one) for one in floors], unknown, parameters_known)
+    floors = [floor(bare, place) for place in range(len(bare.windows))]
+    actuator = plant.actuator
+    paths = [path for path in actuator.tolerances if path.startswith("effects.") or not parameters_known]
+    starts = starts_of(plant, floors, worn=True, exact=parameters_known)
+    others = [*unknowns_of(actuator, paths), *loads_of(plant), *starts]
+    return Setting(plant, floors, unknowns_of(actuator, NAMES), others)
 
 
 def refine_best(given: Setting, k: ArrayLike, seed: int = 0) -> Fitted:
     """The best fit near any of k (n, 8), or near health: of those that the search cannot tell from its best."""
     candidates = np.concatenate([np.atleast_2d(np.asarray(k, dtype=float)), [HEALTHY]])
-    costs = np.sum(given.coarse().residuals(to_x(candidates)) ** 2, axis=1)
+    coarse = given.coarse()
+    costs = np.sum(coarse.residuals(coarse.at(candidates)) ** 2, axis=1)
     order = np.argsort(costs, kind="stable")
     close = order[costs[order] < costs[order[0]] + _CLOSE][:_CANDIDATES]
     fits = sorted((refine(given, candidates[i], seed) for i in close), key=lambda one: one.cost)
@@ -96,11 +103,10 @@ def refine(given: Setting, k: ArrayLike, seed: int = 0) -> Fitted:
     The base parameters keep their file's values at first, and then move as far as the data want them to.
     """
     problem = given.problem(with_base=False)
-    x = np.concatenate([to_x(k), np.zeros(problem.count - FAULTS)])
-    x, _, evaluations = _descend(problem, x)
+    x, _, evaluations = _descend(problem, problem.at(k))
     x, found, more = _with_twins(given, problem, x, None, seed)
     spread = 0.0
-    if any(n.is_base for n in given.nuisances):
+    if any(one.is_base for one in given.others):
         full = given.problem(with_base=True)
         start = np.zeros(full.count)
         start[~full.base] = x
@@ -121,7 +127,7 @@ def refine(given: Setting, k: ArrayLike, seed: int = 0) -> Fitted:
     residuals, slopes = problem.jacobians(x[None, :])
     residual = residuals[0]
     return Fitted(
-        problem, x, float(residual @ residual), residual, slopes[0], found, to_k(x), spread, evaluations + more
+        problem, x, float(residual @ residual), residual, slopes[0], found, problem.k(x), spread, evaluations + more
     )
 
 
@@ -176,17 +182,13 @@ def _cost(problem: Problem, given: Setting, x: Array, seed: int, weights: list[A
 
 def _reweight(problem: Problem, given: Setting, found: Twins | None) -> None:
     if found is None:
-        problem.reweighted(given.weights)
+        problem.reweighted(given.floors)
     else:
-        problem.reweighted(found.weights(given.weights), found.added)
+        problem.reweighted(found.floors(given.floors), found.added)
 
 
 def _descend(problem: Problem, x: Array) -> tuple[Array, float, int]:
-    descent = Descent.begin(problem, x)
-    for _ in range(_STEPS):
-        descent.step()
-        if descent.done:
-            break
+    descent = descend(problem, x, _STEPS)
     return descent.x[0], float(descent.cost[0]), descent.evaluations
 
 

@@ -16,18 +16,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
-from ema_model.commands import Recorded
-from ema_model.estimation.floor import CORRELATED_S
-from ema_model.identification.problem import Problem, Weights
-from ema_model.identification.unknowns import FAULTS, LOAD, to_k
-from ema_model.simulation.run import Run, simulate_reference
+from ema_model.estimation.floor import CORRELATED_S, Floor
+from ema_model.estimation.problem import Problem
+from ema_model.estimation.unknowns import K_SIGMA
+from ema_model.faults import NAMES
 
 Array = NDArray[np.float64]
 
 TWINS = 4
-# σ of the twins' k about the answer.  In saturation the ripple repeats for the same k, but not for one that a fit may
+# σ of the twins' x about the answer.  In saturation the ripple repeats for the same k, but not for one that a fit may
 # still move to: twins that are too close together would call it known.
-_HAIR = 3e-3
+_HAIR = 3e-3 / K_SIGMA
 _SLACK = 0.5  # share of a lasting difference that is not trusted to stay when the fit moves
 WHITE = frozenset({"current_A"})  # the ripple's spread: alternating in the current, lasting in the positions
 
@@ -40,20 +39,20 @@ class Twins:
     spread: list[dict[str, Array]]  # by signal, (blocks,): 1 σ
     deviations: list[dict[str, Array]]  # by signal, (twins, blocks): of each twin from their mean
 
-    def weights(self, before: Sequence[Weights]) -> list[Weights]:
-        """The weights of a fit with this added."""
-        return [Weights(replace(one.floor, model=spread), WHITE) for one, spread in zip(before, self.spread)]
+    def floors(self, before: Sequence[Floor]) -> list[Floor]:
+        """The floors of a fit with this added."""
+        return [replace(one, model=spread, white=WHITE) for one, spread in zip(before, self.spread)]
 
 
 def twins(problem: Problem, x: Array, seed: int, before: Twins | None = None) -> Twins | None:
     """The difference at x (unknowns,), its spread from earlier ones too; None if there is no twin, or it diverges."""
-    if not problem.plant.actuator.has_reference_model:
+    if not problem.model.actuator.has_reference_model:
         return None
     near = np.repeat(x[None, :], TWINS, axis=0)
-    near[:, :FAULTS] += _HAIR * np.random.default_rng([seed, 2]).standard_normal((TWINS, FAULTS))
+    near[:, : len(NAMES)] += _HAIR * np.random.default_rng([seed, 2]).standard_normal((TWINS, len(NAMES)))
     near = problem.clip(near)
     added, spread, deviations = [], [], []
-    for i, window in enumerate(problem.plant.windows):
+    for i, window in enumerate(problem.model.windows):
         try:
             errors = _errors(problem, near, i)
         except FloatingPointError:
@@ -80,38 +79,6 @@ def _spread(deviations: Array, mean: Array, name: str, block_s: float) -> Array:
 
 def _errors(problem: Problem, x: Array, place: int) -> dict[str, Array]:
     """Reference less Monitor Model for x (n, unknowns), both under a constant load and an even supply: (n, blocks)."""
-    plant, window = problem.plant, problem.plant.windows[place]
-    count = len(window.command)
-    mean_load = float(window.load.mean())
-    monitor = problem.simulate(place, x, load=np.full(count, mean_load), supply=np.ones(count))
-    command = Recorded(np.arange(count) * window.step_s, window.command)
-    effects = {name: given for name, given in plant.effects.items() if name != LOAD}
-    names = problem.signals[place]
-    found: dict[str, list[Array]] = {name: [] for name in names}
-    for one in x:
-        values, start, load = problem.rig(one, place)
-        actuator = plant.actuator.varied(window.values | values)
-        run = Run(
-            command,
-            duration_s=count * window.step_s,
-            sample_rate_Hz=1.0 / (window.steps_per_sample * window.step_s),
-            load_torque_Nm=mean_load + load,
-        )
-        twin = simulate_reference(
-            run,
-            actuator,
-            to_k(one),
-            effects,
-            start_rad=window.user_rad + start["turned"] * actuator.transmission.gear_ratio,
-            start_speed_rad_s=window.speed_rad_s,
-            start_play_rad=window.play_rad + start["play"],
-            start_integral_Nm=float(window.integral_Nm(actuator, to_k(one), start["turned"], start["play"])),
-        )
-        sensors = actuator.sensors
-        for name in names:
-            values_ = twin[name][1:].reshape(-1, window.samples_per_block).mean(axis=1)
-            if name == "current_A":
-                values_ = sensors.current_gain * values_ + sensors.current_bias_A
-            late = sensors.delay_s - plant.actuator.sensors.delay_s
-            found[name].append(values_ - late * np.gradient(values_, window.block_s) if late else values_)
-    return {name: np.array(values) - monitor[name] for name, values in found.items()}
+    monitor = problem.simulate(x, place, even=True)
+    twin = [problem.model.twin(place, *problem.rig(one, place)) for one in x]
+    return {name: np.array([one[name] for one in twin]) - monitor[name] for name in problem.weights[place]}

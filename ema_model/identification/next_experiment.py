@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from ema_model.commands import command
 from ema_model.errors import InputError
 from ema_model.estimation.floor import Floor, repeats_of
-from ema_model.identification.fit import Fitted
-from ema_model.identification.problem import Problem, Weights
-from ema_model.identification.unknowns import FAULTS, Nuisance
+from ema_model.estimation.problem import Problem
+from ema_model.estimation.unknowns import K_SIGMA
+from ema_model.identification.fit import FAULTS, Fitted
 from ema_model.models import ClosedLoop
 from ema_model.simulation.run import Run, simulate_monitor
 
@@ -71,26 +71,24 @@ def _columns(name: str) -> tuple[int, ...]:
 def _information(found: Fitted, run: Run) -> Array | None:
     """What such a recording would tell of k, its rig's unknowns integrated out: (8, 8), a root of the information."""
     problem = found.problem
-    plant = problem.plant
+    plant = problem.model
     try:
         recording = simulate_monitor(run, plant.actuator, found.k, plant.effects, plant.stack.circuit)
         own = ClosedLoop([recording], plant.actuator, effects=plant.effects, circuit=plant.stack.circuit)
     except (InputError, FloatingPointError):
         return None
     window = own.windows[0]
-    typical = problem.weights[0]
-    known = typical.floor.model
+    typical = problem.floors[0]
+    known = typical.model
     noise = {name: typical.noise.get(name, _CURRENT_A) for name in window.measured}
     model = {
         name: np.full(window.blocks, np.sqrt(np.mean(known[name] ** 2)) if name in known else 0.0)
         for name in window.measured
     }
-    kept: list[Nuisance] = [n for n in problem.nuisances if " " not in n.name or n.name.endswith(" 0")]
-    own_floor = Floor(noise, model, repeats_of(window, noise), window.block_s)
-    own_problem = Problem(own, [Weights(own_floor, typical.white)], kept)
-    x = np.zeros(own_problem.count)
-    x[:FAULTS] = found.x[:FAULTS]
-    _, slopes = own_problem.jacobians(x[None, :])
+    kept = [one for one in problem.unknowns if one.kind in ("fault", "parameter") or one.place == 0]
+    own_floor = Floor(noise, model, repeats_of(window, noise), window.block_s, typical.white)
+    own_problem = Problem(own, [own_floor], kept)
+    _, slopes = own_problem.jacobians(own_problem.at(found.k)[None, :])
     # The faults last: what is left of them beside the rig's unknowns; normal equations would round it away.
-    ordered = np.concatenate([slopes[0][:, FAULTS:], slopes[0][:, :FAULTS]], axis=1)
+    ordered = np.concatenate([slopes[0][:, FAULTS:], slopes[0][:, :FAULTS] / K_SIGMA], axis=1)
     return np.asarray(np.linalg.qr(ordered, mode="r"))[-FAULTS:, -FAULTS:]

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from ema_model.actuator import Actuator
 from ema_model.errors import InputError, quoted
 from ema_model.models.closed_loop import ClosedLoop
-from ema_model.models.window import BLOCK_S, Window
+from ema_model.models.loop_window import BLOCK_S, LoopWindow
 from ema_model.physics.rows import LANES
 from ema_model.recordings import Measurement
 from ema_model.simulation.pack import initial_state, monitor_rows
@@ -112,12 +112,12 @@ class Objective(ClosedLoop):
             parts.append(result[:, :, 0, :].transpose(0, 2, 1).reshape(len(rows) * LANES, -1)[: len(k)])
         return np.concatenate(parts, axis=1)
 
-    def _target(self, window: Window) -> Array:
+    def _target(self, window: LoopWindow) -> Array:
         """The window's equivalent current, A, (blocks,), the sensor's gain and bias taken off."""
         sensors = self.actuator.varied(window.values).sensors
         return (window.measured["current_A"] - sensors.current_bias_A) / sensors.current_gain
 
-    def _state(self, window: Window, k: Array, actuator: Actuator) -> Array:
+    def _state(self, window: LoopWindow, k: Array, actuator: Actuator) -> Array:
         return initial_state(
             actuator,
             -(-len(k) // LANES),
@@ -129,9 +129,9 @@ class Objective(ClosedLoop):
         )
 
 
-def _alike(windows: Sequence[Window]) -> list[list[Window]]:
+def _alike(windows: Sequence[LoopWindow]) -> list[list[LoopWindow]]:
     """Windows grouped by their sampling and own values, so that one kernel call serves each group."""
-    groups: dict[Any, list[Window]] = {}
+    groups: dict[Any, list[LoopWindow]] = {}
     for window in windows:
         groups.setdefault(
             (window.steps_per_block, round(window.step_s, 12), *sorted(window.values.items())), []
@@ -142,7 +142,7 @@ def _alike(windows: Sequence[Window]) -> list[list[Window]]:
 class _Group:
     """Windows of one sampling and one actuator, laid one after another."""
 
-    def __init__(self, windows: list[Window], targets: list[Array]) -> None:
+    def __init__(self, windows: list[LoopWindow], targets: list[Array]) -> None:
         self.windows = windows
         self.steps_per_block = windows[0].steps_per_block
         self.step_s = windows[0].step_s

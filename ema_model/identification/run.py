@@ -17,7 +17,6 @@ from ema_model.identification.objective import Objective
 from ema_model.identification.optimisers import OPTIMISERS, Optimiser, create
 from ema_model.identification.search import search
 from ema_model.identification.uncertainty import Uncertainty, uncertainty
-from ema_model.identification.unknowns import to_k
 
 Array = NDArray[np.float64]
 
@@ -135,7 +134,7 @@ def steps(
         truth=None if truth is None else np.asarray(truth, dtype=float),
         polished=polishes,
         searched_k=last.k,
-        parameters=found.problem.rig(found.x, 0)[0] if polishes else {},
+        parameters=found.problem.parameters(found.x) if polishes else {},
     )
 
 
@@ -169,8 +168,9 @@ def _robust(
     given = setting(objective, parameters_known=parameters_known)
     compiled = _warm_up_fit(given)
     evaluations, waited = 0, compiled
-    for number, basins in enumerate(search(given.coarse(), population, iterations, seed)):
-        k = to_k(basins.x)
+    problem = given.coarse()
+    for number, basins in enumerate(search(problem, population, iterations, seed)):
+        k = problem.k(basins.x)
         rmse = objective(k)
         evaluations = basins.evaluations
         elapsed = time.perf_counter() - started - waited
@@ -220,6 +220,6 @@ def _warm_up_fit(given: Setting) -> float:
     started = time.perf_counter()
     plant = given.plant
     if not plant.stack.monitor.traces.signatures:
-        plant.signals(plant.windows[0])
+        plant.signals(0)
         return time.perf_counter() - started
     return 0.0

@@ -14,15 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.estimation.descent import Descent
-from ema_model.faults import HEALTHY
-from ema_model.identification.problem import Problem
-from ema_model.identification.unknowns import FAULTS, to_x
+from ema_model.estimation.problem import Problem
+from ema_model.estimation.unknowns import K_SIGMA
+from ema_model.faults import HEALTHY, NAMES
 
 Array = NDArray[np.float64]
 
 _DRAWN = 16  # of each niche
-_APART = 0.25  # least distance in x between two niches at the start
-_SAME = 0.02  # and at which two that went downhill are in one basin
+_APART = 0.25 / K_SIGMA  # least distance in x between two niches at the start
+_SAME = 0.02 / K_SIGMA  # and at which two that went downhill are in one basin
 _HALVE_EVERY = 3  # steps
 _FEWEST = 4
 _MOST_NUMBERS = 5e6  # of simulated values at once: long recordings have fewer niches
@@ -39,7 +39,7 @@ class Basins:
 
 
 def search(problem: Problem, niches: int, most_steps: int, seed: int) -> Generator[Basins, None, Basins]:
-    """Yields after the first draw and after each step; returns the distinct basins."""
+    """Yields after the first draw and after each step; returns the distinct basins of a problem of faults alone."""
     room = int(_MOST_NUMBERS / (problem.values * (2 * problem.count + 1)))
     niches = max(_FEWEST, min(niches, room))
     drawn = _drawn(problem, niches * _DRAWN, seed)
@@ -60,18 +60,16 @@ def search(problem: Problem, niches: int, most_steps: int, seed: int) -> Generat
 
 
 def _drawn(problem: Problem, count: int, seed: int) -> Array:
-    """Evenly spread faults, the eccentricity even over its angle, nothing else changed; a healthy one first."""
+    """Evenly spread faults, the eccentricity even over its angle; a healthy one first."""
     random = np.random.default_rng(seed)
-    strata = random.permuted(np.tile(np.arange(count), (FAULTS, 1)), axis=1).T  # a Latin hypercube
-    k = (strata + random.random((count, FAULTS))) / count
+    strata = random.permuted(np.tile(np.arange(count), (len(NAMES), 1)), axis=1).T  # a Latin hypercube
+    k = (strata + random.random((count, len(NAMES)))) / count
     # Most actuators have few faults: of the second half of the draw each fault is there or not.
     half = k[count // 2 :]
     absent = random.random((len(half), 6)) < 0.6
     half[:, :6][absent] = 0.0
     k[0] = HEALTHY
-    x = np.zeros((count, problem.count))
-    x[:, :FAULTS] = to_x(k)
-    return problem.clip(x)
+    return problem.clip(problem.at(k))
 
 
 def _costs(problem: Problem, x: Array) -> Array:
@@ -86,7 +84,7 @@ def _apart(problem: Problem, x: Array, costs: Array, count: int) -> NDArray[np.i
     order = np.argsort(costs, kind="stable")
     kept: list[int] = []
     for i in order:
-        if all(np.linalg.norm(x[i, :FAULTS] - x[j, :FAULTS]) > _APART for j in kept):
+        if all(np.linalg.norm(x[i] - x[j]) > _APART for j in kept):
             kept.append(int(i))
             if len(kept) == count:
                 return np.array(kept)
@@ -99,7 +97,7 @@ def _distinct(descent: Descent, step: int) -> NDArray[np.intp]:
     order = np.argsort(descent.cost, kind="stable")
     kept: list[int] = []
     for i in order:
-        if all(np.linalg.norm(descent.x[i, :FAULTS] - descent.x[j, :FAULTS]) > _SAME for j in kept):
+        if all(np.linalg.norm(descent.x[i] - descent.x[j]) > _SAME for j in kept):
             kept.append(int(i))
     if step % _HALVE_EVERY == 0:
         kept = kept[: max(_FEWEST, (len(kept) + 1) // 2)]

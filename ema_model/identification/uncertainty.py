@@ -16,15 +16,16 @@ from scipy.special import chdtri, stdtrit
 
 from ema_model import faults
 from ema_model.estimation.feldman_cousins import above_zero, length_of_vector
+from ema_model.estimation.unknowns import ECCENTRICITY, K_SIGMA, polar, to_vector
 from ema_model.identification.adequacy import Adequacy, adequacy
-from ema_model.identification.fit import Fitted
+from ema_model.identification.fit import FAULTS, Fitted
 from ema_model.identification.model_bias import TWINS
 from ema_model.identification.next_experiment import Suggestion, separating
-from ema_model.identification.unknowns import ECCENTRICITY, FAULTS, GAIN, to_x
 
-Array = NDArray[np.floating]
+Array = NDArray[np.float64]
 
 _Z90 = 1.645
+_GAIN = 7  # place of the controller's among the faults
 _ALARM = 0.01 / 7  # of each of seven k, so that all together give a false one in 1 % of healthy actuators
 _ALARM_Z = 2.98  # one-sided, of a k that is healthy at 0
 _ALARM_Z_BOTH = 3.19  # two-sided
@@ -51,7 +52,7 @@ class Uncertainty:
     adequate: bool = True  # the model with this k leaves no more than the floor
     warnings: tuple[str, ...] = ()
     separated_by: Suggestion | None = None  # the run that would tell the groups apart, and the hardly known
-    covariance: Array = field(default_factory=lambda: np.zeros((FAULTS, FAULTS)))  # of the faults' part of x
+    covariance: Array = field(default_factory=lambda: np.zeros((FAULTS, FAULTS)))  # of k
 
 
 def uncertainty(found: Fitted, k: Array) -> Uncertainty:
@@ -86,7 +87,7 @@ def uncertainty(found: Fitted, k: Array) -> Uncertainty:
 class _Basin:
     """What one best fit alone says."""
 
-    covariance: Array  # of the faults' part of x
+    covariance: Array  # of the faults, the eccentricity as a vector
     fit: Adequacy
     interval90: Array  # (8, 2)
     healthy: bool
@@ -94,11 +95,11 @@ class _Basin:
 
 
 def _basin(found: Fitted, k: Array) -> _Basin:
-    covariance = _covariance(found)[:FAULTS, :FAULTS]
+    covariance = K_SIGMA**2 * _covariance(found)[:FAULTS, :FAULTS]
     fit = adequacy(found)
     if not fit.adequate:  # a misfit says how wrong the model is, and the intervals with it
         covariance = covariance * max(1.0, fit.ratio) ** 2
-    free = _unbounded(found)[:FAULTS]
+    free = found.problem.vector(_unbounded(found))
     healthy = _from_healthy(free, covariance) < float(chdtri(FAULTS, 0.01))
     return _Basin(
         covariance,
@@ -120,12 +121,12 @@ def _covariance(found: Fitted) -> Array:
     meat = np.diag(held**4 / problem.prior**2)
     for window, name, rows in problem.parts():
         part = slopes[rows]
-        noise = np.full(rows.stop - rows.start, problem.weights[window].noise[name])
+        noise = np.full(rows.stop - rows.start, problem.floors[window].noise[name])
         if found.twins is None:  # the model's own error, taken to last as its weight says
             noise = 1.0 / problem.over_sigma(window, name, np.ones(len(noise)))
         weighted = part * problem.over_sigma(window, name, noise)[:, None]
         meat = meat + weighted.T @ weighted
-    covariance = inverse @ meat @ inverse + _SLIGHT**2 * np.eye(len(inverse))
+    covariance = inverse @ meat @ inverse + (_SLIGHT / K_SIGMA) ** 2 * np.eye(len(inverse))
     if found.twins is not None:
         scores = _twin_scores(found) @ inverse
         freedom = len(scores) // TWINS * (TWINS - 1)
@@ -159,7 +160,7 @@ def _unbounded(found: Fitted) -> Array:
     rows = slice(0, problem.values)
     slopes, residual = found.slopes[rows][:, moves], found.residual[rows]
     hessian = slopes.T @ slopes + np.diag(prior[moves] ** 2)
-    gradient = slopes.T @ residual + (prior**2 * (x - problem.middle))[moves]
+    gradient = slopes.T @ residual + (prior**2 * x)[moves]
     at_bound = (x <= problem.low + 1e-6) | (x >= problem.high - 1e-6)
     step = np.zeros(problem.count)
     if (at_bound & moves)[:FAULTS].any():  # elsewhere the fit is there already
@@ -172,8 +173,8 @@ def _intervals(free: Array, covariance: Array, k: Array) -> Array:
     interval = np.zeros((8, 2))
     for i in range(5):
         interval[i] = _bounded(free[i], sigma[i])
-    gain = free[GAIN]
-    interval[7] = gain - _Z90 * sigma[GAIN], gain + _Z90 * sigma[GAIN]
+    gain = free[_GAIN]
+    interval[7] = gain - _Z90 * sigma[_GAIN], gain + _Z90 * sigma[_GAIN]
     along, across, length = _polar(free, covariance)
     low, high = length_of_vector(length / along)
     interval[5] = low * along, high * along
@@ -194,17 +195,8 @@ def _bounded(value: float, sigma: float) -> tuple[float, float]:
 
 
 def _polar(free: Array, covariance: Array) -> tuple[float, float, float]:
-    """σ along and across the eccentricity's vector, and its length."""
-    index = list(ECCENTRICITY)
-    vector = free[index]
-    part = covariance[np.ix_(index, index)]
-    length = float(np.hypot(*vector))
-    if length < 1e-9:
-        both = float(np.sqrt(np.trace(part) / 2.0))
-        return both, both, length
-    along = vector / length
-    across = np.array([-along[1], along[0]])
-    return float(np.sqrt(along @ part @ along)), float(np.sqrt(across @ part @ across)), length
+    """`polar` of all faults (8,)."""
+    return polar(free[list(ECCENTRICITY)], covariance[np.ix_(ECCENTRICITY, ECCENTRICITY)])
 
 
 def _from_healthy(free: Array, covariance: Array) -> float:
@@ -214,7 +206,7 @@ def _from_healthy(free: Array, covariance: Array) -> float:
     root = np.linalg.inv(np.linalg.cholesky(covariance))
     low = np.array([0.0] * 5 + [-1.0, -1.0, 0.0])
     best = lsq_linear(root, root @ free, bounds=(low, np.ones(FAULTS)))
-    healthy = root @ (to_x(faults.HEALTHY) - free)
+    healthy = root @ (to_vector(faults.HEALTHY) - free)
     return float(healthy @ healthy - 2.0 * best.cost)
 
 
@@ -224,7 +216,7 @@ def _alarms(free: Array, covariance: Array) -> tuple[str, ...]:
     along, _, length = _polar(free, covariance)
     if length > _ALARM_LENGTH * along:
         outside.append("k6")
-    if abs(free[GAIN] - faults.HEALTHY[7]) > _ALARM_Z_BOTH * sigma[GAIN]:
+    if abs(free[_GAIN] - faults.HEALTHY[7]) > _ALARM_Z_BOTH * sigma[_GAIN]:
         outside.append("k8")
     return tuple(outside)
 

@@ -3,32 +3,38 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ema_model.actuator import Actuator
+from ema_model.commands import Recorded
+from ema_model.commands.recorded import jumps
 from ema_model.effects import find
 from ema_model.errors import InputError
+from ema_model.models.loop_window import BLOCK_S, COMPARED, LoopWindow, cut
+from ema_model.models.model import Effects, Signals
 from ema_model.models.sampling import check_steps, on_even_grid
-from ema_model.models.window import BLOCK_S, Window, cut
 from ema_model.physics.rows import LANES
 from ema_model.recordings import Measurement
+from ema_model.recordings.noise import least_noise, sample_noise
 from ema_model.simulation.one_stack import own_stack, stack_at_hand
 from ema_model.simulation.pack import initial_state, monitor_rows
 from ema_model.simulation.precompile import wait_for
+from ema_model.simulation.run import Run, simulate_reference
 from ema_model.stacks import exclusive
 
 Array = NDArray[np.float64]
 
+LOAD = "constant_load"  # the effect through which a load that was not recorded acts
 _CHUNK = 20_000  # blocks that are simulated at once
 
 
 class ClosedLoop:
     """Recordings whose command and controller are known, cut into windows that start from their own first sample."""
 
-    starts = True  # a window's start is not known exactly
+    simulates_commands = True
 
     def __init__(
         self,
@@ -65,18 +71,90 @@ class ClosedLoop:
 
     def signals(
         self,
-        window: Window,
+        place: int,
         actuator: Actuator | None = None,
         k: ArrayLike | None = None,
         turned_rad: ArrayLike = 0.0,
         play_rad: ArrayLike = 0.0,
-        effects: Mapping[str, Mapping[str, Any]] | None = None,
-    ) -> dict[str, Array]:
-        """All of `COMPARED` for one window, as its sensors would show them: k (n, 8) → (n, blocks) each.
+        effects: Effects | None = None,
+        *,
+        even: bool = False,
+    ) -> Signals:
+        """All of `COMPARED`, as in `Model`."""
+        window = self.windows[place]
+        if even:
+            mean = np.full_like(window.load, window.load.mean())
+            window = replace(window, load=mean, supply=np.ones_like(window.supply))
+        return self._simulated(window, actuator, k, turned_rad, play_rad, effects)
 
-        k: without it, the actuator's own.  The parameters of `actuator` and effects, turned_rad (the motor's angle at
-        the start, rad, beyond the measured one) and play_rad (the same for its place in the play) may be arrays (n,).
-        """
+    def twin(
+        self,
+        place: int,
+        actuator: Actuator | None = None,
+        k: ArrayLike | None = None,
+        turned_rad: float = 0.0,
+        play_rad: float = 0.0,
+        effects: Effects | None = None,
+    ) -> Signals:
+        """The three-phase Reference Model's signals, of those that are measured, as in `Model`."""
+        window = self.windows[place]
+        actuator = (actuator or self.actuator).varied(window.values)
+        if not actuator.has_reference_model:
+            return {}
+        k = actuator.k if k is None else k
+        others = dict(self.effects if effects is None else effects)
+        pull = others.pop(LOAD, {"torque_Nm": 0.0})["torque_Nm"]  # needs no kernels of its own
+        count = len(window.command)
+        run = Run(
+            Recorded(np.arange(count) * window.step_s, window.command),
+            duration_s=count * window.step_s,
+            sample_rate_Hz=1.0 / (window.steps_per_sample * window.step_s),
+            load_torque_Nm=float(window.load.mean() + pull),
+        )
+        shown = simulate_reference(
+            run,
+            actuator,
+            k,
+            others,
+            start_rad=window.user_rad + turned_rad * actuator.transmission.gear_ratio,
+            start_speed_rad_s=window.speed_rad_s,
+            start_play_rad=window.play_rad + play_rad,
+            start_integral_Nm=float(window.integral_Nm(actuator, k, turned_rad, play_rad)),
+        )
+        blocks = {name: shown[name][1:].reshape(1, -1, window.samples_per_block).mean(axis=2) for name in COMPARED}
+        sensed = self._sensed(blocks, actuator, window.block_s)
+        return {name: sensed[name][0] for name in window.measured}
+
+    def noise(self, place: int, stated: Mapping[str, float]) -> dict[str, float]:
+        """As in `Model`; the longest run of the whole recording tells it."""
+        window = self.windows[place]
+        samples = self.recorded[window.recording]
+        longest = max(samples.runs, key=lambda run: run.stop - run.start)
+        each = {
+            name: max(stated[name], least_noise(name)) if name in stated else sample_noise(samples[name][longest], name)
+            for name in window.measured
+        }
+        return {name: one / np.sqrt(window.samples_per_block) for name, one in each.items()}
+
+    def a_sample_late(self, place: int, k: ArrayLike | None = None) -> Signals:
+        """As in `Model`."""
+        window = self.windows[place]
+        if not np.any(jumps(window.command)):
+            return {}
+        steps = window.steps_per_sample
+        later = replace(window, command=np.concatenate([np.full(steps, window.command[0]), window.command[:-steps]]))
+        now, then = (self._simulated(one, k=k) for one in (window, later))
+        return {name: then[name][0] - now[name][0] for name in now}
+
+    def _simulated(
+        self,
+        window: LoopWindow,
+        actuator: Actuator | None = None,
+        k: ArrayLike | None = None,
+        turned_rad: ArrayLike = 0.0,
+        play_rad: ArrayLike = 0.0,
+        effects: Effects | None = None,
+    ) -> Signals:
         actuator = (actuator or self.actuator).varied(window.values)
         k = np.atleast_2d(np.asarray(actuator.k if k is None else k, dtype=float))
         rows = monitor_rows(actuator, k, self.stack, self.effects if effects is None else effects)
@@ -110,17 +188,17 @@ class ClosedLoop:
                 result,
             )
             lanes[:, :, part] = result.transpose(2, 0, 3, 1).reshape(4, len(rows) * LANES, -1)[:, : len(k)]
+        return self._sensed(dict(zip(COMPARED, lanes)), actuator, window.block_s)
+
+    def _sensed(self, true: Signals, actuator: Actuator, block_s: float) -> Signals:
+        """Signals (n, blocks) as the actuator's sensors show them."""
         sensors = actuator.sensors
-        shown = {
-            "current_A": _each(sensors.current_gain) * lanes[0] + _each(sensors.current_bias_A),
-            "motor_speed_rad_s": lanes[1],
-            "motor_position_rad": lanes[2],
-            "user_position_rad": lanes[3],
-        }
+        current = _each(sensors.current_gain) * true["current_A"] + _each(sensors.current_bias_A)
+        shown = {**true, "current_A": current}
         late = _each(sensors.delay_s) - self.actuator.sensors.delay_s  # beyond what the window's command has
         if not np.any(late):
             return shown
-        return {name: y - late * np.gradient(y, window.block_s, axis=1) for name, y in shown.items()}
+        return {name: y - late * np.gradient(y, block_s, axis=1) for name, y in shown.items()}
 
 
 def _each(value: ArrayLike) -> Array:

@@ -8,8 +8,7 @@ angle) nothing moves: what the model has to say there is what effects pull at th
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,9 +16,10 @@ from numpy.typing import ArrayLike, NDArray
 from ema_model.actuator import Actuator
 from ema_model.effects import find
 from ema_model.errors import InputError, quoted
+from ema_model.models.loop_window import CONTEXT
+from ema_model.models.model import Effects, Signals, Window
 from ema_model.models.motion import Motion, motion_of
 from ema_model.models.sampling import check_period, on_even_grid
-from ema_model.models.window import CONTEXT
 from ema_model.physics.rows import LANES
 from ema_model.recordings import Measurement
 from ema_model.recordings.noise import sample_noise
@@ -35,44 +35,25 @@ _CHUNK = 100_000  # samples that are computed at once
 _STILL_STEPS = 3.0  # of the encoder within the filter, under which the motor counts as standing
 
 
-@dataclass(frozen=True, eq=False)
-class Stretch:
-    """One run of a recording; sample arrays are (samples,), block arrays (blocks,).
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Stretch(Window):
+    """A window with its motion; measured is current_A or motor_torque_Nm, filtered like the model's.
 
     Blocks at standstill are left out: friction holds any current up to its static limit there.
     """
 
-    name: str
-    recording: int
-    first: int  # the recording's sample that is its start
-    time_s: Array  # (blocks,)
     motion: Motion
     position: Array  # (samples,), motor, rad
     load: Array  # (samples,), N·m at the user
     still: float  # rad/s
-    measured: dict[str, Array]  # (blocks,): current_A or motor_torque_Nm, filtered like the model's
-    context: dict[str, Array]  # (blocks,)
-    noise: dict[str, float]  # rms per block, of the sensors
+    sensor_noise: dict[str, float]  # rms per block
     moving: NDArray[np.intp]  # (blocks,), which of the run's blocks these are
-    samples_per_block: int
-    period_s: float
-    values: dict[str, float] = field(default_factory=dict)
-
-    @property
-    def blocks(self) -> int:
-        """Number of compared values."""
-        return len(self.time_s)
-
-    @property
-    def block_s(self) -> float:
-        """Time between compared values, s."""
-        return self.samples_per_block * self.period_s
 
 
 class InverseDynamics:
     """Recordings with the motor's position and its current or torque."""
 
-    starts = False
+    simulates_commands = False
 
     def __init__(
         self,
@@ -100,17 +81,20 @@ class InverseDynamics:
 
     def signals(
         self,
-        window: Stretch,
+        place: int,
         actuator: Actuator | None = None,
         k: ArrayLike | None = None,
         turned_rad: ArrayLike = 0.0,
         play_rad: ArrayLike = 0.0,
-        effects: Mapping[str, Mapping[str, Any]] | None = None,
-    ) -> dict[str, Array]:
+        effects: Effects | None = None,
+        *,
+        even: bool = False,
+    ) -> Signals:
         """The current (A) or torque (N·m) that the motion needs, k (n, 8) → (n, blocks); friction's k1 alone counts.
 
-        k: without it, the actuator's own.  Parameters may be arrays (n,); the angles at the start mean nothing here.
+        As in `Model`; a start means nothing here, and the load is the recorded one.
         """
+        window = self.windows[place]
         actuator = (actuator or self.actuator).varied(window.values)
         k = np.atleast_2d(np.asarray(actuator.k if k is None else k, dtype=float))
         rows = monitor_rows(actuator, k, self.stack, self.effects if effects is None else effects)
@@ -126,6 +110,18 @@ class InverseDynamics:
             "current_A": _each(sensors.current_gain) * current + _each(sensors.current_bias_A),
             "motor_torque_Nm": _each(actuator.motor.torque_constant_Nm_A) * current,
         }
+
+    def twin(self, place: int, *args: object, **options: object) -> Signals:
+        """None: the Reference Model follows commands."""
+        return {}
+
+    def noise(self, place: int, stated: Mapping[str, float]) -> dict[str, float]:
+        """As in `Model`, of the sensors after the filter, whatever is stated of them before it."""
+        return dict(self.windows[place].sensor_noise)
+
+    def a_sample_late(self, place: int, k: ArrayLike | None = None) -> Signals:
+        """Nothing: no command is simulated."""
+        return {}
 
     def _currents(self, rows: Array, n: int, window: Stretch, acceleration: Array) -> Array:
         """(n, samples), A"""
@@ -196,12 +192,13 @@ def _stretches(
                 position=position,
                 load=np.zeros_like(position) if load is None else load[run],
                 still=still,
+                command=None,
                 measured={target: means(motion.filtered(raw))},
                 context=context,
-                noise={target: _noise(raw, target, motion.kernel, size)},
+                sensor_noise={target: _noise(raw, target, motion.kernel, size)},
                 moving=moving,
                 samples_per_block=size,
-                period_s=period,
+                block_s=size * period,
                 values=values,
             )
         )

@@ -90,7 +90,7 @@ def test_where_nothing_moves_the_model_is_right_and_k_is_healthy(simulate):
 
 def test_a_sensor_that_is_said_to_have_no_noise_still_has_a_floor():
     plant = ClosedLoop([noiseless()], ACTUATOR)
-    found = floor(plant, plant.windows[0], stated={"current_A": {"noise": 0.0}})
+    found = floor(plant, 0, stated={"current_A": {"noise": 0.0}})
     assert found.noise["current_A"] > 0.0
 
 
@@ -110,8 +110,8 @@ def test_a_held_out_recording_of_which_only_the_start_is_unknown():
 
 def test_nothing_to_calibrate_at_all_is_searched_for_effects():
     plant = InverseDynamics([turning(np.ones(1500))], FIXED)
-    assert not plant.starts
-    needed = plant.signals(plant.windows[0])["current_A"][0]
+    assert not plant.simulates_commands
+    needed = plant.signals(0)["current_A"][0]
     offset = turning(np.ones(1500)).with_signals(current_A=_filled(plant, needed) + 0.2)
     found = discover([offset], FIXED, holdout=[offset], candidates=("current_sensor_bias", "constant_load"))
     assert found.effects or found.unknown is not None

@@ -17,7 +17,7 @@ ACTUATOR = load_actuator()
 def floor_of(name: str, given: dict, rate_Hz: float):
     run = Run(command(name, given), duration_s=0.2, sample_rate_Hz=rate_Hz)
     plant = ClosedLoop([simulate_reference(run, ACTUATOR)], ACTUATOR)
-    return plant.windows[0], floor(plant, plant.windows[0])
+    return plant.windows[0], floor(plant, 0)
 
 
 def test_a_coarser_sampling_of_a_jump_raises_the_floor_of_its_transient():

@@ -11,7 +11,6 @@ from support.hidden_effects import ACTUATOR, SINE, recorded
 from ema_model.actuator import load_actuator, save_actuator
 from ema_model.actuator.parameters import Controller, Inverter
 from ema_model.comparison.assemble import residuals_of
-from ema_model.comparison.compare import known_error
 from ema_model.comparison.explain import Explanation, explain
 from ema_model.comparison.residuals import Residuals
 from ema_model.discovery.model_fit import Data, Fit, fit, gather, holdout_error
@@ -19,6 +18,7 @@ from ema_model.discovery.torque_curve import curve_of, is_torque, with_curve
 from ema_model.effects import find
 from ema_model.effects.user import user_torque
 from ema_model.errors import InputError
+from ema_model.estimation.floor import twin_error
 from ema_model.recordings import prepared
 
 COMMANDS = [("chirp", {}, 0.5), ("step", {"final_rad": 0.005}, 0.5), SINE]
@@ -37,7 +37,8 @@ def data_of(commands, effects, seed: int) -> Data:
 
 
 def explained(data: Data, found: Fit) -> Explanation:
-    known = [known_error(found.plant, window, found.calibration) for window in found.plant.windows]
+    fitted, k = found.calibration.actuator, found.calibration.k
+    known = [twin_error(found.plant, place, fitted, k) for place in range(len(found.plant.windows))]
     model = found.calibration.actuator
     residuals = residuals_of(found.plant, data.floors, found.calibration.signals, known, model, found.calibration)
     return explain(residuals, "current_A", ACTUATOR.axes)[0]

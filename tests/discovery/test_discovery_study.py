@@ -25,9 +25,7 @@ from ema_model.discovery import discover
 from ema_model.discovery.model_fit import fit, gather
 from ema_model.effects import CATALOGUE
 from ema_model.effects.user import user_torque
-from ema_model.estimation import default_free
-from ema_model.estimation.problem import Problem
-from ema_model.faults import HEALTHY
+from ema_model.estimation.calibrate import problem_of
 from ema_model.recordings import prepared
 
 pytestmark = pytest.mark.study
@@ -113,8 +111,8 @@ def showable(name: str, severity: int, seed: int, signals: str) -> float:
     base = fit(data, ACTUATOR)
     x = base.calibration.x
     with_it = data.plant(replace(ACTUATOR, effects=effects))
-    problem = Problem(with_it, data.floors, default_free(ACTUATOR), HEALTHY, data.signals)
-    change = problem.residual(x)[: problem.values] - base.residual
+    problem = problem_of(with_it, data.floors, signals=data.signals)
+    change = problem.residuals(x[None, :])[0, : problem.values] - base.residual
     columns = base.calibration.weighted_jacobian
     own = change - columns @ np.linalg.solve(columns.T @ columns + np.eye(len(x)), columns.T @ change)
     return float(change @ own)

@@ -17,7 +17,7 @@ from ema_model.discovery.next_experiment import allowed, next_experiment
 from ema_model.discovery.repeatability import is_lost, with_divergence
 from ema_model.discovery.score import scored, scored_together
 from ema_model.estimation.floor import floor
-from ema_model.models import plant_for
+from ema_model.models import model_for
 from ema_model.recordings import prepared
 from ema_model.simulation.run import Run, simulate_reference
 from ema_model.simulation.sensors import Sensors
@@ -87,8 +87,8 @@ def test_standstill_counts_once():
 
 def test_floor_is_the_greater_of_two():
     data = data_of(recorded(42, commands=COMMANDS))
-    plant = plant_for(data.measurements, ACTUATOR.varied({"motor.dynamic_friction_Nm": 0.07}))
-    other = floor(plant, plant.windows[1])
+    plant = model_for(data.measurements, ACTUATOR.varied({"motor.dynamic_friction_Nm": 0.07}))
+    other = floor(plant, 1)
     joined = data.floors[1].beside(other)
     for name, values in joined.model.items():
         assert np.all(values >= data.floors[1].model[name]) and np.all(values >= other.model[name])

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ema_model.models.window import cut
 
 from ema_model.actuator import Actuator, Tolerance, load_actuator, save_actuator
 from ema_model.actuator.naming import on_axes, path_inside
@@ -18,7 +19,6 @@ from ema_model.effects import CATALOGUE, Parameter, find
 from ema_model.errors import InputError
 from ema_model.estimation.problem import unknown_of
 from ema_model.models.inverse_dynamics import InverseDynamics
-from ema_model.models.window import cut
 from ema_model.quantities.axes import Axes
 from ema_model.recordings import Measurement
 from ema_model.recordings.checks import check_needed

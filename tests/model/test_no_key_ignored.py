@@ -132,7 +132,7 @@ def said(actuator, circuit: str) -> list[np.ndarray]:
         else ClosedLoop(RECORDINGS, actuator, circuit=circuit or "reduced")
     )
     k = np.stack([HEALTHY, FAULTY])
-    return [values for window in plant.windows for values in plant.signals(window, k=k).values()]
+    return [values for i in range(len(plant.windows)) for values in plant.signals(i, k=k).values()]
 
 
 def moved(before: list[np.ndarray], after: list[np.ndarray]) -> float:

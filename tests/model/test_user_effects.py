@@ -224,13 +224,13 @@ def test_a_failed_lane_leaves_the_others_untouched():
     values = {name: np.full(lanes, 1.0) for name in "abc"}
     values["b"] = np.linspace(1.0, 3.0, lanes)
     k = np.tile(HEALTHY, (lanes, 1))
-    sound = plant.signals(plant.windows[0], k=k, effects={effect.name: values})
+    sound = plant.signals(0, k=k, effects={effect.name: values})
     assert all(np.isfinite(signal).all() for signal in sound.values())
     bad = {3: ("b", 0.0), 17: ("a", -1.0), 35: ("c", 999.0)}
     for lane, (name, value) in bad.items():
         values[name] = values[name].copy()
         values[name][lane] = value
-    found = plant.signals(plant.windows[0], k=k, effects={effect.name: values})
+    found = plant.signals(0, k=k, effects={effect.name: values})
     others = [lane for lane in range(lanes) if lane not in bad]
     for name, signal in found.items():
         assert np.array_equal(signal[others], sound[name][others])
@@ -261,7 +261,7 @@ def test_inverse_dynamics_shows_a_torque_without_value():
     actuator = replace(ACTUATOR, controller=replace(ACTUATOR.controller, kind="unknown"))
     plant = InverseDynamics([simulate_monitor(RUN, ACTUATOR)], actuator, effects={effect.name: {}})
     a = np.array([1.0, -1.0, 4.0])
-    current = plant.signals(plant.windows[0], k=np.tile(HEALTHY, (3, 1)), effects={effect.name: {"a": a}})["current_A"]
+    current = plant.signals(0, k=np.tile(HEALTHY, (3, 1)), effects={effect.name: {"a": a}})["current_A"]
     assert np.isfinite(current[[0, 2]]).all() and np.isnan(current[1]).all()
     np.testing.assert_allclose(current[0] - current[2], 1e-3 / ACTUATOR.motor.torque_constant_Nm_A, rtol=1e-6)
 

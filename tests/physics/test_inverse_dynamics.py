@@ -42,7 +42,7 @@ def spin(cogging: float = 0.0, order: int = 7, duration: float = 2.0) -> Measure
 
 def error(plant: InverseDynamics) -> float:
     [window] = plant.windows
-    needed = plant.signals(window)["current_A"][0]
+    needed = plant.signals(0)["current_A"][0]
     inner = slice(10, -10)  # the ends are continued, not known
     return float(np.sqrt(np.mean((needed - window.measured["current_A"])[inner] ** 2)))
 
@@ -94,12 +94,11 @@ def test_standstill_is_left_out(tmp_path):
 def test_population_is_single_runs(tmp_path):
     actuator = motor(tmp_path)
     plant = InverseDynamics([spin()], actuator)
-    [window] = plant.windows
     inertias = np.linspace(5e-5, 2e-4, 37)
     k = np.tile([0, 0, 0, 0, 0, 0, 0.5, 0.5], (37, 1))
-    together = plant.signals(window, actuator.varied({"motor.inertia_kgm2": inertias}), k)["current_A"]
+    together = plant.signals(0, actuator.varied({"motor.inertia_kgm2": inertias}), k)["current_A"]
     for i in (0, 31, 32, 36):
-        alone = plant.signals(window, actuator.with_values({"motor.inertia_kgm2": inertias[i]}))["current_A"][0]
+        alone = plant.signals(0, actuator.with_values({"motor.inertia_kgm2": inertias[i]}))["current_A"][0]
         np.testing.assert_array_equal(together[i], alone)
 
 
@@ -114,7 +113,7 @@ def test_static_map_needs_no_time_and_shows_the_shaft(tmp_path):
     )
     plant = InverseDynamics([held], actuator)
     [window] = plant.windows
-    np.testing.assert_allclose(plant.signals(window)["current_A"][0], window.measured["current_A"], atol=1e-5)
+    np.testing.assert_allclose(plant.signals(0)["current_A"][0], window.measured["current_A"], atol=1e-5)
     assert window.blocks == 400
 
 

@@ -110,7 +110,7 @@ def let_go(actuator: Actuator, angle: float, seconds: float, enabled: float) -> 
     )
     plant = ClosedLoop([recording], actuator)
     [window] = plant.windows
-    return {name: values[0] for name, values in plant.signals(window).items()} | {"time_s": window.time_s}
+    return {name: values[0] for name, values in plant.signals(0).items()} | {"time_s": window.time_s}
 
 
 def test_pendulum_swings_with_its_period_and_keeps_its_energy_when_the_drive_is_off(tmp_path):
@@ -156,7 +156,7 @@ def test_bus_voltage_scales_the_drive(tmp_path):
             }
         )
         plant = ClosedLoop([recording], actuator)
-        speeds.append(plant.signals(plant.windows[0])["motor_speed_rad_s"][0, -1])
+        speeds.append(plant.signals(0)["motor_speed_rad_s"][0, -1])
     assert speeds[0] == pytest.approx(2.0 * speeds[1], rel=1e-6) and speeds[0] == pytest.approx(24.0, rel=1e-3)
 
 

@@ -134,7 +134,7 @@ def test_a_drive_that_is_switched_off_forgets():
     load = {"load_torque_Nm": np.where(time < 0.05, LOAD, 0.0)}
     plant = ClosedLoop([Measurement({**held, **load, "drive_enabled": enabled})], actuator)
     [window] = plant.windows
-    torque = plant.signals(window)["current_A"][0] * actuator.motor.torque_constant_Nm_A
+    torque = plant.signals(0)["current_A"][0] * actuator.motor.torque_constant_Nm_A
     at = window.time_s
     carried = actuator.transmission.gear_ratio * LOAD
     assert torque[at < 0.05][-1] == pytest.approx(carried, rel=0.02)
@@ -156,7 +156,7 @@ def test_a_stretch_from_the_middle_goes_on_as_the_whole_did(first, monkeypatch):
     [window] = plant.windows
 
     def errors():
-        shown = plant.signals(window)
+        shown = plant.signals(0)
         return np.array([np.sqrt(np.mean((shown[s][0] - window.measured[s]) ** 2)) for s in SIGNALS])
 
     balanced = errors()
@@ -173,7 +173,7 @@ def test_a_start_in_mid_run_is_bumpless_for_every_lane():
     varied = actuator.varied({"controller.integral_gain_Nm_rad": gains, "controller.speed_gain_Nms_rad": 0.01 * gains})
     k = np.tile(HEALTHY, (3, 1))
     k[:, 7] = [0.3, 0.5, 0.9]
-    np.testing.assert_allclose(plant.signals(window, varied, k)["current_A"][:, 0], window.current_A, rtol=0.15)
+    np.testing.assert_allclose(plant.signals(0, varied, k)["current_A"][:, 0], window.current_A, rtol=0.15)
     proportional = actuator.varied({"controller.integral_gain_Nm_rad": np.zeros(3)})
     np.testing.assert_array_equal(window.integral_Nm(proportional, k), 0.0)
 
@@ -195,6 +195,6 @@ def test_calibration_recovers_the_integral_gain_of_a_reference_model(truth):
     recording = recorded(THESIS.with_values(PI | {path: truth}), 0.4)
     nominal = replace(THESIS.with_values(PI | {path: 4.5}), tolerances={path: Tolerance(1.0, True)})
     plant = ClosedLoop([recording], nominal)
-    found = calibrate(plant, [floor(plant, window) for window in plant.windows]).parameters[path]
+    found = calibrate(plant, [floor(plant, 0)]).parameters[path]
     assert found.value == pytest.approx(truth, rel=0.05)
     assert found.interval90[0] - 0.1 < truth < found.interval90[1] + 0.1

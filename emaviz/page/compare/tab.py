@@ -178,7 +178,8 @@ class ComparePanel:
 
     def _compared(self, comparison: Comparison, elapsed_s: float) -> None:
         self._free()
-        fitted = "" if comparison.calibration is None else f", calibrated in {comparison.calibration.evaluations} steps"
+        found = comparison.calibration
+        fitted = "" if found is None else f", calibrated in {found.evaluations} simulations"
         self._say(f"Compared in {elapsed_s:.1f} s{fitted}.")
         self._result.show(comparison)
         self._follow()

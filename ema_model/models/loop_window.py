@@ -1,8 +1,8 @@
-"""A stretch of a recording, ready for the kernels: inputs per step of the model, block means to compare with."""
+"""A window for the closed loop, ready for the kernels: inputs per step of the model, block means to compare with."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from ema_model.actuator import Actuator
 from ema_model.commands.recorded import between
 from ema_model.errors import InputError, quoted
+from ema_model.models.model import Window
 from ema_model.recordings import Measurement
 from ema_model.simulation.pack import integral_at_start
 from ema_model.simulation.run import steps_per_sample
@@ -22,27 +23,19 @@ CONTEXT = ("load_torque_Nm", "temperature_C")
 BLOCK_S = 0.5e-3  # means over it take the chopping ripple away, which no low-fidelity model follows (MODEL §2)
 
 
-@dataclass(frozen=True, eq=False)
-class Window:
-    """One run, or a part of it.  Block arrays are (blocks,), step arrays (steps,)."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LoopWindow(Window):
+    """A window with its inputs, (steps,), and its start; measured are block means of `COMPARED`, as recorded."""
 
-    name: str
-    recording: int  # which of the recordings, from 0
-    first: int  # the recording's sample that is its start
-    time_s: Array  # (blocks,), middle of each block, as recorded
-    command: Array  # (steps,), rad
-    load: Array  # (steps,), N·m at the user
-    supply: Array  # (steps,), bus voltage over nominal; 0 where the drive is off
-    measured: dict[str, Array]  # block means of the signals of `COMPARED`, as recorded
-    context: dict[str, Array]  # block means of what else was recorded of `CONTEXT`
-    samples_per_block: int
+    command: Array  # rad
+    load: Array  # N·m at the user
+    supply: Array  # bus voltage over nominal; 0 where the drive is off
     steps_per_sample: int
     step_s: float
     user_rad: float  # where it starts: the motor's angle as a user's, rad
     speed_rad_s: float
     play_rad: float  # place in the play, rad at the motor
     current_A: float  # that the drive wanted
-    values: dict[str, float] = field(default_factory=dict)  # of the actuator, in this recording alone
 
     def integral_Nm(
         self, actuator: Actuator, k: ArrayLike, turned_rad: ArrayLike = 0.0, play_rad: ArrayLike = 0.0
@@ -57,19 +50,9 @@ class Window:
         )
 
     @property
-    def blocks(self) -> int:
-        """Number of compared values."""
-        return len(self.time_s)
-
-    @property
     def steps_per_block(self) -> int:
         """Model steps between compared values."""
         return self.samples_per_block * self.steps_per_sample
-
-    @property
-    def block_s(self) -> float:
-        """Time between compared values, s."""
-        return self.steps_per_block * self.step_s
 
 
 def cut(
@@ -79,7 +62,7 @@ def cut(
     recording: int = 0,
     block_s: float = BLOCK_S,
     stretches: list[slice] | None = None,
-) -> list[Window]:
+) -> list[LoopWindow]:
     """Windows of a recording on an even grid: its runs, or the given stretches of samples.
 
     block_s: 0 compares every sample.  Raises InputError if nothing can be compared.
@@ -107,7 +90,7 @@ def cut(
         user, speed, play = _start(measurement, actuator, run.start)
         current = _current(measurement, actuator, run.start, speed)
         windows.append(
-            Window(
+            LoopWindow(
                 name=measurement.name,
                 recording=recording,
                 first=run.start,
@@ -118,6 +101,7 @@ def cut(
                 measured={name: means(name) for name in COMPARED if name in measurement},
                 context={name: means(name) for name in CONTEXT if name in measurement},
                 samples_per_block=samples,
+                block_s=samples * steps * step_s,
                 steps_per_sample=steps,
                 step_s=step_s,
                 user_rad=user,

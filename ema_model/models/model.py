@@ -1,0 +1,105 @@
+"""What a model beside recordings offers, whichever it is: the contract of fits, comparisons and discoveries.
+
+A model holds recordings cut into windows and says what each of them would show, for a population at once.  Nobody
+above asks which model it is: what matters of it is said here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ema_model.actuator import Actuator
+from ema_model.recordings import Measurement
+from ema_model.stacks import Stack
+
+Array = NDArray[np.float64]
+Signals = dict[str, Array]  # by name
+Effects = Mapping[str, Mapping[str, Any]]  # settings by name; numbers, or arrays (n,)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Window:
+    """One run of a recording, or a part of it, as it is compared.  Block arrays are (blocks,)."""
+
+    name: str
+    recording: int  # which of the recordings, from 0
+    first: int  # the recording's sample that is its start
+    time_s: Array  # (blocks,), middle of each block, as recorded
+    measured: Signals  # what is compared, block arrays
+    context: Signals  # what else is known of the blocks
+    command: Array | None  # (steps,), rad at the user; None where the model takes the measured motion
+    samples_per_block: int
+    block_s: float  # time between compared values
+    values: dict[str, float] = field(default_factory=dict)  # of the actuator, in this recording alone
+
+    @property
+    def blocks(self) -> int:
+        """Number of compared values."""
+        return len(self.time_s)
+
+
+class Model(Protocol):
+    """An actuator's model beside recordings; windows are named by their place in `windows`."""
+
+    actuator: Actuator
+    effects: dict[str, dict[str, float]]  # besides the actuator's own
+    stack: Stack  # the kernels
+    recorded: list[Measurement]
+    measurements: list[Measurement]  # the same on an even grid
+
+    @property
+    def windows(self) -> Sequence[Window]:
+        """What is compared."""
+        ...
+
+    @property
+    def simulates_commands(self) -> bool:
+        """Whether it follows the command, from a start that is not exactly known; else the motion is given."""
+        ...
+
+    def signals(
+        self,
+        place: int,
+        actuator: Actuator | None = None,
+        k: ArrayLike | None = None,
+        turned_rad: ArrayLike = 0.0,
+        play_rad: ArrayLike = 0.0,
+        effects: Effects | None = None,
+        *,
+        even: bool = False,
+    ) -> Signals:
+        """What a window's sensors would show, all that is measured there and more: k (n, 8) → (n, blocks) each.
+
+        actuator, k, effects: in place of the model's own.  Parameters of the actuator and of effects, turned_rad (the
+        motor's angle at the start, rad, beyond the measured one) and play_rad (the same for its place in the play)
+        may be arrays (n,).  even: under the window's mean load and a supply that does not change.
+        """
+        ...
+
+    def twin(
+        self,
+        place: int,
+        actuator: Actuator | None = None,
+        k: ArrayLike | None = None,
+        turned_rad: float = 0.0,
+        play_rad: float = 0.0,
+        effects: Effects | None = None,
+    ) -> Signals:
+        """The same of the model of higher fidelity, where there is one, for one k (8,), `even`: (blocks,) each.
+
+        Empty where there is none.  Raises FloatingPointError if it diverges.
+        """
+        ...
+
+    def noise(self, place: int, stated: Mapping[str, float]) -> dict[str, float]:
+        """White noise of the measured signals, rms per block; stated: rms per sample, in place of the estimate."""
+        ...
+
+    def a_sample_late(self, place: int, k: ArrayLike | None = None) -> Signals:
+        """What changes if the command comes a sample later, (blocks,) each; empty where it has no jump."""
+        ...

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ema_model.models.window import cut
+from ema_model.models.loop_window import cut
 
 from ema_model.actuator import Actuator, Tolerance, load_actuator, save_actuator
 from ema_model.actuator.naming import on_axes, path_inside

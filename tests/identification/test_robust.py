@@ -144,7 +144,7 @@ def test_descent_ends_where_the_gradient_does_or_at_a_bound():
             break
         descent.step()
     assert descent.done
-    np.testing.assert_allclose(problem.k(descent.x[0]), problem.k(descent.x[1]), atol=5e-3)
+    np.testing.assert_allclose(problem.vector(descent.x[0]), problem.vector(descent.x[1]), atol=5e-3)
     residual, slopes = problem.jacobians(descent.x[:1])
     gradient = slopes[0].T @ residual[0]
     scale = np.linalg.norm(slopes[0], axis=0) * np.linalg.norm(residual[0])

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.actuator.naming import on_axes
-from ema_model.estimation.descent import Descent, LeastSquares, Robust, descend
 from ema_model.estimation.floor import CORRELATED_S, Floor
 from ema_model.estimation.problem import Problem
 from ema_model.estimation.unknowns import ECCENTRICITY, K_SIGMA, Unknown, polar, starts_of, unknowns_of
@@ -25,10 +23,7 @@ _OUTSIDE_Z = 2.99  # from which on a parameter stands at the edge of its toleran
 _DRAWN = 192  # of the prior, from which further starts are taken
 _STARTS = 5
 _MISFIT = 25.0  # χ² per value, from which on the model misses by far
-_STEPS = 40  # of a start
-_TOGETHER = 2  # starts in one population
-_MOST_NUMBERS = 5e6  # of simulated values at once
-_NOTHING = 4.0  # χ²
+_LONGEST = 40  # evaluations of a start
 
 
 @dataclass(frozen=True)
@@ -153,6 +148,7 @@ class _Found:
     residual: Array  # (values,)
     jacobian: Array
     chi2: float  # of the signals, per value
+    cost: float
     converged: bool
 
 
@@ -163,53 +159,77 @@ class _Search:
         self.problem = problem
         self.on_progress = on_progress
         self.evaluations = 0
+        self._at, self._jacobian = np.zeros(0), np.zeros((0, 0))  # of the last evaluation
+
+    def residual(self, x: Array) -> Array:
+        """Also keeps the Jacobian there, which an accepted step asks for next."""
+        self.evaluations += 1
+        if self.on_progress is not None:
+            self.on_progress(self.evaluations)
+        residuals, jacobians = self.problem.jacobians(x[None, :])
+        self._at, self._jacobian = x.copy(), jacobians[0]
+        return residuals[0]
+
+    def jacobian(self, x: Array) -> Array:
+        """∂residual/∂x."""
+        return self._jacobian if np.array_equal(x, self._at) else self.problem.jacobians(x[None, :])[1][0]
 
     def solve(self, start: Mapping[str, float] | None) -> _Found:
         """The best fit; where the model misses by far, one in which large errors count less."""
-        problem = self.problem
-        if not problem.count:
-            fun = problem.residuals(np.zeros((1, 0)))[0]
-            return _Found(np.zeros(0), fun, np.zeros((len(fun), 0)), float(fun @ fun) / problem.values, True)
+        count = self.problem.count
+        if not count:
+            fun = self.problem.residuals(np.zeros((1, 0)))[0]
+            return _Found(np.zeros(0), fun, np.zeros((len(fun), 0)), float(fun @ fun) / self.problem.values, 0.0, True)
         if start is not None:
-            starts = np.array([[start.get(u.name, 0.0) for u in problem.unknowns]])
+            starts = [np.array([start.get(u.name, 0.0) for u in self.problem.unknowns])]
         else:
-            starts = np.concatenate([np.zeros((1, problem.count)), _promising(problem)])
-        found = self._from(problem, starts)
+            starts = [np.zeros(count), *_promising(self.problem)]
+        found = self._from(starts, 1.0, "linear")
         if found.chi2 > _MISFIT:
-            robust = Robust(problem, np.sqrt(found.chi2) / 3.0)
-            found = self._from(robust, np.concatenate([found.x[None, :], starts]))
+            scale = np.sqrt(found.chi2) / 3.0
+            found = self._from([found.x, *starts], scale, "soft_l1")
         return found
 
-    def _from(self, problem: LeastSquares, starts: Array) -> _Found:
-        """A few starts go downhill together, and more only if these do not agree."""
-        together = max(1, min(_TOGETHER, int(_MOST_NUMBERS / (self.problem.values * (2 * problem.count + 1)))))
-        x, costs = np.zeros((0, problem.count)), np.zeros(0)
-        done, agree = np.zeros(0, dtype=bool), len(starts) == 1
-        for first in range(0, len(starts), together):
-            part = descend(problem, starts[first : first + together], _STEPS, partial(self._told, self.evaluations))
-            x, costs = np.concatenate([x, part.x]), np.concatenate([costs, part.cost])
-            done = np.concatenate([done, ~part.moving])
-            best, *others = np.sort(costs)
-            # "At most a hundredth apart": two minima of the same depth are one answer, and none is deeper than nothing.
-            agree |= bool(best < _NOTHING or (others and others[0] < 1.01 * best + _NOTHING))
-            if agree:
-                break
-        at = int(np.argmin(costs))
-        residuals, jacobians = self.problem.jacobians(x[at][None, :])  # a robust problem's are weighted
-        fun = residuals[0]
-        chi2 = float(fun @ fun - x[at] @ x[at]) / self.problem.values
-        return _Found(x[at], fun[: self.problem.values], jacobians[0], chi2, bool(done[at] and agree))
+    def _from(self, starts: Sequence[Array], scale: float, loss: str) -> _Found:
+        from scipy.optimize import least_squares  # takes a third of a second to import
 
-    def _told(self, before: int, descent: Descent) -> None:
-        self.evaluations = before + descent.evaluations
-        if self.on_progress is not None:
-            self.on_progress(self.evaluations)
+        least, greatest = self.problem.low, self.problem.high
+        # The singular values of the long Jacobian cost more than all else, but lsmr looks for its step in a plane.
+        solver = "exact" if len(least) == 1 else "lsmr"
+        fits, agree = [], len(starts) == 1
+        for start in starts:
+            fits.append(
+                least_squares(
+                    self.residual,
+                    np.clip(start, 0.98 * least, 0.98 * greatest),
+                    jac=self.jacobian,  # pyright: ignore[reportArgumentType]
+                    bounds=(least, greatest),
+                    max_nfev=_LONGEST,
+                    xtol=1e-4,
+                    ftol=5e-5,
+                    loss=loss,
+                    f_scale=scale,
+                    tr_solver=solver,
+                )
+            )
+            fits.sort(key=lambda fit: fit.cost)
+            # "At most a hundredth apart": two minima of the same depth are one answer, and none is deeper than nothing.
+            if fits[0].cost < 2.0 or (len(fits) > 1 and fits[1].cost < 1.01 * fits[0].cost + 2.0):
+                agree = True
+                break
+        best = fits[0]
+        x = self.problem.clip(best.x)
+        residuals, jacobians = self.problem.jacobians(x[None, :])  # the fit's own are weighted by its loss
+        fun, jacobian = residuals[0], jacobians[0]
+        chi2 = float(fun @ fun - x @ x) / self.problem.values
+        return _Found(x, fun[: self.problem.values], jacobian, chi2, float(best.cost), bool(best.status > 0 and agree))
 
 
 def _promising(problem: Problem) -> Array:
     """Starts of their own: the best of a population drawn from the prior, (starts, unknowns)."""
-    drawn = np.random.default_rng(0).standard_normal((_DRAWN, problem.count))
-    drawn = np.clip(drawn, np.maximum(0.8 * problem.low, -2.0), np.minimum(0.8 * problem.high, 2.0))
+    least, greatest = problem.low, problem.high
+    drawn = np.random.default_rng(0).standard_normal((_DRAWN, len(least)))
+    drawn = np.clip(drawn, np.maximum(0.8 * least, -2.0), np.minimum(0.8 * greatest, 2.0))
     return drawn[np.argsort(np.sum(problem.residuals(drawn) ** 2, axis=1))[:_STARTS]]
 
 

@@ -6,7 +6,6 @@ All starts' derivatives are one population of the kernel, and so are all steps w
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -20,18 +19,11 @@ _SMALL = 1e-3  # least fall of the cost, in units of χ², that is worth another
 _RELATIVE = 1e-5
 
 
-class LeastSquares(Protocol):
+class Problem(Protocol):
     """Least squares within bounds, of many candidates x (…, count) at once; their prior is among the residuals."""
 
-    @property
-    def low(self) -> Array:
-        """Least x, (count,)."""
-        ...
-
-    @property
-    def high(self) -> Array:
-        """Greatest x, (count,)."""
-        ...
+    low: Array  # (count,)
+    high: Array
 
     @property
     def count(self) -> int:
@@ -55,7 +47,7 @@ class LeastSquares(Protocol):
 class Descent:
     """Where n starts stand; `step` moves each of them downhill."""
 
-    problem: LeastSquares
+    problem: Problem
     x: Array  # (n, unknowns)
     cost: Array  # (n,), χ² with the prior
     damping: Array
@@ -63,7 +55,7 @@ class Descent:
     evaluations: int = 0
 
     @classmethod
-    def begin(cls, problem: LeastSquares, x: Array) -> Descent:
+    def begin(cls, problem: Problem, x: Array) -> Descent:
         """At these starts (n, unknowns)."""
         x = problem.clip(np.atleast_2d(np.asarray(x, dtype=float)))
         n = len(x)
@@ -83,7 +75,7 @@ class Descent:
         self.cost[chosen] = np.sum(residuals**2, axis=1)
         trials = np.concatenate(
             [
-                problem.clip(_newton(problem, x, j.T @ j, j.T @ r, damping))
+                problem.clip(np.array([_newton(problem, x, r, j, damping * d) for d in _DAMPINGS]))
                 for x, r, j, damping in zip(self.x[chosen], residuals, slopes, self.damping[chosen])
             ]
         )
@@ -107,58 +99,20 @@ class Descent:
         self.damping, self.moving = self.damping[rows], self.moving[rows]
 
 
-class Robust:
-    """A problem in which residuals beyond `scale` count by their size instead of their square (soft L1)."""
-
-    def __init__(self, problem: LeastSquares, scale: float) -> None:
-        self.problem, self.scale = problem, scale
-        self.low, self.high, self.count, self.clip = problem.low, problem.high, problem.count, problem.clip
-
-    def residuals(self, x: Array) -> Array:
-        """Signed roots of 2 s² (√(1 + (r/s)²) − 1)."""
-        return self._softened(self.problem.residuals(x))[0]
-
-    def jacobians(self, x: Array) -> tuple[Array, Array]:
-        """The same, and their derivatives."""
-        residuals, slopes = self.problem.jacobians(x)
-        soft, share = self._softened(residuals)
-        return soft, slopes * share[:, :, None]
-
-    def _softened(self, r: Array) -> tuple[Array, Array]:
-        """The residuals, and by how much they move with the problem's own."""
-        root = np.hypot(1.0, r / self.scale)
-        size = np.sqrt(2.0 / (root + 1.0))  # √(2 (√(1 + z) − 1) / z), which rounds nothing away near 0
-        return r * size, 1.0 / (root * size)
-
-
-def descend(
-    problem: LeastSquares, x: Array, most_steps: int, on_step: Callable[[Descent], None] = lambda descent: None
-) -> Descent:
-    """From the starts x (n, unknowns) downhill, until none falls further or the steps are up."""
-    descent = Descent.begin(problem, x)
-    for _ in range(most_steps):
-        descent.step()
-        on_step(descent)
-        if descent.done:
-            break
-    return descent
-
-
-def _newton(problem: LeastSquares, x: Array, hessian: Array, gradient: Array, damping: float) -> Array:
-    """The damped Gauss–Newton points, (dampings, unknowns), with what stands at a bound and would leave it held."""
+def _newton(problem: Problem, x: Array, residual: Array, slopes: Array, damping: float) -> Array:
+    """The damped Gauss–Newton point, with what stands at a bound and would leave it held there."""
+    hessian = slopes.T @ slopes
+    gradient = slopes.T @ residual
     diagonal = np.diag(hessian)
-    scale = 1e-2 * damping * np.maximum(diagonal, 1e-6 * diagonal.max(initial=1e-12))
-    found = []
-    for part in _DAMPINGS:
-        damped = hessian + np.diag(part * scale)
-        free = np.ones(len(x), dtype=bool)
-        move = np.zeros(len(x))
-        for _ in range(len(x)):
-            move[:] = 0.0
-            move[free] = -np.linalg.solve(damped[np.ix_(free, free)], gradient[free])
-            leaves = free & (((x <= problem.low) & (move < 0.0)) | ((x >= problem.high) & (move > 0.0)))
-            if not leaves.any():
-                break
-            free &= ~leaves
-        found.append(x + move)
-    return np.array(found)
+    hessian = hessian + np.diag(1e-2 * damping * np.maximum(diagonal, 1e-6 * diagonal.max(initial=1e-12)))
+    free = np.ones(len(x), dtype=bool)
+    move = np.zeros(len(x))
+    for _ in range(len(x)):
+        move[:] = 0.0
+        part = np.ix_(free, free)
+        move[free] = -np.linalg.solve(hessian[part], gradient[free])
+        leaves = free & (((x <= problem.low) & (move < 0.0)) | ((x >= problem.high) & (move > 0.0)))
+        if not leaves.any():
+            break
+        free &= ~leaves
+    return x + move

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ema_model.estimation.descent import descend
+from ema_model.estimation.descent import Descent
 from ema_model.estimation.floor import Floor, floor
 from ema_model.estimation.problem import Problem
 from ema_model.estimation.unknowns import K_SIGMA, Unknown, loads_of, starts_of, unknowns_of
@@ -188,7 +188,11 @@ def _reweight(problem: Problem, given: Setting, found: Twins | None) -> None:
 
 
 def _descend(problem: Problem, x: Array) -> tuple[Array, float, int]:
-    descent = descend(problem, x, _STEPS)
+    descent = Descent.begin(problem, x)
+    for _ in range(_STEPS):
+        descent.step()
+        if descent.done:
+            break
     return descent.x[0], float(descent.cost[0]), descent.evaluations
 
 

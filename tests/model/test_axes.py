@@ -10,15 +10,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ema_model.models.loop_window import cut
 
 from ema_model.actuator import Actuator, Tolerance, load_actuator, save_actuator
 from ema_model.actuator.naming import on_axes, path_inside
 from ema_model.actuator.parameters import SECTIONS, numbers
 from ema_model.effects import CATALOGUE, Parameter, find
 from ema_model.errors import InputError
-from ema_model.estimation.problem import unknown_of
+from ema_model.estimation.unknowns import unknowns_of
 from ema_model.models.inverse_dynamics import InverseDynamics
+from ema_model.models.loop_window import cut
 from ema_model.quantities.axes import Axes
 from ema_model.recordings import Measurement
 from ema_model.recordings.checks import check_needed
@@ -197,9 +197,9 @@ def test_what_to_calibrate_is_named_as_in_the_file(tmp_path):
     slide = replace(slide, tolerances={"motor.inertia_kgm2": Tolerance(0.1, False)})
     assert path_inside("motor.mass_kg", slide.tolerances, LINEAR) == "motor.inertia_kgm2"
     assert path_inside("k2", slide.tolerances, LINEAR) == "k2"
-    assert unknown_of(slide, "motor.inertia_kgm2").nominal == 2.0
+    assert unknowns_of(slide, ["motor.inertia_kgm2"])[0].nominal == 2.0
     with pytest.raises(InputError, match=r"free may be motor\.mass_kg$"):
-        unknown_of(slide, "motor.dynamic_friction_Nm")
+        unknowns_of(slide, ["motor.dynamic_friction_Nm"])
 
 
 TIME = np.linspace(0.0, 1.0, 500)

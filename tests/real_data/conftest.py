@@ -15,9 +15,7 @@ def data_folder() -> Path:
     """The folder of the real measurements; tests that need it are skipped where it is not."""
     folder = Path(os.environ.get("EMAVIZ_DATA", _PROJECT.parent / "shared" / "data"))
     if not folder.is_dir():
-        pytest.skip(
-            f"no real measurements in {folder}; tests/benchmarks/RESULTS.md says where they come from"
-        )
+        pytest.skip(f"no real measurements in {folder}; tests/benchmarks/RESULTS.md says where they come from")
     return folder
 
 

@@ -178,8 +178,7 @@ class ComparePanel:
 
     def _compared(self, comparison: Comparison, elapsed_s: float) -> None:
         self._free()
-        found = comparison.calibration
-        fitted = "" if found is None else f", calibrated in {found.evaluations} simulations"
+        fitted = "" if comparison.calibration is None else f", calibrated in {comparison.calibration.evaluations} steps"
         self._say(f"Compared in {elapsed_s:.1f} s{fitted}.")
         self._result.show(comparison)
         self._follow()

@@ -102,7 +102,7 @@ def test_tables_count_what_was_right(store):
     assert [cell["case"] for cell in cells] == ["all", "k1=0.2", "k6=0.3 k7=0.98"]
     assert (cells[0]["tasks"], cells[0]["healthy"], cells[0]["with alarms"]) == ("8", "2", "6")
     assert (cells[1]["Err % median"], cells[1]["worst"]) == ("1.50", "3.00")
-    assert cells[1]["90 % intervals that hold k1 … k8, %"] == "50 50 50 50 50 50 – 50"
+    assert cells[1]["90 % intervals that hold k1 … k8, %"] == "50 50 50 50 50 50 0 50"
     cells = [dict(zip(discover.heads, line)) for line in discover.lines]
     assert cells[0]["verdicts"] == "adequate 4, effects_found 2"
     assert [cells[2][name] for name in ("showable", "right one first", "exactly", "wrong, sure", "abstained")] == list(

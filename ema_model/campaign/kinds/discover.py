@@ -69,13 +69,14 @@ def tally(row: dict[str, Any]) -> Counter[str]:
     covered = [group & hidden for group in named]
     exact = all(covered) and set().union(*covered) >= hidden and len(named) == len(hidden)
     ends = [ladder[-1] for ladder in (row["ladder"], row["holdout_ladder"]) if ladder and ladder[-1] is not None]
-    return Counter(
-        first=right,
-        exact=exact,
-        wrong=bool(named) and not right and len(named[0]) == 1,
-        abstained=not named,
-        floor=exact and max(ends, default=0.0) <= _AT_FLOOR,
-    )
+    counts = {
+        "first": right,
+        "exact": exact,
+        "wrong": bool(named) and not right and len(named[0]) == 1,
+        "abstained": not named,
+        "floor": exact and max(ends, default=0.0) <= _AT_FLOOR,
+    }
+    return Counter({name: int(one) for name, one in counts.items()})
 
 
 def _told(rows: list[dict[str, Any]]) -> dict[str, Any]:

@@ -17,7 +17,8 @@
     [groups.bench]
     does = "discover"
     actuator = "rig.toml"
-    recordings = "logs/*.csv"         # each is a task; or [{ fit = ["a.csv", "b.csv"], holdout = ["c.csv"] }, …]
+    recordings = "logs/*.csv"         # each is a task; or { fit = ["a.csv", "b.csv"], holdout = ["c.csv"] }, with
+                                      # each = "unit_*" in every such folder
 
 `like = "other.toml"` takes all of another plan first; what stands here goes before it.
 """
@@ -200,8 +201,12 @@ class _Group:
             if isinstance(entry, str):
                 sets = [([path], []) for path in self._files(entry)]
             elif isinstance(entry, dict):
-                _check(entry, ("fit", "holdout"), f"{self._where} recordings:")
-                sets = [tuple(self._all_files(entry.get(key, [])) for key in ("fit", "holdout"))]
+                _check(entry, ("each", "fit", "holdout"), f"{self._where} recordings:")
+                folders = self._files(entry["each"]) if isinstance(entry.get("each"), str) else [self._beside]
+                sets = [
+                    tuple(self._all_files(entry.get(key, []), Path(folder)) for key in ("fit", "holdout"))
+                    for folder in folders
+                ]
             else:
                 raise InputError(f"{self._where} recordings: takes names of files, or {{ fit = […], holdout = […] }}")
             for fit, holdout in sets:
@@ -214,17 +219,18 @@ class _Group:
             raise InputError(f"{self._where} recordings: holds nothing, so that there is nothing to compute")
         return found
 
-    def _all_files(self, patterns: Any) -> list[str]:
+    def _all_files(self, patterns: Any, beside: Path) -> list[str]:
         if not isinstance(patterns, list) or not all(isinstance(one, str) for one in patterns):
             raise InputError(f"{self._where} recordings: fit and holdout take lists of files' names")
-        return [path for pattern in patterns for path in self._files(pattern)]
+        return [path for pattern in patterns for path in self._files(pattern, beside)]
 
-    def _files(self, pattern: str) -> list[str]:
+    def _files(self, pattern: str, beside: Path | None = None) -> list[str]:
         """Whole paths; InputError where there are none."""
-        beside = self._beside.resolve()
+        beside = (beside or self._beside).resolve()
         found = sorted(str(beside / path) for path in glob(pattern, root_dir=beside, recursive=True))
         if not found:
-            raise InputError(f"{self._where} recordings: no file {quoted(pattern)!r} beside the plan")
+            where = "beside the plan" if beside == self._beside.resolve() else f"in {quoted(beside)}"
+            raise InputError(f"{self._where} recordings: no file {quoted(pattern)!r} {where}")
         return found
 
     def _simulated(self) -> list[tuple[str, Any]]:
@@ -344,6 +350,8 @@ def _whole_paths(entry: Any, beside: Path) -> Any:
         return str(Path(escape(str(beside))) / entry)
     if isinstance(entry, list):
         return [_whole_paths(one, beside) for one in entry]
+    if "each" in entry:  # the others lie in those folders
+        return {**entry, "each": _whole_paths(entry["each"], beside)}
     return {name: _whole_paths(one, beside) for name, one in entry.items()}
 
 

@@ -166,6 +166,26 @@ def test_each_file_of_a_pattern_is_a_task(recordings):
     assert [task.recorded for task in load_plan(copy).tasks] == [task.recorded for task in plan.tasks]
 
 
+def test_each_folder_of_a_pattern_is_a_task(recordings):
+    for unit in ("unit_1", "unit_2"):
+        (recordings / unit).mkdir()
+        for name in ("a.csv", "b.csv"):
+            (recordings / unit / name).write_bytes((recordings / name).read_bytes())
+    path = recordings / "p.toml"
+    path.write_text(
+        '[groups.fleet]\ndoes = "compare"\nrecordings = { each = "unit_*", fit = ["a.csv"], holdout = ["b*"] }\n'
+    )
+    plan = load_plan(path)
+    assert [task.case for task in plan.tasks] == ["unit_1/a.csv", "unit_2/a.csv"]
+    assert [Path(one.path).name for task in plan.tasks for one in task.recorded.holdout] == ["b.csv", "b.csv"]
+    copy = recordings.parent / "copy.toml"
+    copy.write_text(plan.text)
+    assert [task.recorded for task in load_plan(copy).tasks] == [task.recorded for task in plan.tasks]
+    (recordings / "unit_2" / "b.csv").unlink()
+    with pytest.raises(InputError, match=r"no file 'b\*' in .*unit_2"):
+        load_plan(path)
+
+
 def test_a_recording_that_changed_is_another_task_and_the_old_one_says_so(recordings):
     path = recordings / "p.toml"
     path.write_text('[groups.logs]\ndoes = "compare"\nrecordings = "a.csv"\n')

@@ -20,7 +20,8 @@ QUICK = os.environ.get("EMAVIZ_STUDY_QUICK") == "1"
 
 
 @cache
-def _folder() -> Path:
+def folder() -> Path:
+    """Where they are kept."""
     named = os.environ.get("EMAVIZ_STUDY")
     return Path(named) if named else Path(tempfile.mkdtemp(prefix="emaviz-study-"))
 
@@ -29,7 +30,7 @@ def _folder() -> Path:
 def studied(plan: str) -> dict[str, list[dict[str, Any]]]:
     """By group, the rows of a plan, computed as far as they are not there; an error among them is a failure."""
     loaded = load_plan(f"{plan}_quick" if QUICK and "." not in plan else plan)
-    out = _folder() / Path(plan).stem
+    out = folder() / Path(plan).stem
     run_plan(loaded, out, scheduler(os.environ.get("EMAVIZ_STUDY_SCHEDULER"), None))
     store = Store(out)
     print(f"\n{report_text(store)}")

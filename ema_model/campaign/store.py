@@ -188,7 +188,10 @@ class Store:
     def task(self, row: Mapping[str, Any]) -> Task:
         """The task of a table's row, to be computed again."""
         texts = {path.stem: path.read_text(encoding="utf-8") for path in (self.folder / "actuators").glob("*.toml")}
-        return from_json(row["task"], texts)
+        try:
+            return from_json(row["task"], texts)
+        except KeyError as error:
+            raise refusal(self.folder / "actuators", f"lacks the actuator {error} of this row") from None
 
     def _parts(self, kind: str) -> list[Path]:
         return sorted((self.folder / "parts").glob(f"{kind}-*.parquet"))

@@ -10,8 +10,8 @@ import shutil
 
 import pyarrow.parquet as pq
 import pytest
-from plans import cheap, written
 from processes import begun, ended, free_port, rows_of
+from support.cheap_plans import cheap, written
 
 from ema_model.campaign import Store, load_plan, run_plan
 from ema_model.campaign import store as storing

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from plans import cheap, written
+from support.cheap_plans import cheap, written
 from support.hidden_effects import ACTUATOR, plant
 from support.hidden_effects import recorded as by_hand
 

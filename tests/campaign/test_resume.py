@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 
 import pytest
-from plans import cheap, written
 from processes import begun, children_of, cluster, ended, kill, rows_of, wait_for
+from support.cheap_plans import cheap, written
 
 from ema_model.campaign import Store, load_plan
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 import pytest
-from plans import written
+from support.cheap_plans import written
 
 from ema_model.campaign import Store, load_plan
 from ema_model.campaign.execute import common

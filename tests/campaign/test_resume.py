@@ -83,11 +83,22 @@ def test_on_dask_a_worker_the_client_and_the_scheduler_are_killed(tmp_path, expe
         told = ended(begun(plan, "--out", out, "--scheduler", dask.address))
         assert f"{TASKS - len(kept)} computed now, {len(kept)} were there" in told
         again = dask.times_begun()
+        callbacks = callbacks_of(dask.address)
     assert (out / "identify.parquet").read_bytes() == table
     whole = rows_by_name(out)
     assert {name: whole[name] for name in kept} == kept
+    assert callbacks and not any("profile" in name for names in callbacks for name in names)
     # A task is begun again only where a kill met it before its row was kept.
     assert len(set(again)) == TASKS and len(again) - TASKS <= 3 * 2 * 3
+
+
+def callbacks_of(address):
+    """What its workers do from time to time."""
+    from distributed import Client
+
+    with Client(address, set_as_default=False) as client:
+        found = client.run(lambda dask_worker: list(dask_worker.periodic_callbacks))
+    return list(found.values())
 
 
 def test_what_fails_is_a_row_and_not_the_end(tmp_path):

@@ -74,8 +74,11 @@ class Cluster:
             raise InputError(
                 f"--scheduler {self._address}: has no workers; begin some: `dask worker {self._address} --nthreads 1`"
             ) from None
+        from ema_model.campaign.schedulers.dask_worker import Unprofiled
+
         try:
             theirs = self._client.run(own_version)
+            self._client.register_plugin(Unprofiled())
         except Exception as error:
             raise InputError(
                 f"--scheduler {self._address}: its workers cannot run emaviz ({quoted(error, 200)}); install it there"

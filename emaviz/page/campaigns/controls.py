@@ -126,7 +126,9 @@ def tables(store: Store) -> Html:
         "<style>.emaviz-campaign td,.emaviz-campaign th{padding:1px 8px 1px 0;text-align:left;vertical-align:top}"
         "</style>"
     )
-    return style + html('<div class="emaviz-campaign" style="padding:4px 10px;overflow:auto">{}</div>', joined(parts))
+    return style + html(
+        '<div class="emaviz-campaign" style="padding:4px 10px;overflow:auto;font-size:12.5px">{}</div>', joined(parts)
+    )
 
 
 def _progress(store: Store) -> str:

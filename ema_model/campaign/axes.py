@@ -7,7 +7,8 @@ that says how, drawn anew from each seed.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,6 +20,8 @@ from ema_model.effects import CATALOGUE
 from ema_model.errors import InputError, quoted
 from ema_model.files.refusal import listed
 from ema_model.quantities.numbers import as_number
+
+MOST_TASKS = 1_000_000  # of a plan
 
 
 @dataclass(frozen=True)
@@ -54,6 +57,7 @@ def _faults(entry: Any, actuator: Actuator) -> list[Choice]:
         return [Choice("uniform faults", lambda seed: draws.uniform_faults(ranges, seed))]
     if "grid" in table:
         grid = {name: [_number(v) for v in _list(one)] for name, one in _table(_only(table, "grid")).items()}
+        check_count(len(values) for values in grid.values())
         points = [dict(zip(grid, point)) for point in itertools.product(*grid.values())]
     else:
         points = [{name: _number(value) for name, value in table.items()}]
@@ -141,6 +145,12 @@ def _bits(entry: Any, actuator: Actuator) -> list[Choice]:
     if isinstance(entry, bool) or not isinstance(entry, int) or not 0 <= entry <= 32:
         raise InputError(f"is a whole number from 0 to 32, not {quoted(entry, 40)!r}")
     return [_always(f"{entry} bits", entry)]
+
+
+def check_count(sizes: Iterable[int]) -> None:
+    """Raises InputError where a product of so many choices each has too many points."""
+    if (count := math.prod(sizes)) > MOST_TASKS:
+        raise InputError(f"has {count:.3g} points, and {MOST_TASKS} are the most; split it")
 
 
 AXES: dict[str, Reader] = {

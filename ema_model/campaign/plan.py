@@ -38,7 +38,7 @@ import msgspec
 
 from ema_model.actuator import Actuator, actuator_text, parse_actuator, shipped
 from ema_model.campaign import draws
-from ema_model.campaign.axes import AXES, USUAL, Choice, choices_of
+from ema_model.campaign.axes import AXES, MOST_TASKS, USUAL, Choice, check_count, choices_of
 from ema_model.campaign.given import digest, run_of
 from ema_model.campaign.kinds import KINDS
 from ema_model.campaign.task import Excitation, File, Recorded, Simulated, Task
@@ -52,7 +52,6 @@ _ENTRIES = ("schema", "title", "about", "like", "runs", "groups")
 _SHARED = ("does", "actuator", "seeds")
 _SIMULATED = ("runs", "holdout", "load_recorded", "noise_seed_plus", "tolerances_of", *AXES)
 _RECORDED = ("recordings", "mapping")
-_MOST_TASKS = 1_000_000
 _DEEPEST = 5  # plans that are like others
 
 
@@ -89,8 +88,8 @@ def load_plan(path: str | os.PathLike[str]) -> Plan:
         if not isinstance(table, dict):
             raise InputError(f"{where} must be a table")
         group = _Group(name, table, runs, file.parent, where)
-        if (count := len(tasks) + group.count) > _MOST_TASKS:
-            raise InputError(f"{where}: takes the plan to {count} tasks, and {_MOST_TASKS} are the most; split it")
+        if (count := len(tasks) + group.count) > MOST_TASKS:
+            raise InputError(f"{where} takes the plan to {count} tasks, and {MOST_TASKS} are the most; split it")
         tasks += group.tasks()
     title, about = (str(document.get(key, usual)) for key, usual in (("title", file.stem), ("about", "")))
     return Plan(title, about, _text(document, file), tuple(tasks))
@@ -181,6 +180,7 @@ class _Group:
                     raise InputError(f"{name}: holds nothing, so that there is nothing to compute; give it a value")
                 several = len(entries) > 1
                 axes.append([(f"{name} {entry}" if several else "", name, entry) for entry in entries])
+        check_count(map(len, axes))
         found = []
         for point in itertools.product(*axes):
             given = {name: value for _, name, value in point}
@@ -274,6 +274,7 @@ class _Group:
                 noise_seed=seed + plus,
             )
 
+        self._told("", lambda: check_count(map(len, axes.values())))
         found = []
         for choices in itertools.product(*axes.values()):
             point = dict(zip(axes, choices))
@@ -380,7 +381,10 @@ def _seeds(entry: Any) -> list[int]:
     if isinstance(entry, dict):
         _check(entry, ("from", "count"), "")
         first, count = entry.get("from", 0), entry.get("count", 0)
-        entry = list(range(first, first + count)) if isinstance(first, int) and isinstance(count, int) else [None]
+        if not isinstance(first, int) or not isinstance(count, int):
+            raise InputError("takes whole numbers from 0, or { from = 0, count = 100 }")
+        check_count([count])
+        entry = list(range(first, first + count))
     entry = entry if isinstance(entry, list) else [entry]
     if not entry:
         raise InputError("holds nothing, so that there is nothing to compute; give it a value")

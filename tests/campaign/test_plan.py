@@ -200,6 +200,8 @@ def test_a_recording_that_changed_is_another_task_and_the_old_one_says_so(record
 
 GROUP = "[groups.g]\nCHEAP\n"
 BARE = '[groups.g]\ndoes = "identify"\nruns = "short"\n'
+GRID = ", ".join(f"k{i} = {[j / 100 for j in range(100)]}" for i in range(1, 9))
+MANY = list(range(2, 2002))
 WRONG = {
     "no groups": ("", "has no [groups.NAME]"),
     "unknown entry": ("colour = 1\n" + GROUP, "has no 'colour'; it has schema"),
@@ -230,7 +232,11 @@ WRONG = {
     "empty setting": (BARE + "algorithm = []\n", "algorithm: holds nothing"),
     "no seeds": (GROUP + "seeds = { from = 0, count = 0 }\n", "seeds: holds nothing"),
     "seeds": (GROUP + "seeds = [-1]\n", "seeds: takes whole numbers from 0"),
-    "too many": (GROUP + "seeds = { from = 0, count = 2000000 }\n", "and 1000000 are the most; split it"),
+    "too many seeds": (GROUP + "seeds = { from = 0, count = 2000000000000 }\n", "seeds: has 2e+12 points, and 1000000"),
+    "too many faults": (GROUP + f"faults = {{ grid = {{ {GRID} }} }}\n", "faults: has 1e+16 points, and 1000000 are"),
+    "too many settings": (BARE + f"population = {MANY}\niterations = {MANY}\n", "has 4e+06 points, and 1000000 are"),
+    "too many cases": (GROUP + f"noise_A = {MANY}\ntolerances = {MANY}\n", "has 4e+06 points, and 1000000 are"),
+    "too many tasks": (GROUP + f"noise_A = {MANY}\nseeds = {MANY}\n", "takes the plan to 4000000 tasks, and 1000000"),
     "no actuator": (GROUP + 'actuator = "none.toml"\n', "actuator: none.toml: no such file"),
     "no such shipped": (GROUP + 'actuator = "none"\n', "actuator: no actuator 'none' is shipped"),
     "no recordings": ('[groups.g]\ndoes = "compare"\nrecordings = "*.csv"\n', "no file '*.csv' beside the plan"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 
 import pytest
 from processes import begun, children_of, cluster, ended, kill, rows_of, wait_for
@@ -56,6 +57,17 @@ def alive(pid):
     import psutil
 
     return psutil.pid_exists(pid) and psutil.Process(pid).status() != psutil.STATUS_ZOMBIE
+
+
+def test_an_interrupt_keeps_the_rows_and_leaves_no_worker(tmp_path):
+    out = tmp_path / "out"
+    client = begun(cheap(tmp_path, 200), "--out", out, "--workers", "2")
+    wait_for(lambda: rows_of(out) >= 1)
+    workers = children_of(client.pid)
+    client.send_signal(signal.SIGINT)
+    assert ended(client, 130) == ""
+    wait_for(lambda: not any(alive(pid) for pid in workers))
+    assert 1 <= rows_of(out) < 200
 
 
 def test_on_dask_a_worker_the_client_and_the_scheduler_are_killed(tmp_path, expected):

@@ -7,9 +7,13 @@ import sys
 
 import pytest
 from processes import environment
+from support.cheap_plans import cheap
 
+from ema_model.campaign import load_plan
+from ema_model.campaign.execute import OtherVersion, execute
 from ema_model.campaign.one_compiler import Turns
 from ema_model.campaign.schedulers.processes import Processes
+from ema_model.campaign.version import version
 from ema_model.simulation import one_stack
 
 COMPILES = """
@@ -91,6 +95,12 @@ def test_what_is_compiled_does_not_choose_the_kernels(monkeypatch):
     one_stack.always_library()
     assert set(one_stack.stack_at_hand(actuator, ["hinge_moment"], "reduced", "run").effects) == set(one_stack.LIBRARY)
     assert one_stack.stack_at_hand(actuator, [], "reduced", "run").effects == ()
+
+
+def test_a_worker_of_another_version_computes_nothing(tmp_path):
+    (task,) = load_plan(cheap(tmp_path, 1)).tasks
+    with pytest.raises(OtherVersion, match=r"differs from the campaign: emaviz .* / 0\.0\.9"):
+        execute(task, version() | {"emaviz": "0.0.9"})
 
 
 @pytest.mark.parametrize("asked", [1, 3, None])

@@ -25,6 +25,7 @@ FLOORS = {
         ["estimation"],
         ["identification", "comparison", "challenges"],
         ["discovery"],
+        ["campaign"],
     ],
     "emaviz": [
         ["colours", "text"],

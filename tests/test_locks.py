@@ -44,7 +44,12 @@ def test_locks_hold_what_the_project_asks_for_and_its_build_backend() -> None:
         *project["dependency-groups"]["build"],
     )
     assert set(needed) <= set(_locked(RUN))
-    assert set(_asked(*project["project"]["optional-dependencies"]["dev"])) <= set(_locked(TESTS))
+    extras = project["project"]["optional-dependencies"]
+    assert set(_asked(*extras["dev"], *extras["cluster"])) <= set(_locked(TESTS))
+
+
+def test_whoever_runs_no_cluster_installs_none() -> None:
+    assert not set(_asked(*_project()["project"]["optional-dependencies"]["cluster"])) & set(_locked(RUN))
 
 
 def test_tests_run_on_the_versions_that_users_run() -> None:

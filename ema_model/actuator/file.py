@@ -31,14 +31,18 @@ _MOST_BYTES = 10_000_000
 def load_actuator(path: str | Path | None = None) -> Actuator:
     """The actuator of a TOML file, or the thesis's own without one; InputError tells what is wrong in it."""
     if path is None:
-        return _parse(shipped("thesis.toml"), "thesis.toml")
+        return parse_actuator(shipped("thesis.toml"), "thesis.toml")
+    return parse_actuator(actuator_text(path), path)
+
+
+def actuator_text(path: str | Path) -> str:
+    """What an actuator's file holds, not looked at yet; InputError where it cannot be read."""
     try:
         with open_user_file(path, "an actuator file (.toml)", TEXT_BYTES) as file:
-            text = file.read().decode("utf-8")
+            return file.read().decode("utf-8")
     except (OSError, UnicodeDecodeError) as error:
         why = getattr(error, "strerror", None) or "not UTF-8"
         raise InputError(f"{quoted(path)}: cannot be read as text ({why})") from None
-    return _parse(text, path)
 
 
 def shipped(name: str) -> str:
@@ -49,7 +53,8 @@ def shipped(name: str) -> str:
     return (Path(__file__).parents[2] / "assets" / "actuators" / name).read_text(encoding="utf-8")
 
 
-def _parse(text: str, path: str | Path) -> Actuator:
+def parse_actuator(text: str, path: str | Path) -> Actuator:
+    """The actuator of a file's text; path: what errors call it.  InputError tells what is wrong in it."""
     where = quoted(path)
     try:
         document = toml_of(text)

@@ -13,7 +13,7 @@ import pickle
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from numba.core.caching import NullCache
 from numba.core.compiler import CompileResult
@@ -22,6 +22,19 @@ from numba.core.serialize import dumps
 from ema_model.kernel_cache.folder import cache_folder, draft, only_ours, remove
 
 _CHECKSUM = hashlib.sha256().digest_size
+
+
+class Turns(Protocol):
+    """Says when this process may compile a kernel that others on its host may be compiling."""
+
+    def begin(self, path: Path) -> None:
+        """Returns when nobody else compiles the kernel of this file, which may be there by then."""
+
+    def end(self, path: Path) -> None:
+        """The kernel is in its file, or will not be."""
+
+
+turns: Turns | None = None  # without it each process compiles what it does not find
 
 
 def kept(compiler: Callable[[Any], Any]) -> Callable[[Any], Any]:
@@ -51,7 +64,12 @@ class KeptKernels(NullCache):
     def load_overload(self, sig: Any, target_context: Any) -> CompileResult | None:
         target_context.refresh()  # as numba's own cache does: it may not have been used yet
         try:
-            content = _read(self._file(sig, target_context))
+            path = self._file(sig, target_context)
+            content = _read(path)
+            if content is None and turns is not None:
+                turns.begin(path)
+                if (content := _read(path)) is not None:
+                    turns.end(path)
         except OSError:
             return None
         return None if content is None else CompileResult._rebuild(target_context, *pickle.loads(content))
@@ -60,7 +78,12 @@ class KeptKernels(NullCache):
         if data.library.has_dynamic_globals:  # addresses of this process
             return
         try:
-            _write(self._file(sig, data.target_context), dumps(data._reduce()))
+            path = self._file(sig, data.target_context)
+            try:
+                _write(path, dumps(data._reduce()))
+            finally:
+                if turns is not None:
+                    turns.end(path)
         except OSError:  # a full disk, say: the kernel is compiled and runs
             return
 

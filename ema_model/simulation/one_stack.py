@@ -21,6 +21,18 @@ from ema_model.stacks import Stack, find_stack, is_known
 LIBRARY = (*CATALOGUE, *(f"{effect.name}_2" for effect in CATALOGUE.values() if effect.is_periodic))
 
 
+_only_library = False  # whether `stack_at_hand` does without looking at what is compiled
+
+
+def always_library() -> None:
+    """Lets this process take the library's kernels for its effects wherever they serve, whatever is compiled.
+
+    A model's own give the same but for rounding; so the last digits of what comes out would depend on the cache.
+    """
+    global _only_library
+    _only_library = True
+
+
 def own_stack(actuator: Actuator, effects: Iterable[str] = (), circuit: str = "reduced") -> Stack:
     """The kernels of an actuator with effects besides its own, and nothing else; circuit: for the hysteresis loop."""
     return find_stack(*_parts(actuator, {*actuator.effects, *effects}, circuit))
@@ -39,7 +51,8 @@ def stack_at_hand(actuator: Actuator, effects: Iterable[str], circuit: str, kern
     names = {*actuator.effects, *effects}
     if not names or not names <= {*LIBRARY}:
         return own_stack(actuator, names, circuit)
-    if is_known(*_parts(actuator, names, circuit)):  # else it would be written only to look into it
+    # What is not known would be written only to look into it.
+    if not _only_library and is_known(*_parts(actuator, names, circuit)):
         own = own_stack(actuator, names, circuit)
         if is_compiled(own, kernel):
             return own

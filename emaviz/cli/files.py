@@ -50,6 +50,14 @@ class Output:
         return path.suffix.lower() if self.has_side_file else path.suffix
 
 
+@dataclass(frozen=True)
+class Folder:
+    """The type of an option that names a folder, which whoever takes it looks at."""
+
+    def __call__(self, text: str) -> str:
+        return text
+
+
 RECORDING = Input("the file of a measurement", has_side_file=True)
 ACTUATOR = Input("an actuator file (.toml)")
 JSON = Output((".json",), is_kept=False)

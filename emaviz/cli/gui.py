@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from emaviz.cli.files import RECORDING
+from emaviz.cli.files import RECORDING, Folder
 from emaviz.cli.numbers import whole
 from emaviz.cli.options import add_actuator
 
@@ -13,7 +13,7 @@ HELP = "the app in the browser (also without a command)"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """FILE…, --host, --allow-host, --port, --open, --data-dir, --actuator."""
+    """FILE…, --host, --allow-host, --port, --open, --data-dir, --campaign, --actuator."""
     parser.add_argument("files", nargs="*", type=RECORDING, metavar="FILE", help="recordings to open")
     parser.add_argument("--host", default="127.0.0.1", help="address to listen on; the default is this machine only")
     parser.add_argument(
@@ -26,6 +26,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--port", type=whole(0, 65535), default=8080)
     parser.add_argument("--open", action=argparse.BooleanOptionalAction, default=True, help="open the browser")
     parser.add_argument("--data-dir", type=Path, default=Path("emaviz-data"), metavar="DIR", help="recordings, uploads")
+    parser.add_argument(
+        "--campaign", action="append", default=[], type=Folder(), metavar="DIR", help="a campaign to open; repeatable"
+    )
     add_actuator(parser)
 
 

@@ -19,6 +19,7 @@ from ema_model.comparison.result import Comparison
 from ema_model.faults import HEALTHY
 from ema_model.recordings import Measurement
 from ema_model.simulation import plant
+from emaviz.page.campaigns.controls import CampaignControls
 from emaviz.page.compare.keep import KeepControls
 from emaviz.page.compare.moment import hold
 from emaviz.page.compare.result import ResultPanel
@@ -49,6 +50,7 @@ from emaviz.server.door import Door
 from emaviz.server.safe_server import open_server
 from emaviz.server.viser_private import Inside
 from emaviz.session.archive import Recorded, recovered
+from emaviz.session.campaigns import Campaigns
 from emaviz.session.compare.comparing import Comparing
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.discover.discovering import Discovering
@@ -76,9 +78,11 @@ class App:
         actuator_file: str | None = None,
         files: Sequence[Path] = (),
         allow_hosts: Sequence[str] = (),
+        campaigns: Sequence[Path] = (),
     ) -> None:
         """files: recordings to open on Compare, which is then the first tab.  InputError: one of them is none.
 
+        campaigns: folders of campaigns to open, beside those below `folder`.
         allow_hosts: names by which other machines may ask for the page (InputError: none, but host is no loopback).
         """
         started = time.perf_counter()
@@ -99,6 +103,7 @@ class App:
         self.comparing = Comparing(self.session, data)
         self.session.open_file = self.comparing.measurement
         self.discovering = Discovering(self.session, self.comparing)
+        self.campaigns = Campaigns(self.session, data, campaigns)
         self.scene = ActuatorScene(self.server, round(actuator.motor.pole_pairs))
         self.strip = PlaybackStrip(self.page, self.scene, lambda: self.charts.window_s, self._theme)
         self.playback = Playback(self.scene, actuator, self.strip.moved)
@@ -207,6 +212,19 @@ class App:
         with tabs.add_tab("Recordings", viser.Icon.LIST):
             panel = RecordingsPanel(self.page, self.viewer, recorded, self._recording_files, result)
             self.sessions = SessionControls(self.page, self.comparing, self._recording_files)
+            campaigns = CampaignControls(
+                self.page,
+                self.campaigns,
+                self._recording_files,
+                self._recordings_panel,
+                lambda: self._docked.bring(self._recordings_panel),
+            )
+
+        def opened(path: Path, run: Measurement) -> None:
+            panel.choose(path.name)
+            self._play(run)
+
+        campaigns.opened = opened
         self.comparing.events.kept.append(lambda _: panel.refresh_soon())
 
     def _build_identify(
@@ -291,7 +309,10 @@ class App:
 def serve(arguments: argparse.Namespace) -> int:
     """Runs the app until interrupted (the command line's `gui`)."""
     files = [Path(file) for file in arguments.files]
-    app = App(arguments.host, arguments.port, arguments.data_dir, arguments.actuator, files, arguments.allow_host)
+    campaigns = [Path(one) for one in arguments.campaign]
+    app = App(
+        arguments.host, arguments.port, arguments.data_dir, arguments.actuator, files, arguments.allow_host, campaigns
+    )
     port = app.server.get_port()
     print(f"emaviz is at {app.door.entry(port)}  (Ctrl-C ends it)", flush=True)
     if app.door.token:

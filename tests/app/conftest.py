@@ -37,3 +37,19 @@ def page(browser: Any, app: App) -> Iterator[Any]:
     tab.close()
     outside = [url for url in asked if not url.startswith((app.address, "ws://127.0.0.1", "data:", "blob:"))]
     assert not outside, "nothing may be fetched from elsewhere"
+
+
+@pytest.fixture
+def watched(browser: Any, app: App) -> Iterator[Any]:
+    """As `page`, but the Rerun viewer on its own loopback address may be loaded."""
+    tab = browser.new_page(viewport={"width": 1400, "height": 900})
+    asked: list[str] = []
+    tab.on("requestfinished", lambda request: asked.append(request.url))
+    tab.goto(app.address)
+    tab.get_by_role("tab", name="Recordings").wait_for(timeout=60_000)
+    yield tab
+    tab.close()
+    assert app.viewer is not None
+    allowed = (app.address, app.viewer.address, "ws://127.0.0.1", "data:", "blob:")
+    assert any(url.startswith(app.viewer.address) for url in asked)
+    assert not [url for url in asked if not url.startswith(allowed)], "nothing may come from elsewhere"

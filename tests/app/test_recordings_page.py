@@ -190,21 +190,6 @@ def test_closing_the_host_ends_what_follows_a_recording(tmp_path):
 # --- in the browser ---------------------------------------------------------------------------------------------------
 
 
-@pytest.fixture
-def watched(browser, app):
-    """As `page`, but the Rerun viewer on its own loopback address may be loaded."""
-    tab = browser.new_page(viewport={"width": 1400, "height": 900})
-    asked = []
-    tab.on("requestfinished", lambda request: asked.append(request.url))
-    tab.goto(app.address)
-    tab.get_by_role("tab", name="Recordings").wait_for(timeout=60_000)
-    yield tab
-    tab.close()
-    allowed = (app.address, app.viewer.address, "ws://127.0.0.1", "data:", "blob:")
-    assert any(url.startswith(app.viewer.address) for url in asked)
-    assert not [url for url in asked if not url.startswith(allowed)], "nothing may come from elsewhere"
-
-
 @pytest.mark.browser
 def test_recordings_are_opened_compared_renamed_and_deleted(watched, app):
     page, session = watched, app.session

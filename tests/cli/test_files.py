@@ -9,7 +9,7 @@ from options_of import TEXT, command_parser, needed, options_with_values
 
 from ema_model.errors import InputError
 from emaviz.cli import main
-from emaviz.cli.files import Input, Output, check_files
+from emaviz.cli.files import Folder, Input, Output, check_files
 from emaviz.cli.numbers import Number
 
 OPTIONS = options_with_values()
@@ -45,7 +45,7 @@ def _folder(tmp_path, monkeypatch):
 @pytest.mark.parametrize("command, name, action", OPTIONS, ids=[f"{c} {n}" for c, n, _ in OPTIONS])
 def test_every_option_says_what_it_is(command, name, action):
     """A new option must be declared as a file that is read or written, as a number, or be listed as a text."""
-    declared = isinstance(action.type, (Input, Output, Number)) or action.choices is not None
+    declared = isinstance(action.type, (Input, Output, Folder, Number)) or action.choices is not None
     assert declared != (name in TEXT)
     if isinstance(action.type, Output) and action.type.is_kept:
         assert "--force" in command_parser(command)._option_string_actions

@@ -63,6 +63,13 @@ class RecordingsPanel:
 
     # --- on the files' thread ---------------------------------------------------------------------------------------
 
+    def choose(self, name: str) -> None:
+        """Shows a recording, and opens it."""
+        self._choice.options = self._recorded.names()
+        self._choice.value, self._by_hand = name, True
+        self.refresh()
+        self._open_chosen()
+
     def refresh(self) -> None:
         """Reads the folder again."""
         names = self._recorded.names()

@@ -1,0 +1,121 @@
+"""Which effects are missing: the verdict, what was added, the error ladder."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from dataclasses import dataclass
+from typing import Any
+
+import pyarrow as pa
+
+from ema_model.campaign.given import Given
+from ema_model.campaign.kinds.kind import NUMBER, NUMBERS, TEXT, TEXTS, Kind
+from ema_model.campaign.showable import showable
+from ema_model.discovery import as_dict, discover
+from ema_model.errors import InputError, quoted
+
+_LARGEST_GROUP = 3  # of effects that cannot be told apart, with which a name is still an answer
+_AT_FLOOR = 1.1
+_SIGNALS = {"all": None, "current": ["current_A"]}
+
+
+@dataclass(frozen=True)
+class Settings:
+    """As `emaviz discover` has them."""
+
+    signals: str = "all"
+    most_effects: int = 3
+    showable_from: float = 0.0  # of χ²: hidden effects that change the recordings by less are not looked for
+
+    def __post_init__(self) -> None:
+        if self.signals not in _SIGNALS:
+            raise InputError(f"no signals {quoted(self.signals)!r}; there are {', '.join(_SIGNALS)}")
+        if not 0 <= self.most_effects <= 100:
+            raise InputError(f"most_effects is a whole number from 0 to 100, not {self.most_effects}")
+
+
+def _run(given: Given, settings: Settings, seed: int) -> dict[str, Any]:
+    signals = _SIGNALS[settings.signals]
+    asked: dict[str, Any] = {"signals": settings.signals, "showable": None}
+    if settings.showable_from > 0.0 and given.effects:
+        asked["showable"] = showable(given.fitted, given.actuator, given.effects, signals)
+        if asked["showable"] < settings.showable_from:
+            return asked
+    found = as_dict(
+        discover(given.fitted, given.actuator, holdout=given.held, signals=signals, most_effects=settings.most_effects)
+    )
+    ladder, faults, experiment = found["ladder"], found["faults"], found["next_experiment"]
+    return asked | {
+        "verdict": found["verdict"],
+        "effects": [one["name"] for one in found["effects"]],
+        "same_as": ["+".join(one["same_as"]) for one in found["effects"]],
+        "outside": found["parameters_outside_tolerance"],
+        "rungs": [rung["label"] for rung in ladder],
+        "ladder": [rung["rmse"] for rung in ladder],
+        "holdout_ladder": [rung["holdout_rmse"] for rung in ladder],
+        "faults": list(faults),
+        "fault_values": [one["value"] for one in faults.values()],
+        "warnings": found["warnings"],
+        "next_experiment": None if experiment is None else json.dumps(experiment, sort_keys=True),
+    }
+
+
+def tally(row: dict[str, Any]) -> Counter[str]:
+    """What one discovery of hidden effects got right; what cannot be told from an effect counts as it, in groups."""
+    hidden = set(row["hidden"])
+    named = [{name, *filter(None, same.split("+"))} for name, same in zip(row["effects"], row["same_as"])]
+    right = bool(named) and bool(named[0] & hidden) and len(named[0]) <= _LARGEST_GROUP
+    covered = [group & hidden for group in named]
+    exact = all(covered) and set().union(*covered) >= hidden and len(named) == len(hidden)
+    ends = [ladder[-1] for ladder in (row["ladder"], row["holdout_ladder"]) if ladder and ladder[-1] is not None]
+    counts = {
+        "first": right,
+        "exact": exact,
+        "wrong": bool(named) and not right and len(named[0]) == 1,
+        "abstained": not named,
+        "floor": exact and max(ends, default=0.0) <= _AT_FLOOR,
+    }
+    return Counter({name: int(one) for name, one in counts.items()})
+
+
+def _told(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    shown = [row for row in rows if row["verdict"] is not None]
+    told: dict[str, Any] = {"showable": len(shown)}
+    if any(row["hidden"] for row in rows):
+        counts = sum((tally(row) for row in shown if row["hidden"]), Counter())
+        told |= {
+            "right one first": counts["first"],
+            "exactly": counts["exact"],
+            "wrong, sure": counts["wrong"],
+            "abstained": counts["abstained"],
+            "exactly, and at the floor": counts["floor"],
+        }
+    verdicts = Counter(row["verdict"] for row in shown)
+    return told | {"verdicts": ", ".join(f"{verdict} {count}" for verdict, count in verdicts.most_common())}
+
+
+KIND = Kind(
+    title="Discovery",
+    settings=Settings,
+    columns=pa.schema(
+        [
+            ("signals", TEXT),
+            ("showable", NUMBER),  # expected fall of χ²; null where it was not asked for
+            ("verdict", TEXT),  # null where the effects cannot be seen
+            ("effects", TEXTS),
+            ("same_as", TEXTS),  # of each effect, the names that cannot be told from it, joined by +
+            ("outside", TEXTS),
+            ("rungs", TEXTS),
+            ("ladder", NUMBERS),  # in units of the floor
+            ("holdout_ladder", NUMBERS),
+            ("faults", TEXTS),
+            ("fault_values", NUMBERS),
+            ("warnings", TEXTS),
+            ("next_experiment", TEXT),
+        ]
+    ),
+    run=_run,
+    seconds=lambda settings: 12.0,
+    told=_told,
+)

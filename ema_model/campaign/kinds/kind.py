@@ -1,0 +1,53 @@
+"""What a kind's file declares."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import pyarrow as pa
+
+from ema_model.campaign.given import Given
+
+TEXT, NUMBER, FLAG = pa.string(), pa.float64(), pa.bool_()
+TEXTS, NUMBERS = pa.list_(pa.string()), pa.list_(pa.float64())
+
+COMMON = pa.schema(
+    [
+        ("name", TEXT),  # of the task
+        ("group", TEXT),
+        ("case", TEXT),
+        ("seed", pa.int64()),
+        ("error", TEXT),  # null where the task has its answer; the kind's columns are null beside one
+        ("k_true", NUMBERS),  # (8,), of a simulated plant
+        ("hidden", TEXTS),  # effects of the plant that the model lacks
+        ("files", TEXTS),  # the recordings that were fitted
+        ("task", TEXT),  # all of it, so that it can be computed again
+    ]
+)
+HOW = pa.schema(  # how a row came about, which is another each time: in the parts, not in the tables
+    [("elapsed_s", NUMBER), ("worker", TEXT), ("memory_MB", NUMBER), ("finished_s", NUMBER)]
+)
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of task.
+
+    run(given, settings, seed) gives a value for each of `columns`, and raises InputError or FloatingPointError for
+    what cannot be computed; its answer depends on its arguments only.
+    """
+
+    title: str
+    settings: type[Any]  # a frozen dataclass: each field is an option of a plan's group, and may be an axis
+    columns: pa.Schema
+    run: Callable[[Given, Any, int], dict[str, Any]]
+    seconds: Callable[[Any], float]  # about how long one takes on one core, from its settings
+    told: Callable[[list[dict[str, Any]]], dict[str, Any]]  # what rows without errors say together, by its title
+    name: str = ""  # of the file; `KINDS` fills it in
+
+    @property
+    def schema(self) -> pa.Schema:
+        """Of its table."""
+        return pa.schema([*COMMON, *self.columns])

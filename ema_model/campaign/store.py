@@ -1,0 +1,253 @@
+"""A campaign's folder: the plan, the actuators, and the rows so far, each file written whole or not at all.
+
+campaign.json      what is computed, with which version
+plan.toml          a copy of the plan
+actuators/*.toml   the files' texts, by hash
+parts/*.parquet    rows as they came, by kind: what is there is never computed again
+KIND.parquet       the table: all rows of a kind, sorted by name, once a run has ended
+"""
+
+from __future__ import annotations
+
+import os
+import secrets
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from ema_model.campaign.kinds import COMMON, HOW, KINDS
+from ema_model.campaign.task import Task, from_json, text_hash
+from ema_model.campaign.version import commit, differences, version
+from ema_model.errors import InputError, quoted
+from ema_model.files.lock import FileLock
+from ema_model.files.refusal import reason, refusal
+from ema_model.files.whole_file import remove_abandoned, whole_file
+
+_SCHEMA = 1
+_MOST_PARTS = 200  # small ones of a kind, before they are joined
+_SMALL_BYTES = 2_000_000
+_TRIES = 20  # to read parts that are being joined
+
+
+@dataclass(frozen=True)
+class Header:
+    """What a campaign's folder says of it."""
+
+    title: str
+    tasks: dict[str, int]  # by group
+    kinds: dict[str, str]  # by group
+    cases: dict[str, list[str]]  # by group, in the plan's order
+    version: dict[str, str]
+    about: str = ""
+    commit: str = ""
+    schema: int = _SCHEMA
+    begun: str = field(default_factory=lambda: time.strftime("%Y-%m-%d %H:%M"))
+
+
+class Store:
+    """The folder of one campaign, to read.  `writing` makes it the only writer."""
+
+    def __init__(self, folder: str | os.PathLike[str]) -> None:
+        """InputError where the folder holds no campaign."""
+        self.folder = Path(folder)
+        path = self.folder / "campaign.json"
+        try:
+            self.header = msgspec.json.decode(path.read_bytes(), type=Header)
+        except (FileNotFoundError, NotADirectoryError):
+            raise refusal(
+                folder, "is no campaign's folder; name one that `emaviz campaign PLAN --out` has made"
+            ) from None
+        except (OSError, msgspec.DecodeError) as error:
+            raise refusal(path, f"cannot be read ({reason(error)}); name a campaign's folder") from None
+        if self.header.schema != _SCHEMA:
+            raise refusal(path, f"schema {self.header.schema} is not known; this version reads schema {_SCHEMA}")
+        self._lock: FileLock | None = None
+
+    @classmethod
+    def writing(cls, folder: str | os.PathLike[str], header: Header, plan: str, tasks: Sequence[Task]) -> Store:
+        """The folder, made where it is missing, with this process as its only writer until `close`.
+
+        InputError where it belongs to another version, to another plan (it holds rows that this one does not ask
+        for), to another running process, or cannot be written.
+        """
+        at = Path(folder)
+        try:
+            if not (at / "campaign.json").exists():
+                if at.exists() and (not at.is_dir() or any(at.iterdir())):
+                    raise refusal(folder, "holds other files; name a folder that is empty or not there yet")
+                (at / "parts").mkdir(parents=True, exist_ok=True)
+                (at / "actuators").mkdir(exist_ok=True)
+                _write(at / "campaign.json", msgspec.json.format(msgspec.json.encode(header)))
+            store = cls(folder)
+            store._own()
+            try:
+                store._check(tasks, header)
+                for text in {task.actuator for task in tasks}:
+                    _write(at / "actuators" / f"{text_hash(text)}.toml", text.encode())
+                _write(at / "plan.toml", plan.encode())
+                _write(at / "campaign.json", msgspec.json.format(msgspec.json.encode(header)))
+            except BaseException:
+                store.close()
+                raise
+        except OSError as error:
+            raise cannot_write(at, error) from None
+        store.header = header
+        return store
+
+    def _own(self) -> None:
+        self._lock = FileLock.acquire(self.folder / ".lock")
+        if self._lock is None:
+            raise refusal(self.folder, "another campaign is writing there; wait for its end, or name another folder")
+        remove_abandoned(self.folder)
+        remove_abandoned(self.folder / "parts")
+
+    def _check(self, tasks: Sequence[Task], header: Header) -> None:
+        if other := differences(self.header.version, header.version):
+            raise refusal(
+                self.folder,
+                f"was made by another version ({other}); its rows stay as they are: name a new folder, or go back",
+            )
+        if strange := len(self.names(errors=True) - {task.name for task in tasks}):
+            told = f"holds {strange} rows that this plan does not ask for; name another folder, or its own plan.toml"
+            raise refusal(self.folder, told)
+
+    def close(self) -> None:
+        """Lets others write."""
+        if self._lock is not None:
+            self._lock.release()
+
+    def append(self, kind: str, rows: Sequence[Mapping[str, Any]]) -> None:
+        """Keeps rows; OSError where the disk does not take them, and then none of them is kept."""
+        schema = pa.schema([*KINDS[kind].schema, *HOW])
+        filled = [{name: row.get(name) for name in schema.names} for row in rows]
+        self._write_part(kind, pa.Table.from_pylist(filled, schema))
+        parts = [part for part in self._parts(kind) if part.stat().st_size < _SMALL_BYTES]
+        if len(parts) > _MOST_PARTS:
+            self._write_part(kind, _read(parts, schema))  # a kill here leaves rows twice, which are the same
+            for part in parts:
+                part.unlink()
+
+    def names(self, *, errors: bool) -> set[str]:
+        """Names of the tasks that have a row; errors: also where that is an error."""
+        found: set[str] = set()
+        for kind in KINDS:
+            rows = self._rows(kind, pa.schema([COMMON.field("name"), COMMON.field("error")]))
+            pairs = zip(rows["name"].to_pylist(), rows["error"].to_pylist())
+            found.update(name for name, error in pairs if errors or error is None)
+        return found
+
+    def table(self, kind: str, *, how: bool = False) -> pa.Table:
+        """All rows of a kind, sorted by name; how: with what is another each time."""
+        rows = self._rows(kind, pa.schema([*KINDS[kind].schema, *(HOW if how else ())]))
+        # Of a task that was computed again, the answer goes before the error.
+        keys = zip(
+            rows["name"].to_pylist(), (error is not None for error in rows["error"].to_pylist()), range(len(rows))
+        )
+        best = {name: at for name, _, at in sorted(keys, reverse=True)}
+        return rows.take(pa.array([best[name] for name in sorted(best)], pa.int64())).combine_chunks()
+
+    def write_tables(self) -> list[Path]:
+        """Writes the table of each kind that has rows; their paths.  OSError as `append`."""
+        written = []
+        for kind in KINDS:
+            if self._parts(kind):
+                path = self.folder / f"{kind}.parquet"
+                with whole_file(path) as draft:
+                    pq.write_table(self.table(kind), draft)
+                written.append(path)
+        return written
+
+    def progress(self) -> dict[str, dict[str, Any]]:
+        """By group: its kind, how many tasks it has, how many have a row, how many of those are errors."""
+        counts = {
+            group: {"kind": kind, "tasks": self.header.tasks[group], "rows": 0, "errors": 0}
+            for group, kind in self.header.kinds.items()
+        }
+        for kind in set(self.header.kinds.values()):
+            rows = self.table(kind)
+            for group, error in zip(rows["group"].to_pylist(), rows["error"].to_pylist()):
+                counts[group]["rows"] += 1
+                counts[group]["errors"] += error is not None
+        return counts
+
+    def seconds(self) -> dict[str, float]:
+        """By group, the mean time that its tasks took; groups without any are left out."""
+        found: dict[str, float] = {}
+        for kind in set(self.header.kinds.values()):
+            means = self.table(kind, how=True).group_by("group").aggregate([("elapsed_s", "mean")])
+            pairs = zip(means["group"].to_pylist(), means["elapsed_s_mean"].to_pylist())
+            found |= {group: mean for group, mean in pairs if mean}
+        return found
+
+    def task(self, row: Mapping[str, Any]) -> Task:
+        """The task of a table's row, to be computed again."""
+        texts = {path.stem: path.read_text(encoding="utf-8") for path in (self.folder / "actuators").glob("*.toml")}
+        try:
+            return from_json(row["task"], texts)
+        except KeyError as error:
+            raise refusal(self.folder / "actuators", f"lacks the actuator {error} of this row") from None
+
+    def _parts(self, kind: str) -> list[Path]:
+        return sorted((self.folder / "parts").glob(f"{kind}-*.parquet"))
+
+    def _rows(self, kind: str, schema: pa.Schema) -> pa.Table:
+        """All rows that are there; who writes may join parts meanwhile."""
+        for _ in range(_TRIES):
+            try:
+                return _read(self._parts(kind), schema)
+            except FileNotFoundError:
+                continue
+        raise refusal(self.folder, "its parts go away while they are read; wait, and try again")
+
+    def _write_part(self, kind: str, rows: pa.Table) -> None:
+        path = self.folder / "parts" / f"{kind}-{time.time_ns():020d}-{secrets.token_hex(4)}.parquet"
+        with whole_file(path) as draft:
+            pq.write_table(rows, draft)
+
+
+def _read(parts: Iterable[Path], schema: pa.Schema) -> pa.Table:
+    """Rows of files; FileNotFoundError where one has gone."""
+    tables = [schema.empty_table()]
+    for part in parts:
+        try:
+            rows = pq.ParquetFile(part, memory_map=False).read(columns=schema.names)
+        except FileNotFoundError:
+            raise
+        except (OSError, pa.ArrowException):
+            raise refusal(part, "is damaged; remove it, and its tasks are computed again") from None
+        if rows.schema.names != schema.names:
+            raise refusal(part, "has other columns than this version writes; look at it with the one that made it")
+        tables.append(rows)
+    return pa.concat_tables(tables)
+
+
+def header_of(title: str, about: str, tasks: Sequence[Task]) -> Header:
+    """What the folder of these tasks says, as computed by this process's version."""
+    counts: dict[str, int] = {}
+    kinds: dict[str, str] = {}
+    cases: dict[str, dict[str, None]] = {}
+    for task in tasks:
+        counts[task.group] = counts.get(task.group, 0) + 1
+        kinds[task.group] = task.kind
+        cases.setdefault(task.group, {})[task.case] = None
+    ordered = {group: list(its) for group, its in cases.items()}
+    return Header(title, counts, kinds, ordered, version(), about, commit())
+
+
+def cannot_write(folder: Path, error: OSError) -> InputError:
+    """The line for a full disk and the like."""
+    why = error.strerror or type(error).__name__
+    return InputError(
+        f"{quoted(folder)}: cannot be written ({why}); what is there is kept: free some room, and give the same command"
+    )
+
+
+def _write(path: Path, content: bytes) -> None:
+    with whole_file(path) as draft:
+        draft.write_bytes(content)

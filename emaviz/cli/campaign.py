@@ -1,0 +1,130 @@
+"""`emaviz campaign`: the many tasks of a plan, resumable; how far it is; what its rows say."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from pathlib import Path
+
+from ema_model.campaign import Status, Store, duration, estimate_s, load_plan, plan_path, run_plan, scheduler
+from ema_model.campaign.plan import Plan
+from ema_model.errors import InputError
+from ema_model.files.refusal import shown
+from emaviz.cli import files, options, output
+from emaviz.cli.numbers import whole
+from emaviz.text.campaign import progress_table, report_text
+
+HELP = "compute the many tasks of a plan, in processes or on a Dask cluster; status and report of one"
+_STATUS, _REPORT = "status", "report"
+_PLAN = files.Input("a plan (.toml)", is_file=lambda name: bool(Path(name).suffix))
+
+
+def _address(text: str) -> str:
+    """The type of --scheduler."""
+    if not re.fullmatch(r"(tcp|tls|ws|wss|ucx)://\S+:\d+", text):
+        raise argparse.ArgumentTypeError(f"must be an address such as tcp://127.0.0.1:8786, not {shown(text)!r}")
+    return text
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """PLAN with where its rows go and who computes them; or status and report with a campaign's folder."""
+    parser.usage = (
+        "emaviz campaign PLAN --out DIR [--scheduler tcp://HOST:PORT] [--workers N] [--dry-run] [--retry]\n"
+        "       emaviz campaign status|report DIR [--json FILE.json]"
+    )
+    parser.add_argument("plan", type=_PLAN, metavar="PLAN", help="its file, or a shipped one's name; or status, report")
+    parser.add_argument("folder", nargs="?", type=files.Folder(), metavar="DIR", help="of status and report")
+    parser.add_argument("--out", dest="out", type=files.Folder(), metavar="DIR", help="where the rows are kept")
+    parser.add_argument(
+        "--scheduler", type=_address, metavar="tcp://HOST:PORT", help="of Dask; without it, processes here"
+    )
+    parser.add_argument("--workers", type=whole(1, 10_000), metavar="N", help="processes here; all cores without it")
+    parser.add_argument("--dry-run", action="store_true", help="say what would be computed, and how long it takes")
+    parser.add_argument("--retry", action="store_true", help="compute again what ended in an error")
+    options.add_json(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Computes, or tells."""
+    told = arguments.plan in (_STATUS, _REPORT)
+    if told != (arguments.folder is not None) or told == (arguments.out is not None):
+        raise InputError("campaign takes PLAN --out DIR, or status DIR, or report DIR (see emaviz campaign --help)")
+    if arguments.plan == _STATUS:
+        return _status(arguments)
+    if arguments.plan == _REPORT:
+        return _report(arguments)
+    if arguments.scheduler and arguments.workers:
+        raise InputError("--workers is of processes here; a cluster has the workers that were begun for it")
+    plan = load_plan(plan_path(arguments.plan))
+    return _dry_run(plan, arguments) if arguments.dry_run else _run(plan, arguments)
+
+
+def _run(plan: Plan, arguments: argparse.Namespace) -> int:
+    progress = output.Progress()
+    progress.show("beginning")
+    try:
+        status = run_plan(
+            plan,
+            arguments.out,
+            scheduler(arguments.scheduler, arguments.workers),
+            retry=arguments.retry,
+            on_progress=lambda at: progress.show(at.text),
+        )
+    finally:
+        progress.done()
+    print(_ended(status, arguments.out))
+    output.write_json(arguments.json, _numbers(Store(arguments.out)), 0, output.configuration(arguments))
+    return 0
+
+
+def _ended(status: Status, folder: str) -> str:
+    failed = f", {status.errors} of them errors" if status.errors else ""
+    there = f", {status.there} were there" if status.there else ""
+    return f"{folder}: {status.total} tasks, {status.computed} computed now{failed}{there}"
+
+
+def _dry_run(plan: Plan, arguments: argparse.Namespace) -> int:
+    """What there is to do, by the seconds that such tasks took where some are there, else by rough ones."""
+    try:
+        store = Store(arguments.out)
+    except InputError:  # nothing there yet
+        store = None
+    there = store.names(errors=not arguments.retry) if store else set()
+    known = store.seconds() if store else {}
+    workers = scheduler(arguments.scheduler, arguments.workers).workers
+    total = estimate_s(plan, there, workers, known)
+    groups = {task.group: task.kind for task in plan.tasks}
+    for group, kind in groups.items():
+        tasks = [task for task in plan.tasks if task.group == group]
+        left = sum(task.name not in there for task in tasks)
+        how = "measured" if group in known else "rough"
+        seconds = estimate_s(plan, there | {t.name for t in plan.tasks if t.group != group}, 1, known)
+        print(f"{group:28}{kind:10}{left:8} of {len(tasks)}   {duration(seconds)} on one core ({how})")
+    print(f"{workers} workers: about {total / 3600.0:.2g} h ({duration(total)})")
+    numbers = {"tasks": len(plan.tasks), "there": len(there), "workers": workers, "seconds": total}
+    output.write_json(arguments.json, numbers, 0, output.configuration(arguments))
+    return 0
+
+
+def _status(arguments: argparse.Namespace) -> int:
+    store = Store(arguments.folder)
+    print(progress_table(store))
+    output.write_json(arguments.json, _numbers(store), 0, output.configuration(arguments))
+    return 0
+
+
+def _report(arguments: argparse.Namespace) -> int:
+    from emaviz.report.campaign import write_campaign_report  # plotly takes a second to import
+
+    store = Store(arguments.folder)
+    print(report_text(store))
+    path = Path(arguments.folder) / "report.html"
+    write_campaign_report(store, path)
+    output.write_json(arguments.json, _numbers(store), 0, output.configuration(arguments))
+    return 0
+
+
+def _numbers(store: Store) -> dict:
+    return {"title": store.header.title, "version": store.header.version, "commit": store.header.commit} | {
+        "groups": store.progress()
+    }

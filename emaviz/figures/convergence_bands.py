@@ -1,0 +1,38 @@
+"""How many searches converge: the median of their best errors, and the band that nine of ten keep to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import plotly.graph_objects as go
+
+from emaviz.colours import ALGORITHMS
+from emaviz.figures import theme
+from emaviz.figures.error_distribution import colour
+
+_LEAST_A = 1e-9  # a logarithmic axis has no zero
+
+
+def figure(histories: Mapping[str, Sequence[Sequence[float]]], *, dark: bool = False) -> go.Figure:
+    """histories: A, by algorithm or case, of each search by iteration; one that ended keeps its level."""
+    chart = theme.new("Best error of each iteration: median, and 5 to 95 %", "Iteration", "rmse [A]", dark=dark)
+    for i, (name, given) in enumerate(histories.items()):
+        length = max(map(len, given))
+        whole = np.array([[*one, *[one[-1]] * (length - len(one))] for one in given], dtype=float)
+        low, middle, high = np.percentile(np.maximum(whole, _LEAST_A), [5, 50, 95], axis=0)
+        own = ALGORITHMS.get(name, colour(i))
+        steps = np.arange(length)
+        band = {"line": {"width": 0}, "hoverinfo": "skip", "showlegend": False, "mode": "lines"}
+        chart.add_trace(go.Scatter(x=steps, y=high, **band))
+        chart.add_trace(go.Scatter(x=steps, y=low, fill="tonexty", fillcolor=_faint(own), **band))
+        line = {"color": own, "width": 2}
+        chart.add_trace(go.Scatter(x=steps, y=middle, mode="lines", name=theme.plain(name), line=line))
+    chart.update_layout(showlegend=len(histories) > 1)
+    chart.update_yaxes(type="log")
+    return chart
+
+
+def _faint(colour: str) -> str:
+    red, green, blue = (int(colour[at : at + 2], 16) for at in (1, 3, 5))
+    return f"rgba({red},{green},{blue},0.18)"

@@ -1,0 +1,1 @@
+"""Campaigns: their progress and tables, and a row as a run."""

@@ -1,0 +1,164 @@
+"""Campaigns on the page: folders with rows, and a row computed again as a run, with its recording."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from ema_model.campaign.given import Given, given
+from ema_model.campaign.kinds import KINDS
+from ema_model.campaign.store import Store
+from ema_model.campaign.task import Task
+from ema_model.comparison import compare
+from ema_model.discovery import discover
+from ema_model.errors import InputError
+from ema_model.files.refusal import shown
+from ema_model.identification.objective import Objective
+from ema_model.identification.run import steps
+from ema_model.recordings import Measurement
+from emaviz.session.data_folder import DataFolder
+from emaviz.session.events import notify
+from emaviz.session.session import Session
+from emaviz.session.worker import Steps
+
+_HEADER = "campaign.json"
+_DEPTHS = ("*", "*/*")  # below the data folder
+
+
+@dataclass
+class CampaignEvents:
+    """What the screen listens to; called on the compute thread, so listeners only hand over."""
+
+    said: list[Callable[[str], None]] = field(default_factory=list)
+    opened: list[Callable[[Path, Measurement], None]] = field(default_factory=list)  # the recording, and its run
+
+
+class Campaigns:
+    """The campaigns below the data folder, and those that the command line has named.  InputError as `Store`."""
+
+    def __init__(self, session: Session, data: DataFolder, given: Sequence[Path] = ()) -> None:
+        self.events = CampaignEvents()
+        self._session, self._data = session, data
+        self._given = [Store(path).folder for path in given]
+
+    def names(self) -> list[str]:
+        """By which they are opened: those of the command line, then those of the data folder."""
+        return list(self._folders())
+
+    def store(self, name: str) -> Store:
+        """The campaign of that name."""
+        folders = self._folders()
+        if name not in folders:
+            raise InputError(f"{shown(name)}: no such campaign; read the folder again")
+        return Store(folders[name])
+
+    def open_row(self, campaign: str, row_name: str) -> bool:
+        """Computes a row's task again and writes its recording; False while another long run goes on."""
+        store = self.store(campaign)
+        for kind in set(store.header.kinds.values()):
+            for row in store.table(kind).to_pylist():
+                if row["name"] == row_name:
+                    return self._session.worker.start(self._steps(store.task(row)))
+        raise InputError(f"{shown(row_name)}: no such row; read the campaign again")
+
+    def _folders(self) -> dict[str, Path]:
+        found = {str(path): path for path in self._given}
+        for depth in _DEPTHS:
+            for header in sorted(self._data.folder.glob(f"{depth}/{_HEADER}")):
+                if self._data.holds(header):
+                    found.setdefault(str(header.parent.relative_to(self._data.folder)), header.parent)
+        return found
+
+    def _steps(self, task: Task) -> Steps:
+        try:
+            self._say(f"{task.group}, {task.case or 'one case'}, seed {task.seed}: making its recordings …")
+            yield
+            it = given(task)
+            path = self._path(task)
+            yield from _RECORDED[task.kind](task, it, path, self._tell)
+            self._say(f"{path.name}: {task.group}, {task.case or 'one case'}, seed {task.seed}")
+            notify(self.events.opened, path, it.fitted[0])
+        except FloatingPointError as error:
+            raise InputError(str(error)) from None
+
+    def _path(self, task: Task) -> Path:
+        from emaviz.recording.paths import free_name  # rerun takes a second to import
+
+        return free_name(self._session.folder, f"{datetime.now():%Y%m%d-%H%M%S}-{task.kind}-{task.name[:8]}", ".rrd")
+
+    def _tell(self, text: str) -> None:
+        self._say(text)
+        self._session.worker.breathe()
+
+    def _say(self, text: str) -> None:
+        notify(self.events.said, text)
+
+
+def _configuration(task: Task) -> dict[str, Any]:
+    """What the recording says of its task."""
+    return {"group": task.group, "case": task.case, "seed": task.seed, "task": task.name, **task.settings}
+
+
+def _identified(task: Task, it: Given, path: Path, tell: Callable[[str], None]) -> Steps:
+    from emaviz.recording.story import IdentificationStory
+
+    own = msgspec.convert(task.settings, KINDS["identify"].settings)
+    objective = Objective(it.fitted, it.actuator, circuit=own.circuit, fitness=own.fitness)
+    source = "measurement" if it.truth is None else "reference"
+    story = IdentificationStory(path, objective, it.fitted[0], source, it.truth, _configuration(task), [own.algorithm])
+    try:
+        search = steps(
+            objective,
+            own.algorithm,
+            population=own.population,
+            iterations=own.iterations,
+            seed=task.seed,
+            truth=it.truth,
+            parameters_known=own.parameters_known,
+            polish=own.polish,
+        )
+        while True:
+            at = next(search)
+            story.iteration(at)
+            tell(f"{at.algorithm} {at.iteration} of {at.iterations}: rmse {at.rmse:.4f} A")
+            yield
+    except StopIteration as finished:
+        story.finish(finished.value)
+    finally:
+        story.close()
+    if story.failed:
+        raise InputError(story.failed)
+
+
+def _compared(task: Task, it: Given, path: Path, tell: Callable[[str], None]) -> Steps:
+    from emaviz.recording.comparison import write_comparison
+
+    own = msgspec.convert(task.settings, KINDS["compare"].settings)
+    found = compare(it.fitted, it.actuator, calibrate=own.calibrate, holdout=it.held, on_progress=tell)
+    yield
+    write_comparison(found, path, _configuration(task))
+
+
+def _discovered(task: Task, it: Given, path: Path, tell: Callable[[str], None]) -> Steps:
+    from emaviz.recording.discovery.write import write_discovery
+
+    own = msgspec.convert(task.settings, KINDS["discover"].settings)
+    signals = ["current_A"] if own.signals == "current" else None
+    found = discover(
+        it.fitted,
+        it.actuator,
+        holdout=it.held,
+        signals=signals,
+        most_effects=own.most_effects,
+        on_progress=tell,
+    )
+    yield
+    write_discovery(found, path, _configuration(task))
+
+
+_RECORDED = {"identify": _identified, "compare": _compared, "discover": _discovered}

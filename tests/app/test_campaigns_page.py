@@ -1,0 +1,136 @@
+"""Campaigns on the page: found, told, and a row opened as a run with its recording."""
+
+from __future__ import annotations
+
+import threading
+
+import pytest
+from support.cheap_plans import written
+from support.on_page import wait_until
+
+from ema_model.actuator import load_actuator
+from ema_model.campaign import load_plan
+from ema_model.campaign.execute import common
+from ema_model.campaign.given import given
+from ema_model.campaign.kinds import KINDS
+from ema_model.campaign.store import Store, header_of
+from ema_model.errors import InputError
+from emaviz.page.campaigns.controls import label, tables
+from emaviz.recording import read
+from emaviz.session.campaigns import Campaigns
+from emaviz.session.data_folder import DataFolder
+from emaviz.session.session import Session
+
+GROUPS = """
+[groups.worn]
+CHEAP
+faults = { k1 = 0.3 }
+noise_A = 0.2
+seeds = [4]
+
+[groups.shown]
+does = "compare"
+runs = "short"
+seeds = [1]
+"""
+
+
+def computed(folder, at):
+    """A campaign of two kinds, computed here without a worker's settings."""
+    plan = load_plan(written(at, GROUPS))
+    store = Store.writing(folder, header_of("A worn one", "", plan.tasks), plan.text, plan.tasks)
+    for task in plan.tasks:
+        kind = KINDS[task.kind]
+        settings = kind.settings(**task.settings)
+        store.append(task.kind, [common(task) | kind.run(given(task), settings, task.seed)])
+    store.close()
+    return Store(folder)
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory):
+    folder = DataFolder(tmp_path_factory.mktemp("data"))
+    (folder.folder / "campaigns").mkdir()
+    computed(folder.folder / "campaigns" / "first", tmp_path_factory.mktemp("plan"))
+    return folder
+
+
+@pytest.fixture
+def session(data):
+    session = Session(load_actuator(), data.recordings)
+    yield session
+    session.close()
+
+
+def test_campaigns_are_found_below_the_data_folder_and_where_they_are_named(session, data, tmp_path):
+    assert Campaigns(session, data).names() == ["campaigns/first"]
+    plan = load_plan(written(tmp_path, GROUPS))
+    Store.writing(tmp_path / "other", header_of("Other", "", plan.tasks), plan.text, plan.tasks).close()
+    both = Campaigns(session, data, [tmp_path / "other"])
+    assert both.names() == [str(tmp_path / "other"), "campaigns/first"]
+    assert both.store(str(tmp_path / "other")).header.title == "Other"
+    with pytest.raises(InputError, match="no such campaign"):
+        both.store("../../etc")
+    with pytest.raises(InputError, match="is no campaign's folder"):
+        Campaigns(session, data, [tmp_path])
+
+
+def test_a_link_that_leads_outside_is_no_campaign(session, data, tmp_path):
+    plan = load_plan(written(tmp_path, GROUPS))
+    Store.writing(tmp_path / "secret", header_of("Secret", "", plan.tasks), plan.text, plan.tasks).close()
+    link = data.folder / "campaigns" / "link"
+    link.symlink_to(tmp_path / "secret")
+    try:
+        assert Campaigns(session, data).names() == ["campaigns/first"]
+    finally:
+        link.unlink()
+
+
+@pytest.mark.parametrize("kind", ["identify", "compare"])
+def test_a_row_opens_as_a_run_with_its_recording(session, data, kind):
+    campaigns = Campaigns(session, data)
+    (row,) = campaigns.store("campaigns/first").table(kind).to_pylist()
+    done, told = threading.Event(), []
+    campaigns.events.opened.append(lambda *opened: (told.append(opened), done.set()))
+    session.events.told.append(lambda *line: (told.append(line), done.set()))
+    assert campaigns.open_row("campaigns/first", row["name"])
+    assert done.wait(120.0)
+    ((path, run),) = told
+    assert path.parent == data.recordings and run.samples == 501
+    recording = read(path)
+    assert recording.complete
+    if kind == "identify":
+        found = recording.properties["found"]["do"]
+        assert found["k"] == pytest.approx([row[name] for name in ("k1", "k2", "k3", "k4", "k5", "k6", "k7", "k8")])
+    assert "current_A" in recording.signals["reference" if kind == "identify" else "measurement"]
+    wait_until(lambda: not session.worker.busy)
+    with pytest.raises(InputError, match="no such row"):
+        campaigns.open_row("campaigns/first", "nothing")
+
+
+def test_what_the_list_says_of_a_row(data):
+    store = Store(data.folder / "campaigns" / "first")
+    (row,) = store.table("identify").to_pylist()
+    assert label(row, 1) == f"1 · Err {row['error_wrapped_percent']:.2f} % · k1=0.3 · seed 4"
+    assert label(row | {"error": "broken"}, 2) == "2 · error · k1=0.3 · seed 4"
+    (row,) = store.table("compare").to_pylist()
+    assert label(row | {"adequate": False, "variable": "load"}, 1) == "1 · load · seed 1"
+    shown = tables(store)
+    assert "A worn one" in shown and "<td>worn</td>" in shown and "Comparison" in shown
+
+
+@pytest.mark.browser
+def test_a_row_is_chosen_and_opened_on_the_page(watched, app, tmp_path):
+    page = watched
+    computed(app.session.folder.parent / "campaigns" / "<b>here", tmp_path)
+    page.get_by_role("tab", name="Recordings").click()
+    page.get_by_text("Campaigns", exact=True).click()
+    page.get_by_role("button", name="Look for campaigns again").click()
+    page.get_by_text("2 of 2 tasks have a row").wait_for()
+    before = set(app.session.folder.glob("*.rrd"))
+    page.get_by_role("button", name="Open as a run").click()
+    wait_until(lambda: set(app.session.folder.glob("*.rrd")) - before, 120.0)
+    frame = page.frame_locator("iframe.emaviz-rerun")
+    frame.locator("#the_canvas_id").wait_for(timeout=120_000, state="attached")
+    page.get_by_role("tab", name="Campaign", exact=True).click()
+    page.get_by_text("A worn one").wait_for()

@@ -1,0 +1,26 @@
+"""Tasks that are computed in the tests' own process leave it as it was."""
+
+from __future__ import annotations
+
+import os
+
+import numba
+import pytest
+
+from ema_model.campaign.execute import ENVIRONMENT
+from ema_model.kernel_cache import kept
+from ema_model.simulation import one_stack
+
+
+@pytest.fixture(autouse=True)
+def _as_before(monkeypatch):
+    """What `execute.prepare` sets for a worker's process, taken back."""
+    for name in ENVIRONMENT:
+        monkeypatch.setenv(name, os.environ.get(name, ""))
+        if not os.environ[name]:
+            monkeypatch.delenv(name)
+    monkeypatch.setattr(kept, "turns", kept.turns)
+    monkeypatch.setattr(one_stack, "_only_library", one_stack._only_library)
+    threads = numba.get_num_threads()
+    yield
+    numba.set_num_threads(threads)

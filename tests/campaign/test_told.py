@@ -1,0 +1,154 @@
+"""What rows say together: tables for a terminal and for Markdown, and the report with its figures."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from support.cheap_plans import written
+
+from ema_model.campaign import Store, load_plan
+from ema_model.campaign.execute import common
+from ema_model.campaign.kinds.discover import tally
+from ema_model.campaign.kinds.identify import covered
+from ema_model.campaign.store import header_of
+from ema_model.campaign.summary import summaries
+from ema_model.faults import HEALTHY, NAMES
+from emaviz.report.campaign import write_campaign_report
+from emaviz.text.campaign import progress_table, report_text
+
+GROUPS = """
+[groups.found]
+CHEAP
+faults = [{ k1 = 0.2 }, { k6 = 0.3, k7 = 0.98 }]
+seeds = { from = 0, count = 4 }
+
+[groups.named]
+does = "discover"
+runs = "short"
+effects = [{}, { cogging_torque = { amplitude_Nm = 0.01 } }]
+seeds = { from = 0, count = 3 }
+
+[groups.shown]
+does = "compare"
+runs = "short"
+seeds = { from = 0, count = 2 }
+"""
+
+
+def identified(task, i):
+    k = dict(zip(NAMES, common(task)["k_true"]))
+    found = {name: value + 0.01 * i for name, value in k.items()}
+    return {
+        **found,
+        **{f"{name}_low": value - 0.015 for name, value in found.items()},
+        **{f"{name}_high": value + 0.015 for name, value in found.items()},
+        "algorithm": "do",
+        "population": 4,
+        "iterations": 2,
+        "error_percent": float(i),
+        "error_wrapped_percent": float(i),
+        "rmse_A": 0.1,
+        "healthy": i == 0,
+        "alarms": ["k1"] * (i > 0),
+        "adequate": True,
+        "ambiguous": [],
+        "evaluations": 12,
+        "rmse_history_A": [1.0, 0.5, 0.1 + 0.1 * i],
+    }
+
+
+def discovered(task, i):
+    hidden = list(task.simulated.effects)
+    named = {0: ["cogging_torque"], 1: ["hinge_moment"], 2: []}[i]
+    return {
+        "signals": "all",
+        "verdict": "effects_found" if named and hidden else "adequate",
+        "effects": named if hidden else [],
+        "same_as": [""] if named and hidden else [],
+        "ladder": [2.0, 1.0],
+        "holdout_ladder": [2.0, None],
+    }
+
+
+def compared(task, i):
+    return {"adequate": i == 0, "signal": "current_A", "rmse": 2.0, "noise_floor": 1.0, "orders": [12.0]} | (
+        {"variable": "motor_speed", "modulator": "1"} if i else {}
+    )
+
+
+ANSWER = {"identify": identified, "discover": discovered, "compare": compared}
+
+
+@pytest.fixture
+def store(tmp_path):
+    """A campaign with an answer of each kind, and an error."""
+    plan = load_plan(written(tmp_path, GROUPS))
+    header = header_of(plan.title, "About it.", plan.tasks)
+    store = Store.writing(tmp_path / "out", header, plan.text, plan.tasks)
+    for task in plan.tasks:
+        how = {"elapsed_s": 1.5, "worker": "here:1", "memory_MB": 300.0, "finished_s": 1e9 + task.seed}
+        row = common(task) | ANSWER[task.kind](task, task.seed) | how
+        if task.group == "shown" and task.seed == 1:
+            row = common(task) | how | {"error": "FloatingPointError: it | diverged"}
+        store.append(task.kind, [row])
+    store.close()
+    return Store(tmp_path / "out")
+
+
+def test_tables_count_what_was_right(store):
+    compare, discover, identify = summaries(store)
+    cells = [dict(zip(identify.heads, line)) for line in identify.lines]
+    assert [cell["case"] for cell in cells] == ["all", "k1=0.2", "k6=0.3 k7=0.98"]
+    assert (cells[0]["tasks"], cells[0]["healthy"], cells[0]["with alarms"]) == ("8", "2", "6")
+    assert (cells[1]["Err % median"], cells[1]["worst"]) == ("1.50", "3.00")
+    assert cells[1]["90 % intervals that hold k1 … k8, %"] == "50 50 50 50 50 50 0 50"
+    cells = [dict(zip(discover.heads, line)) for line in discover.lines]
+    assert cells[0]["verdicts"] == "adequate 4, effects_found 2"
+    assert [cells[2][name] for name in ("showable", "right one first", "exactly", "wrong, sure", "abstained")] == list(
+        "31111"
+    )
+    cells = [dict(zip(compare.heads, line)) for line in compare.lines]
+    assert (cells[0]["tasks"], cells[0]["errors"], cells[0]["strongest order"]) == ("2", "1", "12: 1")
+
+
+def test_a_name_counts_with_what_cannot_be_told_from_it():
+    row = {"hidden": ["a", "b"], "ladder": [1.0], "holdout_ladder": [1.3]}
+    both = tally(row | {"effects": ["x", "b"], "same_as": ["a+y", ""]})
+    assert both["first"] and both["exact"] and not both["floor"] and not both["wrong"]
+    assert not tally(row | {"effects": ["x"], "same_as": ["a+y+z"]})["first"]  # a group of four says little
+    assert tally(row | {"effects": ["x"], "same_as": [""]})["wrong"]
+
+
+def test_an_interval_of_the_phase_goes_round():
+    row = {"k_true": [*HEALTHY[:6], 0.02, 0.5]}
+    row |= {f"{name}_low": 0.0 for name in NAMES} | {f"{name}_high": 1.0 for name in NAMES}
+    assert all(covered(row))
+    assert covered(row | {"k7_low": 0.97, "k7_high": 1.03})[6]
+    assert not covered(row | {"k7_low": 0.9, "k7_high": 0.99})[6]
+
+
+def test_markdown_tells_version_and_commit(store):
+    told = report_text(store)
+    assert re.search(r"Made with emaviz \S+ \(commit \S+, sources [0-9a-f]{12}\), numpy ", told)
+    assert "| found | k1=0.2 | 4 | 0 | 1.50 |" in told
+    assert "- shown, , seed 1: FloatingPointError: it | diverged" in told or "seed 1: FloatingPointError" in told
+    assert "plan: done" in progress_table(store)
+
+
+def test_the_report_is_one_file_with_its_figures(store, tmp_path):
+    path = tmp_path / "report.html"
+    write_campaign_report(store, path)
+    text = path.read_text(encoding="utf-8")
+    for anchor in ("tasks", "results", "distributions", "answers", "convergence", "errors", "effort"):
+        assert f'<section id="{anchor}">' in text
+    assert text.count('class="figure"') == 1 + 8 + 2 + 1 + 2
+    assert "FloatingPointError" in text
+
+
+def test_an_empty_campaign_has_a_report(tmp_path):
+    plan = load_plan(written(tmp_path, GROUPS))
+    Store.writing(tmp_path / "out", header_of("T", "", plan.tasks), plan.text, plan.tasks).close()
+    store = Store(tmp_path / "out")
+    write_campaign_report(store, tmp_path / "report.html")
+    assert "0 of 16 tasks have a row" in progress_table(store) and report_text(store)

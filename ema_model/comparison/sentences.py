@@ -40,11 +40,16 @@ def amount(value: float, unit: str, digits: int = 2) -> str:
     return f"{text} {prefix}{unit}".rstrip()
 
 
+def goes_with(variable: str, modulator: str) -> str:
+    """'goes with the load, with the direction of motion'."""
+    return f"{_EXPLAINED[variable]}{_MODULATED[modulator]}"
+
+
 def explanation_sentence(signal: str, variable: str, modulator: str, r2: float) -> str:
     """One line on what explains a residual, and how much of it."""
     title = in_sentence(SIGNALS[signal].title)
     share = f"{100.0 * max(0.0, r2):.0f} % of what is left"
-    return f"The {title}'s error {_EXPLAINED[variable]}{_MODULATED[modulator]} ({share})."
+    return f"The {title}'s error {goes_with(variable, modulator)} ({share})."
 
 
 def order_sentence(order: int, amplitude: float, unit: str) -> str:

@@ -162,7 +162,7 @@ def holdout_fit(data: Data, found: Fit) -> tuple[float, dict[str, float]]:
 def resimulated(data: Data, actuator: Actuator) -> tuple[float, dict[str, float]]:
     """`floor_ratio` and `rms_by_signal` of recordings of which only the starts are fitted."""
     plant = data.plant(actuator)
-    calibration = calibrate(plant, data.floors, free=(), signals=data.signals)
+    calibration = calibrate(plant, data.floors, free=(), signals=data.signals, start={})
     ratio = floor_ratio(data, plant, calibration.signals)
     return ratio if math.isfinite(ratio) else math.inf, rms_by_signal(data, plant, calibration.signals)
 

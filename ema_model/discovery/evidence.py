@@ -35,6 +35,8 @@ def colour(data: Data, plant: Plant, residual: Array) -> Array:
     found = np.ones(len(residual))
     for its in parts.values():
         whole = [residual[rows] for rows in its]
+        if np.mean(np.concatenate(whole) ** 2) <= 1.0:
+            continue  # within what sensors and the model's own limits leave: the floor tells how that is correlated
         pieces = [piece for one in whole for piece in np.array_split(one, max(1, round(len(one) / _PIECE)))]
         density = max(1.0, _density(whole), _density(pieces))
         for rows in its:

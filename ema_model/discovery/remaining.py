@@ -35,15 +35,18 @@ class Left:
         return next((one for one in self.explained if one.significant), None)
 
 
-@lru_cache(maxsize=16)
 def at_floor(data: Data, found: Fit) -> bool:
-    """Whether a fit leaves no more than the floor's band, as `compare` has it."""
+    """Whether a fit leaves no more than the floor's band."""
+    return floor_ratio(data, found.plant, found.calibration.signals) <= BAND
+
+
+@lru_cache(maxsize=16)
+def lasts(data: Data, found: Fit) -> bool:
+    """Whether what is left of a signal lasts longer than noise does, as `compare` has it."""
     fitted = found.calibration.signals
-    if floor_ratio(data, found.plant, fitted) > BAND:
-        return False
     known: list[dict[str, Array]] = [{} for _ in fitted]
     residuals = residuals_of(found.plant, data.floors, fitted, known, found.calibration.actuator)
-    return not lasting(residuals, [name for name in data.signals if name in residuals.values])
+    return bool(lasting(residuals, [name for name in data.signals if name in residuals.values]))
 
 
 @lru_cache(maxsize=4)  # a walk asks before and after it has looked for the next effect

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ema_model.discovery.criteria import APART, DISAGREES, PHASES_APART
 from ema_model.discovery.evidence import colour, signals_of
 from ema_model.discovery.model_fit import Data, Fit
+from ema_model.effects import catalogue_name, find
 
 Array = NDArray[np.float64]
 
@@ -37,6 +38,8 @@ def disagreement(data: Data, found: Fit, key: str) -> Disagreement | None:
 
     names = [*found.calibration.parameters, *found.calibration.starts]
     own = [i for i, name in enumerate(names) if name.startswith(f"effects.{key}.")]
+    first = find(catalogue_name(key)).parameters[0]
+    strength = f"effects.{key}.{first.name}" if first.low <= 0.0 else ""  # the model is straight in it
     parts = [_apart(data, found, rows, own) for rows in parts_of(data, found)]
     worst, least = None, DISAGREES
     for place, i in enumerate(own):
@@ -46,6 +49,8 @@ def disagreement(data: Data, found: Fit, key: str) -> Disagreement | None:
         is_phase = names[i].endswith("phase_rad")
         limit = PHASES_APART if is_phase else APART * abs(one.value)
         tell = [(value, error) for value, error in tell if error < max(limit, _TELLS * abs(one.value))]
+        if not (is_phase or names[i] == strength):  # a step of its own size is beyond what is straight
+            tell = [(value, error) for value, error in tell if abs(value - one.value) < abs(one.value)]
         if len(tell) < 2:
             continue
         values, errors = np.array(tell).T

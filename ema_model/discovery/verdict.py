@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from ema_model.comparison.explain import Explanation
 from ema_model.discovery.path import Story
-from ema_model.discovery.remaining import at_floor
+from ema_model.discovery.remaining import at_floor, lasts
 from ema_model.discovery.result import Added
 
 
@@ -20,5 +20,6 @@ def verdict_of(story: Story, named: Sequence[Added], unknown: Explanation | None
     if not story.base.calibration.converged and not story.added:
         return "not_converged"  # an unfinished fit looks exactly like missing physics
     if done:
-        return "adequate" if unknown is None else "unknown_effect"
+        noise = unknown is None and not lasts(story.data, story.current)
+        return "adequate" if noise else "unknown_effect"
     return "partly_explained" if story.added else "unknown_effect"

@@ -56,6 +56,8 @@ def headline(found: Discovery) -> str:
 
 def remains(found: Discovery) -> str:
     """'4.0 times the floor remains, cause unknown, goes with the load'."""
+    if found.at_floor and found.unknown is None:
+        return "what remains is as small as the floor, but lasts longer than noise"
     goes = "" if found.unknown is None else f", {goes_with(found.unknown.variable, found.unknown.modulator)}"
     return f"{number(found.ladder[-1].rmse, 2)} times the floor remains, cause unknown{goes}"
 

@@ -96,7 +96,7 @@ def _actuator(document: dict[str, Any], where: str) -> Actuator:
         effects=_effects(tables["effects"], axes, tolerances, where),
         faults=_faults(tables["faults"], where),
         axes=axes,
-        step_s=_seconds(tables["model"], "step_s", 1e-5, where),
+        step_s=_seconds(tables["model"], "step_s", _usual_step(kinds), where),
         torque_known=_flag(tables["model"], "torque_known", where),
         filter_s=_seconds(tables["model"], "filter_s", 12e-3, where),
         mapping=_mapping(tables["recordings"], where),
@@ -224,6 +224,12 @@ def _axes(table: dict[str, Any], where: str) -> Axes:
     for extra in set(table) - {"motor", "user"}:
         raise InputError(f"{where}: [axes] has no {quoted(extra)!r}; it has motor, user")
     return Axes(*(_choice(table, key, "rotary", AXIS_KINDS, "axes", where) for key in ("motor", "user")))
+
+
+def _usual_step(kinds: dict[str, str]) -> float:
+    """Chopping takes steps of 10 µs; of a drive that has its current at once, only the motion is simulated."""
+    simulated = kinds["inverter"] == "current" and kinds["controller"] != "unknown"
+    return 5e-5 if simulated else Actuator.step_s
 
 
 def _seconds(table: dict[str, Any], name: str, usual: float, where: str) -> float:

@@ -53,6 +53,7 @@ def residuals_of(
                 block_s=window.block_s,
                 torque_constant=actuator.motor.torque_constant_Nm_A if actuator.torque_known else None,
                 known=error,
+                counts=one.counts,
                 is_map=plant.measurements[window.recording].is_map,
             )
         )

@@ -67,13 +67,13 @@ def orders(angle: Array, values: Array, turns: float, advance: Array | None = No
     pairs = [slice(2 * j + 1, 2 * j + 3) for j in range(len(tried))]
     white = np.array([float(coefficients[at] @ np.linalg.solve(covariance[at, at], coefficients[at])) for at in pairs])
     found = []
-    for h, at, chi2 in zip(tried, pairs, white / _colour(white)):
+    for h, at, chi2 in zip(tried, pairs, white / colour(white)):
         a, b = coefficients[at]
         found.append(Order(int(h), float(np.hypot(a, b)), float(np.arctan2(b, a)), float(chi2)))
     return sorted(found, key=lambda order: -order.amplitude)
 
 
-def _colour(chi2: Array) -> Array:
+def colour(chi2: Array) -> Array:
     """How many times stronger than white noise the noise is around each order, at least 1.
 
     The median over neighbouring orders does not see those few that stand out.

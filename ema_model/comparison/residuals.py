@@ -51,6 +51,7 @@ class Residuals:
     torque_constant: float | None = None  # N·m/A (N/A) of the motor, where current can be read as torque
     known: dict[str, Array] = field(default_factory=dict)  # the model's error that its three-phase twin shows
     adjustable: dict[str, Adjustable] = field(default_factory=dict)  # by signal, where it was fitted
+    counts: Array | None = None  # how much each block counts in a mean over time; all alike without it
     is_map: bool = False  # a static map: blocks are independent and have no time
 
     @property
@@ -100,5 +101,6 @@ def join(parts: Sequence[Residuals]) -> Residuals:
         block_s=max(part.block_s for part in parts),
         torque_constant=parts[0].torque_constant,
         known=together("known", 0.0),
+        counts=np.concatenate([np.ones(part.blocks) if part.counts is None else part.counts for part in parts]),
         is_map=all(part.is_map for part in parts),
     )

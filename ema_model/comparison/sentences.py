@@ -10,11 +10,16 @@ from ema_model.quantities.variables import MODULATORS, VARIABLES, is_turn, of_va
 from ema_model.recordings import SIGNALS
 
 
+def goes_with(variable: str, modulator: str) -> str:
+    """'goes with the load, with the direction of motion'."""
+    return f"{VARIABLES[variable].phrase}{MODULATORS[modulator].phrase}"
+
+
 def explanation_sentence(signal: str, variable: str, modulator: str, r2: float) -> str:
     """One line on what explains a residual, and how much of it."""
     title = in_sentence(SIGNALS[signal].title)
     share = f"{100.0 * max(0.0, r2):.0f} % of what is left"
-    return f"The {title}'s error {VARIABLES[variable].phrase}{MODULATORS[modulator].phrase} ({share})."
+    return f"The {title}'s error {goes_with(variable, modulator)} ({share})."
 
 
 def order_sentence(order: int, amplitude: float, of: Quantity) -> str:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.actuator.naming import on_axes
+from ema_model.comparison.criteria import BAND, SLOW
 from ema_model.comparison.explain import Explanation, explain, used_blocks
 from ema_model.comparison.orders import Order, residual_orders
 from ema_model.comparison.regions import worst_regions
@@ -26,7 +27,6 @@ from ema_model.recordings import SIGNALS
 Array = NDArray[np.float64]
 
 ORDER_OF_PRIMARY = ("current_A", "motor_torque_Nm", "user_position_rad", "motor_position_rad", "motor_speed_rad_s")
-_SLOW_RATIO = 2.0  # of the residual's means over 25 ms to their floor, from which on the model has failed
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,11 +51,10 @@ def judge(
     explained = explain(residuals, primary, actuator.axes)
     orders = residual_orders(residuals, primary)
     regions = worst_regions(residuals, primary, explained, actuator.axes)
-    failed = [
-        name for name in residuals.values if name != "motor_speed_rad_s" and slow_ratio(residuals, name) > _SLOW_RATIO
-    ]
     significant = [one for one in explained if one.significant]
-    adequate = not significant and not failed and (calibration is None or calibration.converged)
+    names = [name for name in residuals.values if name != "motor_speed_rad_s"]
+    within = over_floor(residuals, names) <= BAND and not lasting(residuals, names)
+    adequate = not significant and within and (calibration is None or calibration.converged)
     shown = actuator.axes.signal(primary)
     sentences: list[str] = []
     if not adequate:
@@ -79,6 +78,22 @@ def judge(
 def _order(order: Order, primary: str, residuals: Residuals, actuator: Actuator) -> str:
     """The strongest order, as a torque where the signal is a current."""
     return order_sentence(order.order, order.amplitude, of_residual(primary, actuator.axes, residuals.torque_constant))
+
+
+def over_floor(residuals: Residuals, names: Sequence[str]) -> float:
+    """rms of the residual over its floor, pooled over signals; where the drive is at its limits nothing is counted."""
+    squared = counted = 0.0
+    weights = np.ones(residuals.blocks) if residuals.counts is None else residuals.counts
+    for name in names:
+        used = np.isfinite(residuals.values[name]) & ~residuals.saturated
+        squared += float(weights[used] @ (residuals.values[name][used] / residuals.sigma[name][used]) ** 2)
+        counted += float(weights[used].sum())
+    return float(np.sqrt(squared / counted)) if counted else 0.0
+
+
+def lasting(residuals: Residuals, names: Sequence[str]) -> list[str]:
+    """Signals of which more is left over 25 ms than their floor allows."""
+    return [name for name in names if slow_ratio(residuals, name) > SLOW]
 
 
 def slow_ratio(residuals: Residuals, name: str) -> float:

@@ -13,20 +13,25 @@ import numpy as np
 
 from ema_model.actuator import Actuator, load_actuator
 from ema_model.comparison.explain import Explanation
-from ema_model.discovery.harmonics import with_further_orders
+from ema_model.discovery.claims import against, still_against
+from ema_model.discovery.criteria import LARGEST_GROUP, LEAST_BIC, SECOND, TIE
+from ema_model.discovery.evidence import evidence
+from ema_model.discovery.harmonics import Further, further_orders
 from ema_model.discovery.next_experiment import next_experiment
-from ema_model.discovery.path import Story, begun, with_drops
-from ema_model.discovery.refit import LEAST_BIC, Trial, fitted_count, pays
+from ema_model.discovery.path import Story, begun, refreshed, with_drops
+from ema_model.discovery.refit import Trial, fitted_count, pays
+from ema_model.discovery.remaining import at_floor
 from ema_model.discovery.result import Candidate, Discovery, Experiment
-from ema_model.discovery.sentences import as_well, masked, untold
+from ema_model.discovery.sentences import as_well, held_back, masked, untold
+from ema_model.discovery.uncertainty import with_intervals
 from ema_model.discovery.unknown import curve_instead, is_a_shape
+from ema_model.discovery.verdict import verdict_of
 from ema_model.effects import CATALOGUE, find
 from ema_model.recordings import Measurement
 
 Progress = Callable[[str], None]
 
 _REFITTED_SHARE, _MOST_REFITTED = 0.25, 6  # of the best score; of candidates
-_TIE = 10.0  # of χ², within which rivals cannot be told apart
 
 
 def discover(
@@ -92,9 +97,11 @@ def walk(
         accepted = [trial for trial in trials if pays(story.current, trial, story.data, story.held)]
         if not accepted:
             break
-        best, others = _chosen(accepted)
+        claim = _claimed(story, accepted, tell)
+        if claim is None:
+            break
+        best, others, more = claim
         curve = curve_instead(story.data, story.held, story.current, best, left.explanation, tell)
-        more = None if curve else _further(story, best, tell)
         orders = [settings["order"] for settings in more.effects.values()] if more else []
         if curve or is_a_shape([best.candidate.settings.get("order", 0.0), *orders]):
             break
@@ -104,27 +111,58 @@ def walk(
         if more:
             story.add(more, f"+ {best.candidate.name} of orders {', '.join(f'{order:g}' for order in orders)}")
     _drop_idle(story, tell)
+    _drop_doubtful(story, tell)
+    story.settle(tell)
     unknown = story.left().explanation
     if unknown is not None and not _named(story):
         unknown = _with_curve(story, curve, unknown, tell)
+        story.settle(tell)
     return Walked(first, rivals, unknown)
 
 
-def _chosen(accepted: Sequence[Trial]) -> tuple[Trial, list[Trial]]:
+def _claimed(story: Story, accepted: Sequence[Trial], tell: Progress) -> tuple[Trial, list[Trial], Trial | None] | None:
+    """The best trial that nothing speaks against, those that cannot be told from it, and further orders of it.
+
+    None where none is to be claimed.  A trial that tells far less than one that is refused only bends as that one does.
+    """
+    left = [trial for trial in accepted if trial.drop > SECOND * accepted[0].drop]
+    while left:
+        best, others = _chosen(story, left)
+        further = _further(story, best, tell)
+        more, reason = further and further.trial, ""
+        if len(others) >= LARGEST_GROUP:
+            reason = f"{len(others)} others tell as much"
+        elif further is not None and not further.stands_out:
+            reason = f"its order {best.candidate.settings['order']:g} tells no more than its neighbours"
+        for whole in (more, best):
+            if whole is not None and not reason:
+                keys = [*best.effects, *(whole.effects if whole is more else ())]
+                reason = against(story.data, story.current, whole.fit, keys)
+                if not reason:
+                    return best, others, more if whole is more else None
+                if whole is more:
+                    reason = ""
+        story.refused[best.candidate.name] = reason
+        left = [trial for trial in left if trial is not best]
+    return None
+
+
+def _chosen(story: Story, accepted: Sequence[Trial]) -> tuple[Trial, list[Trial]]:
     """The best of the trials, and those that cannot be told from it.
 
     Of what cannot be told apart, a parameter outside its tolerance comes after an effect.
     """
-    tied = [trial for trial in accepted if accepted[0].drop - trial.drop < _TIE]
+    first = accepted[0]
+    tied = [trial for trial in accepted if trial is first or evidence(story.data, trial.fit, first.fit) < TIE]
     best = next((trial for trial in tied if not find(trial.candidate.name).duplicates), tied[0])
     return best, [trial for trial in tied if trial is not best]
 
 
-def _further(story: Story, best: Trial, tell: Progress) -> Trial | None:
+def _further(story: Story, best: Trial, tell: Progress) -> Further | None:
     """Further orders of a periodic effect, beside it."""
     if not find(best.candidate.name).is_periodic:
         return None
-    return with_further_orders(story.data, story.held, best.fit, best.candidate.name, tell)
+    return further_orders(story.data, story.held, best, tell)
 
 
 def _drop_idle(story: Story, tell: Progress) -> None:
@@ -132,8 +170,22 @@ def _drop_idle(story: Story, tell: Progress) -> None:
     for one in story.added[:-1]:
         tell(f"trying without {one.name}")
         smaller = story.without(one.key, tell)
-        if smaller.chi2 - story.current.chi2 < fitted_count(one.key) * np.log(len(smaller.residual)) + LEAST_BIC:
+        needed = fitted_count(one.key) * np.log(len(smaller.residual)) + LEAST_BIC
+        if evidence(story.data, smaller, story.current) < needed:
             story.remove(one.key, smaller)
+
+
+def _drop_doubtful(story: Story, tell: Progress) -> None:
+    """Takes out effects that the last model bends away from what they were claimed as."""
+    while len({one.name for one in story.added}) > 1:
+        doubts = {one.key: still_against(story.data, story.base, story.current, one.key) for one in story.added}
+        key = next((key for key in reversed(doubts) if doubts[key]), None)
+        if key is None:
+            return
+        name = next(one.name for one in story.added if one.key == key)
+        tell(f"taking out {name}")
+        story.refused[name] = doubts[key]
+        story.remove(key)
 
 
 def _with_curve(story: Story, curve: Trial | None, unknown: Explanation, tell: Progress) -> Explanation:
@@ -171,15 +223,17 @@ def result_of(
     experiment: Experiment | None = None,
 ) -> Discovery:
     """What a story comes to; unknown: what its last model leaves."""
-    calibration = story.current.calibration
-    named = _named(story)
+    calibration = with_intervals(story.data, story.current)
+    names = _named(story)
+    added = [refreshed(one, calibration) for one in story.added]
+    named = [one for one in added if one.name in names]
     faults = {name: calibration.parameters[name] for name in story.current.faults}
     outside = [name for name in calibration.outside_tolerance if "." in name and not name.startswith("effects.")]
     stand_ins = [path for one in story.added if (path := find(one.name).duplicates)]
     return Discovery(
-        verdict=_verdict(story, unknown),
+        verdict=verdict_of(story, named, unknown),
         calibration=calibration,
-        effects=[one for one in story.added if one.name in named],
+        effects=named,
         ladder=story.ladder,
         candidates=candidates,
         faults=faults,
@@ -188,26 +242,19 @@ def result_of(
         plant=story.current.plant,
         floors=story.data.floors,
         data=story.data,
+        at_floor=at_floor(story.data, story.current),
         held=story.held,
         unknown=unknown,
-        curve=next((one for one in story.added if one.name not in CATALOGUE), None),
+        curve=next((one for one in added if one.name not in CATALOGUE), None),
         next_experiment=experiment,
+        not_claimed={name: why for name, why in story.refused.items() if name not in names},
         warnings=[
             *story.warnings,
+            *held_back(story.current.held, calibration.actuator.axes),
             *masked(story.added, calibration.actuator.axes),
             *as_well(story.ties, story.added, story.current.faults),
         ],
     )
-
-
-def _verdict(story: Story, unknown: Explanation | None) -> str:
-    if not story.repeatable:
-        return "not_repeatable"
-    if _named(story):
-        return "effects_found"
-    if not story.base.calibration.converged and not story.added:
-        return "not_converged"  # an unfinished fit looks exactly like missing physics
-    return "adequate" if unknown is None else "unknown_effect"
 
 
 def settings_of(found: Discovery) -> Mapping[str, Mapping[str, float]]:

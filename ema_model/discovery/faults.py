@@ -13,8 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ema_model.discovery.criteria import LEAST_BIC
 from ema_model.discovery.model_fit import Data, Fit, fit
-from ema_model.discovery.refit import LEAST_BIC, Trial, pays, worth
+from ema_model.discovery.refit import Trial, pays, worth
 from ema_model.discovery.result import Candidate
 from ema_model.discovery.score import amounts_of, movable
 from ema_model.discovery.unknown import TEETH
@@ -60,9 +61,9 @@ def fault_for(
     trials = [trial for trial in trials if pays(current, trial, data, held)]
     if not trials:
         return None
-    fault = max(trials, key=lambda trial: worth(current, trial))
-    rival = max(effects(), key=lambda trial: worth(current, trial), default=None)
-    more = worth(current, fault) - (0.0 if rival is None else worth(current, rival))
+    fault = max(trials, key=lambda trial: worth(data, current, trial))
+    rival = max(effects(), key=lambda trial: worth(data, current, trial), default=None)
+    more = worth(data, current, fault) - (0.0 if rival is None else worth(data, current, rival))
     if rival is None or more > LEAST_BIC:
         return fault
     if more < -LEAST_BIC:

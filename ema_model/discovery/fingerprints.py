@@ -57,16 +57,16 @@ def fingerprints(data: Data, found: Fit, names: Iterable[str], orders: Sequence[
     lanes = [(effect, one) for effect, settings in tried for one in settings]
     if not lanes:
         return []
-    for attempt in range(_ATTEMPTS):
-        change = _changes(data, found, lanes)
-        if attempt == _ATTEMPTS - 1:
-            break
+    change = _changes(data, found, lanes)
+    for _ in range(1, _ATTEMPTS):
         with np.errstate(over="ignore"):  # a loop that an effect makes unstable
             size = np.sqrt(np.mean(change**2, axis=1))
         gentle = [_gentler(effect, one, s, found.error()) for (effect, one), s in zip(lanes, size)]
-        if all(new is None for new in gentle):
+        again = [lane for lane, new in enumerate(gentle) if new is not None]
+        if not again:
             break
         lanes = [(effect, new or one) for (effect, one), new in zip(lanes, gentle)]
+        change[again] = _changes(data, found, [lanes[lane] for lane in again])
     prints, lane = [], 0
     for effect, settings in tried:
         columns = change[lane : lane + len(settings)].T

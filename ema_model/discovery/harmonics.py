@@ -2,38 +2,63 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
+import numpy as np
+
+from ema_model.comparison.orders import Order, colour
+from ema_model.discovery.criteria import LEAST_BIC
 from ema_model.discovery.fingerprints import fingerprints
-from ema_model.discovery.model_fit import Data, Fit
-from ema_model.discovery.refit import LEAST_BIC, Trial, pays, tried
+from ema_model.discovery.model_fit import Data
+from ema_model.discovery.refit import Trial, pays, tried
 from ema_model.discovery.result import Candidate
-from ema_model.discovery.score import scored_together
+from ema_model.discovery.score import scored_all, scored_together
 from ema_model.effects import catalogue_name, find
 
 _MOST = 5  # further orders
 _SHARE = 0.05  # of the strongest one's predicted drop
 
 
-def with_further_orders(
-    data: Data, held: Data | None, current: Fit, name: str, tell: Callable[[str], None]
-) -> Trial | None:
-    """The model with the effect at further orders as well, if the data pay for them: all at once, or the best alone."""
+@dataclass(frozen=True, eq=False)
+class Further:
+    """What is seen of other orders beside one of a periodic effect."""
+
+    stands_out: bool  # whether that one tells more than what is left tells at its neighbours
+    trial: Trial | None  # the model with further orders, where the data pay for them
+
+
+def further_orders(data: Data, held: Data | None, best: Trial, tell: Callable[[str], None]) -> Further:
+    """The model of a trial with its effect at further orders as well, if the data pay: all at once, or the best alone.
+
+    Teeth and poles have a cause, and stand out; what is no periodic torque tells a little at every order.
+    """
+    name, current = best.candidate.name, best.fit
     present = current.actuator.effects.items()
     known = {values.get("order") for effect, values in present if catalogue_name(effect) == name}
     order = next(parameter for parameter in find(name).parameters if parameter.name == "order")
     tell(f"scoring further orders of {name}")
     left = [h for h in range(int(order.low), int(order.high) + 1) if h not in known]
-    found = scored_together(current, fingerprints(data, current, [f"{name}_2"], left), _MOST)
-    worth = [c for c in found if c.predicted_drop > max(2.0 * LEAST_BIC, _SHARE * found[0].predicted_drop)]
+    prints = fingerprints(data, current, [f"{name}_2"], left)
+    drops = np.array([one.predicted_drop for one in scored_all(current, prints)])
+    around = dict(zip(left, colour(drops)))
+    found = scored_together(current, prints, _MOST)
+    strong = [c for c in found if c.predicted_drop > max(2.0 * LEAST_BIC, _SHARE * found[0].predicted_drop)]
+    worth = [c for c in strong if _stands_out(c.settings["order"], c.predicted_drop, around)]
     for chosen in (worth, worth[:1]):
         if chosen:
             tell(f"trying {name} at {len(chosen)} further orders")
             effects = {f"{name}_{i}": one.settings for i, one in enumerate(chosen, 2)}
             trial = tried(data, current, _together(name, chosen), effects, tell)
             if pays(current, trial, data, held):
-                return trial
-    return None
+                return Further(_stands_out(best.candidate.settings["order"], best.drop, around), trial)
+    return Further(_stands_out(best.candidate.settings["order"], best.drop, around), None)
+
+
+def _stands_out(order: float, drop: float, around: Mapping[int, float]) -> bool:
+    """Whether a fall of χ² at an order is significant; around: how strong noise is at the others."""
+    near = min(around, key=lambda other: abs(other - order))
+    return Order(int(order), 0.0, 0.0, drop / around[near]).is_significant(len(around))
 
 
 def _together(name: str, chosen: Sequence[Candidate]) -> Candidate:

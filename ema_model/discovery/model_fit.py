@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 
 _SHARE = 0.5  # 1 σ of an effect's parameter, of the value that its fingerprint suggests
 _ANGLE_SIGMA = 0.7  # rad
+_ALIKE = 0.02  # of a floor, that two may differ by
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +46,14 @@ class Data:
         ]
         return np.concatenate(parts, axis=-1)
 
+    def weighs_as(self, other: Data) -> bool:
+        """Whether floors of the same windows hardly differ, so that a fit to one is a fit to the other."""
+        return all(
+            np.max(np.abs(mine.fit_sigma(name) / its.fit_sigma(name) - 1.0)) < _ALIKE
+            for mine, its in zip(self.floors, other.floors)
+            for name in mine.noise
+        )
+
     def beside(self, found: Fit) -> Data:
         """The data with the model's floor at a calibrated model as well, where that is greater."""
         plant = self.plant(found.calibration.actuator)
@@ -61,6 +70,7 @@ class Fit:
     calibration: Calibration
     starts: dict[str, float]  # x by name
     faults: tuple[str, ...] = ()  # k1 … k8 that move beside the parameters
+    held: tuple[str, ...] = ()  # parameters that stay as the file says, though it leaves them free
 
     @property
     def residual(self) -> Array:
@@ -121,20 +131,21 @@ def fit(
     start: Mapping[str, float] | None = None,
     tell: Callable[[str], None] | None = None,
     faults: tuple[str, ...] = (),
+    held: tuple[str, ...] = (),
 ) -> Fit:
-    """Calibrates the base parameters, those of the actuator's effects, and these faults (k1 … k8) together."""
+    """Calibrates the base parameters but those held, those of the actuator's effects, and these faults together."""
     plant = data.plant(actuator)
     calibration = calibrate(
         plant,
         data.floors,
-        free=(*default_free(actuator), *faults),
+        free=(*(path for path in default_free(actuator) if path not in held), *faults),
         signals=data.signals,
         start=start,
         on_progress=None if tell is None else lambda evaluations: tell(f"fitting: {evaluations} simulations"),
     )
     names = [*calibration.parameters, *calibration.starts]
     starts = {name: float(x) for name, x in zip(names, calibration.x)}
-    return Fit(actuator, plant, calibration, starts, faults)
+    return Fit(actuator, plant, calibration, starts, faults, held)
 
 
 def holdout_error(data: Data, found: Fit) -> float:
@@ -151,7 +162,7 @@ def holdout_fit(data: Data, found: Fit) -> tuple[float, dict[str, float]]:
 def resimulated(data: Data, actuator: Actuator) -> tuple[float, dict[str, float]]:
     """`floor_ratio` and `rms_by_signal` of recordings of which only the starts are fitted."""
     plant = data.plant(actuator)
-    calibration = calibrate(plant, data.floors, free=(), signals=data.signals)
+    calibration = calibrate(plant, data.floors, free=(), signals=data.signals, start={})
     ratio = floor_ratio(data, plant, calibration.signals)
     return ratio if math.isfinite(ratio) else math.inf, rms_by_signal(data, plant, calibration.signals)
 

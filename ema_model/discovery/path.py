@@ -16,6 +16,7 @@ from ema_model.actuator import Actuator
 from ema_model.actuator.naming import on_axes
 from ema_model.comparison.compare import weights_of
 from ema_model.comparison.explain import Explanation
+from ema_model.discovery.evidence import predicted_evidence
 from ema_model.discovery.faults import fault_for
 from ema_model.discovery.fingerprints import Fingerprint, fingerprints
 from ema_model.discovery.model_fit import (
@@ -29,13 +30,15 @@ from ema_model.discovery.model_fit import (
     without_effect,
 )
 from ema_model.discovery.refit import Trial, promising, tried
-from ema_model.discovery.remaining import Left, left_by
+from ema_model.discovery.remaining import Left, at_floor, left_by
 from ema_model.discovery.repeatability import by_inverse_dynamics, is_lost, with_divergence
 from ema_model.discovery.result import Added, Candidate, Rung, StoodIn
 from ema_model.discovery.score import scored, signatures
 from ema_model.discovery.sentences import NOT_REPEATABLE
+from ema_model.discovery.uncertainty import settled
 from ema_model.discovery.unknown import curve_for
 from ema_model.effects import CATALOGUE, catalogue_name, find
+from ema_model.estimation import Calibration
 from ema_model.faults import BY_NAME
 from ema_model.models.stretches import fit_stretches
 from ema_model.quantities.titles import in_sentence
@@ -72,6 +75,8 @@ class Story:
     repeatable: bool = True
     warnings: list[str] = field(default_factory=list)
     ties: dict[str, str] = field(default_factory=dict)  # effects by the fault that would explain as much
+    refused: dict[str, str] = field(default_factory=dict)  # effects that are not claimed, and what speaks against each
+    _settled: Fit | None = None
     _prints: list[Fingerprint] = field(default_factory=list)
 
     @property
@@ -121,7 +126,10 @@ class Story:
     def tried(self, ranked: Sequence[Candidate], share: float, most: int, tell: Progress) -> list[Trial]:
         """The most promising candidates, each in the model and refitted, the best first."""
         trials = []
-        for candidate in promising(self.current, ranked, share, most):
+        expected = {
+            name: predicted_evidence(self.data, self.current, part) for name, part in self.signatures(ranked).items()
+        }
+        for candidate in promising(self.current, ranked, share, most, expected):
             tell(f"trying {candidate.name}")
             trials.append(self.trial(candidate, tell))
         return sorted(trials, key=lambda trial: -trial.drop)
@@ -164,6 +172,18 @@ class Story:
             self.data, without_effect(self.current.actuator, key), self.current.starts, tell, self.current.faults
         )
 
+    def settle(self, tell: Progress = lambda text: None) -> None:
+        """Fits the last model anew as what it leaves asks for, where that is no noise.
+
+        Counted in the sensors' noise, an error that the model cannot have outvotes every tolerance.
+        """
+        if self.current is self._settled or at_floor(self.data, self.current):
+            return
+        tell("calibrating within what is left")
+        self._settled = settled(self.data, self.current, tell)
+        last = self.steps.pop()
+        self._append(self._settled, self._rung(last.rung.label, self._settled), last.added)
+
     def undo(self) -> bool:
         """Takes the last step back; False where there is none."""
         if len(self.steps) == 1:
@@ -192,7 +212,7 @@ class Story:
 
     def _append(self, found: Fit, rung: Rung, added: Sequence[Added]) -> None:
         # All with the last model's values: what is added later moves what was there.
-        self.steps.append(Step(found, rung, tuple(_refreshed(one, found) for one in added)))
+        self.steps.append(Step(found, rung, tuple(refreshed(one, found.calibration) for one in added)))
 
     def _rung(self, label: str, found: Fit) -> Rung:
         return rung_of(label, found, self.data, self.held)
@@ -234,9 +254,10 @@ def _calibrated(
     tell("calibrating")
     base = fit(data, actuator, tell=tell)
     # How the two models differ depends on their parameters: on where the motor comes to stand above all.
-    data, lost = with_divergence(data.beside(base), base)
+    bare, (data, lost) = data, with_divergence(data.beside(base), base)
     held = None if held is None else held.beside(base)
-    base = fit(data, actuator, base.starts, tell)
+    if not data.weighs_as(bare):
+        base = fit(data, actuator, base.starts, tell)
     return Story(data, held, [Step(base, rung_of("calibrated", base, data, held), ())], not is_lost(lost))
 
 
@@ -272,13 +293,11 @@ def _stood_in(before: Fit, after: Fit) -> tuple[StoodIn, ...]:
     return tuple(moved)
 
 
-def _refreshed(one: Added, found: Fit) -> Added:
-    """With the values of a fit."""
+def refreshed(one: Added, calibration: Calibration) -> Added:
+    """With the values of a calibration."""
     path = f"effects.{one.key}."
-    fitted = {
-        name.removeprefix(path): value for name, value in found.calibration.parameters.items() if name.startswith(path)
-    }
-    settings = found.calibration.actuator.effects[one.key]
+    fitted = {name.removeprefix(path): value for name, value in calibration.parameters.items() if name.startswith(path)}
+    settings = calibration.actuator.effects[one.key]
     chosen = {name: value for name, value in settings.items() if name not in fitted}
     return replace(one, parameters=fitted, chosen=chosen)
 

@@ -8,13 +8,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ema_model.discovery.criteria import LEAST_BIC, MOMENT, MOMENTS
+from ema_model.discovery.evidence import colour_of, evidence
 from ema_model.discovery.model_fit import Data, Fit, fit, holdout_error, with_effect
 from ema_model.discovery.result import Candidate
 from ema_model.effects import Effect, find
 
 Progress = Callable[[str], None]
 
-LEAST_BIC = 10.0
 _LEAST_FALL = 0.004  # of the error: what is less is immaterial
 _FALL = 0.01  # below which the data must be twice as sure
 _LEAST_T = 2.4  # of the mean gain over blocks of time: 1 % of chance
@@ -23,6 +24,7 @@ _AGREES = 0.8  # of the held-out error: so great a fall there needs no test over
 _FLOOR = 1.1  # of the floor, up to which an error counts as at it
 _CORRELATED = 50  # values of a signal that may share their error
 _SCORE = 0.4  # of what a refit gives, that a score may have fallen short of predicting
+_RECENTRED = 2  # times that a refit begins anew from where its first guess stopped it
 _FAINT = 0.1  # of the suggested strength, from which a fit that went astray begins anew
 
 
@@ -47,20 +49,24 @@ def tried(
     if best.chi2 > current.chi2:  # it began too strong to find back
         faint = {name: _weakened(find(name, current.actuator.axes), settings) for name, settings in effects.items()}
         best = min(best, _refitted(data, current, faint, tell), key=lambda one: one.chi2)
+    for _ in range(_RECENTRED):
+        if best.chi2 > current.chi2 - LEAST_BIC or not _stopped(best, effects):
+            break
+        found = best.calibration.actuator.effects
+        best = _refitted(data, current, {name: found[name] for name in effects}, tell)
     return Trial(candidate, effects, best, current.chi2 - best.chi2)
 
 
-def worth(current: Fit, trial: Trial) -> float:
-    """How much of χ² a trial takes beyond what its parameters must (BIC)."""
+def worth(data: Data, current: Fit, trial: Trial) -> float:
+    """How much a trial tells beyond what its parameters must (BIC), relative to what it leaves."""
     count = sum(fitted_count(name) for name in trial.effects) + len(trial.faults)
-    return trial.drop - count * math.log(len(current.residual))
+    return evidence(data, current, trial.fit) - count * math.log(len(current.residual))
 
 
 def pays(current: Fit, trial: Trial, data: Data, held: Data | None) -> bool:
     """Whether the data pay for the parameters: most of the time, materially, and where they were not fitted."""
-    values = len(current.residual)
     fall = 1.0 - trial.fit.error() / current.error()
-    if fall < _LEAST_FALL or worth(current, trial) < (LEAST_BIC if fall > _FALL else 2.0 * LEAST_BIC):
+    if fall < _LEAST_FALL or worth(data, current, trial) < (LEAST_BIC if fall > _FALL else 2.0 * LEAST_BIC):
         return False
     if held is not None:
         before, after = holdout_error(held, current), holdout_error(held, trial.fit)
@@ -68,9 +74,19 @@ def pays(current: Fit, trial: Trial, data: Data, held: Data | None) -> bool:
             return True  # no chance repeats itself where it was not fitted
         if not _holds(before, after):
             return False
-    gains = np.array_split(current.residual**2 - trial.fit.residual**2, max(8, values // _CORRELATED))
-    sums = np.array([gain.sum() for gain in gains])
-    return bool(sums.sum() >= _LEAST_T * np.std(sums, ddof=1) * np.sqrt(len(sums)))
+    return _lasts(data, current, trial.fit)
+
+
+def _lasts(data: Data, before: Fit, after: Fit) -> bool:
+    """Whether a gain is seen most of the time, or beyond chance in several moments apart."""
+    gains = (before.residual**2 - after.residual**2) / colour_of(data, after)
+    blocks = np.array_split(gains, max(8, len(gains) // _CORRELATED))
+    sums = np.array([block.sum() for block in blocks])
+    if sums.sum() >= _LEAST_T * np.std(sums, ddof=1) * np.sqrt(len(sums)):
+        return True
+    moments = np.flatnonzero(sums > MOMENT)
+    apart = np.count_nonzero(np.diff(moments) > 1) + min(1, len(moments))
+    return bool(apart >= MOMENTS and -sums[sums < 0.0].sum() < 0.5 * sums[sums > 0.0].sum())
 
 
 def _holds(before: float, after: float) -> bool:
@@ -85,17 +101,46 @@ def _refitted(data: Data, current: Fit, effects: Mapping[str, Mapping[str, float
     return fit(data, actuator, current.starts, tell, current.faults)
 
 
+def _stopped(found: Fit, effects: Mapping[str, Mapping[str, float]]) -> bool:
+    """Whether a parameter of the effects ended where only the guess that it began with held it."""
+    for name in effects:
+        for parameter in find(name, found.actuator.axes).parameters:
+            one = found.calibration.parameters.get(f"effects.{name}.{parameter.name}")
+            if one is None or not one.at_bound or parameter.name == "phase_rad":
+                continue
+            near = 0.01 * abs(one.value)
+            if parameter.low + near < one.value < parameter.high - near:
+                return True
+    return False
+
+
 def _weakened(effect: Effect, settings: Mapping[str, float]) -> dict[str, float]:
     first = effect.parameters[0]
     return {**settings, first.name: max(first.low, _FAINT * settings[first.name])}
 
 
-def promising(current: Fit, ranked: Sequence[Candidate], share: float, most: int) -> list[Candidate]:
-    """Candidates worth a refit: near the best, and such that a refit might make the data pay for them."""
+def promising(
+    current: Fit,
+    ranked: Sequence[Candidate],
+    share: float,
+    most: int,
+    expected: Mapping[str, float] | None = None,
+) -> list[Candidate]:
+    """Candidates worth a refit: near the best, and such that a refit might make the data pay for them.
+
+    expected: the evidence that is predicted for each; without it, the fall of χ².
+    """
+    told = {c.name: c.predicted_drop for c in ranked} | dict(expected or {})
     values = len(current.residual)
     material = (1.0 - (1.0 - _LEAST_FALL) ** 2) * current.chi2
-    needed = {c.name: max(material, fitted_count(c.name) * np.log(values) + LEAST_BIC) for c in ranked}
-    chosen = [c for c in ranked if not c.untestable_reason and c.predicted_drop > _SCORE * needed[c.name]]
+    needed = {c.name: fitted_count(c.name) * np.log(values) + LEAST_BIC for c in ranked}
+    chosen = [
+        c
+        for c in ranked
+        if not c.untestable_reason
+        and c.predicted_drop > _SCORE * max(material, needed[c.name])
+        and told[c.name] > _SCORE * needed[c.name]
+    ]
     return [c for c in chosen if c.predicted_drop >= share * chosen[0].predicted_drop][:most]
 
 

@@ -5,15 +5,21 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ema_model.comparison.assemble import residuals_of
+from ema_model.comparison.criteria import BAND
 from ema_model.comparison.curves import orders_in
-from ema_model.comparison.explain import Explanation, advance_of, explain, used_blocks
+from ema_model.comparison.explain import Explanation, advance_of, explain, used_blocks, without_spikes
 from ema_model.comparison.orders import Order
 from ema_model.comparison.orders import orders as orders_of
 from ema_model.comparison.residuals import Residuals
-from ema_model.comparison.verdict import ORDER_OF_PRIMARY
-from ema_model.discovery.model_fit import Data, Fit
+from ema_model.comparison.verdict import ORDER_OF_PRIMARY, lasting
+from ema_model.discovery.model_fit import Data, Fit, floor_ratio
 from ema_model.estimation.floor import twin_error
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -29,6 +35,20 @@ class Left:
         return next((one for one in self.explained if one.significant), None)
 
 
+def at_floor(data: Data, found: Fit) -> bool:
+    """Whether a fit leaves no more than the floor's band."""
+    return floor_ratio(data, found.plant, found.calibration.signals) <= BAND
+
+
+@lru_cache(maxsize=16)
+def lasts(data: Data, found: Fit) -> bool:
+    """Whether what is left of a signal lasts longer than noise does, as `compare` has it."""
+    fitted = found.calibration.signals
+    known: list[dict[str, Array]] = [{} for _ in fitted]
+    residuals = residuals_of(found.plant, data.floors, fitted, known, found.calibration.actuator)
+    return bool(lasting(residuals, [name for name in data.signals if name in residuals.values]))
+
+
 @lru_cache(maxsize=4)  # a walk asks before and after it has looked for the next effect
 def left_by(data: Data, found: Fit) -> Left:
     """What a fit leaves."""
@@ -36,6 +56,19 @@ def left_by(data: Data, found: Fit) -> Left:
     primary = next(name for name in ORDER_OF_PRIMARY if name in residuals.values)
     orders = sorted(_orders(residuals, primary), key=lambda one: -one.significance)
     return Left(explain(residuals, primary, found.actuator.axes), [one.order for one in orders])
+
+
+def used_left(data: Data, before: Fit, after: Fit) -> tuple[str, Array, Array]:
+    """The signal that is explained, and what two fits leave of it where it counts, over its floor: (blocks,) each."""
+    first, second = residuals_left(data, before), residuals_left(data, after)
+    primary = next(name for name in ORDER_OF_PRIMARY if name in first.values)
+    used = used_blocks(first, primary)
+    if used is None:
+        return primary, np.zeros(0), np.zeros(0)
+    left = second.values[primary] - second.known.get(primary, 0.0)
+    own = used.values * used.weight
+    most = float(np.max(np.abs(without_spikes(own))))
+    return primary, np.clip(own, -most, most), np.clip(left[used.chosen] * used.weight, -most, most)
 
 
 def residuals_left(data: Data, found: Fit) -> Residuals:

@@ -16,7 +16,7 @@ from ema_model.models import Model
 
 Array = NDArray[np.float64]
 
-VERDICTS = ("effects_found", "adequate", "unknown_effect", "not_converged", "not_repeatable")
+VERDICTS = ("effects_found", "adequate", "partly_explained", "unknown_effect", "not_converged", "not_repeatable")
 
 
 @dataclass(frozen=True)
@@ -99,11 +99,13 @@ class Discovery:
     plant: Model  # the recordings as they were fitted: windows with their blocks
     floors: Sequence[Floor]  # of its windows
     data: Data  # what was fitted
+    at_floor: bool = False  # whether what is left may be noise and the model's own floor
     held: Data | None = None  # and what was held out
     faults: Mapping[str, Calibrated] = field(default_factory=dict)  # k1 … k8 in the last model
     unknown: Explanation | None = None
     curve: Added | None = None  # the torque curve that was added for what is unknown
     next_experiment: Experiment | None = None
+    not_claimed: Mapping[str, str] = field(default_factory=dict)  # effects that the data would pay for, and why not
     warnings: Sequence[str] = field(default_factory=tuple)
 
     @property

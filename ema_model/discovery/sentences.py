@@ -47,6 +47,17 @@ def as_well(ties: Mapping[str, str], added: Sequence[Added], faults: Sequence[st
     return lines
 
 
+def held_back(paths: Sequence[str], axes: Axes) -> list[str]:
+    """One line on parameters that stay as the file says, since what is missing would drive them to their bounds."""
+    if not paths:
+        return []
+    names = ", ".join(in_sentence(on_axes(path, axes).title) for path in paths)
+    return [
+        f"Kept as the file says, since what is missing would drive {'it' if len(paths) == 1 else 'them'}"
+        f" to the edge of tolerance: {names}."
+    ]
+
+
 def untold(first: str, second: str) -> str:
     """That no test is known which would tell two effects apart."""
     one, other = (in_sentence(find(name).title) for name in (first, second))

@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.comparison.assemble import residuals_of
+from ema_model.comparison.criteria import BAND
 from ema_model.comparison.explain import Explanation
 from ema_model.comparison.residuals import Residuals
 from ema_model.discovery import Candidate, Discovery, Story
+from ema_model.discovery.criteria import LEAST_BIC
 from ema_model.discovery.path import alike
-from ema_model.discovery.refit import LEAST_BIC
 from ema_model.discovery.remaining import Left
 from ema_model.discovery.result import Added
 from ema_model.discovery.tracks import primary
@@ -22,7 +23,7 @@ from ema_model.effects import find
 
 Array = NDArray[np.float64]
 
-AT_FLOOR = 1.1  # times the floor, from which on there is little left to find
+AT_FLOOR = BAND  # times the floor, up to which there is little left to find
 _RIVAL = 25.0  # of χ², below which an effect is too faint to be taken for another
 _TO_90 = 1.645  # σ, of a 90 % interval
 

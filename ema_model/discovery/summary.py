@@ -46,6 +46,8 @@ def as_dict(found: Discovery) -> dict[str, Any]:
                 "curve": np.column_stack([unknown.centres, unknown.curve, unknown.error]).tolist(),
                 "added": None if found.curve is None else _added(found.curve, axes),
             },
+            "remaining": {"rmse": found.ladder[-1].rmse, "at_floor": found.at_floor},
+            "not_claimed": dict(found.not_claimed),
             "next_experiment": _experiment(found.next_experiment),
             "warnings": list(found.warnings),
         }

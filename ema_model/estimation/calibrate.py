@@ -106,7 +106,7 @@ def calibrate(
         covariance *= max(1.0, CORRELATED_S / min(one.block_s for one in floors))
     fitted_k = problem.k(x)
     actuator = replace(model.actuator.varied(problem.parameters(x)), faults=named(fitted_k))
-    found = _calibrated(problem, x, covariance)
+    found = calibrated(problem, x, covariance)
     chosen = tuple(u.name for u in problem.unknowns if u.kind in ("parameter", "fault"))
     return Calibration(
         converged=fit.converged,
@@ -252,7 +252,7 @@ def _split(problem: Problem, jacobian: Array, *, weighted: bool) -> list[dict[st
     return parts
 
 
-def _calibrated(problem: Problem, x: Array, covariance: Array) -> dict[str, Calibrated]:
+def calibrated(problem: Problem, x: Array, covariance: Array) -> dict[str, Calibrated]:
     """What each unknown was found to be, by name; the eccentricity by its size and its angle."""
     axes = problem.model.actuator.axes
     found = {}

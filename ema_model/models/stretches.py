@@ -7,9 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from ema_model.actuator import Actuator
+from ema_model.models.loop_window import BLOCK_S
 from ema_model.recordings import Measurement
 
 _FIT_STEPS = 300_000  # of the model over all recordings, for a calibration: 3 s at 1e-5 s
+_FIT_BLOCKS = 16_000  # of a closed loop over all recordings, for a calibration: more tell no more, and take longer
 _MOST_STEPS = 12_000_000  # for the evaluation: 120 s
 _PARTS = 6  # that a long recording is fitted on
 _LEAST_S = 0.05
@@ -18,7 +20,7 @@ _STEPS_A_SAMPLE = 2.0
 
 def fit_stretches(measurements: Sequence[Measurement], actuator: Actuator) -> list[list[slice] | None] | None:
     """Parts of each recording to calibrate on, spread over its length; None if all can be taken whole."""
-    return _stretches(measurements, actuator, _FIT_STEPS, _PARTS)
+    return _stretches(measurements, actuator, _FIT_STEPS, _PARTS, _FIT_BLOCKS)
 
 
 def evaluation_stretches(measurements: Sequence[Measurement], actuator: Actuator) -> list[list[slice] | None] | None:
@@ -27,17 +29,19 @@ def evaluation_stretches(measurements: Sequence[Measurement], actuator: Actuator
 
 
 def _stretches(
-    measurements: Sequence[Measurement], actuator: Actuator, budget: int, parts: int
+    measurements: Sequence[Measurement], actuator: Actuator, budget: int, parts: int, most_blocks: float = np.inf
 ) -> list[list[slice] | None] | None:
     if any(measurement.is_map for measurement in measurements):
         return None
     if actuator.controller.kind == "unknown":  # a sample costs as much as some steps of a simulation
         steps = [_STEPS_A_SAMPLE * measurement.samples for measurement in measurements]
+        blocks = 0.0
     else:
         steps = [measurement.duration_s / actuator.step_s for measurement in measurements]
-    if sum(steps) <= budget:
+        blocks = sum(one.duration_s / max(one.sample_period_s, BLOCK_S) for one in measurements)
+    share = min(budget / sum(steps), most_blocks / max(blocks, 1.0))
+    if share >= 1.0:
         return None
-    share = budget / sum(steps)
     return [_of(measurement, share, parts, actuator) for measurement in measurements]
 
 

@@ -11,7 +11,15 @@ from ema_model.discovery import Discovery, as_dict, discover, verified
 from ema_model.effects import find
 from emaviz.cli import files, options, output
 from emaviz.cli.numbers import whole
-from emaviz.text.discovery import VERDICTS, faults, next_experiment, settings, verification
+from emaviz.text.discovery import (
+    VERDICTS,
+    faults,
+    next_experiment,
+    not_claimed,
+    remains,
+    settings,
+    verification,
+)
 
 HELP = "find the physical effects that the model lacks, and add them"
 _CURRENT_ONLY = ("current_A",)
@@ -101,8 +109,12 @@ def text(found: Discovery) -> str:
     if found.parameters_outside_tolerance:
         outside = ", ".join(on_axes(name, found.actuator.axes).path for name in found.parameters_outside_tolerance)
         lines += ["", f"outside their tolerance: {outside}"]
+    if found.verdict in ("partly_explained", "unknown_effect"):
+        lines += ["", f"{remains(found)}"]
     if found.unknown is not None:
         lines += ["", found.unknown.sentence]
+    if refused := not_claimed(found):
+        lines += ["", *refused]
     if experiment := next_experiment(found):
         lines += ["", *experiment]
     return "\n".join(lines)

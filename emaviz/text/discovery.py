@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from ema_model.actuator.naming import on_axes
 from ema_model.actuator.readings import sentences as phrases_of
+from ema_model.comparison.sentences import goes_with
 from ema_model.discovery import Discovery, Verified
 from ema_model.discovery.result import Added, Rung
 from ema_model.effects import find
@@ -22,6 +23,7 @@ from emaviz.text.run import run_in_words
 VERDICTS = {
     "effects_found": "effects are missing, and have been added",
     "adequate": "nothing is missing: what is left is noise and the model's own floor",
+    "partly_explained": "a part of what is missing has been found, and added; of the rest the cause is not known",
     "unknown_effect": "something is missing that none of the known effects explains",
     "not_converged": "the calibration has not converged; what looks like missing physics may be an unfinished fit",
     "not_repeatable": "the run does not repeat itself, so that a comparison over time means nothing",
@@ -43,8 +45,28 @@ def headline(found: Discovery) -> str:
         return f"No physics is missing: the actuator has {faulty}."
     if found.verdict == "adequate" and found.parameters_outside_tolerance:
         return "No physics is missing, but not all parameters are within their tolerance."
+    if found.verdict == "partly_explained":
+        names = _listed(
+            list(dict.fromkeys(in_sentence(effect_title(one.name)) for one in found.effects)) or ["a curve"]
+        )
+        return f"Found in part: {names}{f', and {faulty}' if faulty else ''}; {remains(found)}."
+    if found.verdict == "unknown_effect" and found.curve is None:
+        return f"Something is missing that none of the known effects explains: {remains(found)}."
     text = VERDICTS.get(found.verdict, found.verdict.replace("_", " "))
     return f"{text[:1].upper()}{text[1:]}."
+
+
+def remains(found: Discovery) -> str:
+    """'4.0 times the floor remains, cause unknown, goes with the load'."""
+    if found.at_floor and found.unknown is None:
+        return "what remains is as small as the floor, but lasts longer than noise"
+    goes = "" if found.unknown is None else f", {goes_with(found.unknown.variable, found.unknown.modulator)}"
+    return f"{number(found.ladder[-1].rmse, 2)} times the floor remains, cause unknown{goes}"
+
+
+def not_claimed(found: Discovery) -> list[str]:
+    """A line for each effect that the data would pay for, with what speaks against it."""
+    return [f"{effect_title(name)} is not claimed: {why}." for name, why in found.not_claimed.items()]
 
 
 def sentences(found: Discovery) -> list[str]:
@@ -68,6 +90,7 @@ def sentences(found: Discovery) -> list[str]:
         told.append(f"Outside {whose} tolerance: {outside}.")
     if found.unknown is not None:
         told.append(("Something else is left. " if found.effects else "") + found.unknown.sentence)
+    told += not_claimed(found)
     if found.curve is not None:
         told.append(f"A torque curve stands in for it, with which the error falls from {_times(first, last)}.")
     return told

@@ -1,0 +1,133 @@
+"""Whether an effect that the data pay for is claimed: what speaks against it, in plain words.
+
+Where physics is missing that the library does not have, some effect bends into its place.  It is told by what it is
+bent to: a value that no such part has, another one in each recording, an error that rises.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ema_model.actuator.naming import on_axes
+from ema_model.discovery.criteria import AS_MUCH, LEAST_SHARE, PLAUSIBLE, TIE
+from ema_model.discovery.evidence import colour_of, evidence, signals_of
+from ema_model.discovery.model_fit import Data, Fit, floor_ratio
+from ema_model.discovery.remaining import at_floor, left_by, used_left
+from ema_model.discovery.stability import disagreement
+from ema_model.effects import catalogue_name, find
+from ema_model.quantities.numbers import number
+from ema_model.quantities.titles import in_sentence
+
+_READINGS = {"current_reading": "current_A", "position_reading": "user_position_rad"}
+
+
+def against(data: Data, before: Fit, after: Fit, keys: Sequence[str]) -> str:
+    """The first thing that speaks against the effects that a fit has beyond another; "" where nothing does."""
+    known = [_unmeasured(data, key) or _bent(before, after, key) or _implausible(after, key) for key in keys]
+    if not after.calibration.converged:
+        known.append("the fit with it did not converge")
+    known.append(_worse(data, before, after) or _little(data, before, after))
+    known += [_unsteady(data, after, key) for key in keys]
+    return next((reason for reason in known if reason), "") or outdone(data, before, after)
+
+
+def still_against(data: Data, base: Fit, found: Fit, key: str) -> str:
+    """What speaks against one of the effects of a model, in it."""
+    return _bent(base, found, key) or _implausible(found, key) or _unsteady(data, found, key)
+
+
+def outdone(data: Data, before: Fit, after: Fit) -> str:
+    """Whether the residual's own curve tells more than a model does; what brings the error to the floor tells all."""
+    curve = left_by(data, before).explanation
+    if curve is None or at_floor(data, after):
+        return ""
+    signal, residual, left = used_left(data, before, after)
+    total = float(residual @ residual)
+    beyond = max(total - len(residual), 3.0 * np.sqrt(2.0 * len(residual)))
+    tells = curve.r2 * beyond  # of χ² of the signal that is explained
+    colours = [float(colour_of(data, after)[rows][0]) for name, rows in signals_of(data, after.plant) if name == signal]
+    scale = colours[0] if colours else 1.0
+    enough = AS_MUCH * tells - TIE * scale
+    if total - float(left @ left) >= enough or evidence(data, before, after) * scale >= enough:
+        return ""
+    return f"a curve over the {curve.variable.replace('_', ' ')} tells more"
+
+
+def ratio(data: Data, found: Fit) -> float:
+    """The error of a fit in floors, as the ladder has it."""
+    return floor_ratio(data, found.plant, found.calibration.signals)
+
+
+def _unmeasured(data: Data, key: str) -> str:
+    """A sensor's error, where nothing was recorded of that sensor."""
+    effect = find(catalogue_name(key))
+    for place in effect.places:
+        signal = _READINGS.get(place.__name__)
+        if signal is not None and not any(signal in one for one in data.measurements):
+            return "the signal that it falsifies was not recorded"
+    return ""
+
+
+def _bent(before: Fit, after: Fit, key: str) -> str:
+    """A parameter of the effect at its bound, or one of the actuator that it drives there."""
+    parameters = after.calibration.parameters
+    for path, one in parameters.items():
+        if not one.at_bound or path.endswith("phase_rad"):
+            continue
+        if path.startswith(f"effects.{key}."):
+            return f"its {_title(after, path)} would stand at the bound"
+        if "." in path and not path.startswith("effects.") and not before.calibration.parameters[path].at_bound:
+            return f"it drives the {_title(after, path)} to its bound"
+    return ""
+
+
+def _implausible(after: Fit, key: str) -> str:
+    """A value that no such part has."""
+    name = catalogue_name(key)
+    for parameter, value in after.calibration.actuator.effects[key].items():
+        low, high = PLAUSIBLE.get((name, parameter), (-np.inf, np.inf))
+        if not low <= value <= high:
+            return f"its {_title(after, f'effects.{key}.{parameter}')} of {number(value)} is not plausible"
+        if parameter == "period_rad" and value > _travel(after):
+            return "its period is longer than the travel"
+    return ""
+
+
+def _travel(found: Fit) -> float:
+    """What the motor turns in the recordings, rad."""
+    shown = [signals["motor_position_rad"] for signals in found.calibration.signals if "motor_position_rad" in signals]
+    return float(max((np.ptp(one) for one in shown), default=np.inf))
+
+
+def _worse(data: Data, before: Fit, after: Fit) -> str:
+    return "the error rises with it" if ratio(data, after) > ratio(data, before) else ""
+
+
+def _little(data: Data, before: Fit, after: Fit) -> str:
+    """Whether far more is left of every signal than the effects explain."""
+    if at_floor(data, after):
+        return ""
+    first, second, values = ({} for _ in range(3))
+    for name, rows in signals_of(data, after.plant):
+        first[name] = first.get(name, 0.0) + float(np.sum(before.residual[rows] ** 2))
+        second[name] = second.get(name, 0.0) + float(np.sum(after.residual[rows] ** 2))
+        values[name] = values.get(name, 0) + rows.stop - rows.start
+    share = max((first[n] - second[n]) / max(first[n] - values[n], values[n]) for n in first)
+    return "" if share >= LEAST_SHARE else f"it explains {100.0 * share:.0f} % of an error whose cause is not known"
+
+
+def _unsteady(data: Data, after: Fit, key: str) -> str:
+    apart = disagreement(data, after, key)
+    if apart is None:
+        return ""
+    values = " and ".join(number(value) for value in (min(apart.values), max(apart.values)))
+    parts = "the recordings" if len(data.measurements) > 1 else "the halves of the recording"
+    return f"{parts} ask for another {_title(after, apart.parameter)} each: {values}"
+
+
+def _title(found: Fit, path: str) -> str:
+    """'stiffness' of 'effects.hinge_moment.stiffness_Nm_rad'."""
+    title = on_axes(path, found.actuator.axes).title
+    return in_sentence(title.rpartition(": ")[2])

@@ -1,0 +1,145 @@
+"""The verdict is bound to the ladder: what is said, in every kind of answer, is what the error bears out."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.discovered import with_cogging, with_unknown
+from support.hidden_effects import ACTUATOR, SINE, recorded
+
+from ema_model.comparison.criteria import BAND
+from ema_model.comparison.residuals import Residuals
+from ema_model.comparison.result import SignalError
+from ema_model.comparison.verdict import judge
+from ema_model.discovery import as_dict, begun, result_of
+from ema_model.discovery.path import Step, rung_of
+from ema_model.discovery.result import VERDICTS
+from emaviz.cli.discover import text
+from emaviz.text.discovery import VERDICTS as IN_WORDS
+from emaviz.text.discovery import headline, sentences
+
+CLEAR = {"load_dependent_friction": {"ratio": 0.25}}
+SURE = ("adequate", "effects_found")
+
+
+def sharper(story, times: float):
+    """The same steps beside sensors so many times finer: as much more is left, in floors."""
+    floors = [
+        replace(
+            one,
+            noise={name: value / times for name, value in one.noise.items()},
+            model={name: values / times for name, values in one.model.items()},
+        )
+        for one in story.data.floors
+    ]
+    data = replace(story.data, floors=floors)
+    fits = [replace(one.fit, calibration=_counted(one.fit.calibration, times)) for one in story.steps]
+    steps = [Step(fit, rung_of(one.rung.label, fit, data, None), one.added) for fit, one in zip(fits, story.steps)]
+    return replace(story, data=data, held=None, steps=steps, _settled=None)
+
+
+def _counted(calibration, times: float):
+    return replace(
+        calibration,
+        residual=times * calibration.residual,
+        weighted_sensitivities=[
+            {name: times * values for name, values in part.items()} for part in calibration.weighted_sensitivities
+        ],
+    )
+
+
+@pytest.fixture(scope="module")
+def healthy():
+    return begun(recorded(31, commands=[SINE]), ACTUATOR)
+
+
+@pytest.fixture(scope="module")
+def lacking():
+    """The calibrated model of a plant with a hidden effect, and the same with it."""
+    story = begun(recorded(31, effects=CLEAR), ACTUATOR)
+    bare = replace(story, steps=list(story.steps))
+    story.add(story.trial(next(one for one in story.ranked(tuple(CLEAR)))))
+    return bare, story
+
+
+def answers(healthy, lacking):
+    for story in (healthy, *lacking):
+        for times in (1.0, 4.0, 30.0):
+            yield result_of(sharper(story, times))
+    yield from (with_cogging(), with_unknown())
+
+
+def test_verdict_and_ladder_never_contradict(healthy, lacking):
+    seen = set()
+    for found in answers(healthy, lacking):
+        seen.add(found.verdict)
+        rest = found.ladder[-1].rmse
+        assert found.verdict in VERDICTS and (found.verdict not in SURE or (found.at_floor and rest <= BAND))
+        assert found.at_floor or rest > BAND or found.verdict not in SURE
+        assert not found.effects or found.verdict == ("effects_found" if found.at_floor else "partly_explained")
+        told = json.loads(json.dumps(as_dict(found), allow_nan=False))
+        assert told["remaining"] == {"rmse": rest, "at_floor": found.at_floor}
+    assert seen >= {"adequate", "effects_found", "partly_explained", "unknown_effect"}
+
+
+def test_what_remains_is_told_in_every_place(healthy, lacking):
+    part = result_of(sharper(lacking[1], 4.0))
+    assert headline(part).startswith("Found in part: load-dependent friction; ") and "cause unknown" in headline(part)
+    assert text(part).startswith("partly_explained: ") and "times the floor remains, cause unknown" in text(part)
+    nothing = result_of(sharper(healthy, 30.0))
+    assert "times the floor remains, cause unknown" in headline(nothing) and not nothing.effects
+    assert set(IN_WORDS) == set(VERDICTS)
+
+
+def test_what_is_not_claimed_is_told_with_the_reason(healthy):
+    found = replace(result_of(healthy), not_claimed={"torsional_compliance": "the fit with it did not converge"})
+    line = "Torsional compliance is not claimed: the fit with it did not converge."
+    assert line in sentences(found) and line in text(found)
+    assert as_dict(found)["not_claimed"] == {"torsional_compliance": "the fit with it did not converge"}
+
+
+def test_compare_is_bound_by_the_same_band():
+    """A fast error of three floors follows no variable and vanishes in means over 25 ms; yet it is no noise."""
+    n = 4000
+    random = np.random.default_rng(3)
+    values = 3.0 * np.where(np.arange(n) % 2, 1.0, -1.0) * random.uniform(0.5, 1.5, n)
+    left = Residuals(
+        time_s=np.arange(n) * 5e-4,
+        values={"current_A": values},
+        sigma={"current_A": np.ones(n)},
+        noise={"current_A": np.ones(n)},
+        variables={"motor_speed": 50.0 + random.uniform(-1.0, 1.0, n)},
+        recording=np.zeros(n, np.intp),
+        run=np.zeros(n, np.intp),
+        saturated=np.zeros(n, np.bool_),
+        block_s=5e-4,
+    )
+    errors = {"current_A": SignalError(3.1, 3.1, 0.1, 1.0, 3.0)}
+    assert not judge(left, errors, None, ACTUATOR).adequate
+    assert judge(replace(left, values={"current_A": values / 3.2}), errors, None, ACTUATOR).adequate
+
+
+def test_parameters_that_an_unknown_error_drives_to_their_bounds_stay_as_the_file_says(lacking):
+    story = sharper(lacking[0], 4.0)
+    driven = {name for name, one in story.current.calibration.parameters.items() if one.at_bound}
+    assert driven
+    story.settle()
+    found = result_of(story)
+    assert not any(one.at_bound for one in found.calibration.parameters.values())
+    for path in story.current.held:
+        assert path not in found.calibration.parameters
+        assert found.actuator.value(path) == ACTUATOR.value(path)
+    assert bool(story.current.held) == any(line.startswith("Kept as the file says") for line in found.warnings)
+    before = story.current
+    story.settle()
+    assert story.current is before
+
+
+def test_finer_sensors_make_nothing_surer_that_the_model_cannot_follow(lacking):
+    path = "effects.load_dependent_friction.ratio"
+    near, far = (result_of(sharper(lacking[1], times)).calibration.parameters[path] for times in (1.0, 30.0))
+    width = [one.interval90[1] - one.interval90[0] for one in (near, far)]
+    assert near.value == far.value and 0.3 * width[0] < width[1] < 2.0 * width[0]

@@ -12,7 +12,7 @@ from ema_model.campaign.execute import common
 from ema_model.campaign.kinds import KINDS
 from ema_model.campaign.plan import Plan
 from ema_model.campaign.schedulers import Died, Outcome, Scheduler
-from ema_model.campaign.store import Store, cannot_write, header_of
+from ema_model.campaign.store import Store, header_of
 from ema_model.campaign.task import Task
 from ema_model.campaign.version import version
 
@@ -58,12 +58,9 @@ def run_plan(
         there = store.names(errors=not retry)
         missing = [task for task in plan.tasks if task.name not in there]
         status = Status(len(plan.tasks), len(plan.tasks) - len(missing))
-        try:
-            if missing:
-                _compute(missing, store, scheduler, status, on_progress or (lambda status: None))
-            store.write_tables()
-        except OSError as error:
-            raise cannot_write(store.folder, error) from None
+        if missing:
+            _compute(missing, store, scheduler, status, on_progress or (lambda status: None))
+        store.write_tables()
         return status
     finally:
         store.close()

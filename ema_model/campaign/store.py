@@ -96,7 +96,7 @@ class Store:
                 store.close()
                 raise
         except OSError as error:
-            raise cannot_write(at, error) from None
+            raise _cannot_write(at, error) from None
         store.header = header
         return store
 
@@ -123,7 +123,7 @@ class Store:
             self._lock.release()
 
     def append(self, kind: str, rows: Sequence[Mapping[str, Any]]) -> None:
-        """Keeps rows; OSError where the disk does not take them, and then none of them is kept."""
+        """Keeps rows; InputError where the disk does not take them, and then none of them is kept."""
         schema = pa.schema([*KINDS[kind].schema, *HOW])
         filled = [{name: row.get(name) for name in schema.names} for row in rows]
         self._write_part(kind, pa.Table.from_pylist(filled, schema))
@@ -153,14 +153,12 @@ class Store:
         return rows.take(pa.array([best[name] for name in sorted(best)], pa.int64())).combine_chunks()
 
     def write_tables(self) -> list[Path]:
-        """Writes the table of each kind that has rows; their paths.  OSError as `append`."""
+        """Writes the table of each kind that has rows; their paths.  InputError as `append`."""
         written = []
         for kind in KINDS:
             if self._parts(kind):
-                path = self.folder / f"{kind}.parquet"
-                with whole_file(path) as draft:
-                    pq.write_table(self.table(kind), draft)
-                written.append(path)
+                written.append(self.folder / f"{kind}.parquet")
+                self._write(written[-1], self.table(kind))
         return written
 
     def progress(self) -> dict[str, dict[str, Any]]:
@@ -206,9 +204,15 @@ class Store:
         raise refusal(self.folder, "its parts go away while they are read; wait, and try again")
 
     def _write_part(self, kind: str, rows: pa.Table) -> None:
-        path = self.folder / "parts" / f"{kind}-{time.time_ns():020d}-{secrets.token_hex(4)}.parquet"
-        with whole_file(path) as draft:
-            pq.write_table(rows, draft)
+        name = f"{kind}-{time.time_ns():020d}-{secrets.token_hex(4)}.parquet"
+        self._write(self.folder / "parts" / name, rows)
+
+    def _write(self, path: Path, rows: pa.Table) -> None:
+        try:
+            with whole_file(path) as draft:
+                pq.write_table(rows, draft)
+        except OSError as error:
+            raise _cannot_write(self.folder, error) from None
 
 
 def _read(parts: Iterable[Path], schema: pa.Schema) -> pa.Table:
@@ -240,7 +244,7 @@ def header_of(title: str, about: str, tasks: Sequence[Task]) -> Header:
     return Header(title, counts, kinds, ordered, version(), about, commit())
 
 
-def cannot_write(folder: Path, error: OSError) -> InputError:
+def _cannot_write(folder: Path, error: OSError) -> InputError:
     """The line for a full disk and the like."""
     why = error.strerror or type(error).__name__
     return InputError(

@@ -11,12 +11,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.studied import studied
+from support.studied import QUICK, studied
 
 from ema_model import faults
 from ema_model.campaign.kinds.identify import covered
 
 pytestmark = pytest.mark.study
+
+LESS = 20.0 if QUICK else 0.0  # %, of a coverage: 3 σ of a share of 90 % of 20 intervals
 
 
 def held(rows: list[dict[str, Any]]) -> np.ndarray:
@@ -40,11 +42,11 @@ def test_noisy_vectors():
     rows = studied("robust")["noisy"]
     errors = [row["error_wrapped_percent"] for row in rows]
     assert np.median(errors) <= 0.6 and np.percentile(errors, 95) <= 2.0
-    assert np.all(held(rows) >= 80.0)
+    assert np.all(held(rows) >= 80.0 - LESS)
 
 
 def test_noisy_vectors_with_base_parameters_off():
-    assert np.all(held(studied("robust")["off"]) >= 75.0)
+    assert np.all(held(studied("robust")["off"]) >= 75.0 - LESS)
 
 
 def test_healthy_actuators_are_called_healthy():

@@ -127,10 +127,11 @@ class Cluster:
             return Died("Died: Dask's workers ended while they computed it")
         except OtherVersion as error:
             raise InputError(f"--scheduler {self._address}: {error}; install the same there") from None
-        except Exception:
-            if self._client.status != "running" or future.status == "cancelled":
+        except Exception as error:
+            if isinstance(error, OSError) or self._client.status != "running" or future.status == "cancelled":
                 raise self._gone() from None
-            raise
+            told = f"its workers cannot compute ({type(error).__name__}: {quoted(error, 200)}); see their logs"
+            raise InputError(f"--scheduler {self._address}: {told}") from None
 
     def _gone(self) -> InputError:
         return InputError(

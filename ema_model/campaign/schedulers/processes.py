@@ -21,7 +21,7 @@ from ema_model.campaign.schedulers.scheduler import MOST_DEATHS, Died, Outcome
 from ema_model.campaign.task import Task
 from ema_model.errors import InputError
 
-_AHEAD = 2  # tasks that a process has: the one that it computes, and the next
+_AHEAD = 2  # tasks that a process has: the one that it computes, and the next; the last ones go to whoever is free
 _MOST_MB = 1500.0  # of a process, after which another takes its place: each stack of effects that it met stays in it
 _POLL_S = 0.5
 
@@ -44,7 +44,7 @@ class Processes:
         try:
             while running:
                 for one in running:
-                    while waiting and len(one.tasks) < _AHEAD and not one.retiring:
+                    while waiting and one.has_room(_AHEAD if len(waiting) > len(running) else 1):
                         one.give(waiting.popleft())
                 wait([one.connection for one in running], _POLL_S)
                 found: list[Outcome] = []
@@ -92,6 +92,10 @@ class _Process:
         theirs.close()  # so that ours tells when the process has ended
         self.tasks: deque[Task] = deque()
         self.began = self.retiring = self.ended = False
+
+    def has_room(self, ahead: int) -> bool:
+        """Whether it takes one more, of so many that it may have."""
+        return len(self.tasks) < ahead and not self.retiring
 
     def give(self, task: Task) -> None:
         """One more to compute, after those that it has."""

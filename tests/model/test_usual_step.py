@@ -15,6 +15,9 @@ DRIVE = """
 position_gain_1_s = 1500.0
 speed_limit_rad_s = 300.0
 speed_gain_Nms_rad = 0.011
+integral_gain_Nm_rad = 0.4
+derivative_gain_Nms2_rad = 0.0
+integrator_window_rad = 10.0
 torque_constant_Nm_A = 0.05
 current_limit_A = 6.0
 [inverter]

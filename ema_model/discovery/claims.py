@@ -23,19 +23,27 @@ from ema_model.quantities.titles import in_sentence
 _READINGS = {"current_reading": "current_A", "position_reading": "user_position_rad"}
 
 
-def against(data: Data, before: Fit, after: Fit, keys: Sequence[str]) -> str:
-    """The first thing that speaks against the effects that a fit has beyond another; "" where nothing does."""
-    known = [_unmeasured(data, key) or _bent(before, after, key) or _implausible(after, key) for key in keys]
-    if not after.calibration.converged:
+def against(data: Data, before: Fit, after: Fit, keys: Sequence[str], calm: Fit) -> str:
+    """The first thing that speaks against the effects that a fit has beyond another; "" where nothing does.
+
+    calm: the fit with the effects, settled to what it leaves; far above the floor the tolerances count only there.
+    """
+    seen = before if calm is after else calm
+    known = [_unmeasured(data, key) or _bent(seen, calm, key) or _implausible(calm, key) for key in keys]
+    if not calm.calibration.converged:
         known.append("the fit with it did not converge")
     known.append(_worse(data, before, after) or _little(data, before, after))
-    known += [_unsteady(data, after, key) for key in keys]
+    known += [_unsteady(data, calm, key) for key in keys]
     return next((reason for reason in known if reason), "") or outdone(data, before, after)
 
 
 def still_against(data: Data, base: Fit, found: Fit, key: str) -> str:
     """What speaks against one of the effects of a model, in it."""
-    return _bent(base, found, key) or _implausible(found, key) or _unsteady(data, found, key)
+    return (
+        _bent(base if at_floor(data, found) else found, found, key)
+        or _implausible(found, key)
+        or _unsteady(data, found, key)
+    )
 
 
 def outdone(data: Data, before: Fit, after: Fit) -> str:
@@ -71,7 +79,10 @@ def _unmeasured(data: Data, key: str) -> str:
 
 
 def _bent(before: Fit, after: Fit, key: str) -> str:
-    """A parameter of the effect at its bound, or one of the actuator that it drives there."""
+    """A parameter of the effect at its bound, or one of the actuator that is not there in the fit before.
+
+    Far above the floor tolerances count for nothing until the model has settled: there `before` is `after` itself.
+    """
     parameters = after.calibration.parameters
     for path, one in parameters.items():
         if not one.at_bound or path.endswith("phase_rad"):

@@ -137,7 +137,7 @@ def _claimed(story: Story, accepted: Sequence[Trial], tell: Progress) -> tuple[T
         for whole in (more, best):
             if whole is not None and not reason:
                 keys = [*best.effects, *(whole.effects if whole is more else ())]
-                reason = against(story.data, story.current, whole.fit, keys)
+                reason = against(story.data, story.current, whole.fit, keys, story.settled(whole.fit, tell))
                 if not reason:
                     return best, others, more if whole is more else None
                 if whole is more:

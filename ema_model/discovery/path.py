@@ -76,7 +76,7 @@ class Story:
     warnings: list[str] = field(default_factory=list)
     ties: dict[str, str] = field(default_factory=dict)  # effects by the fault that would explain as much
     refused: dict[str, str] = field(default_factory=dict)  # effects that are not claimed, and what speaks against each
-    _settled: Fit | None = None
+    _calm: dict[Fit, Fit] = field(default_factory=dict)  # fits by those that they were settled from
     _prints: list[Fingerprint] = field(default_factory=list)
 
     @property
@@ -177,12 +177,19 @@ class Story:
 
         Counted in the sensors' noise, an error that the model cannot have outvotes every tolerance.
         """
-        if self.current is self._settled or at_floor(self.data, self.current):
-            return
-        tell("calibrating within what is left")
-        self._settled = settled(self.data, self.current, tell)
-        last = self.steps.pop()
-        self._append(self._settled, self._rung(last.rung.label, self._settled), last.added)
+        calm = self.settled(self.current, tell)
+        if calm is not self.current:
+            last = self.steps.pop()
+            self._append(calm, self._rung(last.rung.label, calm), last.added)
+
+    def settled(self, found: Fit, tell: Progress = lambda text: None) -> Fit:
+        """A fit made anew as what it leaves asks for; itself where it is at the floor, or is so already."""
+        if found in self._calm.values() or at_floor(self.data, found):
+            return found
+        if found not in self._calm:
+            tell("calibrating within what is left")
+            self._calm[found] = settled(self.data, found, tell)
+        return self._calm[found]
 
     def undo(self) -> bool:
         """Takes the last step back; False where there is none."""

@@ -94,6 +94,7 @@ def said(found: Discovery) -> dict[str, Any]:
         "unknown": None if unknown is None else [unknown.variable, unknown.modulator, unknown.r2],
         "curve": found.curve is not None,
         "ladder": [[rung.label, rung.rmse, rung.holdout_rmse] for rung in found.ladder],
+        "not_claimed": dict(getattr(found, "not_claimed", {})),
         "warnings": list(found.warnings),
     }
 

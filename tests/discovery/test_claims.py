@@ -11,6 +11,7 @@ from ema_model.actuator import Tolerance
 from ema_model.discovery import claims
 from ema_model.discovery.stability import disagreement
 from ema_model.estimation import Calibrated
+from ema_model.quantities.axes import ROTARY
 
 RANDOM = np.random.default_rng(7)
 N = 4000
@@ -42,7 +43,7 @@ def fitted(amplitudes, noise=1.0, settings=None, at_bound=False, path=PATH):
         converged=True,
         signals=[{"motor_position_rad": np.linspace(0.0, 3.0, N)}],
     )
-    actuator = SimpleNamespace(tolerances={path: Tolerance(500.0, True)})
+    actuator = SimpleNamespace(tolerances={path: Tolerance(500.0, True)}, axes=ROTARY)
     return Fit(plant=SimpleNamespace(windows=windows), residual=residual, calibration=calibration, actuator=actuator)
 
 

@@ -27,7 +27,11 @@ def tasks_a_second(out: Path) -> float:
     for worker in sorted({row["worker"] for row in rows}):
         its = [row["memory_MB"] for row in rows if row["worker"] == worker]
         print(f"    {worker}: {len(its)} tasks, {its[0]:.0f} … {its[-1]:.0f} MB")
-    return (len(rows) - 1) / (rows[-1]["finished_s"] - rows[0]["finished_s"])
+    span = rows[-1]["finished_s"] - rows[0]["finished_s"]
+    busy = sum(min(row["elapsed_s"], row["finished_s"] - rows[0]["finished_s"]) for row in rows[1:])
+    share = busy / span / len({row["worker"] for row in rows})
+    print(f"    workers compute for {100.0 * share:.0f} % of the time, which others' load does not change")
+    return (len(rows) - 1) / span
 
 
 def main(tasks: int = 200, turns: int = 3, workers: int = 2) -> None:

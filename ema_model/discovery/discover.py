@@ -112,11 +112,10 @@ def walk(
             story.add(more, f"+ {best.candidate.name} of orders {', '.join(f'{order:g}' for order in orders)}")
     _drop_idle(story, tell)
     _drop_doubtful(story, tell)
-    story.settle(tell)
     unknown = story.left().explanation
     if unknown is not None and not _named(story):
         unknown = _with_curve(story, curve, unknown, tell)
-        story.settle(tell)
+    story.settle(tell)  # last: beside a settled model any refit falls that only goes back to the sensors' noise
     return Walked(first, rivals, unknown)
 
 

@@ -67,6 +67,12 @@ def evidence(data: Data, before: Fit, after: Fit) -> float:
     return float(np.sum(squares / colour_of(data, after)) + prior)
 
 
+def effective_values(data: Data, found: Fit) -> float:
+    """Number of independent values that a fit leaves: all of them at the floor, its shapes far above it."""
+    squares = np.maximum(found.residual**2, colour_of(data, found) == 1.0)
+    return max(2.0, float(np.sum(squares / colour_of(data, found))))
+
+
 def predicted_evidence(data: Data, current: Fit, change: Array) -> float:
     """The same of a change of the residual, before any refit."""
     left = current.residual + change

@@ -13,7 +13,7 @@ from ema_model.discovery.fingerprints import fingerprints
 from ema_model.discovery.model_fit import Data
 from ema_model.discovery.refit import Trial, pays, tried
 from ema_model.discovery.result import Candidate
-from ema_model.discovery.score import scored_all, scored_together
+from ema_model.discovery.score import scored_beside, scored_together
 from ema_model.effects import catalogue_name, find
 
 _MOST = 5  # further orders
@@ -40,9 +40,9 @@ def further_orders(data: Data, held: Data | None, best: Trial, tell: Callable[[s
     tell(f"scoring further orders of {name}")
     left = [h for h in range(int(order.low), int(order.high) + 1) if h not in known]
     prints = fingerprints(data, current, [f"{name}_2"], left)
-    drops = np.array([one.predicted_drop for one in scored_all(current, prints)])
-    around = dict(zip(left, colour(drops)))
     found = scored_together(current, prints, _MOST)
+    drops = np.array([one.predicted_drop for one in scored_beside(current, prints, found)])
+    around = dict(zip(left, colour(drops)))
     strong = [c for c in found if c.predicted_drop > max(2.0 * LEAST_BIC, _SHARE * found[0].predicted_drop)]
     worth = [c for c in strong if _stands_out(c.settings["order"], c.predicted_drop, around)]
     for chosen in (worth, worth[:1]):

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ema_model.discovery.criteria import LEAST_BIC, MOMENT, MOMENTS
-from ema_model.discovery.evidence import colour_of, evidence
+from ema_model.discovery.evidence import colour_of, effective_values, evidence
 from ema_model.discovery.model_fit import Data, Fit, fit, holdout_error, with_effect
 from ema_model.discovery.result import Candidate
 from ema_model.effects import Effect, find
@@ -60,7 +60,9 @@ def tried(
 def worth(data: Data, current: Fit, trial: Trial) -> float:
     """How much a trial tells beyond what its parameters must (BIC), relative to what it leaves."""
     count = sum(fitted_count(name) for name in trial.effects) + len(trial.faults)
-    return evidence(data, current, trial.fit) - count * math.log(len(current.residual))
+    return evidence(data, current, trial.fit) - count * math.log(
+        min(len(current.residual), effective_values(data, trial.fit))
+    )
 
 
 def pays(current: Fit, trial: Trial, data: Data, held: Data | None) -> bool:

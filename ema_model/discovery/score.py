@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,6 +68,19 @@ def scored_together(found: Fit, prints: Sequence[Fingerprint], most: int) -> lis
         jacobian = np.concatenate([jacobian, columns], axis=1)
         prior = np.concatenate([prior, np.zeros(columns.shape[1])])
     return chosen
+
+
+def scored_beside(found: Fit, prints: Sequence[Fingerprint], known: Sequence[Candidate]) -> list[Candidate]:
+    """Fingerprints scored beside some that are taken to be in the model, the known ones among them as nothing."""
+    jacobian, _ = movable(found)
+    orders = {one.settings["order"] for one in known}
+    taken = [one.columns for one in prints if one.settings["order"] in orders]
+    count = jacobian.shape[1]
+    jacobian = np.concatenate([jacobian, *taken], axis=1)
+    gram = jacobian.T @ jacobian + np.diag(np.r_[np.ones(count), np.full(jacobian.shape[1] - count, 1e-6)])
+    left = found.residual - jacobian @ np.linalg.solve(gram, jacobian.T @ found.residual)
+    beside = replace(found, calibration=replace(found.calibration, residual=left))
+    return [_scored(beside, one, jacobian, gram) for one in prints]
 
 
 def movable(found: Fit) -> tuple[Array, Array]:

@@ -39,7 +39,7 @@ def _stretches(
     else:
         steps = [measurement.duration_s / actuator.step_s for measurement in measurements]
         blocks = sum(one.duration_s / max(one.sample_period_s, BLOCK_S) for one in measurements)
-    share = min(budget / sum(steps), most_blocks / max(blocks, 1.0))
+    share = min(budget / max(sum(steps), 1.0), most_blocks / max(blocks, 1.0))
     if share >= 1.0:
         return None
     return [_of(measurement, share, parts, actuator) for measurement in measurements]

@@ -24,7 +24,6 @@ from emaviz.page.compare.keep import KeepControls
 from emaviz.page.compare.moment import hold
 from emaviz.page.compare.result import ResultPanel
 from emaviz.page.compare.tab import ComparePanel
-from emaviz.page.discover.cards import TABS
 from emaviz.page.discover.keep import DiscoveryKeep
 from emaviz.page.discover.result import DiscoveryPanel
 from emaviz.page.discover.tab import DiscoverPanel
@@ -174,7 +173,6 @@ class App:
         ]
         if compare_first:
             builders.insert(0, builders.pop(2))
-        add_html(gui, TABS)
         tabs = gui.add_tab_group()
         for build in builders:
             build(tabs)

@@ -24,13 +24,16 @@ _LABEL = "> div > .mantine-Flex-root > div:first-child"
 
 def page() -> Html:
     """What holds for the whole page."""
-    return unescaped(
+    rules = unescaped(
         "<style>"
         # all tabs of the main panel in one line
-        "[data-dock-region=left] [data-dock-tab]{padding-left:7px!important;padding-right:7px!important}"
+        "[data-dock-region=left] [data-dock-tab]{padding-left:4px!important;padding-right:4px!important;"
+        "font-size:12.5px!important}[data-dock-region=left] [data-dock-tab] *{font-size:inherit!important}"
+        "[data-dock-region=left] [data-dock-tab] > div:has(svg){display:none!important}"
         f"div:has(> div > .emaviz-long) {_LABEL}{{width:10.4em!important}}"
-        "</style>" + _strip()
+        "</style>"
     )
+    return rules + _strip()
 
 
 def _strip() -> Html:

@@ -34,7 +34,9 @@ def page(browser: Any, app: App) -> Iterator[Any]:
     tab.get_by_role("tab", name="Explore").wait_for(timeout=60_000)
     tab.wait_for_function("Object.keys(window.__viserTestpoints?.uplots ?? {}).length >= 4", timeout=60_000)
     yield tab
+    seen = tab.inner_text("body")
     tab.close()
+    assert "<style" not in seen and "</" not in seen, "markup of ours is shown letter by letter"
     outside = [url for url in asked if not url.startswith((app.address, "ws://127.0.0.1", "data:", "blob:"))]
     assert not outside, "nothing may be fetched from elsewhere"
 
@@ -48,7 +50,9 @@ def watched(browser: Any, app: App) -> Iterator[Any]:
     tab.goto(app.address)
     tab.get_by_role("tab", name="Recordings").wait_for(timeout=60_000)
     yield tab
+    seen = tab.inner_text("body")
     tab.close()
+    assert "<style" not in seen and "</" not in seen, "markup of ours is shown letter by letter"
     assert app.viewer is not None
     allowed = (app.address, app.viewer.address, "ws://127.0.0.1", "data:", "blob:")
     assert any(url.startswith(app.viewer.address) for url in asked)

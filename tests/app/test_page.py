@@ -138,3 +138,14 @@ def test_sliders_answer_while_an_identification_runs(page, app):
     assert app.session.worker.busy
     app.session.stop()
     wait_until(lambda: not app.session.worker.busy)
+
+
+def test_six_tabs_stand_in_one_line_and_the_strip_holds_its_controls(page):
+    tabs = page.locator("[data-dock-region=left] [data-dock-tab]")
+    assert [name.strip() for name in tabs.all_inner_texts()] == [
+        "Explore", "Identify", "Compare", "Discover", "Library", "Recordings"
+    ]  # fmt: skip
+    assert len({round(tab.bounding_box()["y"]) for tab in tabs.all()}) == 1
+    strip = page.locator("[data-floating-window]:has(.emaviz-strip)")
+    for name in ("Play", "Reset view"):
+        assert strip.get_by_role("button", name=name, exact=True).bounding_box()["x"] < 1400

@@ -23,14 +23,6 @@ _LITTLE = 0.005  # of the error
 _BAR = "rgba(240,140,0,.28)"
 
 
-# Six tabs of the main panel in one line; it stands above them, as a tab's own content is there only once it was seen.
-TABS = Html(
-    "<style>[data-dock-region=left] [data-dock-tab]{padding-left:6px!important;padding-right:6px!important}"
-    "[data-dock-region=left] [data-dock-tab] > div:has(svg){display:none!important}"
-    "div:has(> .emaviz-tabs){display:none}</style><div class=emaviz-tabs></div>"
-)
-
-
 def label(look: Look, one: Candidate) -> str:
     """The lines of a card; its first is the effect's name."""
     title = effect_title(one.name)

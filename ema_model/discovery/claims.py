@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ema_model.actuator.naming import on_axes
-from ema_model.discovery.criteria import AS_MUCH, LEAST_SHARE, PLAUSIBLE, TIE
+from ema_model.discovery.criteria import AS_MUCH, LEAST_FALL, LEAST_SHARE, PLAUSIBLE, TIE
 from ema_model.discovery.evidence import colour_of, evidence, signals_of
 from ema_model.discovery.model_fit import Data, Fit, floor_ratio
 from ema_model.discovery.remaining import at_floor, left_by, used_left
@@ -23,16 +23,16 @@ from ema_model.quantities.titles import in_sentence
 _READINGS = {"current_reading": "current_A", "position_reading": "user_position_rad"}
 
 
-def against(data: Data, before: Fit, after: Fit, keys: Sequence[str], calm: Fit) -> str:
+def against(data: Data, before: Fit, after: Fit, keys: Sequence[str], calm: Fit, calm_before: Fit) -> str:
     """The first thing that speaks against the effects that a fit has beyond another; "" where nothing does.
 
-    calm: the fit with the effects, settled to what it leaves; far above the floor the tolerances count only there.
+    calm, calm_before: both fits, settled to what they leave; far above the floor the tolerances count only there.
     """
     seen = before if calm is after else calm
     known = [_unmeasured(data, key) or _bent(seen, calm, key) or _implausible(calm, key) for key in keys]
     if not calm.calibration.converged:
         known.append("the fit with it did not converge")
-    known.append(_worse(data, before, after) or _little(data, before, after))
+    known.append(_worse(data, before, after) or _little(data, before, after) or _idle(data, calm_before, calm))
     known += [_unsteady(data, calm, key) for key in keys]
     return next((reason for reason in known if reason), "") or outdone(data, before, after)
 
@@ -114,6 +114,13 @@ def _travel(found: Fit) -> float:
 
 def _worse(data: Data, before: Fit, after: Fit) -> str:
     return "the error rises with it" if ratio(data, after) > ratio(data, before) else ""
+
+
+def _idle(data: Data, before: Fit, after: Fit) -> str:
+    """Whether the error stays where it is once the actuator's parameters keep to their tolerances."""
+    if at_floor(data, after) or ratio(data, after) < (1.0 - LEAST_FALL) * ratio(data, before):
+        return ""
+    return "within the tolerances of the actuator the error does not fall with it"
 
 
 def _little(data: Data, before: Fit, after: Fit) -> str:

@@ -29,6 +29,9 @@ PHASES_APART = 1.0
 # tells less of an error whose cause is not known may be a part of that cause (a drive's bias is a constant load).
 LEAST_SHARE = 0.25
 
+# Of the error, that an effect must take away beside a model whose parameters keep to their tolerances (MODEL §6).
+LEAST_FALL = 0.01
+
 # Of what the residual's own curve tells, that an effect must tell: a curve has more freedom.
 AS_MUCH = 0.9
 

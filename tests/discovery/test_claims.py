@@ -104,3 +104,10 @@ def test_a_sensor_that_was_not_recorded_has_no_bias():
     assert "not recorded" in claims._unmeasured(blind, "current_sensor_bias")
     assert not claims._unmeasured(blind, "position_sensor_bias") and not claims._unmeasured(DATA, "current_sensor_bias")
     assert not claims._unmeasured(blind, "cogging_torque_2")
+
+
+def test_what_takes_nothing_away_within_the_tolerances_is_not_claimed(monkeypatch):
+    monkeypatch.setattr(claims, "ratio", lambda _, found: found)
+    monkeypatch.setattr(claims, "at_floor", lambda *_: False)
+    assert "does not fall" in claims._idle(DATA, 4.07, 4.06)
+    assert not claims._idle(DATA, 4.07, 3.90)

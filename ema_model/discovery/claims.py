@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ema_model.actuator.naming import on_axes
-from ema_model.discovery.criteria import AS_MUCH, LEAST_FALL, LEAST_SHARE, PLAUSIBLE, TIE
+from ema_model.discovery.criteria import AS_MUCH, FAR, LEAST_FALL, LEAST_SHARE, PLAUSIBLE, TIE
 from ema_model.discovery.evidence import colour_of, evidence, signals_of
 from ema_model.discovery.model_fit import Data, Fit, floor_ratio
 from ema_model.discovery.remaining import at_floor, left_by, used_left
@@ -125,7 +125,7 @@ def _idle(data: Data, before: Fit, after: Fit) -> str:
 
 def _little(data: Data, before: Fit, after: Fit) -> str:
     """Whether far more is left of every signal than the effects explain."""
-    if at_floor(data, after):
+    if ratio(data, after) < FAR:
         return ""
     first, second, values = ({} for _ in range(3))
     for name, rows in signals_of(data, after.plant):

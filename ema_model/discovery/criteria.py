@@ -29,6 +29,10 @@ PHASES_APART = 1.0
 # tells less of an error whose cause is not known may be a part of that cause (a drive's bias is a constant load).
 LEAST_SHARE = 0.25
 
+# Of the floor, beyond which that share is asked for: nearer to it, two causes may share the error (a shorted phase and
+# cogging), and the own studies name no effect falsely.
+FAR = 2.0
+
 # Of the error, that an effect must take away beside a model whose parameters keep to their tolerances (MODEL §6).
 LEAST_FALL = 0.01
 

@@ -6,7 +6,7 @@ bent to: a value that no such part has, another one in each recording, an error 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -23,18 +23,29 @@ from ema_model.quantities.titles import in_sentence
 _READINGS = {"current_reading": "current_A", "position_reading": "user_position_rad"}
 
 
-def against(data: Data, before: Fit, after: Fit, keys: Sequence[str], calm: Fit, calm_before: Fit) -> str:
+def against(data: Data, before: Fit, after: Fit, keys: Sequence[str], settled: Callable[[Fit], Fit]) -> str:
     """The first thing that speaks against the effects that a fit has beyond another; "" where nothing does.
 
-    calm, calm_before: both fits, settled to what they leave; far above the floor the tolerances count only there.
+    settled(fit): a fit calibrated to what it leaves; far above the floor the tolerances count only there.  It takes as
+    long as a fit, so that it is asked for last.
     """
+    return (
+        next((reason for key in keys if (reason := _unmeasured(data, key))), "")
+        or _worse(data, before, after)
+        or _little(data, before, after)
+        or outdone(data, before, after)
+        or _against_settled(data, before, after, keys, settled)
+    )
+
+
+def _against_settled(data: Data, before: Fit, after: Fit, keys: Sequence[str], settled: Callable[[Fit], Fit]) -> str:
+    calm = settled(after)
     seen = before if calm is after else calm
-    known = [_unmeasured(data, key) or _bent(seen, calm, key) or _implausible(calm, key) for key in keys]
-    if not calm.calibration.converged:
-        known.append("the fit with it did not converge")
-    known.append(_worse(data, before, after) or _little(data, before, after) or _idle(data, calm_before, calm))
-    known += [_unsteady(data, calm, key) for key in keys]
-    return next((reason for reason in known if reason), "") or outdone(data, before, after)
+    known = [_bent(seen, calm, key) or _implausible(calm, key) or _unsteady(data, calm, key) for key in keys]
+    reason = next((reason for reason in known if reason), "")
+    if not reason and not calm.calibration.converged:
+        reason = "the fit with it did not converge"
+    return reason or ("" if calm is after else _idle(data, settled(before), calm))
 
 
 def still_against(data: Data, base: Fit, found: Fit, key: str) -> str:
@@ -124,15 +135,11 @@ def _idle(data: Data, before: Fit, after: Fit) -> str:
 
 
 def _little(data: Data, before: Fit, after: Fit) -> str:
-    """Whether far more is left of every signal than the effects explain."""
+    """Whether far more is left than the effects explain."""
     if ratio(data, after) < FAR:
         return ""
-    first, second, values = ({} for _ in range(3))
-    for name, rows in signals_of(data, after.plant):
-        first[name] = first.get(name, 0.0) + float(np.sum(before.residual[rows] ** 2))
-        second[name] = second.get(name, 0.0) + float(np.sum(after.residual[rows] ** 2))
-        values[name] = values.get(name, 0) + rows.stop - rows.start
-    share = max((first[n] - second[n]) / max(first[n] - values[n], values[n]) for n in first)
+    first, second = (float(one.residual @ one.residual) for one in (before, after))
+    share = (first - second) / max(first - len(before.residual), len(before.residual))
     return "" if share >= LEAST_SHARE else f"it explains {100.0 * share:.0f} % of an error whose cause is not known"
 
 

@@ -25,7 +25,7 @@ DISAGREES, APART = 1e-3, 0.35
 # rad, that a phase may differ by between parts: half the power of the wave would be missed.
 PHASES_APART = 1.0
 
-# Of a signal's χ² beyond its floor, that an effect must explain where it does not bring the error to the floor: what
+# Of χ² beyond the floor, that an effect must explain where it does not bring the error near the floor: what
 # tells less of an error whose cause is not known may be a part of that cause (a drive's bias is a constant load).
 LEAST_SHARE = 0.25
 

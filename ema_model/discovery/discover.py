@@ -136,8 +136,7 @@ def _claimed(story: Story, accepted: Sequence[Trial], tell: Progress) -> tuple[T
         for whole in (more, best):
             if whole is not None and not reason:
                 keys = [*best.effects, *(whole.effects if whole is more else ())]
-                calm, calm_before = (story.settled(one, tell) for one in (whole.fit, story.current))
-                reason = against(story.data, story.current, whole.fit, keys, calm, calm_before)
+                reason = against(story.data, story.current, whole.fit, keys, lambda found: story.settled(found, tell))
                 if not reason:
                     return best, others, more if whole is more else None
                 if whole is more:

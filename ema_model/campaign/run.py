@@ -36,7 +36,8 @@ class Status:
         """One line of it."""
         left = "" if self.left_s is None else f", {duration(self.left_s)} left"
         failed = f", {self.errors} errors" if self.errors else ""
-        return f"{self.there + self.computed} of {self.total} tasks{failed}, {self.workers} workers{left}"
+        workers = f"{self.workers} workers{left}" if self.workers else "no workers: waiting for some"
+        return f"{self.there + self.computed} of {self.total} tasks{failed}, {workers}"
 
 
 def run_plan(

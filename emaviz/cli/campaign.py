@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import re
+import sys
 from pathlib import Path
 
 from ema_model.campaign import Status, Store, duration, estimate_s, load_plan, plan_path, run_plan, scheduler
@@ -68,13 +69,28 @@ def _run(plan: Plan, arguments: argparse.Namespace) -> int:
             arguments.out,
             scheduler(arguments.scheduler, arguments.workers),
             retry=arguments.retry,
-            on_progress=lambda at: progress.show(at.text),
+            on_progress=_Told(progress, arguments.scheduler),
         )
     finally:
         progress.done()
     print(_ended(status, arguments.out))
     output.write_json(arguments.json, _numbers(Store(arguments.out)), 0, output.configuration(arguments))
     return 0
+
+
+class _Told:
+    """Shows how far it is; that all workers are gone is a line of its own, once each time."""
+
+    def __init__(self, progress: output.Progress, scheduler: str | None) -> None:
+        self._progress, self._scheduler, self._waiting = progress, scheduler, False
+
+    def __call__(self, at: Status) -> None:
+        if not at.workers and not self._waiting:
+            self._progress.done()
+            begin = f"; begin some: `dask worker {self._scheduler} --nthreads 1`" if self._scheduler else ""
+            print(f"{at.text}{begin}", file=sys.stderr, flush=True)
+        self._waiting = not at.workers
+        self._progress.show(at.text)
 
 
 def _ended(status: Status, folder: str) -> str:

@@ -18,7 +18,7 @@ from ema_model.campaign import store as storing
 from ema_model.campaign.execute import execute
 from ema_model.campaign.version import version
 from ema_model.errors import InputError
-from emaviz.cli import main
+from emaviz.cli import campaign, main
 
 
 class Here:
@@ -171,6 +171,31 @@ def test_a_scheduler_that_is_not_there(tmp_path, capsys, monkeypatch):
     assert not (tmp_path / "o").exists()
     for wrong in ("127.0.0.1", "tcp://host", "http://host:1"):
         assert "must be an address such as" in told(["campaign", plan, "--out", "o", "--scheduler", wrong], capsys)
+
+
+class Losing(Here):
+    """All its workers are gone for a while."""
+
+    def outcomes(self, tasks, version):
+        rows = super().outcomes(tasks, version)
+        yield next(rows)
+        self.workers = 0
+        yield []
+        yield []
+        self.workers = 1
+        yield from rows
+
+
+def test_workers_that_are_gone_are_told_once(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(campaign, "scheduler", lambda address, workers: Losing())
+    plan = cheap(tmp_path, 2)
+    arguments = ["campaign", plan, "--out", tmp_path / "o", "--scheduler", "tcp://127.0.0.1:1"]
+    assert main([str(one) for one in arguments]) == 0
+    out, err = capsys.readouterr()
+    assert "2 tasks, 2 computed now" in out
+    assert err == (
+        "1 of 2 tasks, no workers: waiting for some; begin some: `dask worker tcp://127.0.0.1:1 --nthreads 1`\n"
+    )
 
 
 def test_without_dask_a_scheduler_says_what_to_install(tmp_path, capsys, monkeypatch):

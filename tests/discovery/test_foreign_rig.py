@@ -1,9 +1,9 @@
-"""Two recordings of rigs that nobody here wrote, with nothing hidden: the study is in test_foreign_rig_study.py."""
+"""Recordings of rigs that nobody here wrote, with nothing hidden: the study is in test_foreign_rigs_study.py."""
 
 from __future__ import annotations
 
 import pytest
-from support.foreign_rig import Case, recorded
+from support.foreign_rigs import actuator_of, measured, recorded
 
 from ema_model.comparison.criteria import BAND
 from ema_model.discovery import discover
@@ -11,8 +11,11 @@ from ema_model.discovery import discover
 
 @pytest.mark.parametrize("rig", ["hobby", "gearservo"])
 def test_a_healthy_rig_is_adequate_or_unknown_and_nothing_is_named(rig, tmp_path):
-    run = recorded(Case(rig, 2, fitted=("chirp",), held=()), tmp_path)
-    found = discover(run.fitted, run.actuator, candidates=("asymmetric_friction", "torsional_compliance"))
+    recorded(rig, 2, tmp_path, programmes=["chirp"])
+    actuator = actuator_of(rig)
+    found = discover(
+        measured(tmp_path, actuator, ["chirp"]), actuator, candidates=("asymmetric_friction", "torsional_compliance")
+    )
     assert found.verdict in ("adequate", "unknown_effect") and not found.effects
     assert found.ladder[-1].rmse <= BAND or found.verdict == "unknown_effect"
     assert not any(one.at_bound for one in found.calibration.parameters.values())

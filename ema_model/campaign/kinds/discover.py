@@ -46,11 +46,17 @@ def _run(given: Given, settings: Settings, seed: int) -> dict[str, Any]:
         discover(given.fitted, given.actuator, holdout=given.held, signals=signals, most_effects=settings.most_effects)
     )
     ladder, faults, experiment = found["ladder"], found["faults"], found["next_experiment"]
+    unknown = found["unknown"]
     return asked | {
         "verdict": found["verdict"],
         "effects": [one["name"] for one in found["effects"]],
         "same_as": ["+".join(one["same_as"]) for one in found["effects"]],
+        "parameters": json.dumps(
+            {one["name"]: {name: p["value"] for name, p in one["parameters"].items()} for one in found["effects"]}
+        ),
         "outside": found["parameters_outside_tolerance"],
+        "at_bound": [name for name, one in found["calibration"]["parameters"].items() if one["at_bound"]],
+        "unknown": None if unknown is None else f"{unknown['variable']} × {unknown['modulator']}",
         "rungs": [rung["label"] for rung in ladder],
         "ladder": [rung["rmse"] for rung in ladder],
         "holdout_ladder": [rung["holdout_rmse"] for rung in ladder],
@@ -105,7 +111,10 @@ KIND = Kind(
             ("verdict", TEXT),  # null where the effects cannot be seen
             ("effects", TEXTS),
             ("same_as", TEXTS),  # of each effect, the names that cannot be told from it, joined by +
+            ("parameters", TEXT),  # of the effects, as JSON: their values by name
             ("outside", TEXTS),
+            ("at_bound", TEXTS),  # calibrated parameters
+            ("unknown", TEXT),  # what the rest goes with: variable × modulator
             ("rungs", TEXTS),
             ("ladder", NUMBERS),  # in units of the floor
             ("holdout_ladder", NUMBERS),

@@ -104,8 +104,7 @@ class Cluster:
                     task, _ = given.pop(future.key)
                     found.append((task, self._answer(future)))
             left -= len(found)
-            if found:
-                yield found
+            yield found
 
     def _finished(self, done: queue.SimpleQueue[Any]) -> Iterator[Any]:
         """Futures that have come to an end; InputError when the scheduler is gone."""

@@ -26,7 +26,8 @@ class Scheduler(Protocol):
         ...
 
     def outcomes(self, tasks: Sequence[Task], version: dict[str, str]) -> Iterator[list[Outcome]]:
-        """The rows of the tasks as they come, one or more at a time; closing the iterator ends the work.
+        """The rows of the tasks as they come, some at a time, or none, so that waiting can be told; closing the
+        iterator ends the work.
 
         Raises InputError for workers that cannot compute them.
         """

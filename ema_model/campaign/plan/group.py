@@ -1,36 +1,12 @@
-"""A plan: a TOML file that says which tasks a campaign has, as products of axes or as lists of recordings.
-
-    title = "Robust identification"
-
-    [runs.chirp]                      # what simulated recordings are made with
-    command = "chirp"
-    duration_s = 0.5
-
-    [groups.noisy]                    # a product: each entry is one choice, or a list of them
-    does = "identify"                 # or discover, compare
-    runs = ["chirp", "step"]          # two tasks; [["chirp", "step"]] is one that fits both recordings
-    faults = [{ k1 = 0.25 }, { uniform = { k1 = [0, 0.5], k8 = [0.2, 0.8] } }]
-    noise_A = [0.1, 0.45]
-    algorithm = ["robust", "do"]      # every setting of what it does may be an axis, too
-    seeds = { from = 0, count = 100 }
-
-    [groups.bench]
-    does = "discover"
-    actuator = "rig.toml"
-    recordings = "logs/*.csv"         # each is a task; or { fit = ["a.csv", "b.csv"], holdout = ["c.csv"] }, with
-                                      # each = "unit_*" in every such folder
-
-`like = "other.toml"` takes all of another plan first; what stands here goes before it.
-"""
+"""One group of a plan: the products of its axes, or its recordings, as tasks."""
 
 from __future__ import annotations
 
 import itertools
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields
-from glob import escape, glob
-from importlib import resources
+from dataclasses import fields
+from glob import glob
 from pathlib import Path
 from typing import Any
 
@@ -38,83 +14,21 @@ import msgspec
 
 from ema_model.actuator import Actuator, actuator_text, parse_actuator, shipped
 from ema_model.campaign import draws
-from ema_model.campaign.axes import AXES, MOST_TASKS, USUAL, Choice, check_count, choices_of
+from ema_model.campaign.axes import AXES, USUAL, Choice, check_count, choices_of
 from ema_model.campaign.given import digest, run_of
 from ema_model.campaign.kinds import KINDS
+from ema_model.campaign.plan.document import check_names
 from ema_model.campaign.task import Excitation, File, Recorded, Simulated, Task
 from ema_model.errors import InputError, quoted
-from ema_model.files.limits import TEXT_BYTES
 from ema_model.files.refusal import listed
-from ema_model.files.toml_text import toml_of
-from ema_model.files.user_file import open_user_file
 
-_ENTRIES = ("schema", "title", "about", "like", "runs", "groups")
 _SHARED = ("does", "actuator", "seeds")
 _SIMULATED = ("runs", "holdout", "load_recorded", "noise_seed_plus", "tolerances_of", *AXES)
 _RECORDED = ("recordings", "mapping")
-_DEEPEST = 5  # plans that are like others
 
 
-@dataclass(frozen=True)
-class Plan:
-    """What a campaign computes."""
-
-    title: str
-    about: str
-    text: str  # a file that gives the same plan, wherever it lies
-    tasks: tuple[Task, ...]
-
-
-def load_plan(path: str | os.PathLike[str]) -> Plan:
-    """The plan of a file, or the shipped one of that name; InputError, one line, for whatever is wrong in it.
-
-    Files that it names lie beside it, unless their paths are whole.
-    """
-    file = plan_path(path)
-    document = _document(file, 0)
-    _check(document, _ENTRIES, f"{quoted(file)}:")
-    if document.get("schema", 1) != 1:
-        raise InputError(f"{quoted(file)}: schema {quoted(document['schema'], 40)} is not known; this reads schema 1")
-    groups = _table(document, "groups", f"{quoted(file)}:")
-    if not groups:
-        raise InputError(f"{quoted(file)}: has no [groups.NAME]; each says what is to be computed")
-    runs = {}
-    for name, table in _table(document, "runs", f"{quoted(file)}:").items():
-        where = f"{quoted(file)}: [runs.{quoted(name)}]"
-        runs[name] = _excitation(table, where)
-    tasks: list[Task] = []
-    for name, table in groups.items():
-        where = f"{quoted(file)}: [groups.{quoted(name)}]"
-        if not isinstance(table, dict):
-            raise InputError(f"{where} must be a table")
-        group = _Group(name, table, runs, file.parent, where)
-        if (count := len(tasks) + group.count) > MOST_TASKS:
-            raise InputError(f"{where} takes the plan to {count} tasks, and {MOST_TASKS} are the most; split it")
-        tasks += group.tasks()
-    title, about = (str(document.get(key, usual)) for key, usual in (("title", file.stem), ("about", "")))
-    return Plan(title, about, _text(document, file), tuple(tasks))
-
-
-def plan_path(path: str | os.PathLike[str]) -> Path:
-    """Where a plan lies: the file, or, of a name without a suffix, the one that is shipped under it."""
-    given = Path(path)
-    if given.suffix or given.exists():
-        return given
-    known = shipped_plans()
-    if str(given) not in known:
-        raise InputError(f"no plan {quoted(given)!r}; shipped are {', '.join(known)}, or name a file (.toml)")
-    return known[str(given)]
-
-
-def shipped_plans() -> dict[str, Path]:
-    """The plans that come with the package (assets/plans), by name."""
-    inside = Path(str(resources.files("ema_model") / "assets" / "plans"))
-    folder = inside if inside.is_dir() else Path(__file__).parents[2] / "assets" / "plans"
-    return {path.stem: path for path in sorted(folder.glob("*.toml"))}
-
-
-class _Group:
-    """One group of a plan, checked."""
+class Group:
+    """One group of a plan, checked; InputError, with its place in the plan, for whatever is wrong in it."""
 
     def __init__(self, name: str, table: dict[str, Any], runs: Mapping[str, Excitation], beside: Path, where: str):
         self.name, self._table, self._runs, self._beside, self._where = name, table, runs, beside, where
@@ -123,7 +37,7 @@ class _Group:
         self._kind = KINDS[table["does"]]
         options = [field.name for field in fields(self._kind.settings)]
         source = _RECORDED if "recordings" in table else _SIMULATED
-        _check(table, (*_SHARED, *source, *options), where)
+        check_names(table, (*_SHARED, *source, *options), where)
         self._text, self._actuator = self._told("actuator", self._actuator_file)
         self._seeds = self._told("seeds", lambda: _seeds(table.get("seeds", [0])))
         self._settings = self._told("", lambda: self._all_settings(options))
@@ -131,9 +45,11 @@ class _Group:
 
     @property
     def count(self) -> int:
+        """How many tasks it has."""
         return len(self._sources) * len(self._settings) * len(self._seeds)
 
     def tasks(self) -> Iterator[Task]:
+        """In the order of its axes, the seed last."""
         for (label, source), (settings_label, settings) in itertools.product(self._sources, self._settings):
             case = " · ".join(filter(None, (label, settings_label)))
             for seed in self._seeds:
@@ -201,7 +117,7 @@ class _Group:
             if isinstance(entry, str):
                 sets = [([path], []) for path in self._files(entry)]
             elif isinstance(entry, dict):
-                _check(entry, ("each", "fit", "holdout"), f"{self._where} recordings:")
+                check_names(entry, ("each", "fit", "holdout"), f"{self._where} recordings:")
                 folders = self._files(entry["each"]) if isinstance(entry.get("each"), str) else [self._beside]
                 sets = [
                     tuple(self._all_files(entry.get(key, []), Path(folder)) for key in ("fit", "holdout"))
@@ -302,65 +218,12 @@ class _Group:
         return tuple(self._runs[name] for name in names)
 
 
-def _document(path: Path, depth: int) -> dict[str, Any]:
-    """The file's content over that of the plan that it is like."""
-    try:
-        with open_user_file(path, "a plan (.toml)", TEXT_BYTES) as file:
-            document = toml_of(file.read().decode("utf-8"))
-    except UnicodeDecodeError:
-        raise InputError(f"{quoted(path)}: cannot be read as text (not UTF-8)") from None
-    except InputError:
-        raise
-    except ValueError as error:
-        raise InputError(f"{quoted(path)}: not valid TOML: {quoted(error)}") from None
-    like = document.pop("like", None)
-    if like is None:
-        return document
-    if not isinstance(like, str) or depth >= _DEEPEST:
-        raise InputError(f"{quoted(path)}: like is the name of another plan's file, which is not like this one in turn")
-    other = _document(path.parent / like, depth + 1)
-    return _over(document, other)
-
-
-def _over(above: dict[str, Any], below: dict[str, Any], depth: int = 0) -> dict[str, Any]:
-    """Entries of `above` go before those of `below`, down to the entries of groups and runs."""
-    whole = dict(below)
-    for name, entry in above.items():
-        both = isinstance(entry, dict) and isinstance(below.get(name), dict) and depth < 2
-        whole[name] = _over(entry, below[name], depth + 1) if both else entry
-    return whole
-
-
-def _text(document: Mapping[str, Any], file: Path) -> str:
-    """The whole plan as one file, with whole paths of what it names."""
-    from ema_model.campaign.toml_write import toml_text
-
-    groups = {}
-    for name, table in document["groups"].items():
-        table = dict(table)
-        if Path(table.get("actuator", "thesis")).suffix:
-            table["actuator"] = str((file.parent / table["actuator"]).resolve())
-        if "recordings" in table:
-            table["recordings"] = _whole_paths(table["recordings"], file.parent.resolve())
-        groups[name] = table
-    return toml_text({**document, "groups": groups})
-
-
-def _whole_paths(entry: Any, beside: Path) -> Any:
-    if isinstance(entry, str):
-        return str(Path(escape(str(beside))) / entry)
-    if isinstance(entry, list):
-        return [_whole_paths(one, beside) for one in entry]
-    if "each" in entry:  # the others lie in those folders
-        return {**entry, "each": _whole_paths(entry["each"], beside)}
-    return {name: _whole_paths(one, beside) for name, one in entry.items()}
-
-
 def _digested(paths: list[str]) -> tuple[File, ...]:
     return tuple(File(path, digest(path)) for path in paths)
 
 
-def _excitation(table: Any, where: str) -> Excitation:
+def excitation_of(table: Any, where: str) -> Excitation:
+    """One of a plan's [runs]."""
     if not isinstance(table, dict) or not isinstance(table.get("command"), str):
         raise InputError(f'{where} needs command = "chirp", or another command\'s name, and its settings')
     own = ("command", "duration_s", "sample_rate_Hz")
@@ -379,7 +242,7 @@ def _excitation(table: Any, where: str) -> Excitation:
 
 def _seeds(entry: Any) -> list[int]:
     if isinstance(entry, dict):
-        _check(entry, ("from", "count"), "")
+        check_names(entry, ("from", "count"), "")
         first, count = entry.get("from", 0), entry.get("count", 0)
         if not isinstance(first, int) or not isinstance(count, int):
             raise InputError("takes whole numbers from 0, or { from = 0, count = 100 }")
@@ -391,19 +254,6 @@ def _seeds(entry: Any) -> list[int]:
     if not all(isinstance(one, int) and not isinstance(one, bool) and 0 <= one < 2**62 for one in entry):
         raise InputError("takes whole numbers from 0, or { from = 0, count = 100 }")
     return entry
-
-
-def _check(table: Mapping[str, Any], known: tuple[str, ...], where: str) -> None:
-    for name in table:
-        if name not in known:
-            raise InputError(f"{where} has no {quoted(name, 60)!r}; it has {', '.join(known)}".strip())
-
-
-def _table(document: Mapping[str, Any], name: str, where: str) -> dict[str, Any]:
-    found = document.get(name, {})
-    if not isinstance(found, dict):
-        raise InputError(f"{where} [{name}] must be a table")
-    return found
 
 
 def _or(names: Mapping[str, Any]) -> str:

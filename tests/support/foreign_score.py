@@ -1,0 +1,77 @@
+"""What a discovery on a foreign rig is worth, as the rig's README says what a right answer is."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Mapping
+from typing import Any
+
+from ema_model.comparison.criteria import BAND
+from ema_model.effects import CATALOGUE
+
+SHOWABLE = 3.0  # `change_over_floor` of what a recording must tell; below 1 nobody can, between them hardly
+_HARDLY = 1.0
+_OWN_DELAY_SAMPLES = 2.0  # of the drive: a delay up to so many is its own
+_LARGEST_GROUP = 3  # with which a name is still an answer
+_PARAMETERS = {  # effects that are a wrong value of a parameter, by what the parameter's path has
+    "viscous_friction": "viscous",
+    "inertia_error": "inertia",
+    "demagnetisation": "torque_constant",
+    "winding_resistance": "resistance",
+}
+_DRIVE = {"position_sensor_delay"}
+COLUMNS = ("right", "false", "silent", "hardly showable", "unknown with its variable", "contradicts", "at bound",
+           "drive told")  # fmt: skip
+
+
+def tally(row: Mapping[str, Any], truth: Mapping[str, Any]) -> Counter[str]:
+    """Counts of one row of `discover`; `silent` is what could have been told, and was not."""
+    hidden = truth["hidden"].values()
+    told = [one for one in hidden if max(one["change_over_floor"].values()) > _HARDLY]
+    shown = any(max(one["change_over_floor"].values()) >= SHOWABLE for one in hidden)
+    right = {name for one in told for name in one["right"]}
+    groups = [{name, *filter(None, same.split("+"))} for name, same in zip(row["effects"], row["same_as"])]
+    values = json.loads(row["parameters"])
+    wrong = [
+        name
+        for name, group in zip(row["effects"], groups)
+        if not group & right and not _is_the_drives(name, values[name], truth["drive"]["rate"])
+    ]
+    outside = any(part in path for name, part in _PARAMETERS.items() if name in right for path in row["outside"])
+    named = bool(groups) and bool(groups[0] & right) and len(groups[0]) <= _LARGEST_GROUP
+    curve = bool(right & {"curve", "unknown"}) and not groups and bool(row["unknown"])
+    above = row["ladder"][-1] is None or row["ladder"][-1] > BAND
+    correct = (named or outside) and not wrong
+    drive = bool(row.get("controller_mismatch")) or any(not group.isdisjoint(_DRIVE) for group in groups)
+    return Counter(
+        {
+            "cases": 1,
+            "showable": int(shown),
+            "right": int(shown and correct),
+            "false": int(bool(wrong)),
+            "silent": int(shown and not wrong and not correct and not curve),
+            "hardly showable": int(bool(hidden) and not shown),
+            "unknown with its variable": int(shown and curve),
+            "contradicts": int(row["verdict"] in ("adequate", "effects_found") and above),
+            "at bound": int(bool(row["at_bound"])),
+            "drive told": int(drive or row["verdict"] == "adequate"),
+        }
+    )
+
+
+def line(row: Mapping[str, Any]) -> str:
+    """The answer in a line."""
+    ladder = " → ".join("?" if rmse is None else f"{rmse:.3g}" for rmse in row["ladder"])
+    names = ", ".join("≡".join(filter(None, [name, same])) for name, same in zip(row["effects"], row["same_as"]))
+    bound = f" | at bound {', '.join(row['at_bound'])}" if row["at_bound"] else ""
+    outside = f" | outside {', '.join(row['outside'])}" if row["outside"] else ""
+    goes = f" | goes with {row['unknown']}" if row["unknown"] else ""
+    drive = " | not the controller of the file" if row.get("controller_mismatch") else ""
+    return f"{row['verdict']:16} {names or '-'} | {ladder}{goes}{outside}{bound}{drive}"
+
+
+def _is_the_drives(name: str, values: Mapping[str, float], rate: float) -> bool:
+    if name == "position_sensor_delay":
+        return values.get("delay_s", 0.0) <= _OWN_DELAY_SAMPLES / rate
+    return name in _DRIVE and name in CATALOGUE

@@ -1,0 +1,29 @@
+"""The electromechanical actuator's models, without a screen.
+
+    import ema_model as em
+    recording = em.simulate("chirp", faults={"k1": 0.25}, noise_A=0.1)
+    print(em.identify(recording))
+
+`face` says what each takes; what is below stands in the folders.  Nothing is loaded before it is asked for.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ema_model.face import InputError, compare, discover, identify, load_actuator, read, simulate
+
+__all__ = ["InputError", "compare", "discover", "identify", "load_actuator", "read", "simulate"]
+
+
+def __getattr__(name: str) -> Any:
+    if name in __all__:
+        from ema_model import face
+
+        return getattr(face, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -14,7 +14,7 @@ import pytest
 PROJECT = Path(__file__).parents[1]
 FLOORS = {
     "ema_model": [
-        ["errors", "kernel_cache"],
+        ["errors", "kernel_cache", "text"],
         ["files", "quantities"],
         ["physics", "faults"],
         ["effects", "kernels", "commands"],
@@ -26,6 +26,7 @@ FLOORS = {
         ["identification", "comparison", "challenges"],
         ["discovery"],
         ["campaign"],
+        ["face"],
     ],
     "emaviz": [
         ["colours", "text"],

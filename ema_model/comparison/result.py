@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ema_model.comparison.explain import Explanation
 from ema_model.comparison.residuals import Residuals
 from ema_model.quantities.numbers import Quantity
+from ema_model.text import InWords
 
 if TYPE_CHECKING:
     from ema_model.actuator import Actuator
@@ -68,8 +69,8 @@ class Compared:
     errors: dict[str, SignalError]
 
 
-@dataclass(frozen=True, eq=False)
-class Comparison:
+@dataclass(frozen=True, eq=False, repr=False)
+class Comparison(InWords):
     """All of it: the recordings one by one, and what they say together."""
 
     actuator: Actuator  # as given

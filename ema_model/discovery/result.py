@@ -13,6 +13,7 @@ from ema_model.comparison.explain import Explanation
 from ema_model.discovery.model_fit import Data
 from ema_model.estimation import Calibrated, Calibration, Floor
 from ema_model.models import Model
+from ema_model.text import InWords
 
 Array = NDArray[np.float64]
 
@@ -85,8 +86,8 @@ class Experiment:
     expected_chi2: float
 
 
-@dataclass(frozen=True, eq=False)
-class Discovery:
+@dataclass(frozen=True, eq=False, repr=False)
+class Discovery(InWords):
     """The verdict, and all that led to it."""
 
     verdict: str

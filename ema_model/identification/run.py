@@ -11,12 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ema_model import faults
+from ema_model.actuator import Actuator
 from ema_model.errors import InputError, quoted
 from ema_model.identification.fit import Setting, refine, refine_best, setting
 from ema_model.identification.objective import Objective
 from ema_model.identification.optimisers import OPTIMISERS, Optimiser, create
 from ema_model.identification.search import search
 from ema_model.identification.uncertainty import Uncertainty, uncertainty
+from ema_model.text import InWords
 
 Array = NDArray[np.float64]
 
@@ -39,10 +41,11 @@ class Progress:
     elapsed_s: float
 
 
-@dataclass(frozen=True)
-class Identification:
+@dataclass(frozen=True, repr=False)
+class Identification(InWords):
     """The answer, and how it was found."""
 
+    actuator: Actuator  # as its file says
     algorithm: str
     seed: int
     k: Array
@@ -120,6 +123,7 @@ def steps(
     sure = uncertainty(found, k)
     after = time.perf_counter() - started - first_compile
     return Identification(
+        actuator=objective.actuator,
         algorithm=algorithm,
         seed=seed,
         k=k,

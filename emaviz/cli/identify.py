@@ -11,7 +11,7 @@ import numpy as np
 from ema_model import faults
 from ema_model.actuator import Actuator, save_actuator
 from ema_model.actuator.naming import on_axes
-from ema_model.actuator.readings import readings, sentences
+from ema_model.actuator.readings import readings
 from ema_model.discovery.model_fit import with_effect
 from ema_model.errors import InputError
 from ema_model.identification.objective import Objective
@@ -97,7 +97,7 @@ def run(arguments: argparse.Namespace) -> int:
         save_actuator(found, arguments.save_actuator)
     document = result(answer, actuator, holdout_rmse)
     output.write_json(arguments.json, document, arguments.seed, output.configuration(arguments))
-    print(_table(answer, actuator))
+    print(answer)
     if unseen and holdout_rmse is None:
         print("the model diverges on what was not fitted")
     elif holdout_rmse is not None:
@@ -158,41 +158,6 @@ def _recordings(
 
 def _finite(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
-
-
-def _table(answer: Identification, actuator: Actuator) -> str:
-    sure = answer.uncertainty
-    known = "   truth" if answer.truth is not None else ""
-    lines = [f"{'':4}{'value':>8}  {'90 % interval':17}{known}   meaning"]
-    for i, (name, phrase) in enumerate(zip(faults.NAMES, sentences(answer.k, actuator))):
-        low, high = sure.interval90[i]
-        truth = "" if answer.truth is None else f"  {answer.truth[i]:6.3f}"
-        alarm = "  ← not healthy" if name in sure.alarms else ""
-        lines.append(f"{name:4}{answer.k[i]:8.4f}  {low:7.4f} … {high:.4f}  {truth}   {phrase}{alarm}")
-    lines.append("")
-    lines.append(_verdict(answer))
-    if sure.ambiguous:
-        lines.append("cannot be told apart here: " + "; ".join(" / ".join(group) for group in sure.ambiguous))
-    if sure.hardly_known:
-        lines.append(f"hardly known: {', '.join(sure.hardly_known)}; the other intervals rest on them")
-    if sure.separated_by:
-        lines.append(f"would tell more: {sure.separated_by.options}")
-    lines += sure.warnings
-    error = "" if answer.truth is None else f", Err {answer.error_percent:.2f} %"
-    lines.append(
-        f"rmse {amount(answer.rmse, 'A')}{error}; {answer.evaluations} simulations in {answer.elapsed_s:.2f} s "
-        f"({answer.algorithm}), compiled in {answer.compile_s:.1f} s"
-    )
-    return "\n".join(lines)
-
-
-def _verdict(answer: Identification) -> str:
-    sure = answer.uncertainty
-    if not sure.adequate:
-        return "the model does not fit: no fault can be told"
-    if sure.healthy:
-        return "healthy"
-    return f"not healthy: {', '.join(sure.alarms) or 'no single k stands out'}"
 
 
 class _Recorder:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import plotly.graph_objects as go
 
 from ema_model.discovery import Discovery
+from ema_model.discovery.words import effect_title
 from emaviz.figures import theme
-from emaviz.text.discovery import effect_title
 
 PREDICTED, REFITTED = theme.MEASURED, theme.MODEL
 

@@ -7,9 +7,9 @@ import math
 import plotly.graph_objects as go
 
 from ema_model.discovery import Discovery
+from ema_model.discovery.words import rung_title
 from ema_model.quantities.numbers import number
 from emaviz.figures import theme
-from emaviz.text.discovery import rung_title
 
 FITTED, HELD_OUT = theme.MEASURED, theme.MODEL
 _WIDE = 15.0  # times the floor, from which on the scale is logarithmic

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 from ema_model.discovery import Discovery
 from ema_model.discovery.result import Added
+from ema_model.discovery.words import effect_title, settings
 from ema_model.effects import Effect, find
 from emaviz.colours import ALGORITHMS, MONITOR, TRUTH
-from emaviz.text.discovery import effect_title, settings
 from emaviz.text.html import Html, html, joined
 
 COLOURS = (MONITOR, ALGORITHMS["ssa"], ALGORITHMS["do"], TRUTH)

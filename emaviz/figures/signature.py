@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from ema_model.comparison.residuals import Residuals
 from ema_model.discovery import Candidate
 from ema_model.discovery.snapshot import Look
+from ema_model.discovery.words import effect_title
 from ema_model.quantities.numbers import Quantity
 from ema_model.quantities.shown import of_residual
 from ema_model.quantities.titles import in_sentence
 from ema_model.quantities.variables import is_turn, of_variable
 from emaviz.figures import theme
 from emaviz.figures.binned import Binned, binned, edges_for
-from emaviz.text.discovery import effect_title
 
 Array = NDArray[np.float64]
 

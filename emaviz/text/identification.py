@@ -5,19 +5,11 @@ from __future__ import annotations
 from ema_model.faults import FAULTS
 from ema_model.identification.run import Identification
 from ema_model.quantities.titles import in_sentence
+from ema_model.simulation.words import run_in_words
 from emaviz.text.html import Html, html, joined
-from emaviz.text.run import run_in_words
 
 _BOX = Html('style="padding:4px 12px;font-size:13px;line-height:1.45"')
 _GOOD, _BAD, _WARNING = "#2b8a3e", "#e03131", "#e8590c"
-
-
-def verdict(answer: Identification) -> str:
-    """The short one: healthy, which k are not, or that nothing can be told."""
-    sure = answer.uncertainty
-    if not sure.adequate:
-        return "the model does not fit: no fault can be told; see Discover"
-    return "healthy" if sure.healthy else f"not healthy: {', '.join(sure.alarms) or 'no single k stands out'}"
 
 
 def sure_words(answer: Identification | None) -> Html:

@@ -10,11 +10,11 @@ from support.rig import Rig
 
 from ema_model.actuator import load_actuator
 from ema_model.challenges.truth import Truth
+from ema_model.discovery.words import faults, headline, sentences
 from ema_model.errors import InputError
 from emaviz.page.discover.result import answer
 from emaviz.page.discover.reveal import agrees, reveal
 from emaviz.session.discover.record import checked
-from emaviz.text.discovery import faults, headline, sentences
 
 
 @pytest.fixture(scope="module")

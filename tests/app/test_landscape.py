@@ -12,9 +12,9 @@ from ema_model.errors import InputError
 from ema_model.faults import HEALTHY, vector
 from ema_model.identification.landscape import Landscape, Way, extent, slices, ways
 from ema_model.identification.next_experiment import Suggestion
+from ema_model.simulation.words import run_in_words
 from emaviz.figures import landscape as figures
 from emaviz.text.identification import sure_words
-from emaviz.text.run import run_in_words
 
 TRUTH = vector({"k1": 0.3, "k6": 0.4})
 

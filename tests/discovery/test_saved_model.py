@@ -12,10 +12,10 @@ from ema_model.actuator import load_actuator, save_actuator
 from ema_model.commands import command
 from ema_model.comparison import compare
 from ema_model.discovery import discover, verified
+from ema_model.discovery.words import verification
 from ema_model.faults import vector
 from ema_model.simulation.run import Run, simulate_reference
 from ema_model.simulation.sensors import Sensors
-from emaviz.text.discovery import verification
 
 ACTUATOR = load_actuator()
 RIG = Sensors(current_noise_A=0.3, encoder_bits=12)

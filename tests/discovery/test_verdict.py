@@ -17,9 +17,8 @@ from ema_model.comparison.verdict import judge
 from ema_model.discovery import as_dict, begun, result_of
 from ema_model.discovery.path import Step, rung_of
 from ema_model.discovery.result import VERDICTS
-from emaviz.cli.discover import text
-from emaviz.text.discovery import VERDICTS as IN_WORDS
-from emaviz.text.discovery import headline, sentences
+from ema_model.discovery.words import VERDICTS as IN_WORDS
+from ema_model.discovery.words import headline, sentences
 
 CLEAR = {"load_dependent_friction": {"ratio": 0.25}}
 SURE = ("adequate", "effects_found")
@@ -88,7 +87,7 @@ def test_verdict_and_ladder_never_contradict(healthy, lacking):
 def test_what_remains_is_told_in_every_place(healthy, lacking):
     part = result_of(sharper(lacking[1], 4.0))
     assert headline(part).startswith("Found in part: load-dependent friction; ") and "cause unknown" in headline(part)
-    assert text(part).startswith("partly_explained: ") and "times the floor remains, cause unknown" in text(part)
+    assert str(part).startswith("partly_explained: ") and "times the floor remains, cause unknown" in str(part)
     nothing = result_of(sharper(healthy, 30.0))
     assert "times the floor remains, cause unknown" in headline(nothing) and not nothing.effects
     assert set(IN_WORDS) == set(VERDICTS)
@@ -97,7 +96,7 @@ def test_what_remains_is_told_in_every_place(healthy, lacking):
 def test_what_is_not_claimed_is_told_with_the_reason(healthy):
     found = replace(result_of(healthy), not_claimed={"torsional_compliance": "the fit with it did not converge"})
     line = "Torsional compliance is not claimed: the fit with it did not converge."
-    assert line in sentences(found) and line in text(found)
+    assert line in sentences(found) and line in str(found)
     assert as_dict(found)["not_claimed"] == {"torsional_compliance": "the fit with it did not converge"}
 
 

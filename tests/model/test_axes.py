@@ -25,9 +25,9 @@ from ema_model.recordings.checks import check_needed
 from ema_model.recordings.health.card import health
 from ema_model.recordings.prepared import prepared
 from ema_model.simulation.run import Run, _finite
+from ema_model.simulation.words import run_in_words
 from emaviz.cli.options import effects_of
 from emaviz.figures.signals import charts
-from emaviz.text.run import run_in_words
 
 PROJECT = Path(__file__).parents[2]
 ROTARY, LINEAR = Axes(), Axes("linear", "linear")

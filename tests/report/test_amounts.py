@@ -9,11 +9,10 @@ import pytest
 
 from ema_model.comparison.result import SignalError
 from ema_model.comparison.verdict import judge
-from emaviz.cli.compare import text
+from ema_model.comparison.words import held_out
 from emaviz.page.compare.result import headline
 from emaviz.recording.comparison import _answer
 from emaviz.report.comparison.errors_per_signal import ErrorsPerSignal
-from emaviz.text.comparison import held_out
 
 SIZES = {  # of the error and its floor, A: as both are to be read
     (0.2, 0.12): ("0.200", "0.120", "A"),
@@ -32,7 +31,7 @@ def test_an_error_reads_alike_wherever_it_is_told(sizes, comparison):
     told = replace(comparison, signals={"current_A": error}, recordings=[])
     sentence = judge(comparison.residuals, comparison.signals | told.signals, None, comparison.actuator).sentences[-1]
     assert f"{size} {unit} rms" in sentence and f"{least} {unit}" in sentence
-    row = next(line for line in text(told).splitlines() if line.startswith("current_A")).split()
+    row = next(line for line in str(told).splitlines() if line.startswith("  current_A ")).split()
     assert row[1] == size and row[3] == least and row[-1] == unit
     page = headline(told)
     assert f"Equivalent current [{unit}]" in page and f">{size}<" in page and f">{least}<" in page
@@ -47,4 +46,4 @@ def test_an_order_reads_alike_in_the_sentence_and_in_the_terminal(comparison):
     told = judge(comparison.residuals, comparison.signals, None, comparison.actuator)
     [sentence] = [one for one in told.sentences if "times a turn" in one]
     order, amount = re.findall(r"repeats (\d+) times a turn with an amplitude of ([^ ]+ [^ ]+)\.", sentence)[0]
-    assert f"{order} ({amount})" in text(replace(comparison, orders=told.orders))
+    assert f"{order} ({amount})" in str(replace(comparison, orders=told.orders))

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 from ema_model.discovery import Candidate
 from ema_model.discovery.snapshot import Look
+from ema_model.discovery.words import effect_title
 from ema_model.effects import find
 from ema_model.quantities.numbers import amount, number, with_uncertainty
 from ema_model.quantities.titles import in_sentence
-from emaviz.text.discovery import effect_title
 from emaviz.text.html import Html, html, unescaped
 
 BOX = Html('style="padding:2px 12px 6px;font-size:13px;line-height:1.45"')

@@ -10,6 +10,7 @@ import viser
 
 from ema_model.discovery import Candidate
 from ema_model.discovery.snapshot import Look
+from ema_model.discovery.words import effect_title
 from ema_model.effects import Effect, find
 from ema_model.quantities.numbers import Quantity, number
 from ema_model.quantities.titles import in_sentence
@@ -17,7 +18,6 @@ from emaviz.figures import signature
 from emaviz.page.discover import cards
 from emaviz.page.page import Page
 from emaviz.session.discover.discovering import Discovering
-from emaviz.text.discovery import effect_title
 from emaviz.text.html import Html, add_html, html, joined
 
 CONFIG = {"displayModeBar": False, "responsive": False}

@@ -7,10 +7,10 @@ from collections.abc import Callable
 import viser
 
 from ema_model.discovery.snapshot import AT_FLOOR, Look
+from ema_model.discovery.words import effect_title
 from ema_model.quantities.numbers import number
 from emaviz.page.page import Page
 from emaviz.session.discover.discovering import Discovering
-from emaviz.text.discovery import effect_title
 from emaviz.text.html import Html, add_html, html, said
 
 STEPS = 6

@@ -12,10 +12,10 @@ import viser
 from ema_model.commands import command
 from ema_model.discovery.result import Experiment
 from ema_model.discovery.snapshot import Look
+from ema_model.discovery.words import next_experiment
 from emaviz.page.discover import cards
 from emaviz.page.page import Page
 from emaviz.session.discover.discovering import Discovering
-from emaviz.text.discovery import next_experiment
 from emaviz.text.html import add_html, html, joined
 
 _RATE_HZ = 10_000.0

@@ -10,6 +10,7 @@ import viser
 
 from ema_model.discovery.snapshot import AT_FLOOR, Look
 from ema_model.discovery.tracks import Track, tracks
+from ema_model.discovery.words import FLOOR_NOTE, headline, sentences
 from ema_model.effects import CATALOGUE
 from ema_model.quantities.numbers import number
 from ema_model.recordings import SIGNALS, Measurement
@@ -22,7 +23,6 @@ from emaviz.page.discover.next_experiment import NextTest
 from emaviz.page.discover.reveal import reveal
 from emaviz.page.page import Page
 from emaviz.session.discover.discovering import Discovering
-from emaviz.text.discovery import FLOOR_NOTE, headline, sentences
 from emaviz.text.html import Html, add_html, html, joined
 
 _RESTING = Html(

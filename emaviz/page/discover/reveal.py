@@ -9,12 +9,12 @@ from ema_model.actuator.readings import sentences
 from ema_model.challenges.truth import Truth
 from ema_model.discovery import Discovery
 from ema_model.discovery.result import Added
+from ema_model.discovery.words import effect_title, fitted_of, value
 from ema_model.effects import CATALOGUE, find
 from ema_model.faults import BY_NAME, NAMES
 from ema_model.quantities.numbers import amount
 from ema_model.quantities.titles import in_sentence
 from emaviz.page.discover.cards import BOX
-from emaviz.text.discovery import effect_title, fitted_of, value
 from emaviz.text.html import Html, html, joined
 
 _GOOD, _BAD = "#2b8a3e", "#e03131"

@@ -9,6 +9,7 @@ import viser
 
 from ema_model.discovery import Candidate
 from ema_model.discovery.snapshot import AT_FLOOR, Look
+from ema_model.discovery.words import effect_title
 from ema_model.effects import CATALOGUE
 from ema_model.quantities.numbers import number
 from emaviz.page.discover import cards
@@ -19,7 +20,6 @@ from emaviz.page.discover.source import SourceControls
 from emaviz.page.page import Page
 from emaviz.session.discover.discovering import Discovering
 from emaviz.session.uploads import Uploads
-from emaviz.text.discovery import effect_title
 from emaviz.text.html import add_html, html
 
 _MOST_ADDED = 6

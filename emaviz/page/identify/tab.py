@@ -9,6 +9,7 @@ from typing import Any
 import viser
 
 from ema_model.identification.run import ALGORITHMS
+from ema_model.identification.words import verdict
 from ema_model.simulation.plant import FITNESSES
 from emaviz.figures.convergence import colour
 from emaviz.page.identify.result import IdentifyResult
@@ -18,7 +19,6 @@ from emaviz.session.compare.comparing import Comparing
 from emaviz.session.race import Race
 from emaviz.session.settings import SLIDERS
 from emaviz.text.html import Html, add_html, html, joined
-from emaviz.text.identification import verdict
 
 PLANT = "The plant of Explore's sliders"
 

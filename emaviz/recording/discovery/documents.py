@@ -9,13 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.actuator.naming import on_axes
-from ema_model.discovery import Discovery
+from ema_model.discovery import Discovery, words
 from ema_model.discovery.tracks import Track
 from ema_model.effects import find
 from ema_model.quantities.numbers import number
 from ema_model.quantities.titles import in_sentence
 from emaviz.recording.markdown import escaped
-from emaviz.text import discovery as words
 
 Array = NDArray[np.float64]
 

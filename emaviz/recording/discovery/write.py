@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ema_model.discovery import Discovery, as_dict
 from ema_model.discovery.tracks import PAUSE_S, Track, one_after_another, primary, tracks
+from ema_model.discovery.words import rung_title
 from ema_model.errors import InputError
 from ema_model.estimation.floor import BAND_SIGMAS
 from emaviz.recording import series
@@ -21,7 +22,6 @@ from emaviz.recording.discovery.layout import CANDIDATES, LADDER, Step
 from emaviz.recording.errors import RecordingError
 from emaviz.recording.style import GROUP_COLOURS, ITERATION, plain, series_title
 from emaviz.recording.writer import RecordingWriter
-from emaviz.text.discovery import rung_title
 
 Array = NDArray[np.float64]
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from ema_model.comparison.result import Comparison
+from ema_model.comparison.words import held_out
 from emaviz.report.markup import bullets
 from emaviz.report.section import Figures, Section
-from emaviz.text.comparison import held_out
 
 
 class HeldOut(Section[Comparison]):

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from ema_model.discovery.result import Added
+from ema_model.discovery.words import effect_title, fitted_of
 from ema_model.effects import Effect, find
 from ema_model.quantities.numbers import number
 from ema_model.quantities.titles import in_sentence
 from emaviz.report.discovery.subject import Told
 from emaviz.report.markup import escape, paragraph, table
 from emaviz.report.section import Figures, Section
-from emaviz.text.discovery import effect_title, fitted_of
 
 
 class AddedEffects(Section[Told]):

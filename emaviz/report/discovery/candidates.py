@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from ema_model.discovery.words import effect_title
 from emaviz.figures import candidates
 from emaviz.report.discovery.subject import Told
 from emaviz.report.markup import folded, paragraph, table
 from emaviz.report.section import Figures, Section
-from emaviz.text.discovery import effect_title
 
 _NOTE = (
     "Predicted: from the effect's fingerprint, less what the calibrated parameters can do as well. The promising ones "

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from ema_model.discovery.words import FLOOR_NOTE, rung_title
 from ema_model.quantities.numbers import number
 from ema_model.quantities.shown import of_signal
 from emaviz.figures import error_ladder
 from emaviz.report.discovery.subject import Told
 from emaviz.report.markup import paragraph, table
 from emaviz.report.section import Figures, Section
-from emaviz.text.discovery import FLOOR_NOTE, rung_title
 
 
 class Ladder(Section[Told]):

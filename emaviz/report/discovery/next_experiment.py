@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from ema_model.discovery.words import next_experiment
 from emaviz.report.discovery.subject import Told
 from emaviz.report.markup import paragraph
 from emaviz.report.section import Figures, Section
-from emaviz.text.discovery import next_experiment
 
 
 class NextExperiment(Section[Told]):

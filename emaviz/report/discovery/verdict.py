@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from ema_model.discovery.words import headline, sentences
 from emaviz.report.discovery.subject import Told
 from emaviz.report.markup import bullets, escape, paragraph
 from emaviz.report.section import Figures, Section
-from emaviz.text.discovery import headline, sentences
 
 _KINDS = {"adequate": "good", "effects_found": "note"}
 

@@ -11,6 +11,7 @@ from ema_model.discovery.refit import Trial
 from ema_model.discovery.result import Experiment
 from ema_model.discovery.snapshot import Look
 from ema_model.discovery.unknown import curve_for
+from ema_model.discovery.words import verification
 from ema_model.effects import CATALOGUE, find
 from ema_model.effects.user import UserEffect
 from ema_model.errors import InputError, quoted
@@ -27,7 +28,6 @@ from emaviz.session.discover.source import NOTHING, DiscoverySource, files_of
 from emaviz.session.events import notify
 from emaviz.session.session import Session
 from emaviz.session.worker import Worker
-from emaviz.text.discovery import verification
 
 
 class Discovering:

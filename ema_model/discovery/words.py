@@ -1,14 +1,14 @@
-"""What a discovery found, in plain words: for the terminal, the report and the recording alike."""
+"""What a discovery found, in plain words: for the terminal, a notebook, the report and the recording alike."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from ema_model.actuator.naming import on_axes
 from ema_model.actuator.readings import sentences as phrases_of
 from ema_model.comparison.sentences import goes_with
-from ema_model.discovery import Discovery, Verified
-from ema_model.discovery.result import Added, Rung
+from ema_model.discovery.result import Added, Discovery, Rung
+from ema_model.discovery.verify import Verified
 from ema_model.effects import find
 from ema_model.errors import InputError
 from ema_model.estimation import Calibrated
@@ -18,7 +18,8 @@ from ema_model.quantities.numbers import amount, number, with_uncertainty
 from ema_model.quantities.shown import of_signal
 from ema_model.quantities.sides import USER
 from ema_model.quantities.titles import in_sentence
-from emaviz.text.run import run_in_words
+from ema_model.simulation.words import run_in_words
+from ema_model.text import Document, Lines, Note, Table
 
 VERDICTS = {
     "effects_found": "effects are missing, and have been added",
@@ -169,6 +170,54 @@ def settings(found: Discovery, one: Added) -> dict[str, str]:
 def fitted_of(found: Discovery, one: Added, name: str) -> Calibrated:
     """A fitted parameter of an added effect as the last model has it: later effects may have moved it."""
     return found.calibration.parameters.get(f"effects.{one.key}.{name}", one.parameters[name])
+
+
+def document_of(found: Discovery) -> Document:
+    """All that the terminal and a notebook show: the verdict, the effects, the ladder, the candidates."""
+    notes = [Note(warning) for warning in found.warnings]
+    head = Lines([f"{found.verdict}: {VERDICTS[found.verdict]}"])
+    return Document([head, *notes, *_added(found), *_tables(found), *_rest(found)])
+
+
+def _added(found: Discovery) -> Iterator[Lines]:
+    for one in found.effects:
+        effect = find(one.name)
+        names = {name: on_axes(f"effects.{one.key}.{name}", found.actuator.axes).name for name in one.parameters}
+        lines = [f"{names.get(name, name):24}  {told}" for name, told in settings(found, one).items()]
+        if one.same_as:
+            lines.append(f"these recordings cannot tell it from {', '.join(one.same_as)}")
+        yield Lines(lines, f"{effect.title}: {effect.equation}")
+    if found.faults:
+        yield Lines(list(faults(found).values()), "faults of the actuator")
+
+
+def _tables(found: Discovery) -> Iterator[Table]:
+    rungs = [[one.label, _three(one.rmse), _three(one.holdout_rmse)] for one in found.ladder]
+    yield Table(("fitted", "held out"), rungs, "error ladder", unit="(1 is the floor)")
+    if found.candidates:
+        rows = [
+            [one.name, f"{one.predicted_drop:.0f}", "" if one.refitted_drop is None else f"{one.refitted_drop:.0f}"]
+            for one in found.candidates
+        ]
+        remarks = [one.untestable_reason for one in found.candidates]
+        yield Table(("predicted", "refitted"), rows, "candidates", remarks, "(fall of χ²)")
+
+
+def _rest(found: Discovery) -> Iterator[Lines]:
+    if found.parameters_outside_tolerance:
+        outside = ", ".join(on_axes(name, found.actuator.axes).path for name in found.parameters_outside_tolerance)
+        yield Lines([f"outside their tolerance: {outside}"])
+    if found.verdict in ("partly_explained", "unknown_effect"):
+        yield Lines([remains(found)])
+    if found.unknown is not None:
+        yield Lines([found.unknown.sentence])
+    for lines in (not_claimed(found), next_experiment(found)):
+        if lines:
+            yield Lines(lines)
+
+
+def _three(rmse: float | None) -> str:
+    return "" if rmse is None else f"{rmse:.3f}"
 
 
 def _times(first: Rung, last: Rung) -> str:

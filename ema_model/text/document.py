@@ -1,0 +1,131 @@
+"""What a result says, as data: lines, notes and tables, which a terminal and a notebook each show in their way."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+from importlib import import_module
+
+_GAP = 3  # characters between the columns of plain text
+_STYLE = "border-collapse:collapse;margin:.6em 0"
+_CELL = "padding:1px 12px 1px 0;text-align:right;border:0"
+_FIRST = "padding:1px 12px 1px 0;text-align:left;border:0"
+
+
+@dataclass(frozen=True)
+class Lines:
+    """Sentences that belong together, one below the other."""
+
+    lines: Sequence[str]
+    title: str = ""
+
+    @property
+    def text(self) -> str:
+        """Plain; indented below a title."""
+        return "\n".join([self.title, *(f"  {line}" for line in self.lines)] if self.title else self.lines)
+
+    @property
+    def html(self) -> str:
+        """Escaped."""
+        head = f"<b>{escape(self.title)}</b><br>" if self.title else ""
+        return f"<p>{head}{'<br>'.join(map(escape, self.lines))}</p>"
+
+
+@dataclass(frozen=True)
+class Note:
+    """A warning."""
+
+    line: str
+
+    @property
+    def text(self) -> str:
+        """'! …'."""
+        return f"! {self.line}"
+
+    @property
+    def html(self) -> str:
+        """Escaped, with a mark before it."""
+        return f'<p style="border-left:3px solid #e8590c;padding-left:8px">{escape(self.line)}</p>'
+
+
+@dataclass(frozen=True)
+class Table:
+    """Numbers, each written already; the first cell of a row names it."""
+
+    head: Sequence[str]  # of the columns after the first
+    rows: Sequence[Sequence[str]]
+    title: str = ""
+    remarks: Sequence[str] = ()  # beside the rows, or none at all
+    unit: str = ""  # what all numbers are in, said beside the head
+
+    @property
+    def text(self) -> str:
+        """Columns below each other, the first to the left; rows are indented below a title."""
+        indent = "  " if self.title else ""
+        names = [self.title, *(indent + row[0] for row in self.rows)]
+        columns = [[head, *(row[i] for row in self.rows)] for i, head in enumerate(self.head, 1)]
+        widths = [max(map(len, column)) + _GAP for column in columns]
+        first = max(map(len, names))
+        beside = [self.unit, *(self.remarks or [""] * len(self.rows))]
+        lines = []
+        for i, name in enumerate(names):
+            numbers = "".join(column[i].rjust(width) for column, width in zip(columns, widths))
+            lines.append(f"{name:{first}}{numbers}{' ' * _GAP}{beside[i]}".rstrip())
+        return "\n".join(lines)
+
+    @property
+    def html(self) -> str:
+        """Escaped."""
+        beside = [self.unit, *(self.remarks or [""] * len(self.rows))]
+        rows = []
+        for i, row in enumerate([(self.title, *self.head), *self.rows]):
+            tag = "th" if i == 0 else "td"
+            cells = "".join(f'<{tag} style="{_CELL}">{escape(cell)}</{tag}>' for cell in row[1:])
+            last = f'<{tag} style="{_FIRST}">{escape(beside[i])}</{tag}>'
+            rows.append(f'<tr><{tag} style="{_FIRST}">{escape(row[0])}</{tag}>{cells}{last}</tr>')
+        return f'<table style="{_STYLE}">{"".join(rows)}</table>'
+
+
+Block = Lines | Note | Table
+
+
+@dataclass(frozen=True)
+class Document:
+    """Blocks, one after another."""
+
+    blocks: Sequence[Block]
+
+    @property
+    def text(self) -> str:
+        """For a terminal: an empty line between blocks, but for notes, which follow what they are about."""
+        parts = []
+        for i, block in enumerate(self.blocks):
+            parts += ["\n" if i == 0 or isinstance(block, Note) else "\n\n", block.text]
+        return "".join(parts[1:])
+
+    @property
+    def html(self) -> str:
+        """For a notebook; whatever came from a file is escaped."""
+        return f"<div>{''.join(block.html for block in self.blocks)}</div>"
+
+
+class InWords:
+    """A result that shows itself: as text when it is printed, as HTML in a notebook.
+
+    What it says stands in the file `words.py` beside it, as `document_of(result)`.
+    """
+
+    @property
+    def document(self) -> Document:
+        """What it says."""
+        beside, _, _ = type(self).__module__.rpartition(".")
+        return import_module(f"{beside}.words").document_of(self)
+
+    def __str__(self) -> str:
+        return self.document.text
+
+    __repr__ = __str__
+
+    def _repr_html_(self) -> str:
+        return self.document.html

@@ -12,7 +12,8 @@ import numpy as np
 from ema_model.physics.jit import parallel_kernel
 from ema_model.physics.rows import LANES, OMEGA, THETA
 
-from .monitor_step import advance, advance_memory, shown_current, shown_position, speed_loop_remembers
+from .drive_step import is_driven
+from .monitor_step import advance, advance_demand, shown_current, shown_position
 
 
 @parallel_kernel
@@ -33,7 +34,7 @@ def squared_errors(
         block = job % blocks
         s = states[run, block].copy()
         p = parameters[block]
-        remembers = speed_loop_remembers(p)
+        driven = is_driven(p)
         total = np.zeros(LANES)
         mean = np.empty(LANES)
         scale = 1.0 / period
@@ -44,11 +45,11 @@ def squared_errors(
                 c = command[step]
                 t = load[step]
                 u = supply[step]
-                if remembers:
+                if driven:
                     for i in range(LANES):
-                        advance_memory(s, p, i, c, u, dt)
+                        advance_demand(s, p, i, c, u, dt)
                 for i in range(LANES):
-                    advance(s, p, i, c, t, u, dt)
+                    advance(s, p, i, c, t, u, driven, dt)
                     mean[i] += shown_current(s, p, i)
                 step += 1
             y = target[sample]
@@ -71,7 +72,7 @@ def traces(states, parameters, command, load, supply, period, group, dt, result)
     for block in numba.prange(states.shape[0]):
         s = states[block].copy()  # of its own, which proves to the compiler that nothing overlaps
         p = parameters[block]
-        remembers = speed_loop_remembers(p)
+        driven = is_driven(p)
         total = np.empty(4 * LANES)
         of_group = 1.0 / group
         of_steps = of_group / period
@@ -83,11 +84,11 @@ def traces(states, parameters, command, load, supply, period, group, dt, result)
                     c = command[step]
                     t = load[step]
                     u = supply[step]
-                    if remembers:
+                    if driven:
                         for i in range(LANES):
-                            advance_memory(s, p, i, c, u, dt)
+                            advance_demand(s, p, i, c, u, dt)
                     for i in range(LANES):
-                        advance(s, p, i, c, t, u, dt)
+                        advance(s, p, i, c, t, u, driven, dt)
                         total[i] += shown_current(s, p, i)
                     step += 1
                 for i in range(LANES):

@@ -20,14 +20,14 @@ def drive_output(output, begins, dt, delay, clock, before, first, second, third,
     since = clock + dt
     kept = begins | (since >= spacing)
     late = 0.0 if begins else since - spacing  # since the line had to be moved on
-    now = output if begins else output + (before - output) * (late / dt)
+    now = output if begins else output + (before - output) * (late * (1.0 / dt))
     a = now if kept else first
     b = (now if begins else first) if kept else second
     c = (now if begins else second) if kept else third
     d = (now if begins else third) if kept else fourth
     age = late if kept else since
     shifted = c + (d - c) * (1.0 - age / spacing)
-    share = clamp(delay / (_KEPT * dt), 0.0, 1.0)
+    share = clamp(delay * (1.0 / (_KEPT * dt)), 0.0, 1.0)
     return output + share * (shifted - output), age, output, a, b, c, d
 
 

@@ -46,7 +46,12 @@ STAGES = (
     *("drive_output", "current_reference"),
 )
 # What an effect is of: a part of the actuator, or of what drives and measures it.
-FAMILIES = ("mechanics", "electrics", "sensor", "drive")
+FAMILIES = {
+    "mechanics": "the actuator's mechanics",
+    "electrics": "the motor, the inverter and their supply",
+    "sensor": "a sensor",
+    "drive": "the drive's controller, not the actuator",
+}
 # The arguments of an effect's `advance_states`, which returns its new states as a tuple: the step, s; angle and
 # speed at its start; the rigid transmission's output before and after; how far the user moved; what acts.
 ADVANCE = (

@@ -9,6 +9,7 @@ from ema_model.actuator.naming import on_axes
 from ema_model.comparison.summary import plain
 from ema_model.discovery import Discovery, as_dict, discover, verified
 from ema_model.effects import find
+from ema_model.effects.effect import FAMILIES
 from emaviz.cli import files, options, output
 from emaviz.cli.numbers import whole
 from emaviz.text.discovery import (
@@ -92,6 +93,8 @@ def text(found: Discovery) -> str:
         lines += ["", f"{effect.title}: {effect.equation}"]
         names = {name: on_axes(f"effects.{one.key}.{name}", found.actuator.axes).name for name in one.parameters}
         lines += [f"  {names.get(name, name):24}  {told}" for name, told in settings(found, one).items()]
+        if effect.family == "drive":
+            lines.append(f"  it belongs to {FAMILIES[effect.family]}")
         if one.same_as:
             lines.append(f"  these recordings cannot tell it from {', '.join(one.same_as)}")
     if found.faults:

@@ -10,7 +10,8 @@ from ema_model.physics.jit import scalar
 def integral_gain(gain, speed_gain, rate):
     """K_I + r K_P, not below 0."""
     raised = gain + rate * speed_gain
-    return 0.0 * raised if raised < 0.0 else raised
+    least = gain if gain < 0.0 else 0.0
+    return least if raised < least else raised
 
 
 EFFECT = Effect(

@@ -10,10 +10,10 @@ import numba
 import numpy as np
 
 from ema_model.physics.jit import parallel_kernel
-from ema_model.physics.rows import LANES, OMEGA, THETA
+from ema_model.physics.rows import LANES, OMEGA, THETA, TOLD
 
 from .drive_step import is_driven
-from .monitor_step import advance, advance_demand, shown_current, shown_position
+from .monitor_step import advance, advance_demand, sense, shown_current
 
 
 @parallel_kernel
@@ -35,6 +35,8 @@ def squared_errors(
         s = states[run, block].copy()
         p = parameters[block]
         driven = is_driven(p)
+        for i in range(LANES):
+            sense(s, p, i)
         total = np.zeros(LANES)
         mean = np.empty(LANES)
         scale = 1.0 / period
@@ -73,6 +75,8 @@ def traces(states, parameters, command, load, supply, period, group, dt, result)
         s = states[block].copy()  # of its own, which proves to the compiler that nothing overlaps
         p = parameters[block]
         driven = is_driven(p)
+        for i in range(LANES):
+            sense(s, p, i)
         total = np.empty(4 * LANES)
         of_group = 1.0 / group
         of_steps = of_group / period
@@ -94,7 +98,7 @@ def traces(states, parameters, command, load, supply, period, group, dt, result)
                 for i in range(LANES):
                     total[LANES + i] += s[OMEGA * LANES + i]
                     total[2 * LANES + i] += s[THETA * LANES + i]
-                    total[3 * LANES + i] += shown_position(s, p, i)
+                    total[3 * LANES + i] += s[TOLD * LANES + i]
             for i in range(LANES):
                 result[block, value, 0, i] = total[i] * of_steps
                 result[block, value, 1, i] = total[LANES + i] * of_group

@@ -40,8 +40,10 @@ from ema_model.physics.rows import (
     STOP_HIGH,
     STOP_LOW,
     THETA,
+    TOLD,
     TORQUE_CONSTANT,
     TORQUE_LIMIT,
+    USER,
     VISCOUS,
     VOLTAGE_RATIO,
 )
@@ -67,12 +69,19 @@ FIRST = len(STATE_ROWS)  # row of the effects' own states
 
 
 @scalar
-def advance_demand(s, p, i, command, supply, dt):
-    """What the drive of lane i asks for, in full, for the step that `advance` is about to take."""
+def sense(s, p, i):
+    """Where the user of lane i stands, and what the sensor tells of it, for the step to come."""
     gear = p[GEAR_RATIO * LANES + i]
     user = user_position(gear * s[PLAY * LANES + i], s[THETA * LANES + i], gear, s, FIRST, p, i)
-    told = position_reading(user, s, FIRST, p, i)
-    s[DEMAND * LANES + i] = advance_drive(s, FIRST, p, i, command, told, s[OMEGA * LANES + i], supply, dt)
+    s[USER * LANES + i] = user
+    s[TOLD * LANES + i] = position_reading(user, s, FIRST, p, i)
+
+
+@scalar
+def advance_demand(s, p, i, command, supply, dt):
+    """What the drive of lane i asks for, in full, for the step that `advance` is about to take."""
+    told, omega = s[TOLD * LANES + i], s[OMEGA * LANES + i]
+    s[DEMAND * LANES + i] = advance_drive(s, FIRST, p, i, command, told, omega, supply, dt)
 
 
 @scalar
@@ -80,7 +89,8 @@ def advance(s, p, i, command, load, supply, driven, dt):
     """Advances lane i of the state s (rows of `STATE_ROWS`) by dt, s, under a command, rad, and a load, N·m.
 
     supply: the bus voltage over its nominal value; 0 is a drive switched off, which carries no current.
-    driven: whether `advance_demand` has found what the drive asks for.
+    driven: whether `advance_demand` has found what the drive asks for.  The state has been sensed (`sense`), and is so
+    again at the end.
     """
     theta = s[THETA * LANES + i]
     omega = s[OMEGA * LANES + i]
@@ -92,9 +102,9 @@ def advance(s, p, i, command, load, supply, driven, dt):
     before = s[CURRENT * LANES + i]
     gear = p[GEAR_RATIO * LANES + i]
     rigid = gear * play
-    user = user_position(rigid, theta, gear, s, FIRST, p, i)
+    user = s[USER * LANES + i]
 
-    plain = plain_demand(p, i, command, position_reading(user, s, FIRST, p, i), omega)
+    plain = plain_demand(p, i, command, s[TOLD * LANES + i], omega)
     demand = s[DEMAND * LANES + i] if driven else plain
 
     flux = flux_factor(
@@ -175,17 +185,10 @@ def advance(s, p, i, command, load, supply, driven, dt):
         p,
         i,
     )
+    sense(s, p, i)
 
 
 @scalar
 def shown_current(s, p, i):
     """The equivalent current as its sensor shows it, A."""
     return current_reading(s[CURRENT * LANES + i], s, FIRST, p, i)
-
-
-@scalar
-def shown_position(s, p, i):
-    """The user's position as its sensor shows it, rad."""
-    gear = p[GEAR_RATIO * LANES + i]
-    user = user_position(gear * s[PLAY * LANES + i], s[THETA * LANES + i], gear, s, FIRST, p, i)
-    return position_reading(user, s, FIRST, p, i)

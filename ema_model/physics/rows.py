@@ -101,6 +101,8 @@ STATE_ROWS = (
     "current",  # equivalent current I_3eq, A
     "integral",  # K_I ∫e dt of the speed loop, N·m
     "speed_error",  # e of the step before, rad/s
+    "user",  # where the user stands, rad
+    "told",  # what the position sensor tells of it, rad
     "begun",  # 0 before the drive's first step, then 1
     "demand",  # what the drive asks for in this step, where more than the plain cascade acts: A, or a share of the bus
 )
@@ -115,6 +117,8 @@ STATE_ROWS = (
     CURRENT,
     INTEGRAL,
     SPEED_ERROR,
+    USER,
+    TOLD,
     BEGUN,
     DEMAND,
 ) = range(len(STATE_ROWS))

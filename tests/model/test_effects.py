@@ -29,12 +29,13 @@ CHIRP = Run(command("chirp"), 0.5, load_torque_Nm=10.0)
 SMALL_STEP = Run(command("step", {"final_rad": 5e-3}), 0.1)
 # The load keeps the currents up, so that resistance and dead time matter at top speed too.
 SATURATING = Run(command("step"), 0.25, load_torque_Nm=200.0)
+FLIGHT = Run(command("step", {"final_rad": 1.0}), 0.15)  # at the current's limit, then at the top speed
 
 # Where an effect shows, if not in the current during the sine.
 SHOWN = {
     "acceleration_limit": (SATURATING, "motor_speed_rad_s"),
-    "computation_delay": (SATURATING, "motor_speed_rad_s"),
-    "current_loop_lag": (CHIRP, "motor_position_rad"),
+    "computation_delay": (FLIGHT, "motor_position_rad"),
+    "current_loop_lag": (FLIGHT, "motor_position_rad"),
     "current_sensor_bias": (SINE, "motor_position_rad"),
     "dead_band": (SINE, "motor_position_rad"),
     "sampled_control": (SINE, "motor_position_rad"),

@@ -22,7 +22,7 @@ from types import ModuleType
 from typing import Any
 
 from ema_model.effects import find
-from ema_model.effects.effect import ADVANCE, PLACES
+from ema_model.effects.effect import ADVANCE, PLACES, STAGES
 from ema_model.errors import InputError
 from ema_model.kernel_cache.folder import cache_folder
 from ema_model.physics.rows import LANES, PARAMETER_ROWS
@@ -127,22 +127,31 @@ def _composition(circuit: str, controller: str, effects: Sequence[Any]) -> str:
     ]
     bodies: dict[str, list[str]] = {place: [] for place in PLACES}
     advances: list[str] = []
+    acting: list[str] = []  # whether an effect of the drive does anything
     row, state = len(PARAMETER_ROWS), 0
     for effect in effects:
         own = [f"p[{(row + j) * LANES} + i]" for j in range(len(effect.parameters))]
         states = [f"s[(first + {state + j}) * {LANES} + i]" for j in range(len(effect.states))]
         row += len(effect.parameters)
         state += len(effect.states)
+        new = [f"new_{state_name}" for state_name in effect.states]
+        if effect.acts_in_drive:
+            acting.append(f"({own[0]} != {effect.nothing!r})")
         for function in effect.places:
             place = function.__name__
+            if place == "current_reference" and circuit == "voltage":
+                continue  # a duty is no current: there is no current loop
             value, *rest = PLACES[place]
             alias = f"{effect.name}_{place}"
             imports.append(f"from {function.__module__} import {place} as {alias}")
-            bodies[place].append(f"    {value} = {alias}({', '.join([value, *rest, *own, *states])})")
-        if effect.states:
+            renewed = new if place in STAGES else []
+            bodies[place].append(
+                f"    {', '.join([value, *renewed])} = {alias}({', '.join([value, *rest, *own, *states])})"
+            )
+            bodies[place] += [f"    {where} = {fresh}" for where, fresh in zip(states, renewed)]
+        if effect.advance_states is not None:
             alias = f"{effect.name}_advance"
             imports.append(f"from {effect.advance_states.__module__} import advance_states as {alias}")
-            new = [f"new_{state_name}" for state_name in effect.states]
             advances.append(f"    ({', '.join(new)},) = {alias}({', '.join([*ADVANCE, *own, *states])})")
             advances += [f"    {place} = {value}" for place, value in zip(states, new)]
     functions = []
@@ -150,6 +159,7 @@ def _composition(circuit: str, controller: str, effects: Sequence[Any]) -> str:
         head = f"def {place}({', '.join(arguments)}, s, first, p, i):"
         decorator = "@scalar" if bodies[place] else "@passed_on"
         functions += ["", "", decorator, head, *bodies[place], f"    return {arguments[0]}"]
+    functions += ["", "", "@scalar", "def drive_acts(p, i):", f"    return {' | '.join(acting) or 'False'}"]
     head = f"def advance_states({', '.join(ADVANCE)}, s, first, p, i):"
     functions += ["", "", "@scalar" if advances else "@passed_on", head, *(advances or ["    pass"])]
     return "\n".join([*imports, *functions, ""])

@@ -7,7 +7,7 @@ from dataclasses import fields
 from ema_model.actuator.actuator import Actuator
 from ema_model.actuator.naming import on_axes
 from ema_model.actuator.parameters import SECTIONS
-from ema_model.actuator.unread import INVERSE, INVERSE_PLACES, NO_WINDING, WINDING_PLACES, check_value_is_read, unread
+from ema_model.actuator.unread import INVERSE, check_value_is_read, idle, unread
 from ema_model.errors import InputError
 
 # In the Reference Model alone (MODEL: T 3.3): known well enough by their values, but no fit could learn of them.
@@ -60,10 +60,9 @@ def _check_effect_acts(actuator: Actuator, name: str, where: str) -> None:
 
     effect = find(name)
     places = {function.__name__ for function in effect.places}
-    if actuator.controller.kind == "unknown" and (effect.states or not places & set(INVERSE_PLACES)):
-        raise InputError(f"{where}: effects.{name}: {INVERSE} does not simulate what it acts on; leave it out")
-    if actuator.inverter.kind == "current" and places <= set(WINDING_PLACES):
-        raise InputError(f"{where}: effects.{name}: {NO_WINDING} for it to act on; leave it out")
+    reason = idle(places, bool(effect.states), actuator.controller.kind, actuator.inverter.kind)
+    if reason:
+        raise InputError(f"{where}: effects.{name}: {reason}; leave it out")
 
 
 def _check_value(actuator: Actuator, path: str, value: float, where: str) -> None:

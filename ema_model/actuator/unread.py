@@ -6,6 +6,7 @@ default, it says nothing and may stand.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import fields
 
 from ema_model.actuator.naming import on_axes
@@ -59,9 +60,26 @@ _MOTION_IN = {
     },
     "sensors": {"delay_s": f"{INVERSE} has no command that anything could lag behind"},
 }
-# The places of effects (`ema_model.stacks.PLACES`) that inverse dynamics has, and those that a winding alone has.
+# The places of effects (`PLACES`) that inverse dynamics has, and those that a winding alone has.
 INVERSE_PLACES = ("current_reading", "electric_torque", "inverse_inertia", "moving_friction", "shaft_torque")
 WINDING_PLACES = ("back_emf", "bus_voltage", "winding_resistance")
+# Those of the drive's controller that a position controller has not, and that a voltage drive has not.
+SPEED_LOOP_PLACES = ("speed_reading", "speed_sample", "speed_command", "speed_gain", "integral_gain")
+CURRENT_LOOP_PLACES = ("current_reference",)
+
+
+def idle(places: Collection[str], has_states: bool, controller: str, inverter: str) -> str:
+    """Why an effect with these places does nothing to an actuator of these kinds; "" where it may act."""
+    at = set(places)
+    if controller == "unknown" and (has_states or not at & set(INVERSE_PLACES)):
+        return f"{INVERSE} does not simulate what it acts on"
+    if inverter == "current" and at <= set(WINDING_PLACES):
+        return f"{NO_WINDING} for it to act on"
+    if controller == "position" and at <= set(SPEED_LOOP_PLACES):
+        return "a position controller has no speed loop for it to act on"
+    if inverter == "voltage" and at <= set(CURRENT_LOOP_PLACES):
+        return "a voltage drive has no current loop for it to act on"
+    return ""
 
 
 def unread(controller: str, inverter: str) -> dict[str, str]:

@@ -129,8 +129,9 @@ def _claimed(story: Story, accepted: Sequence[Trial], tell: Progress) -> tuple[T
         best, others = _chosen(story, left)
         further = _further(story, best, tell)
         more, reason = further and further.trial, ""
-        if len(others) >= LARGEST_GROUP:
-            reason = f"{len(others)} others tell as much"
+        apart = _of_other_parts(best, others)
+        if len(apart) >= LARGEST_GROUP:
+            reason = f"{len(apart)} others tell as much"
         elif further is not None and not further.stands_out:
             reason = f"its order {best.candidate.settings['order']:g} tells no more than its neighbours"
         for whole in (more, best):
@@ -155,6 +156,13 @@ def _chosen(story: Story, accepted: Sequence[Trial]) -> tuple[Trial, list[Trial]
     tied = [trial for trial in accepted if trial is first or evidence(story.data, trial.fit, first.fit) < TIE]
     best = next((trial for trial in tied if not find(trial.candidate.name).duplicates), tied[0])
     return best, [trial for trial in tied if trial is not best]
+
+
+def _of_other_parts(best: Trial, others: Sequence[Trial]) -> list[Trial]:
+    """Those that are of another part than the best: a drive's delays are alike, and any of them names the drive."""
+    if find(best.candidate.name).family != "drive":
+        return list(others)
+    return [trial for trial in others if find(trial.candidate.name).family != "drive"]
 
 
 def _further(story: Story, best: Trial, tell: Progress) -> Further | None:

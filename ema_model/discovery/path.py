@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.actuator.naming import on_axes
+from ema_model.actuator.unread import idle
 from ema_model.comparison.compare import weights_of
 from ema_model.comparison.explain import Explanation
 from ema_model.discovery.evidence import predicted_evidence
@@ -106,7 +107,9 @@ class Story:
     def ranked(self, names: Sequence[str] | None = None, left: Left | None = None) -> list[Candidate]:
         """All effects (or these) with the fall of χ² that is predicted for each, the most promising first."""
         known = self.current.actuator.effects
-        wanted = [name for name in names or CATALOGUE if name not in known and name not in _NOT_LOOKED_FOR]
+        actuator = self.current.actuator
+        looked_for = [name for name in CATALOGUE if name not in _NOT_LOOKED_FOR and _may_act(name, actuator)]
+        wanted = [name for name in names or looked_for if name not in known and name not in _NOT_LOOKED_FOR]
         orders = (left or self.left()).orders
         self._prints = fingerprints(self.data, self.current, wanted, orders)
         return scored(self.current, self._prints)
@@ -223,6 +226,14 @@ class Story:
 
     def _rung(self, label: str, found: Fit) -> Rung:
         return rung_of(label, found, self.data, self.held)
+
+
+def _may_act(name: str, actuator: Actuator) -> bool:
+    """Whether an effect is of something that is there: of a drive only where its controller is simulated."""
+    effect = find(name)
+    kinds = actuator.controller.kind, actuator.inverter.kind
+    places = {function.__name__ for function in effect.places}
+    return effect.family != "drive" or not idle(places, bool(effect.states), *kinds)
 
 
 def begun(

@@ -9,6 +9,7 @@ import numpy as np
 from ema_model.actuator.naming import on_axes
 from ema_model.comparison.summary import calibration_dict, parameter_dict, plain
 from ema_model.discovery.result import Added, Discovery, Experiment, Rung
+from ema_model.effects import find
 from ema_model.quantities.axes import Axes
 
 
@@ -25,6 +26,7 @@ def as_dict(found: Discovery) -> dict[str, Any]:
             "candidates": [
                 {
                     "name": one.name,
+                    "family": find(one.name).family,
                     "predicted_drop": one.predicted_drop,
                     "tested": one.refitted_drop is not None,
                     "refitted_drop": one.refitted_drop,
@@ -82,6 +84,7 @@ def _added(one: Added, axes: Axes) -> dict[str, Any]:
     found = {name: parameter_dict(parameter) for name, parameter in one.parameters.items()} | chosen
     return {
         "name": one.name,
+        "family": find(one.name).family,
         "parameters": {on_axes(f"effects.{one.key}.{name}", axes).name: facts for name, facts in found.items()},
         "rmse_before": one.rmse_before,
         "rmse_after": one.rmse_after,

@@ -10,6 +10,7 @@ from ema_model.comparison.sentences import goes_with
 from ema_model.discovery.result import Added, Discovery, Rung
 from ema_model.discovery.verify import Verified
 from ema_model.effects import find
+from ema_model.effects.effect import FAMILIES
 from ema_model.errors import InputError
 from ema_model.estimation import Calibrated
 from ema_model.faults import BY_NAME, FAULTS, NAMES
@@ -184,6 +185,8 @@ def _added(found: Discovery) -> Iterator[Lines]:
         effect = find(one.name)
         names = {name: on_axes(f"effects.{one.key}.{name}", found.actuator.axes).name for name in one.parameters}
         lines = [f"{names.get(name, name):24}  {told}" for name, told in settings(found, one).items()]
+        if effect.family == "drive":
+            lines.append(f"it belongs to {FAMILIES[effect.family]}")
         if one.same_as:
             lines.append(f"these recordings cannot tell it from {', '.join(one.same_as)}")
         yield Lines(lines, f"{effect.title}: {effect.equation}")

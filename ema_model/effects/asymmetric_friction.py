@@ -28,4 +28,5 @@ EFFECT = Effect(
     places=(moving_friction,),
     shows="as an offset of the current in motion, in either direction alike",
     mistaken_for="current sensor bias",
+    family="mechanics",
 )

@@ -31,4 +31,5 @@ EFFECT = Effect(
     places=(bus_voltage,),
     shows="in the top speed, and in the current near the voltage limit",
     mistaken_for="winding resistance",
+    family="electrics",
 )

@@ -43,4 +43,5 @@ EFFECT = Effect(
     places=(shaft_torque,),
     shows="periodic in the motor angle, at any current",
     mistaken_for="eccentricity, torque ripple",
+    family="electrics",
 )

@@ -35,6 +35,7 @@ EFFECT = Effect(
     places=(shaft_torque,),
     shows="as a constant offset of the current",
     mistaken_for="current sensor bias",
+    family="mechanics",
     duplicates="sensors.current_bias_A",
     is_load=True,
 )

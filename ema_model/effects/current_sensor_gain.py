@@ -27,4 +27,5 @@ EFFECT = Effect(
     places=(current_reading,),
     shows="in the recorded current, in proportion to it, not in the motion",
     mistaken_for="demagnetisation",
+    family="sensor",
 )

@@ -32,4 +32,5 @@ EFFECT = Effect(
     places=(back_emf,),
     shows="in the current and the speed in saturating steps",
     mistaken_for="winding resistance, bus voltage sag",
+    family="electrics",
 )

@@ -32,5 +32,6 @@ EFFECT = Effect(
     places=(electric_torque, back_emf),
     shows="in the current, in proportion to the current; top speed",
     mistaken_for="current sensor gain, short circuit of all phases alike",
+    family="electrics",
     duplicates="motor.torque_constant_Nm_A",
 )

@@ -29,6 +29,28 @@ PLACES = {
     "user_position": ("user", "theta", "gear"),
     "position_reading": ("user",),
     "current_reading": ("current",),
+    # the drive's controller, in the order in which it works (`ema_model.kernels.drive_step`)
+    "position_error": ("error", "begins", "dt"),
+    "speed_reading": ("speed", "begins", "dt"),
+    "speed_sample": ("speed", "begins", "dt"),
+    "speed_command": ("wanted", "limit", "begins", "dt"),
+    "speed_gain": ("gain",),
+    "integral_gain": ("gain", "speed_gain"),
+    "drive_output": ("output", "begins", "dt"),
+    "current_reference": ("reference", "begins", "dt"),
+}
+# Places of the drive, each passed once a step.  An effect with states returns there its changed value and all of its
+# new states, as a tuple; begins: whether this is the first step, before which its states say nothing.
+STAGES = (
+    *("position_error", "speed_reading", "speed_sample", "speed_command", "speed_gain", "integral_gain"),
+    *("drive_output", "current_reference"),
+)
+# What an effect is of: a part of the actuator, or of what drives and measures it.
+FAMILIES = {
+    "mechanics": "the actuator's mechanics",
+    "electrics": "the motor, the inverter and their supply",
+    "sensor": "a sensor",
+    "drive": "the drive's controller, not the actuator",
 }
 # The arguments of an effect's `advance_states`, which returns its new states as a tuple: the step, s; angle and
 # speed at its start; the rigid transmission's output before and after; how far the user moved; what acts.
@@ -112,12 +134,22 @@ class Effect:
     places: tuple[Callable[..., Any], ...]
     shows: str
     mistaken_for: str
-    states: tuple[str, ...] = ()  # of its own, 0 at the start; `advance_states` takes their next values
+    family: str  # of `FAMILIES`
+    states: tuple[str, ...] = ()  # of its own, 0 at the start; a stage of the drive, or `advance_states`, renews them
     advance_states: Callable[..., Any] | None = None  # (*ema_model.stacks.ADVANCE, parameters, states) → new states
     duplicates: str = ""  # path of the base parameter that does the same, e.g. "motor.inertia_kgm2"
     is_load: bool = False  # pulls at the user from outside, so that its torque counts as the load
     nothing: float = 0.0  # the first parameter, the others at their defaults, with which kernels go on as without it
     name: str = ""  # of the file; the catalogue fills it in
+
+    def __post_init__(self) -> None:
+        if self.family not in FAMILIES:
+            raise ValueError(f"effect {self.title}: family must be one of {', '.join(FAMILIES)}")
+
+    @property
+    def acts_in_drive(self) -> bool:
+        """Whether it changes what the drive's controller does."""
+        return any(place.__name__ in STAGES for place in self.places)
 
     @property
     def is_periodic(self) -> bool:

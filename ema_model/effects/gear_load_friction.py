@@ -27,4 +27,5 @@ EFFECT = Effect(
     places=(moving_friction,),
     shows="in the current under a load from outside, with the direction of motion",
     mistaken_for="load-dependent friction, dry friction",
+    family="mechanics",
 )

@@ -31,5 +31,6 @@ EFFECT = Effect(
     places=(shaft_torque,),
     shows="in the current, in proportion to the user position",
     mistaken_for="position gain, inertia in a sine",
+    family="mechanics",
     is_load=True,
 )

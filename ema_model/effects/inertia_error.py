@@ -26,5 +26,6 @@ EFFECT = Effect(
     places=(inverse_inertia,),
     shows="in the current, in proportion to acceleration",
     mistaken_for="position gain, torque constant, torsional compliance",
+    family="mechanics",
     duplicates="motor.inertia_kgm2",
 )

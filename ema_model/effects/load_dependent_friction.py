@@ -26,4 +26,5 @@ EFFECT = Effect(
     places=(moving_friction,),
     shows="in the current under load, with the direction of motion",
     mistaken_for="dry friction, viscous friction",
+    family="mechanics",
 )

@@ -32,5 +32,6 @@ EFFECT = Effect(
     places=(shaft_torque,),
     shows="against the user position, in motion and at rest",
     mistaken_for="hinge moment, constant load",
+    family="mechanics",
     is_load=True,
 )

@@ -28,4 +28,5 @@ EFFECT = Effect(
     places=(position_reading,),
     shows="in the motor angle against the user position, as a constant offset",
     mistaken_for="backlash",
+    family="sensor",
 )

@@ -32,6 +32,7 @@ EFFECT = Effect(
     places=(position_reading,),
     shows="in the user position against the motor angle, as a lag, and in the current as frequency rises",
     mistaken_for="inertia error, position gain",
+    family="sensor",
     states=("late_rad",),
     advance_states=advance_states,
 )

@@ -61,6 +61,7 @@ EFFECT = Effect(
     places=(friction,),
     shows="as hysteresis of the current just after reversals and at rest",
     mistaken_for="backlash",
+    family="mechanics",
     states=("bend_rad",),
     advance_states=advance_states,
     nothing=math.inf,

@@ -43,4 +43,5 @@ EFFECT = Effect(
     places=(user_position,),
     shows="in the user position against the motor angle, periodic",
     mistaken_for="an error of the position sensor, cogging torque",
+    family="mechanics",
 )

@@ -32,4 +32,5 @@ EFFECT = Effect(
     places=(moving_friction,),
     shows="in the current just after reversals and at low speed",
     mistaken_for="backlash, dry friction",
+    family="mechanics",
 )

@@ -44,4 +44,5 @@ EFFECT = Effect(
     places=(electric_torque,),
     shows="in the current, periodic in the motor angle and in proportion to the current",
     mistaken_for="short circuit, eccentricity, cogging torque",
+    family="electrics",
 )

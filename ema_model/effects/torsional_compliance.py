@@ -61,6 +61,7 @@ EFFECT = Effect(
     places=(user_position, shaft_torque),
     shows="in the user position, as a lag near the mode, and in the current",
     mistaken_for="backlash, inertia error",
+    family="mechanics",
     states=("deflection_rad", "speed_rad_s", "twist_Nm"),
     advance_states=advance_states,
     nothing=math.inf,

@@ -36,5 +36,6 @@ EFFECT = Effect(
     places=(shaft_torque,),
     shows="in the current, in proportion to speed",
     mistaken_for="load-dependent friction",
+    family="mechanics",
     duplicates="motor.viscous_friction_Nms_rad",
 )

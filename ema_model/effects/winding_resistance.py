@@ -26,5 +26,6 @@ EFFECT = Effect(
     places=(winding_resistance,),
     shows="in the current and the speed near the voltage limit",
     mistaken_for="bus voltage sag, dead time",
+    family="electrics",
     duplicates="motor.resistance_Ohm",
 )

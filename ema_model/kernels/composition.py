@@ -18,12 +18,21 @@ __all__ = [
     "bus_voltage",
     "control",
     "current_reading",
+    "current_reference",
+    "drive_acts",
+    "drive_output",
     "electric_torque",
     "friction",
+    "integral_gain",
     "inverse_inertia",
     "moving_friction",
+    "position_error",
     "position_reading",
     "shaft_torque",
+    "speed_command",
+    "speed_gain",
+    "speed_reading",
+    "speed_sample",
     "user_position",
     "winding_resistance",
 ]
@@ -93,6 +102,60 @@ def position_reading(user, s, first, p, i):
 def current_reading(current, s, first, p, i):
     """What the recorded equivalent current is, A."""
     return current
+
+
+@scalar
+def position_error(error, begins, dt, s, first, p, i):
+    """The position error that the controller acts on, rad at the user."""
+    return error
+
+
+@scalar
+def speed_reading(speed, begins, dt, s, first, p, i):
+    """What the drive takes the motor's speed to be, rad/s."""
+    return speed
+
+
+@scalar
+def speed_sample(speed, begins, dt, s, first, p, i):
+    """The same as it is when the controller computes, rad/s."""
+    return speed
+
+
+@scalar
+def speed_command(wanted, limit, begins, dt, s, first, p, i):
+    """The speed that the position loop asks for, rad/s, kept to ±limit already."""
+    return wanted
+
+
+@scalar
+def speed_gain(gain, s, first, p, i):
+    """The speed loop's proportional gain, N·m·s/rad."""
+    return gain
+
+
+@scalar
+def integral_gain(gain, speed_gain, s, first, p, i):
+    """The speed loop's integral gain, N·m/rad."""
+    return gain
+
+
+@scalar
+def drive_output(output, begins, dt, s, first, p, i):
+    """What the controller puts out: a reference current, A, or a share of the bus voltage."""
+    return output
+
+
+@scalar
+def current_reference(reference, begins, dt, s, first, p, i):
+    """The current that the current loop brings about, A, as far as the voltage suffices."""
+    return reference
+
+
+@scalar
+def drive_acts(p, i):
+    """Whether an effect of the drive does anything."""
+    return False
 
 
 @scalar

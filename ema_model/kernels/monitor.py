@@ -10,9 +10,10 @@ import numba
 import numpy as np
 
 from ema_model.physics.jit import parallel_kernel
-from ema_model.physics.rows import LANES, OMEGA, THETA
+from ema_model.physics.rows import LANES, OMEGA, THETA, TOLD
 
-from .monitor_step import advance, advance_memory, shown_current, shown_position, speed_loop_remembers
+from .drive_step import is_driven
+from .monitor_step import advance, advance_demand, sense, shown_current
 
 
 @parallel_kernel
@@ -33,7 +34,9 @@ def squared_errors(
         block = job % blocks
         s = states[run, block].copy()
         p = parameters[block]
-        remembers = speed_loop_remembers(p)
+        driven = is_driven(p)
+        for i in range(LANES):
+            sense(s, p, i)
         total = np.zeros(LANES)
         mean = np.empty(LANES)
         scale = 1.0 / period
@@ -44,11 +47,11 @@ def squared_errors(
                 c = command[step]
                 t = load[step]
                 u = supply[step]
-                if remembers:
+                if driven:
                     for i in range(LANES):
-                        advance_memory(s, p, i, c, u, dt)
+                        advance_demand(s, p, i, c, u, dt)
                 for i in range(LANES):
-                    advance(s, p, i, c, t, u, dt)
+                    advance(s, p, i, c, t, u, driven, dt)
                     mean[i] += shown_current(s, p, i)
                 step += 1
             y = target[sample]
@@ -71,7 +74,9 @@ def traces(states, parameters, command, load, supply, period, group, dt, result)
     for block in numba.prange(states.shape[0]):
         s = states[block].copy()  # of its own, which proves to the compiler that nothing overlaps
         p = parameters[block]
-        remembers = speed_loop_remembers(p)
+        driven = is_driven(p)
+        for i in range(LANES):
+            sense(s, p, i)
         total = np.empty(4 * LANES)
         of_group = 1.0 / group
         of_steps = of_group / period
@@ -83,17 +88,17 @@ def traces(states, parameters, command, load, supply, period, group, dt, result)
                     c = command[step]
                     t = load[step]
                     u = supply[step]
-                    if remembers:
+                    if driven:
                         for i in range(LANES):
-                            advance_memory(s, p, i, c, u, dt)
+                            advance_demand(s, p, i, c, u, dt)
                     for i in range(LANES):
-                        advance(s, p, i, c, t, u, dt)
+                        advance(s, p, i, c, t, u, driven, dt)
                         total[i] += shown_current(s, p, i)
                     step += 1
                 for i in range(LANES):
                     total[LANES + i] += s[OMEGA * LANES + i]
                     total[2 * LANES + i] += s[THETA * LANES + i]
-                    total[3 * LANES + i] += shown_position(s, p, i)
+                    total[3 * LANES + i] += s[TOLD * LANES + i]
             for i in range(LANES):
                 result[block, value, 0, i] = total[i] * of_steps
                 result[block, value, 1, i] = total[LANES + i] * of_group

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from ema_model.physics.backlash import advance_play
-from ema_model.physics.controller import advance_speed_loop
 from ema_model.physics.elementary import clamp, rotate
 from ema_model.physics.friction import advance_rotor, borello_friction
 from ema_model.physics.jit import scalar
@@ -13,8 +12,7 @@ from ema_model.physics.rows import (
     COS_ELECTRICAL,
     COS_ROTOR,
     CURRENT,
-    CURRENT_PER_TORQUE,
-    DERIVATIVE_GAIN,
+    DEMAND,
     DYNAMIC_FRICTION,
     EMF_CONSTANT,
     FLUX_0,
@@ -28,32 +26,24 @@ from ema_model.physics.rows import (
     FLUX_8,
     GEAR_RATIO,
     HALF_PLAY,
-    INTEGRAL,
-    INTEGRAL_GAIN,
-    INTEGRATOR_REST,
-    INTEGRATOR_WINDOW,
     INVERSE_INDUCTANCE,
     INVERSE_INERTIA,
     LANES,
     OMEGA,
-    OUTPUT_LIMIT,
     PLAY,
     POLE_PAIRS,
-    POSITION_GAIN,
-    REMEMBERED,
     RESISTANCE,
     SIN_ELECTRICAL,
     SIN_ROTOR,
-    SPEED_ERROR,
-    SPEED_GAIN,
-    SPEED_LIMIT,
     STATE_ROWS,
     STATIC_FRICTION,
     STOP_HIGH,
     STOP_LOW,
     THETA,
+    TOLD,
     TORQUE_CONSTANT,
     TORQUE_LIMIT,
+    USER,
     VISCOUS,
     VOLTAGE_RATIO,
 )
@@ -63,7 +53,6 @@ from .composition import (
     advance_states,
     back_emf,
     bus_voltage,
-    control,
     current_reading,
     electric_torque,
     friction,
@@ -74,51 +63,34 @@ from .composition import (
     user_position,
     winding_resistance,
 )
+from .drive_step import advance_drive, plain_demand
 
 FIRST = len(STATE_ROWS)  # row of the effects' own states
 
 
 @scalar
-def speed_loop_remembers(p):
-    """Whether the speed loop of any lane has an integral or a derivative action."""
-    for i in range(LANES):
-        if p[INTEGRAL_GAIN * LANES + i] != 0.0 or p[DERIVATIVE_GAIN * LANES + i] != 0.0:
-            return True
-    return False
-
-
-@scalar
-def advance_memory(s, p, i, command, supply, dt):
-    """What the speed loop of lane i remembers, for the step that `advance` is about to take; off, it forgets."""
+def sense(s, p, i):
+    """Where the user of lane i stands, and what the sensor tells of it, for the step to come."""
     gear = p[GEAR_RATIO * LANES + i]
     user = user_position(gear * s[PLAY * LANES + i], s[THETA * LANES + i], gear, s, FIRST, p, i)
-    remembered, integral, error = advance_speed_loop(
-        command,
-        position_reading(user, s, FIRST, p, i),
-        s[OMEGA * LANES + i],
-        s[INTEGRAL * LANES + i],
-        s[SPEED_ERROR * LANES + i],
-        p[POSITION_GAIN * LANES + i],
-        p[SPEED_LIMIT * LANES + i],
-        p[SPEED_GAIN * LANES + i],
-        p[INTEGRAL_GAIN * LANES + i],
-        p[DERIVATIVE_GAIN * LANES + i],
-        p[INTEGRATOR_WINDOW * LANES + i],
-        p[INTEGRATOR_REST * LANES + i],
-        p[CURRENT_PER_TORQUE * LANES + i],
-        p[OUTPUT_LIMIT * LANES + i],
-        dt,
-    )
-    s[REMEMBERED * LANES + i] = remembered
-    s[INTEGRAL * LANES + i] = integral if supply > 0.0 else 0.0
-    s[SPEED_ERROR * LANES + i] = error
+    s[USER * LANES + i] = user
+    s[TOLD * LANES + i] = position_reading(user, s, FIRST, p, i)
 
 
 @scalar
-def advance(s, p, i, command, load, supply, dt):
+def advance_demand(s, p, i, command, supply, dt):
+    """What the drive of lane i asks for, in full, for the step that `advance` is about to take."""
+    told, omega = s[TOLD * LANES + i], s[OMEGA * LANES + i]
+    s[DEMAND * LANES + i] = advance_drive(s, FIRST, p, i, command, told, omega, supply, dt)
+
+
+@scalar
+def advance(s, p, i, command, load, supply, driven, dt):
     """Advances lane i of the state s (rows of `STATE_ROWS`) by dt, s, under a command, rad, and a load, N·m.
 
     supply: the bus voltage over its nominal value; 0 is a drive switched off, which carries no current.
+    driven: whether `advance_demand` has found what the drive asks for.  The state has been sensed (`sense`), and is so
+    again at the end.
     """
     theta = s[THETA * LANES + i]
     omega = s[OMEGA * LANES + i]
@@ -130,19 +102,10 @@ def advance(s, p, i, command, load, supply, dt):
     before = s[CURRENT * LANES + i]
     gear = p[GEAR_RATIO * LANES + i]
     rigid = gear * play
-    user = user_position(rigid, theta, gear, s, FIRST, p, i)
+    user = s[USER * LANES + i]
 
-    demand = control(
-        command,
-        position_reading(user, s, FIRST, p, i),
-        omega,
-        s[REMEMBERED * LANES + i],
-        p[POSITION_GAIN * LANES + i],
-        p[SPEED_LIMIT * LANES + i],
-        p[SPEED_GAIN * LANES + i],
-        p[CURRENT_PER_TORQUE * LANES + i],
-        p[OUTPUT_LIMIT * LANES + i],
-    )
+    plain = plain_demand(p, i, command, s[TOLD * LANES + i], omega)
+    demand = s[DEMAND * LANES + i] if driven else plain
 
     flux = flux_factor(
         sin_r,
@@ -222,17 +185,10 @@ def advance(s, p, i, command, load, supply, dt):
         p,
         i,
     )
+    sense(s, p, i)
 
 
 @scalar
 def shown_current(s, p, i):
     """The equivalent current as its sensor shows it, A."""
     return current_reading(s[CURRENT * LANES + i], s, FIRST, p, i)
-
-
-@scalar
-def shown_position(s, p, i):
-    """The user's position as its sensor shows it, rad."""
-    gear = p[GEAR_RATIO * LANES + i]
-    user = user_position(gear * s[PLAY * LANES + i], s[THETA * LANES + i], gear, s, FIRST, p, i)
-    return position_reading(user, s, FIRST, p, i)

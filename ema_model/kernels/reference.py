@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from ema_model.physics.backlash import advance_play
-from ema_model.physics.controller import advance_speed_loop
 from ema_model.physics.elementary import clamp, rotate
 from ema_model.physics.friction import advance_rotor, borello_friction
 from ema_model.physics.inverter import relay
@@ -22,8 +21,6 @@ from ema_model.physics.rows import (
     CURRENT_A,
     CURRENT_B,
     CURRENT_C,
-    CURRENT_PER_TORQUE,
-    DERIVATIVE_GAIN,
     DYNAMIC_FRICTION,
     ECCENTRICITY,
     ECCENTRICITY_COS,
@@ -32,25 +29,16 @@ from ema_model.physics.rows import (
     GEAR_RATIO,
     HALF_PLAY,
     HYSTERESIS,
-    INTEGRAL,
-    INTEGRAL_GAIN,
-    INTEGRATOR_REST,
-    INTEGRATOR_WINDOW,
     INVERSE_INDUCTANCE,
     INVERSE_INERTIA,
     LANES,
     OMEGA,
-    OUTPUT_LIMIT,
     PLAY,
     POLE_PAIRS,
-    POSITION_GAIN,
     REFERENCE_STATE_ROWS,
     RESISTANCE,
     SIN_ELECTRICAL,
     SIN_ROTOR,
-    SPEED_ERROR,
-    SPEED_GAIN,
-    SPEED_LIMIT,
     STATIC_FRICTION,
     STOP_HIGH,
     STOP_LOW,
@@ -68,7 +56,6 @@ from .composition import (
     advance_states,
     back_emf,
     bus_voltage,
-    control,
     current_reading,
     electric_torque,
     friction,
@@ -79,6 +66,7 @@ from .composition import (
     user_position,
     winding_resistance,
 )
+from .drive_step import advance_drive, is_driven, plain_demand
 
 FIRST = len(REFERENCE_STATE_ROWS)  # row of the effects' own states
 
@@ -103,10 +91,9 @@ def run(state, p, command, load, period, substeps, dt, result):
     current_b = state[CURRENT_B * LANES]
     current_c = state[CURRENT_C * LANES]
     leg_a, leg_b, leg_c = 1.0, 1.0, 1.0
-    integral, speed_error = state[INTEGRAL * LANES], state[SPEED_ERROR * LANES]
+    driven = is_driven(p)
 
     tau = p[GEAR_RATIO * LANES]
-    limit = p[OUTPUT_LIMIT * LANES]
     torque_limit = p[TORQUE_LIMIT * LANES]
     s = state.copy()
     bus = p[BUS_VOLTAGE * LANES]
@@ -145,34 +132,10 @@ def run(state, p, command, load, period, substeps, dt, result):
                 rigid = tau * play
                 user = user_position(rigid, theta, tau, s, FIRST, p, 0)
                 told = position_reading(user, s, FIRST, p, 0)
-                remembered, integral, speed_error = advance_speed_loop(
-                    demand,
-                    told,
-                    omega,
-                    integral,
-                    speed_error,
-                    p[POSITION_GAIN * LANES],
-                    p[SPEED_LIMIT * LANES],
-                    p[SPEED_GAIN * LANES],
-                    p[INTEGRAL_GAIN * LANES],
-                    p[DERIVATIVE_GAIN * LANES],
-                    p[INTEGRATOR_WINDOW * LANES],
-                    p[INTEGRATOR_REST * LANES],
-                    p[CURRENT_PER_TORQUE * LANES],
-                    limit,
-                    dt,
-                )
-                current_ref = control(
-                    demand,
-                    told,
-                    omega,
-                    remembered,
-                    p[POSITION_GAIN * LANES],
-                    p[SPEED_LIMIT * LANES],
-                    p[SPEED_GAIN * LANES],
-                    p[CURRENT_PER_TORQUE * LANES],
-                    limit,
-                )
+                if driven:
+                    current_ref = advance_drive(s, FIRST, p, 0, demand, told, omega, 1.0, dt)
+                else:
+                    current_ref = plain_demand(p, 0, demand, told, omega)
 
                 amplitude = -(2.0 / 3.0) * current_ref
                 sin_b = minus_120(sin_e, cos_e)[0]

@@ -11,40 +11,34 @@ from ema_model.physics.jit import scalar
 
 
 @scalar
-def speed_reference(command, user_position, position_gain, speed_limit):
+def speed_reference(position_error, position_gain, speed_limit):
     """ω_ref = sat(G·e), rad/s, with e the position error at the user, rad."""
-    return clamp(position_gain * (command - user_position), -speed_limit, speed_limit)
+    return clamp(position_gain * position_error, -speed_limit, speed_limit)
 
 
 @scalar
-def cascade_controller(
-    command, user_position, omega, remembered, position_gain, speed_limit, speed_gain, current_per_torque, limit
-):
-    """Position loop and PID speed loop (T 3.1): the reference current, A.
+def cascade_controller(position_error, speed_error, remembered, position_gain, speed_gain, current_per_torque, limit):
+    """PID speed loop (T 3.1) behind a position loop: the reference current, A.
 
     I_ref = sat(T_ref / k_t), T_ref = K_P e + K_I ∫e dt + K_D de/dt, e = ω_ref − ω; remembered: the last two, N·m.
     """
-    error = speed_reference(command, user_position, position_gain, speed_limit) - omega
-    return clamp((speed_gain * error + remembered) * current_per_torque, -limit, limit)
+    return clamp((speed_gain * speed_error + remembered) * current_per_torque, -limit, limit)
 
 
 @scalar
-def position_controller(
-    command, user_position, omega, remembered, position_gain, speed_limit, speed_gain, current_per_torque, limit
-):
+def position_controller(position_error, speed_error, remembered, position_gain, speed_gain, current_per_torque, limit):
     """A position loop alone: limit·sat(gain·e), the share of the bus voltage, or a current, A."""
-    return limit * clamp(position_gain * (command - user_position), -1.0, 1.0)
+    return limit * clamp(position_gain * position_error, -1.0, 1.0)
 
 
 @scalar
 def advance_speed_loop(
-    command,
-    user_position,
+    position_error,
+    speed_error,
     omega,
     integral,
     error_before,
-    position_gain,
-    speed_limit,
+    begins,
     speed_gain,
     integral_gain,
     derivative_gain,
@@ -54,17 +48,17 @@ def advance_speed_loop(
     limit,
     dt,
 ):
-    """What the speed loop remembers: K_I ∫e dt + K_D de/dt for this step, N·m; its integral after; its error now.
+    """What the speed loop remembers: K_I ∫e dt + K_D de/dt for this step, N·m; and its integral after it.
 
-    integral: K_I ∫e dt, N·m; error_before: e of the step before, rad/s, NaN in the first one.
+    integral: K_I ∫e dt, N·m, which counts for nothing without an integral gain; error_before: e of the step before,
+    rad/s; begins: whether there was none.
     """
-    error = speed_reference(command, user_position, position_gain, speed_limit) - omega
-    rise = error - error_before
-    remembered = integral + derivative_gain * (rise * (1.0 / dt) if rise == rise else 0.0)
-    wanted = (speed_gain * error + remembered) * current_per_torque
-    position_error = command - user_position
-    after = advance_integral(integral, integral_gain, error, position_error, omega, wanted, limit, window, rest, dt)
-    return remembered, after, error
+    kept = integral if integral_gain != 0.0 else 0.0
+    rise = 0.0 if begins else speed_error - error_before
+    remembered = kept + derivative_gain * (rise * (1.0 / dt))
+    wanted = (speed_gain * speed_error + remembered) * current_per_torque
+    after = advance_integral(kept, integral_gain, speed_error, position_error, omega, wanted, limit, window, rest, dt)
+    return remembered, after
 
 
 @scalar

@@ -100,8 +100,11 @@ STATE_ROWS = (
     "cos_electrical",  # the RM's of θ_e = N_p times that, the MM's of 2θ_e
     "current",  # equivalent current I_3eq, A
     "integral",  # K_I ∫e dt of the speed loop, N·m
-    "speed_error",  # e of the step before, rad/s; NaN before the first
-    "remembered",  # K_I ∫e dt + K_D de/dt of this step, N·m
+    "speed_error",  # e of the step before, rad/s
+    "user",  # where the user stands, rad
+    "told",  # what the position sensor tells of it, rad
+    "begun",  # 0 before the drive's first step, then 1
+    "demand",  # what the drive asks for in this step, where more than the plain cascade acts: A, or a share of the bus
 )
 (
     THETA,
@@ -114,7 +117,10 @@ STATE_ROWS = (
     CURRENT,
     INTEGRAL,
     SPEED_ERROR,
-    REMEMBERED,
+    USER,
+    TOLD,
+    BEGUN,
+    DEMAND,
 ) = range(len(STATE_ROWS))
 
 REFERENCE_STATE_ROWS = (

@@ -128,13 +128,12 @@ def integral_at_start(
 ) -> Array:
     """K_I ∫e dt, N·m, of a speed loop that is caught at work: what makes it ask for the current that flows.
 
-    k_t I − K_P (ω_ref − ω), within the torque of the current's limit, for k (n, 8) or (8,) → (n,) or (); 0 without an
-    integral action.  It is the bumpless start of Åström and Hägglund (Advanced PID Control, ISA 2006), and steady state
-    where the recording begins in steady state.
+    k_t I − K_P (ω_ref − ω), within the torque of the current's limit, for k (n, 8) or (8,) → (n,) or ().  A speed loop
+    without an integral action passes it by: its gain may be an effect's.  It is the bumpless start of Åström and
+    Hägglund (Advanced PID Control, ISA 2006), and steady state where the recording begins in steady state.
     """
     controller = actuator.controller
-    integral_gain = np.asarray(controller.integral_gain_Nm_rad, dtype=float)
-    if not np.any(integral_gain > 0.0):
+    if controller.kind != "cascade":
         return np.zeros(())
     gain = controller.position_gain_1_s * faults.physical(k).gain_factor
     limit = np.asarray(controller.speed_limit_rad_s, dtype=float)
@@ -142,7 +141,7 @@ def integral_at_start(
     with np.errstate(invalid="ignore"):  # a k that is no number is one lane's matter
         error = np.clip(gain * (command_rad - np.asarray(user_rad)), -limit, limit) - np.asarray(speed_rad_s)
         torque = controller.torque_constant_Nm_A * np.asarray(current_A) - controller.speed_gain_Nms_rad * error
-    return np.where(integral_gain > 0.0, np.clip(torque, -most, most), 0.0)
+        return np.clip(torque, -most, most)
 
 
 def _state(
@@ -168,7 +167,6 @@ def _state(
         "sin_electrical": np.sin(electrical * rotor),
         "cos_electrical": np.cos(electrical * rotor),
         "integral": integral_Nm,
-        "speed_error": np.nan,  # none yet
     }
     state = np.zeros((blocks, len(rows), LANES))
     for name, value in values.items():

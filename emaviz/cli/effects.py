@@ -8,6 +8,7 @@ from dataclasses import asdict
 from typing import Any
 
 from ema_model.effects import CATALOGUE, Effect, Parameter, find
+from ema_model.effects.effect import FAMILIES
 from ema_model.quantities.axes import Axes
 from emaviz.cli.options import add_json
 from emaviz.cli.output import configuration, write_json
@@ -29,7 +30,7 @@ def run(arguments: argparse.Namespace) -> int:
     else:
         width = max(len(effect.name) for effect in chosen)
         for effect in chosen:
-            print(f"{effect.name:{width}}  {effect.equation}")
+            print(f"{effect.name:{width}}  {effect.family:9}  {effect.equation}")
     write_json(arguments.json, {"effects": [_facts(effect) for effect in chosen]}, 0, configuration(arguments))
     return 0
 
@@ -45,6 +46,7 @@ def explain(effect: Effect) -> str:
     severities = ", ".join(f"{value:g}" for value in effect.severities)
     lines += [
         "",
+        f"Belongs to    {FAMILIES[effect.family]}",
         f"Shows         {effect.shows}",
         f"Mistaken for  {effect.mistaken_for}",
         *([f"Duplicates    {effect.duplicates}, which a calibration moves"] if effect.duplicates else []),
@@ -74,5 +76,6 @@ def _facts(effect: Effect) -> dict[str, Any]:
         "severities": effect.severities,
         "shows": effect.shows,
         "mistaken_for": effect.mistaken_for,
+        "family": effect.family,
         "duplicates": effect.duplicates,
     }

@@ -9,6 +9,7 @@ from ema_model.discovery import Discovery
 from ema_model.discovery.result import Added
 from ema_model.discovery.words import effect_title, settings
 from ema_model.effects import Effect, find
+from ema_model.effects.effect import STAGES
 from emaviz.colours import ALGORITHMS, MONITOR, TRUTH
 from emaviz.text.html import Html, html, joined
 
@@ -20,6 +21,7 @@ _LINES = {
     "friction": "T_f = T_s at rest, T_d sgn ω in motion",
     "output": "θ_user = τ θ, with play",
     "sensors": "read: θ_user, i",
+    "drive": "I_ref = sat(K_P (ω_ref − ω) + K_I ∫(ω_ref − ω) dt), ω_ref = sat(G (θ_cmd − θ_user))",
 }
 _OF_PLACE = {
     "moving_friction": "friction",
@@ -33,6 +35,7 @@ _OF_PLACE = {
     "user_position": "output",
     "position_reading": "sensors",
     "current_reading": "sensors",
+    **dict.fromkeys(STAGES, "drive"),
 }
 
 

@@ -63,7 +63,7 @@ def plain_loop(stack: Stack) -> Callable[..., float]:
         s = state.copy()
         total = 0.0
         for step in range(len(command)):
-            advance(s, parameters, 0, command[step], load[step], 1.0, dt)
+            advance(s, parameters, 0, command[step], load[step], 1.0, False, dt)
             total += s[CURRENT * LANES] ** 2
         return total
 

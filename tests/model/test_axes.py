@@ -288,6 +288,7 @@ EFFECT = Effect(
     places=(shaft_torque,),
     shows="in the current",
     mistaken_for="hinge moment",
+    family="mechanics",
 )
 '''
 ASKED = """

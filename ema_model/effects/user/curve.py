@@ -72,6 +72,7 @@ def torque_curve(
             places=(module.shaft_torque,),
             shows=f"against {symbol}",
             mistaken_for="",
+            family="mechanics",
             name=name,
             kind="torque_curve",
             definition={"variable": variable, "modulator": modulator, "low": low, "high": high},

@@ -63,6 +63,7 @@ def user_torque(text: str, ranges: Mapping[str, tuple[float, float]] | None = No
             places=(module.shaft_torque, module.user_position),
             shows="as the expression says",
             mistaken_for="",
+            family="mechanics",
             states=("time_s",) if timed else (),
             advance_states=module.advance_states if timed else None,
             name=name,

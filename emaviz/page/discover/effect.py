@@ -12,6 +12,7 @@ from ema_model.discovery import Candidate
 from ema_model.discovery.snapshot import Look
 from ema_model.discovery.words import effect_title
 from ema_model.effects import Effect, find
+from ema_model.effects.effect import FAMILIES
 from ema_model.quantities.numbers import Quantity, number
 from ema_model.quantities.titles import in_sentence
 from emaviz.figures import signature
@@ -102,7 +103,12 @@ def head(look: Look, one: Candidate) -> Html:
 
 def about(effect: Effect, equation: bool = True) -> Html:
     """Equation (unless it stands elsewhere), cause, typical size, where it shows, what it is mistaken for."""
-    rows = [("Why", effect.explanation), ("Typical", typical(effect)), ("Shows", effect.shows)]
+    rows = [
+        ("Belongs to", FAMILIES[effect.family]),
+        ("Why", effect.explanation),
+        ("Typical", typical(effect)),
+        ("Shows", effect.shows),
+    ]
     if effect.mistaken_for:
         rows.append(("Mistaken for", effect.mistaken_for))
     rows.append(("Source", effect.source))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from ema_model.discovery.result import Added
 from ema_model.discovery.words import effect_title, fitted_of
 from ema_model.effects import Effect, find
+from ema_model.effects.effect import FAMILIES
 from ema_model.quantities.numbers import number
 from ema_model.quantities.titles import in_sentence
 from emaviz.report.discovery.subject import Told
@@ -39,7 +40,12 @@ def _card(told: Told, index: int, one: Added) -> str:
 
 
 def _known(effect: Effect) -> str:
-    facts = {"Where it shows": effect.shows, "Mistaken for": effect.mistaken_for, "Source": effect.source}
+    facts = {
+        "Belongs to": FAMILIES[effect.family],
+        "Where it shows": effect.shows,
+        "Mistaken for": effect.mistaken_for,
+        "Source": effect.source,
+    }
     return " ".join(f"{name}: {fact}." for name, fact in facts.items() if fact)
 
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
 
-from ema_model.actuator import load_actuator
+from ema_model.actuator import Actuator, load_actuator
 from ema_model.actuator.parameters import Inverter
 from ema_model.actuator.unread import idle
 from ema_model.commands import command
@@ -38,7 +39,7 @@ STEP = Run(command("step", {"final_rad": 5e-3}), 0.1)
 DT = 1e-5
 
 
-def simulated(run: Run, actuator=IDEAL, **effects: float):
+def simulated(run: Run, actuator: Actuator = IDEAL, /, **effects: float):
     """The Monitor Model's signals; effects: the first parameter of each, by name."""
     settings = {name: {CATALOGUE[name].parameters[0].name: value} for name, value in effects.items()}
     # Beside something that does nothing, so that all runs go in the library's kernels.
@@ -201,7 +202,7 @@ def test_each_lane_has_a_drive_of_its_own(integral_gain):
     """Beside others with other drives it is what it is alone; without an effect it is what it is without any."""
     actuator = IDEAL.with_values({"controller.integral_gain_Nm_rad": integral_gain})
     given = [(name, CATALOGUE[name].severities[2]) for name in IN_DRIVE]
-    together = {name: dict(CATALOGUE[name].neutral) for name in IN_DRIVE}
+    together: dict[str, dict[str, Any]] = {name: {**CATALOGUE[name].neutral} for name in IN_DRIVE}
     for lane, (name, value) in enumerate(given):
         first = CATALOGUE[name].parameters[0].name
         column = np.full(len(given) + 1, CATALOGUE[name].nothing)

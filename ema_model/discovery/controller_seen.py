@@ -33,7 +33,7 @@ _DELAYS = 25  # tried
 _AT_LIMIT = 0.97  # of the current's limit, from which on it tells nothing of the gains
 _BLOCKS = 8  # of time, by whose scatter the gains' uncertainty is told
 _Z90 = 1.645
-_LEAST_ROWS = 200
+_LEAST_ROWS = 60
 
 
 @dataclass(frozen=True)
@@ -152,7 +152,9 @@ def _runs(measurement: Measurement, actuator: Actuator) -> Iterator[_Run]:
         error = wanted - omega
         raw = (current - sensors.current_bias_A) / sensors.current_gain
         limited = np.abs(raw) > _AT_LIMIT * actuator.current_limit_A
-        held = limited | (np.abs(behind) > controller.integrator_window_rad)
+        held = limited
+        if controller.integral_gain_Nm_rad > 0.0:  # without it nobody has set a window
+            held = limited | (np.abs(behind) > controller.integrator_window_rad)
         integral = np.cumsum(np.where(held, 0.0, error)) * period
         width = min(round(_WINDOW_S / period), (run.stop - run.start) // 4)
         yield _Run(

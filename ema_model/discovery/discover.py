@@ -147,7 +147,8 @@ def _claimed(story: Story, accepted: Sequence[Trial], tell: Progress) -> tuple[T
     while left:
         best, others = _chosen(story, left)
         further = _further(story, best, tell)
-        more, reason = further and further.trial, ""
+        # A drive's commutation makes orders of its own; where no controller is simulated no twin tells of them.
+        more, reason = None if further is None or story.data.guarded else further.trial, ""
         if len(others) >= LARGEST_GROUP:
             reason = f"{len(others)} others tell as much"
         elif further is not None and not further.stands_out:

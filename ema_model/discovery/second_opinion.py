@@ -43,9 +43,13 @@ class Opinion:
         return self.seen is not None and self.seen.differs
 
     def explains_better(self, closed: Story) -> bool:
-        """Whether it explains what flowed: to its floor, or far better than the closed loop does."""
+        """Whether it explains what flowed: to its floor, or far better than the closed loop does.
+
+        A gain that is another than the file's is seen without any plant: better is then enough.
+        """
         left = self.story.ladder[-1].rmse
-        return left <= BAND or left <= MUCH_BETTER * closed.ladder[-1].rmse
+        sure = self.seen is not None and self.seen.holds and any(gain.differs for gain in self.seen.gains)
+        return left <= BAND or left <= (1.0 if sure else MUCH_BETTER) * closed.ladder[-1].rmse
 
 
 def second_opinion(story: Story, tell: Callable[[str], None]) -> Opinion | None:
@@ -58,7 +62,7 @@ def second_opinion(story: Story, tell: Callable[[str], None]) -> Opinion | None:
     tell("asking inverse dynamics for a second opinion")
     held = () if story.held is None else story.held.measurements
     try:
-        other = calibrated_story(story.data.measurements, _delayed(without), held, None, tell, guarded=True)
+        other = calibrated_story(story.data.measurements, delayed(without), held, None, tell, guarded=True)
     except InputError:  # too little motion, or a held-out recording without a current
         return None
     late = other.current.calibration.actuator.sensors.delay_s
@@ -113,7 +117,7 @@ def support_of(story: Story, name: str) -> tuple[str, ...]:
     return story.support.get(name, (own,))
 
 
-def _delayed(actuator: Actuator) -> Actuator:
+def delayed(actuator: Actuator) -> Actuator:
     """Free in what inverse dynamics reads, and in the delay between current and motion."""
     ignored = unread(actuator.controller.kind, actuator.inverter.kind)
     kept = {path: one for path, one in actuator.tolerances.items() if path not in ignored}

@@ -120,6 +120,7 @@ _POSITIVE = {
     "torque_limit_Nm", "inertia_kgm2", "gear_ratio", "pole_pairs", "current_gain", "emf_scale", "integrator_window_rad",
     "output_limit",
 }  # fmt: skip
+_BEHIND = "sensors.delay_s"
 _ANY_SIGN = {"rotor_offset_rad", "current_bias_A", "stop_low_rad", "stop_high_rad"}
 
 
@@ -128,10 +129,14 @@ def numbers(section: str) -> tuple[str, ...]:
     return tuple(f.name for f in fields(SECTIONS[section]) if f.name != "kind")
 
 
-def low_limit(path: str) -> float:
-    """The least value that a parameter may take; 0 where it must only be above."""
+def low_limit(path: str, controller: str = "") -> float:
+    """The least value that a parameter may take; 0 where it must only be above.
+
+    controller: its kind; without a known one, the sensors' delay is that of one signal behind another, of any sign.
+    """
     name = path.split(".")[-1]
-    return -math.inf if path.startswith("effects.") or name in _ANY_SIGN else 0.0
+    any_sign = name in _ANY_SIGN or (controller == "unknown" and path == _BEHIND)
+    return -math.inf if path.startswith("effects.") or any_sign else 0.0
 
 
 def check_value(section: str, name: str, value: Any, where: str, shown: str = "") -> None:
@@ -141,7 +146,7 @@ def check_value(section: str, name: str, value: Any, where: str, shown: str = ""
         raise InputError(f"{where}: [{section}] {shown} must be a number, not {quoted(value, 40)!r}")
     if name in _POSITIVE and value <= 0.0:
         raise InputError(f"{where}: [{section}] {shown} must be above 0, not {quoted(value)}")
-    if name not in _ANY_SIGN and value < 0.0:
+    if name not in _ANY_SIGN and f"{section}.{name}" != _BEHIND and value < 0.0:
         raise InputError(f"{where}: [{section}] {shown} must not be negative, not {quoted(value)}")
 
 

@@ -58,7 +58,6 @@ _MOTION_IN = {
         "backlash_rad": f"{INVERSE} does not follow the play",
         "stop_low_rad stop_high_rad": f"{INVERSE} takes the motion as measured",
     },
-    "sensors": {"delay_s": f"{INVERSE} has no command that anything could lag behind"},
 }
 # The places of effects (`PLACES`) that inverse dynamics has, and those that a winding alone has.
 INVERSE_PLACES = ("current_reading", "electric_torque", "inverse_inertia", "moving_friction", "shaft_torque")

@@ -50,3 +50,32 @@ PLAUSIBLE = {
     ("gear_load_friction", "ratio"): (0.0, 0.8),
     ("torque_ripple", "ratio"): (0.0, 0.5),
 }
+
+# Of a gain, that a drive's must differ by from the file's; drives' own scaling and a torque constant that is known to a
+# few percent stay below.
+GAIN_APART = 0.1
+
+# Samples of the recording, by which a drive must answer later than the file's controller: less is how it is logged.
+LATE_SAMPLES = 1.5
+
+# Times what the drive's own law leaves of the current, that the file's must leave before it counts as another one.
+LAW_APART = 1.1
+
+# Of the current's rms, up to which a law of the file's form tells it; beyond, the drive is of another form.
+LAW_HOLDS = 0.2
+
+# Of the closed loop's error in floors, that inverse dynamics must come down to, where it does not reach its own floor,
+# before it is said to explain what the loop does not: the two floors count different things.
+MUCH_BETTER = 1.0 / 3.0
+
+# Floors that inverse dynamics may leave before any effect, up to which it may contradict one; and how much of an effect
+# it may leave then, that is said to be none of it.
+HEARD, GONE = 2.0, 0.3
+
+# Times the fitted recordings' error, that a held-out one must be missed by before it counts as contradicting them; and
+# of that, what a sign, a zero or a unit put right must come down to.
+MISSED, PUT_RIGHT = 3.0, 0.4
+
+# Tolerances of the file, by which a parameter must differ before a recording counts as another actuator's; and how much
+# wider than them is looked.
+ANOTHER, WIDER = 3.0, 4.0

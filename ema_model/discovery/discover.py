@@ -7,13 +7,14 @@ when the data pay for its parameters (ΔBIC), on most stretches of time, materia
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ema_model.actuator import Actuator, load_actuator
 from ema_model.comparison.explain import Explanation
 from ema_model.discovery.claims import against, still_against
+from ema_model.discovery.contradiction import contradictions
 from ema_model.discovery.criteria import LARGEST_GROUP, LEAST_BIC, SECOND, TIE
 from ema_model.discovery.evidence import evidence
 from ema_model.discovery.harmonics import Further, further_orders
@@ -22,7 +23,8 @@ from ema_model.discovery.path import Story, begun, refreshed, with_drops
 from ema_model.discovery.refit import Trial, fitted_count, pays
 from ema_model.discovery.remaining import at_floor
 from ema_model.discovery.result import Candidate, Discovery, Experiment
-from ema_model.discovery.sentences import as_well, held_back, masked, untold
+from ema_model.discovery.second_opinion import compared, second_opinion, support_of, taken_over
+from ema_model.discovery.sentences import as_well, held_back, masked, mismatch, untold
 from ema_model.discovery.uncertainty import with_intervals
 from ema_model.discovery.unknown import curve_instead, is_a_shape
 from ema_model.discovery.verdict import verdict_of
@@ -78,8 +80,25 @@ def walk(
 ) -> Walked:
     """Goes on by itself from where a story stands: adds what pays, takes out what became idle, draws what is unknown.
 
-    tell is told after each step, too, and may raise to stop; the story then stands at its last whole step.
+    Where a closed loop is left unexplained, inverse dynamics is asked as well, and takes over if the controller is to
+    blame.  tell is told after each step, too, and may raise to stop; the story then stands at its last whole step.
     """
+    walked = _walked(story, tell, candidates, most_effects)
+    opinion = second_opinion(story, tell)
+    if opinion is not None:
+        other = None
+        if opinion.blames_controller:
+            other = _walked(opinion.story, tell, candidates, most_effects)
+        if other is not None and opinion.explains_better(story):
+            taken_over(story, opinion)
+            walked = other
+        else:
+            compared(story, opinion, tell)
+    story.disagreements = contradictions(story, tell)
+    return walked
+
+
+def _walked(story: Story, tell: Progress, candidates: Sequence[str] | None, most_effects: int) -> Walked:
     first: list[Candidate] = []
     rivals: list[Trial] = []
     curve: Trial | None = None
@@ -128,7 +147,8 @@ def _claimed(story: Story, accepted: Sequence[Trial], tell: Progress) -> tuple[T
     while left:
         best, others = _chosen(story, left)
         further = _further(story, best, tell)
-        more, reason = further and further.trial, ""
+        # A drive's commutation makes orders of its own; where no controller is simulated no twin tells of them.
+        more, reason = None if further is None or story.data.guarded else further.trial, ""
         apart = _of_other_parts(best, others)
         if len(apart) >= LARGEST_GROUP:
             reason = f"{len(apart)} others tell as much"
@@ -232,7 +252,7 @@ def result_of(
     """What a story comes to; unknown: what its last model leaves."""
     calibration = with_intervals(story.data, story.current)
     names = _named(story)
-    added = [refreshed(one, calibration) for one in story.added]
+    added = [replace(refreshed(one, calibration), supported_by=support_of(story, one.name)) for one in story.added]
     named = [one for one in added if one.name in names]
     faults = {name: calibration.parameters[name] for name in story.current.faults}
     outside = [name for name in calibration.outside_tolerance if "." in name and not name.startswith("effects.")]
@@ -257,10 +277,14 @@ def result_of(
         not_claimed={name: why for name, why in story.refused.items() if name not in names},
         warnings=[
             *story.warnings,
+            *mismatch(story.controller_seen, calibration.actuator.axes),
+            *(one.sentence for one in story.disagreements),
             *held_back(story.current.held, calibration.actuator.axes),
             *masked(story.added, calibration.actuator.axes),
             *as_well(story.ties, story.added, story.current.faults),
         ],
+        controller_seen=story.controller_seen,
+        disagreements=story.disagreements,
     )
 
 

@@ -31,10 +31,11 @@ class Data:
     stretches: Sequence[list[slice] | None] | None
     floors: Sequence[Floor]
     signals: Mapping[str, float]
+    guarded: bool = False  # inverse dynamics as a second opinion: held to what differentiation can tell
 
     def plant(self, actuator: Actuator) -> Model:
         """The recordings beside this actuator's model."""
-        return model_for(self.measurements, actuator, stretches=self.stretches)
+        return model_for(self.measurements, actuator, stretches=self.stretches, guarded=self.guarded)
 
     def over_floor(self, plant: Model, shown: Sequence[Mapping[str, Array]]) -> Array:
         """Signals of each window of the plant, (…, blocks), over the floor, in a residual's order: (…, values)."""
@@ -97,10 +98,12 @@ def gather(
     actuator: Actuator,
     signals: Mapping[str, float],
     stretches: Sequence[list[slice] | None] | None,
+    guarded: bool = False,
 ) -> Data:
     """The data with the floors of the bare model."""
-    plant = model_for(measurements, actuator, stretches=stretches)
-    return Data(measurements, stretches, [floor(plant, place) for place in range(len(plant.windows))], signals)
+    plant = model_for(measurements, actuator, stretches=stretches, guarded=guarded)
+    floors = [floor(plant, place) for place in range(len(plant.windows))]
+    return Data(measurements, stretches, floors, signals, guarded)
 
 
 def with_effect(actuator: Actuator, name: str, settings: Mapping[str, float]) -> Actuator:

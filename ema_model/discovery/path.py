@@ -17,6 +17,8 @@ from ema_model.actuator.naming import on_axes
 from ema_model.actuator.unread import idle
 from ema_model.comparison.compare import weights_of
 from ema_model.comparison.explain import Explanation
+from ema_model.discovery.contradiction import Contradiction
+from ema_model.discovery.controller_seen import ControllerSeen
 from ema_model.discovery.evidence import predicted_evidence
 from ema_model.discovery.faults import fault_for
 from ema_model.discovery.fingerprints import Fingerprint, fingerprints
@@ -77,6 +79,9 @@ class Story:
     warnings: list[str] = field(default_factory=list)
     ties: dict[str, str] = field(default_factory=dict)  # effects by the fault that would explain as much
     refused: dict[str, str] = field(default_factory=dict)  # effects that are not claimed, and what speaks against each
+    support: dict[str, tuple[str, ...]] = field(default_factory=dict)  # models that bear out an effect, by its name
+    controller_seen: ControllerSeen | None = None  # where it is not the file's
+    disagreements: list[Contradiction] = field(default_factory=list)  # of held-out recordings
     _calm: dict[Fit, Fit] = field(default_factory=dict)  # fits by those that they were settled from
     _prints: list[Fingerprint] = field(default_factory=list)
 
@@ -206,6 +211,13 @@ class Story:
         """The number of steps before the first effect: the calibrated model, and its faults."""
         return next((i for i, step in enumerate(self.steps) if step.added), len(self.steps))
 
+    def take_over(self, other: Story) -> None:
+        """Goes on as another story of the same recordings, by another model; its warnings come last."""
+        self.data, self.held, self.steps = other.data, other.held, other.steps
+        self.ties, self._calm, self._prints = other.ties, other._calm, other._prints
+        self.refused = {**self.refused, **other.refused}
+        self.warnings += other.warnings
+
     def restart(self) -> None:
         """Takes all effects back."""
         del self.steps[self.bare :]
@@ -250,24 +262,26 @@ def begun(
     """
     check_same_actuator([*measurements, *holdout])
     compile_library(actuator)
-    story = _calibrated(measurements, actuator, holdout, signals, tell)
+    story = calibrated_story(measurements, actuator, holdout, signals, tell)
     inverse = None if story.repeatable else by_inverse_dynamics(story.data, actuator)
     if inverse is None:
         return story
-    story = _calibrated(measurements, inverse, holdout, signals, tell)
+    story = calibrated_story(measurements, inverse, holdout, signals, tell)
     story.warnings.append(NOT_REPEATABLE)
     return story
 
 
-def _calibrated(
+def calibrated_story(
     measurements: Sequence[Measurement],
     actuator: Actuator,
     holdout: Sequence[Measurement],
     signals: Sequence[str] | None,
     tell: Progress,
+    guarded: bool = False,
 ) -> Story:
+    """guarded: as of `InverseDynamics`."""
     tell("measuring the model's floor")
-    data, held = (_data(recordings, actuator, signals) for recordings in (measurements, holdout))
+    data, held = (_data(recordings, actuator, signals, guarded) for recordings in (measurements, holdout))
     assert data is not None
     tell("calibrating")
     base = fit(data, actuator, tell=tell)
@@ -279,11 +293,13 @@ def _calibrated(
     return Story(data, held, [Step(base, rung_of("calibrated", base, data, held), ())], not is_lost(lost))
 
 
-def _data(recordings: Sequence[Measurement], actuator: Actuator, signals: Sequence[str] | None) -> Data | None:
+def _data(
+    recordings: Sequence[Measurement], actuator: Actuator, signals: Sequence[str] | None, guarded: bool
+) -> Data | None:
     if not recordings:
         return None
     inside = [prepared(recording, actuator) for recording in recordings]
-    return gather(inside, actuator, weights_of(signals, actuator), fit_stretches(inside, actuator))
+    return gather(inside, actuator, weights_of(signals, actuator), fit_stretches(inside, actuator), guarded)
 
 
 def rung_of(label: str, found: Fit, data: Data, held: Data | None) -> Rung:

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.comparison.explain import Explanation
+from ema_model.discovery.contradiction import Contradiction
+from ema_model.discovery.controller_seen import ControllerSeen
 from ema_model.discovery.model_fit import Data
 from ema_model.estimation import Calibrated, Calibration, Floor
 from ema_model.models import Model
@@ -71,6 +73,7 @@ class Added:
     key: str  # under which the model holds it: `name`, or `name_2` for a second order of the same
     chosen: dict[str, float] = field(default_factory=dict)  # parameters that are not fitted: a whole order
     stood_in: tuple[StoodIn, ...] = ()  # parameters that had been standing in for it
+    supported_by: tuple[str, ...] = ()  # of "closed_loop" and "inverse_dynamics"
 
 
 @dataclass(frozen=True)
@@ -108,6 +111,8 @@ class Discovery(InWords):
     next_experiment: Experiment | None = None
     not_claimed: Mapping[str, str] = field(default_factory=dict)  # effects that the data would pay for, and why not
     warnings: Sequence[str] = field(default_factory=tuple)
+    controller_seen: ControllerSeen | None = None  # where the drive's controller is not the file's
+    disagreements: Sequence[Contradiction] = field(default_factory=tuple)  # held-out recordings at odds with the fitted
 
     @property
     def ranked(self) -> list[Candidate]:

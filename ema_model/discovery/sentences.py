@@ -5,16 +5,40 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from ema_model.actuator.naming import on_axes
+from ema_model.discovery.controller_seen import ControllerSeen
 from ema_model.discovery.result import Added
 from ema_model.effects import find
 from ema_model.faults import BY_NAME
 from ema_model.quantities.axes import Axes
+from ema_model.quantities.numbers import amount, number, with_uncertainty
 from ema_model.quantities.titles import in_sentence
 
 NOT_REPEATABLE = (
     "The closed loop is not repeatable (a change of 0.05 % in the inertia moves its signals by more than the noise): "
     "what the measured motion needs is compared instead."
 )
+
+
+def mismatch(seen: ControllerSeen | None, axes: Axes) -> list[str]:
+    """That the controller is not what the file says, and what was seen instead."""
+    if seen is None:
+        return []
+    parts = []
+    for gain in seen.gains:
+        if seen.holds and gain.differs:
+            one = on_axes(gain.path, axes)
+            told = with_uncertainty(gain.seen, gain.half, one.unit)
+            parts.append(f"a {in_sentence(one.title)} of {told} where the file has {amount(gain.file, one.unit)}")
+    if seen.late:
+        parts.append(f"an answer that comes {number(1e3 * seen.delay_s, 2)} ms later")
+    told = f"On the measured motion the drive's current shows {' and '.join(parts)}. " if parts and seen.holds else ""
+    left, best = (f"{100.0 * share:.0f} %" for share in (seen.left_by_file, seen.left))
+    form = "" if seen.holds else ", so that it is of another form"
+    return [
+        f"The controller is not what the file says. {told}Of that current the file's controller leaves {left} untold, "
+        f"one of the same form at its best {best}{form}. What the measured motion needs of the motor is told instead, "
+        "without a controller."
+    ]
 
 
 def masked(added: Sequence[Added], axes: Axes) -> list[str]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from ema_model.actuator.naming import on_axes
 from ema_model.comparison.summary import calibration_dict, parameter_dict, plain
+from ema_model.discovery.controller_seen import ControllerSeen
 from ema_model.discovery.result import Added, Discovery, Experiment, Rung
 from ema_model.effects import find
 from ema_model.quantities.axes import Axes
@@ -51,6 +52,19 @@ def as_dict(found: Discovery) -> dict[str, Any]:
             "remaining": {"rmse": found.ladder[-1].rmse, "at_floor": found.at_floor},
             "not_claimed": dict(found.not_claimed),
             "next_experiment": _experiment(found.next_experiment),
+            "controller_mismatch": found.controller_seen is not None,
+            "controller_seen": _seen(found.controller_seen, axes),
+            "disagreements": [
+                {
+                    "recording": one.recording,
+                    "signal": None if one.signal is None else axes.signal(one.signal),
+                    "how": one.how,
+                    "sentence": one.sentence,
+                    "before": one.before,
+                    "after": one.after,
+                }
+                for one in found.disagreements
+            ],
             "warnings": list(found.warnings),
         }
     )
@@ -63,6 +77,26 @@ def _rung(one: Rung) -> dict[str, Any]:
         "holdout_rmse": one.holdout_rmse,
         "signals": one.signals,
         "holdout_signals": one.holdout_signals,
+    }
+
+
+def _seen(one: ControllerSeen | None, axes: Axes) -> dict[str, Any] | None:
+    if one is None:
+        return None
+    return {
+        "gains": {
+            on_axes(gain.path, axes).path: {
+                "file": gain.file,
+                "seen": gain.seen,
+                "interval90": [gain.seen - gain.half, gain.seen + gain.half],
+                "differs": gain.differs,
+            }
+            for gain in one.gains
+        },
+        "delay_s": one.delay_s,
+        "left_by_file": one.left_by_file,
+        "left": one.left,
+        "same_form": one.holds,
     }
 
 
@@ -91,4 +125,5 @@ def _added(one: Added, axes: Axes) -> dict[str, Any]:
         "holdout_rmse_before": one.holdout_before,
         "holdout_rmse_after": one.holdout_after,
         "same_as": list(one.same_as),
+        "supported_by": list(one.supported_by),
     }

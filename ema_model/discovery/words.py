@@ -37,7 +37,15 @@ FLOOR_NOTE = (
 
 
 def headline(found: Discovery) -> str:
-    """The verdict in one sentence."""
+    """The verdict in one sentence; in two where the controller is not the file's."""
+    if found.controller_seen is None:
+        return _answer(found)
+    if found.verdict == "adequate" and not found.parameters_outside_tolerance:
+        return "The controller is not what the file says; without it, motion and current show nothing else missing."
+    return f"The controller is not what the file says. Without it: {in_sentence(_answer(found))}"
+
+
+def _answer(found: Discovery) -> str:
     faulty = _faulty(found)
     if found.verdict == "effects_found":
         # Once, where two orders of one effect were added.

@@ -82,7 +82,7 @@ def floor(
     for name in noise:
         lasting = uniform_filter1d(twins[name] ** 2, width, mode="nearest") if twins else np.zeros(window.blocks)
         jump = late[name] / np.sqrt(12.0) if late else 0.0  # anywhere within the sample
-        own = np.hypot(np.sqrt(np.maximum(lasting, 0.0)), jump)
+        own = np.hypot(np.hypot(np.sqrt(np.maximum(lasting, 0.0)), jump), window.lasting.get(name, 0.0))
         slow[name] = np.hypot(own, given.get(name, {}).get("accuracy", 0.0))
     return Floor(noise, slow, repeats_of(window, noise), window.block_s)
 

@@ -110,7 +110,7 @@ def _parameter(actuator: Actuator, name: str) -> Unknown:
         known = ", ".join(on_axes(path, actuator.axes).path for path in actuator.tolerances)
         raise InputError(f"{name} cannot be calibrated: the actuator's file gives it no tolerance; free may be {known}")
     nominal, sigma = actuator.value(name), actuator.tolerances[name].sigma
-    low, high = low_limit(name), math.inf
+    low, high = low_limit(name, actuator.controller.kind), math.inf
     if name.startswith("effects."):
         _, effect, parameter = name.split(".")
         low, high = next((p.low, p.high) for p in find(effect, actuator.axes).parameters if p.name == parameter)

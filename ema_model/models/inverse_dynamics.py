@@ -3,6 +3,13 @@
 The current that the measured motion needs is held against the measured one after both have passed the filter
 of the motion (`ema_model.models.motion`).  In a static map (the current that holds the rotor, against its
 angle) nothing moves: what the model has to say there is what effects pull at the shaft.
+
+Guarded, it is held to what differentiation can tell, as a second opinion must be.  What the position is off by
+(quantisation, jitter of its time stamps) acts on the current through the inertia; after the filter it lasts as long
+as the filter does, and stands in the floor as such: a regression that took it for white would be too sure of all that
+it finds (Janot, Vandanjon and Gautier, IEEE Trans. Control Syst. Technol. 22 (2014), on noise in the regressors).
+About a reversal, friction is no step of the measured speed's sign: blocks within the filter's reach of one are left
+out, as usual in the identification of robots.
 """
 
 from __future__ import annotations
@@ -12,6 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.ndimage import maximum_filter1d, median_filter
 
 from ema_model.actuator import Actuator
 from ema_model.effects import find
@@ -22,7 +30,7 @@ from ema_model.models.motion import Motion, motion_of
 from ema_model.models.sampling import check_period, on_even_grid
 from ema_model.physics.rows import LANES
 from ema_model.recordings import Measurement
-from ema_model.recordings.noise import sample_noise
+from ema_model.recordings.noise import least_noise, sample_noise
 from ema_model.simulation.one_stack import stack_at_hand
 from ema_model.simulation.pack import monitor_rows
 from ema_model.simulation.precompile import wait_for
@@ -33,6 +41,12 @@ Array = NDArray[np.float64]
 _BLOCKS_PER_FILTER = 6  # compared values in a half width of the motion's filter
 _CHUNK = 100_000  # samples that are computed at once
 _STILL_STEPS = 3.0  # of the encoder within the filter, under which the motor counts as standing
+_SHORT = 4.0  # times that the speed's own filter is shorter, so that what depends on it is filtered once
+_LEAST_KEPT = 0.3  # of the moving blocks, which must be left when those about reversals are left out
+_NOISE_SAMPLES = (
+    101  # over which a position's noise is taken to stay alike: it grows with the speed where stamps jitter
+)
+_RESOLVED = 2e-3  # of a signal's rms, that no rig tells better: a magnet's torque falls by half of it a kelvin
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -44,10 +58,17 @@ class Stretch(Window):
 
     motion: Motion
     position: Array  # (samples,), motor, rad
+    speed: Array  # (samples,), rad/s, hardly filtered
     load: Array  # (samples,), N·m at the user
     still: float  # rad/s
     sensor_noise: dict[str, float]  # rms per block
+    passed: float  # of a sample's white noise, by the filter and the mean over a block
     moving: NDArray[np.intp]  # (blocks,), which of the run's blocks these are
+
+    @property
+    def period_s(self) -> float:
+        """Between samples."""
+        return self.block_s / self.samples_per_block
 
 
 class InverseDynamics:
@@ -62,7 +83,9 @@ class InverseDynamics:
         *,
         effects: Mapping[str, Mapping[str, float]] | None = None,
         stretches: Sequence[list[slice] | None] | None = None,
+        guarded: bool = False,
     ) -> None:
+        """guarded: whether noise of the position counts in the floor, and reversals are left out."""
         if not measurements:
             raise InputError("one recording or more is needed")
         self.actuator = actuator
@@ -76,7 +99,7 @@ class InverseDynamics:
         self.windows = [
             stretch
             for i, (m, parts) in enumerate(zip(self.measurements, chosen))
-            for stretch in _stretches(m, actuator, recording=i, parts=parts)
+            for stretch in _stretches(self.recorded[i], m, actuator, recording=i, parts=parts, guarded=guarded)
         ]
 
     def signals(
@@ -92,7 +115,8 @@ class InverseDynamics:
     ) -> Signals:
         """The current (A) or torque (N·m) that the motion needs, k (n, 8) → (n, blocks); friction's k1 alone counts.
 
-        As in `Model`; a start means nothing here, and the load is the recorded one.
+        As in `Model`; a start means nothing here, and the load is the recorded one.  The sensors' delay is what
+        the current (or torque) comes later by than the motion.
         """
         window = self.windows[place]
         actuator = (actuator or self.actuator).varied(window.values)
@@ -102,6 +126,7 @@ class InverseDynamics:
         static = self._currents(rows, len(k), window, np.zeros_like(window.position))
         moving = self._currents(rows, len(k), window, window.motion.acceleration)
         needed = window.motion.filtered(static) + moving - static
+        needed = _later(needed, _each(actuator.sensors.delay_s), window.period_s)
         size = window.samples_per_block
         whole = needed.shape[1] // size
         current = needed[:, : whole * size].reshape(len(k), whole, size).mean(axis=2)[:, window.moving]
@@ -116,8 +141,12 @@ class InverseDynamics:
         return {}
 
     def noise(self, place: int, stated: Mapping[str, float]) -> dict[str, float]:
-        """As in `Model`, of the sensors after the filter, whatever is stated of them before it."""
-        return dict(self.windows[place].sensor_noise)
+        """As in `Model`, of the sensors after the filter."""
+        window = self.windows[place]
+        return {
+            name: max(stated[name], least_noise(name)) * window.passed if name in stated else own
+            for name, own in window.sensor_noise.items()
+        }
 
     def a_sample_late(self, place: int, k: ArrayLike | None = None) -> Signals:
         """Nothing: no command is simulated."""
@@ -134,7 +163,7 @@ class InverseDynamics:
                 self.stack.inverse.currents,
                 rows,
                 window.position[part],
-                window.motion.speed[part],
+                window.speed[part],
                 acceleration[part],
                 window.load[part],
                 window.still,
@@ -145,7 +174,13 @@ class InverseDynamics:
 
 
 def _stretches(
-    measurement: Measurement, actuator: Actuator, *, recording: int, parts: list[slice] | None
+    recorded: Measurement,
+    measurement: Measurement,
+    actuator: Actuator,
+    *,
+    recording: int,
+    parts: list[slice] | None,
+    guarded: bool,
 ) -> list[Stretch]:
     measurement.require("motor_position_rad")
     target = next((name for name in ("current_A", "motor_torque_Nm") if name in measurement), None)
@@ -157,6 +192,8 @@ def _stretches(
     if not measurement.is_map:
         check_period(measurement, actuator.filter_s)
     size = 1 if measurement.is_map else max(1, round(actuator.filter_s / _BLOCKS_PER_FILTER / period))
+    guarded = guarded and not measurement.is_map
+    shaken = _position_noise(recorded, measurement) if guarded else np.zeros(measurement.samples)
     found = []
     runs = [slice(0, measurement.samples)] if measurement.is_map else parts or measurement.runs
     for run in runs:
@@ -165,9 +202,11 @@ def _stretches(
         if blocks < 10:
             continue
         motion = _standing(position) if measurement.is_map else motion_of(position, period, actuator.filter_s)
-        still = max(1e-9, _STILL_STEPS * _step_of(position) / (motion.kernel.size * period))
-        slowest = np.abs(motion.speed[: blocks * size]).reshape(blocks, size).min(axis=1)
-        moving = np.arange(blocks) if measurement.is_map else np.flatnonzero(slowest > still)
+        speed, still, moving = motion.speed, 1e-9, np.arange(blocks)
+        if not measurement.is_map:
+            own = motion_of(position, period, actuator.filter_s / _SHORT) if guarded else motion
+            speed, still = own.speed, max(1e-9, _STILL_STEPS * _step_of(position) / (own.kernel.size * period))
+            moving = _moving(speed, still, motion.kernel.size if guarded else 0, size)
         if moving.size < 10:
             continue
         load = measurement.get("load_torque_Nm")
@@ -176,6 +215,16 @@ def _stretches(
             return values[: blocks * size].reshape(blocks, size).mean(axis=1)[moving]
 
         raw = measurement[target][run]
+        per_acceleration = actuator.motor.inertia_kgm2
+        if target == "current_A":
+            per_acceleration *= actuator.sensors.current_gain / actuator.motor.torque_constant_Nm_A
+        measured = means(motion.filtered(raw))
+        passed = _passed(motion.kernel, size)
+        lasting = np.zeros(moving.size)
+        if guarded:
+            second = np.convolve(motion.kernel, [1.0, -2.0, 1.0]) / period**2
+            unsure = per_acceleration * means(shaken[run]) * _passed(second, size)
+            lasting = np.hypot(unsure, _RESOLVED * np.sqrt(np.mean(measured**2)))
         context = {
             "motor_position_rad": means(position),
             "motor_speed_rad_s": means(motion.speed),
@@ -190,12 +239,15 @@ def _stretches(
                 time_s=means(measurement.time_s[run]),
                 motion=motion,
                 position=position,
+                speed=speed,
                 load=np.zeros_like(position) if load is None else load[run],
                 still=still,
                 command=None,
-                measured={target: means(motion.filtered(raw))},
+                measured={target: measured},
+                lasting={target: lasting},
                 context=context,
-                sensor_noise={target: _noise(raw, target, motion.kernel, size)},
+                sensor_noise={target: sample_noise(raw, target) * passed},
+                passed=passed,
                 moving=moving,
                 samples_per_block=size,
                 block_s=size * period,
@@ -221,9 +273,52 @@ def _step_of(position: Array) -> float:
     return float(np.quantile(steps, 0.01)) if steps.size else 0.0
 
 
-def _noise(raw: Array, signal: str, kernel: Array, size: int) -> float:
-    """White noise of the raw signal after the filter and the mean over a block, rms."""
-    return sample_noise(raw, signal) * float(np.sqrt(np.sum(np.convolve(kernel, np.full(size, 1.0 / size)) ** 2)))
+def _moving(speed: Array, still: float, reach: int, size: int) -> NDArray[np.intp]:
+    """Blocks of `size` samples without standstill; with a reach (samples), away from reversals and ends if some are."""
+    blocks = speed.size // size
+    slow = np.abs(speed) <= still
+    moving = np.flatnonzero(~slow[: blocks * size].reshape(blocks, size).any(axis=1))
+    if not reach:
+        return moving
+    turns = np.concatenate([np.diff(np.sign(speed)) != 0.0, [True]])
+    turns[0] = True  # beyond the ends nothing was recorded that the filter would need
+    near = maximum_filter1d((slow | turns).astype(np.int8), 2 * reach + 1).astype(bool)
+    away = np.flatnonzero(~near[: blocks * size].reshape(blocks, size).any(axis=1))
+    return away if away.size >= max(10, _LEAST_KEPT * moving.size) else moving
+
+
+def _position_noise(recorded: Measurement, even: Measurement) -> Array:
+    """White noise of the motor's position about each sample of the even grid, rad, with that of its time stamps.
+
+    From divided differences of the third order as recorded: what was put on another grid is smoother than its noise.
+    """
+    source = recorded if len(recorded.runs) == 1 else even
+    time, position = source.time_s, source["motor_position_rad"]
+    points = np.lib.stride_tricks.sliding_window_view(time, 4)
+    away = points[:, :, None] - points[:, None, :] + np.eye(4)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        weights = 1.0 / np.prod(away, axis=2)
+        weights /= np.sqrt(np.sum(weights**2, axis=1, keepdims=True))
+    third = np.nan_to_num(np.sum(weights * np.lib.stride_tricks.sliding_window_view(position, 4), axis=1))
+    local = 1.4826 * median_filter(np.abs(third), min(_NOISE_SAMPLES, third.size), mode="nearest")
+    local = np.concatenate([local, local[-1:].repeat(3)])
+    if source is not even:
+        local = np.interp(even.time_s, time, local)
+    least = min(_step_of(position) / np.sqrt(12.0), sample_noise(position, "motor_position_rad"))
+    return np.maximum(local, least)
+
+
+def _passed(kernel: Array, size: int) -> float:
+    """Of a sample's white noise, what passes a filter and the mean over a block, rms."""
+    return float(np.sqrt(np.sum(np.convolve(kernel, np.full(size, 1.0 / size)) ** 2)))
+
+
+def _later(values: Array, late_s: Array, period_s: float) -> Array:
+    """Smooth signals (n, samples) so much later, (n, 1): to the second order of what the filter lets pass."""
+    if not np.any(late_s):
+        return values
+    slope = np.gradient(values, period_s, axis=1)
+    return values - late_s * slope + 0.5 * late_s**2 * np.gradient(slope, period_s, axis=1)
 
 
 def _each(value: ArrayLike) -> Array:

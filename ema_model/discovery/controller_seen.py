@@ -1,0 +1,214 @@
+"""What a drive does with the measured motion: its current, held against that of the controller in the file.
+
+Command and measured motion go into the speed loop's law, T 3.1; what comes out must be the current that flowed.  No
+plant takes part in it, so that no missing physics can stand in for a controller that is not the drive's.  The law is
+linear in its gains: least squares tells which ones the drive has, and after which delay it answers.  An integral
+over a whole recording would drift with the last digit of an encoder: both sides lose what is slower than a window.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
+
+from ema_model import faults
+from ema_model.actuator import Actuator
+from ema_model.discovery.criteria import GAIN_APART, LATE_SAMPLES, LAW_APART, LAW_HOLDS
+from ema_model.models import Model
+from ema_model.models.motion import Motion, motion_of
+from ema_model.recordings import Measurement
+
+Array = NDArray[np.float64]
+
+_SIGNALS = ("command_rad", "user_position_rad", "motor_position_rad", "current_A")
+_HALF_S = 12e-3  # half width of the motion's filter
+_WINDOW_S = 0.25  # beyond which what is slow is taken out: several times K_P/K_I of usual drives
+_STEP = 3  # rows in such a half width
+_LATEST_S = 6e-3  # that a drive may answer by, beyond the delay between the signals
+_DELAYS = 25  # tried
+_AT_LIMIT = 0.97  # of the current's limit, from which on it tells nothing of the gains
+_BLOCKS = 8  # of time, by whose scatter the gains' uncertainty is told
+_Z90 = 1.645
+_LEAST_ROWS = 60
+
+
+@dataclass(frozen=True)
+class Gain:
+    """A gain as the drive's current tells it, beside the file's."""
+
+    path: str  # "controller.speed_gain_Nms_rad"
+    file: float
+    seen: float
+    half: float  # of its 90 % interval
+
+    @property
+    def differs(self) -> bool:
+        """Whether it is another than the file's, for sure and by much."""
+        away = abs(self.seen - self.file)
+        return away > max(GAIN_APART * abs(self.file), 2.0 * self.half)
+
+
+@dataclass(frozen=True)
+class ControllerSeen:
+    """The drive's law beside the file's."""
+
+    gains: tuple[Gain, ...]
+    delay_s: float  # that it answers later by than the file's controller, beyond the delay between the signals
+    left_by_file: float  # of the current's rms, that the file's controller does not tell
+    left: float  # and the same law with the gains and the delay that suit best
+    sample_s: float  # of the recording
+
+    @property
+    def holds(self) -> bool:
+        """Whether the law tells the current at all, with gains of its own."""
+        return self.left < LAW_HOLDS
+
+    @property
+    def late(self) -> bool:
+        """Whether it answers later than the recording could hide."""
+        return self.delay_s > LATE_SAMPLES * self.sample_s
+
+    @property
+    def differs(self) -> bool:
+        """Whether the drive is not what the file says: it tells far less of the current than such a law could."""
+        apart = self.left_by_file > LAW_APART * self.left and self.left_by_file - self.left > 0.01
+        return apart and (self.late or not self.holds or any(gain.differs for gain in self.gains))
+
+
+@dataclass(frozen=True, eq=False)
+class _Run:
+    """A run's rows: the torque that the drive asked for, and what its law makes it of; delay (s) → columns."""
+
+    time_s: Array
+    torque: Array  # (samples,), N·m
+    error: Array  # ω_ref − ω, filtered
+    integral: Array
+    slope: Array
+    rows: NDArray[np.intp]
+
+    def columns(self, delay_s: float) -> Array:
+        """(rows, 3)"""
+        at = self.time_s[self.rows] - delay_s
+        return np.column_stack([np.interp(at, self.time_s, one) for one in (self.error, self.integral, self.slope)])
+
+
+def controller_seen(
+    model: Model, actuator: Actuator, current_late_s: float = 0.0, measurements: Sequence[Measurement] | None = None
+) -> ControllerSeen | None:
+    """The controller that the recordings of a model show; None where they do not tell, or it is no cascade.
+
+    current_late_s: what the recorded current comes later by than the recorded motion.
+    """
+    recorded = model.measurements if measurements is None else measurements
+    if actuator.controller.kind != "cascade":
+        return None
+    runs = [run for one in recorded for run in _runs(one, actuator)]
+    if sum(len(run.rows) for run in runs) < _LEAST_ROWS:
+        return None
+    controller = actuator.controller
+    paths = ("speed_gain_Nms_rad", "integral_gain_Nm_rad", "derivative_gain_Nms2_rad")
+    file = np.array([getattr(controller, name) for name in paths])
+    free = np.array([True, True, file[2] != 0.0])
+    delays = current_late_s + np.linspace(-0.25, 1.0, _DELAYS) * _LATEST_S
+    fits = [_fitted(runs, delay, free) for delay in delays]
+    best = int(np.argmin([left for _, left in fits]))
+    gains, left = fits[best]
+    half = _scatter(runs, float(delays[best]), free)
+    size = float(np.sqrt(np.mean(np.concatenate([run.torque[run.rows] for run in runs]) ** 2)))
+    by_file = _left(runs, current_late_s, file)
+    seen = np.zeros(3)
+    seen[free] = gains
+    return ControllerSeen(
+        gains=tuple(
+            Gain(f"controller.{name}", float(file[i]), float(seen[i]), float(half[i]))
+            for i, name in enumerate(paths)
+            if free[i]
+        ),
+        delay_s=float(delays[best] - current_late_s),
+        left_by_file=by_file / size,
+        left=left / size,
+        sample_s=max(one.sample_period_s for one in recorded),
+    )
+
+
+def _runs(measurement: Measurement, actuator: Actuator) -> Iterator[_Run]:
+    if measurement.is_map or any(name not in measurement for name in _SIGNALS):
+        return
+    controller, sensors = actuator.controller, actuator.sensors
+    period = measurement.sample_period_s
+    gain = controller.position_gain_1_s * float(faults.physical(actuator.k).gain_factor)
+    for run in measurement.runs:
+        if run.stop - run.start < 10 * _HALF_S / period:
+            continue
+        command, user, motor, current = (measurement[name][run] for name in _SIGNALS)
+        motion = motion_of(motor, period, _HALF_S)
+        omega = np.gradient(motor, period)
+        behind = command - user
+        wanted = np.clip(gain * behind, -controller.speed_limit_rad_s, controller.speed_limit_rad_s)
+        error = wanted - omega
+        raw = (current - sensors.current_bias_A) / sensors.current_gain
+        limited = np.abs(raw) > _AT_LIMIT * actuator.current_limit_A
+        held = limited
+        if controller.integral_gain_Nm_rad > 0.0:  # without it nobody has set a window
+            held = limited | (np.abs(behind) > controller.integrator_window_rad)
+        integral = np.cumsum(np.where(held, 0.0, error)) * period
+        width = min(round(_WINDOW_S / period), (run.stop - run.start) // 4)
+        yield _Run(
+            time_s=measurement.time_s[run],
+            torque=controller.torque_constant_Nm_A * _quick(motion, raw, width),
+            error=_quick(motion, error, width),
+            integral=_quick(motion, integral, width),
+            slope=_quick(motion, np.gradient(error, period), width),
+            rows=_rows(held, motion.kernel.size + width // 2, max(1, round(_HALF_S / _STEP / period))),
+        )
+
+
+def _quick(motion: Motion, values: Array, width: int) -> Array:
+    """Values (samples,) through the motion's filter, less their mean over `width` samples about each."""
+    smooth = motion.filtered(values)
+    return smooth - uniform_filter1d(smooth, width, mode="nearest")
+
+
+def _rows(limited: NDArray[np.bool_], reach: int, step: int) -> NDArray[np.intp]:
+    """Samples that no limit reaches through the filters."""
+    near = limited.copy()
+    near[[0, -1]] = True
+    near = maximum_filter1d(near.astype(np.int8), 2 * reach + 1).astype(bool)
+    return np.flatnonzero(~near)[::step]
+
+
+def _centred(run: _Run, values: Array) -> Array:
+    """Values (rows, …) less their mean: what the integral had come to at the start, and what limits did to it."""
+    return values - values.mean(axis=0) if len(values) else values
+
+
+def _fitted(runs: Sequence[_Run], delay_s: float, free: NDArray[np.bool_]) -> tuple[Array, float]:
+    """The gains that suit best, and the rms torque that they leave, N·m."""
+    columns = np.concatenate([_centred(run, run.columns(delay_s))[:, free] for run in runs])
+    torque = np.concatenate([_centred(run, run.torque[run.rows]) for run in runs])
+    scale = np.linalg.norm(columns, axis=0) + 1e-300
+    gains = np.linalg.lstsq(columns / scale, torque, rcond=None)[0] / scale
+    return gains, float(np.sqrt(np.mean((torque - columns @ gains) ** 2)))
+
+
+def _left(runs: Sequence[_Run], delay_s: float, gains: Array) -> float:
+    """The rms torque that known gains leave, N·m."""
+    parts = [_centred(run, run.torque[run.rows] - run.columns(delay_s) @ gains) for run in runs]
+    return float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
+
+
+def _scatter(runs: Sequence[_Run], delay_s: float, free: NDArray[np.bool_]) -> Array:
+    """Half of each gain's 90 % interval, from leaving out one block of time after the other (jackknife): (3,)."""
+    columns = np.concatenate([_centred(run, run.columns(delay_s))[:, free] for run in runs])
+    torque = np.concatenate([_centred(run, run.torque[run.rows]) for run in runs])
+    scale = np.linalg.norm(columns, axis=0) + 1e-300
+    blocks = np.array_split(np.arange(len(torque)), _BLOCKS)
+    without = [np.setdiff1d(np.arange(len(torque)), block, assume_unique=True) for block in blocks]
+    gains = np.array([np.linalg.lstsq(columns[at] / scale, torque[at], rcond=None)[0] / scale for at in without])
+    half = np.zeros(3)
+    half[free] = _Z90 * np.sqrt((_BLOCKS - 1.0) / _BLOCKS * np.sum((gains - gains.mean(axis=0)) ** 2, axis=0))
+    return half

@@ -1,0 +1,144 @@
+"""A second opinion: what the measured motion needs of the motor, where the closed loop is left unexplained.
+
+A closed loop fails where its plant or its controller is not the real one.  Inverse dynamics has no controller, and the
+controller's own law (`controller_seen`) no plant: asked apart, they tell which of the two is to blame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from ema_model.actuator import Actuator, Tolerance
+from ema_model.actuator.unread import INVERSE_PLACES, unread
+from ema_model.comparison.criteria import BAND
+from ema_model.discovery.controller_seen import ControllerSeen, controller_seen
+from ema_model.discovery.criteria import APART, GONE, HEARD, MUCH_BETTER
+from ema_model.discovery.path import Story, calibrated_story
+from ema_model.discovery.refit import pays
+from ema_model.discovery.remaining import at_floor
+from ema_model.discovery.repeatability import by_inverse_dynamics
+from ema_model.discovery.result import Added, Candidate
+from ema_model.discovery.uncertainty import with_intervals
+from ema_model.effects import CATALOGUE, find
+from ema_model.errors import InputError
+from ema_model.estimation import Calibrated
+
+CLOSED_LOOP, INVERSE_DYNAMICS = "closed_loop", "inverse_dynamics"
+_DELAY = "sensors.delay_s"
+_DELAY_SIGMA_S = 1e-3  # between two channels of a usual logger
+_CALIBRATED = "calibrated, without the controller"
+
+
+@dataclass(frozen=True, eq=False)
+class Opinion:
+    """Inverse dynamics beside the same recordings, and the controller that they show."""
+
+    story: Story
+    seen: ControllerSeen | None
+
+    @property
+    def blames_controller(self) -> bool:
+        """Whether the drive's current is not what the file's controller makes of the measured motion."""
+        return self.seen is not None and self.seen.differs
+
+    def explains_better(self, closed: Story) -> bool:
+        """Whether it explains what flowed: to its floor, or far better than the closed loop does.
+
+        A gain that is another than the file's is seen without any plant: better is then enough.
+        """
+        left = self.story.ladder[-1].rmse
+        sure = self.seen is not None and self.seen.holds and any(gain.differs for gain in self.seen.gains)
+        return left <= BAND or left <= (1.0 if sure else MUCH_BETTER) * closed.ladder[-1].rmse
+
+
+def second_opinion(story: Story, tell: Callable[[str], None]) -> Opinion | None:
+    """Inverse dynamics, calibrated; None where the closed loop leaves no more than its band, or it cannot be asked."""
+    if not story.repeatable or not story.current.plant.simulates_commands or at_floor(story.data, story.current):
+        return None
+    without = by_inverse_dynamics(story.data, story.base.actuator)
+    if without is None:
+        return None
+    tell("asking inverse dynamics for a second opinion")
+    held = () if story.held is None else story.held.measurements
+    try:
+        other = calibrated_story(story.data.measurements, delayed(without), held, None, tell, guarded=True)
+    except InputError:  # too little motion, or a held-out recording without a current
+        return None
+    late = other.current.calibration.actuator.sensors.delay_s
+    fitted = story.current.calibration.actuator
+    return Opinion(other, controller_seen(story.current.plant, fitted, late))
+
+
+def taken_over(story: Story, opinion: Opinion) -> None:
+    """Goes on with inverse dynamics: what its effects are, the closed loop has no say in but to agree."""
+    both = [
+        mine.name for mine in story.added for its in opinion.story.added if mine.name == its.name and _agree(mine, its)
+    ]
+    alone = {one.name for one in story.added if one.name in CATALOGUE} - {one.name for one in opinion.story.added}
+    story.support = {one.name: (INVERSE_DYNAMICS,) for one in opinion.story.added}
+    story.support |= {name: (CLOSED_LOOP, INVERSE_DYNAMICS) for name in both}
+    reason = "only the loop of the file's controller asks for it, which is not the drive's"
+    story.refused |= dict.fromkeys(alone, reason)
+    story.take_over(opinion.story)
+    first = story.steps[0]
+    story.steps[0] = replace(first, rung=replace(first.rung, label=_CALIBRATED))
+    story.controller_seen = opinion.seen
+
+
+def compared(story: Story, opinion: Opinion, tell: Callable[[str], None]) -> None:
+    """Asks inverse dynamics for each effect of the closed loop; one that it plainly contradicts is taken out."""
+    heard = opinion.story.ladder[0].rmse <= HEARD
+    for one in [one for one in story.added if one.name in CATALOGUE]:
+        story.support[one.name] = (CLOSED_LOOP,)
+        if not _acts(one.name):
+            continue
+        tell(f"asking inverse dynamics for {one.name}")
+        settings = dict(story.current.calibration.actuator.effects[one.key])
+        other = opinion.story
+        trial = other.trial(Candidate(one.name, 0.0, settings), tell)
+        first = find(one.name).parameters[0].name
+        path, its = f"effects.{one.key}.{first}", f"effects.{one.name}.{first}"
+        mine, there = with_intervals(story.data, story.current), with_intervals(other.data, trial.fit)
+        if path not in mine.parameters or its not in there.parameters:
+            continue
+        here, seen = mine.parameters[path], there.parameters[its]
+        if abs(seen.value - here.value) <= max(APART * abs(here.value), _half(here) + _half(seen)):
+            if pays(other.current, trial, other.data, other.held):
+                story.support[one.name] = (CLOSED_LOOP, INVERSE_DYNAMICS)
+        elif heard and abs(seen.value) + _half(seen) < GONE * abs(here.value):
+            story.refused[one.name] = "the motion and the current alone, without the controller, show none of it"
+            story.remove(one.key)
+
+
+def support_of(story: Story, name: str) -> tuple[str, ...]:
+    """The models that bear out an effect of a story."""
+    own = CLOSED_LOOP if story.current.plant.simulates_commands else INVERSE_DYNAMICS
+    return story.support.get(name, (own,))
+
+
+def delayed(actuator: Actuator) -> Actuator:
+    """Free in what inverse dynamics reads, and in the delay between current and motion."""
+    ignored = unread(actuator.controller.kind, actuator.inverter.kind)
+    kept = {path: one for path, one in actuator.tolerances.items() if path not in ignored}
+    kept[_DELAY] = Tolerance(_DELAY_SIGMA_S, True)
+    return replace(actuator, tolerances=kept, sensors=replace(actuator.sensors, delay_s=0.0))
+
+
+def _acts(name: str) -> bool:
+    """Whether all that an effect does is there in inverse dynamics, and free to be asked for."""
+    effect = find(name)
+    return not effect.states and not effect.duplicates and all(p.__name__ in INVERSE_PLACES for p in effect.places)
+
+
+def _agree(one: Added, other: Added) -> bool:
+    first = find(one.name).parameters[0].name
+    mine, its = one.parameters.get(first), other.parameters.get(first)
+    if mine is None or its is None:
+        return False
+    return abs(mine.value - its.value) <= max(APART * abs(its.value), _half(mine) + _half(its))
+
+
+def _half(one: Calibrated) -> float:
+    low, high = one.interval90
+    return 0.5 * (high - low)

@@ -1,0 +1,116 @@
+"""A file whose controller is not the drive's: what the drive does is told, and the effect is named without it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.hidden_effects import ACTUATOR, recorded
+
+from ema_model.discovery import as_dict, discover
+from ema_model.discovery.contradiction import contradictions
+from ema_model.discovery.controller_seen import controller_seen
+from ema_model.discovery.path import begun, calibrated_story
+from ema_model.discovery.second_opinion import delayed, second_opinion
+from ema_model.models.inverse_dynamics import InverseDynamics
+from emaviz.cli.discover import text
+
+GAIN = "controller.speed_gain_Nms_rad"
+MOTION = ("multisine", {"amplitude_rad": 0.012, "frequencies_Hz": (2, 5, 9)}, 1.2)
+COGGING = {"cogging_torque": {"amplitude_Nm": 0.02, "order": 12.0, "phase_rad": 0.7}}
+OTHER = ACTUATOR.with_values({GAIN: ACTUATOR.value(GAIN) / 0.7})
+FEW = ("cogging_torque", "constant_load", "dead_time")
+
+
+def quiet(told: str) -> None:
+    """Progress that nobody reads."""
+
+
+@pytest.fixture(scope="module")
+def healthy():
+    return recorded(11, commands=[MOTION], noise_A=0.2)
+
+
+@pytest.fixture(scope="module")
+def cogging():
+    return recorded(11, commands=[MOTION], noise_A=0.2, effects=COGGING)
+
+
+def test_the_drives_own_gain_is_seen_on_the_measured_motion(healthy):
+    for actuator, differs in ((ACTUATOR, False), (OTHER, True)):
+        seen = controller_seen(InverseDynamics(healthy, ACTUATOR), actuator)
+        assert seen is not None and seen.holds
+        gain = next(one for one in seen.gains if one.path == GAIN)
+        assert gain.seen == pytest.approx(ACTUATOR.value(GAIN), rel=0.1)
+        assert seen.differs == gain.differs == differs
+
+
+def test_missing_physics_is_not_blamed_on_the_controller(cogging):
+    seen = controller_seen(InverseDynamics(cogging, ACTUATOR), ACTUATOR)
+    assert seen is not None and not seen.differs
+
+
+def test_a_loop_that_reaches_its_band_is_not_asked_again(healthy):
+    assert second_opinion(begun(healthy, ACTUATOR), quiet) is None
+
+
+def test_inverse_dynamics_names_what_the_wrong_loop_cannot(cogging):
+    found = discover(cogging, OTHER, candidates=FEW)
+    assert found.controller_seen is not None
+    assert [one.name for one in found.effects] == ["cogging_torque"]
+    (one,) = found.effects
+    assert "inverse_dynamics" in one.supported_by
+    assert one.parameters["amplitude_Nm"].value == pytest.approx(0.02, rel=0.15)
+    told = json.loads(json.dumps(as_dict(found), allow_nan=False))
+    assert told["controller_mismatch"] is True and told["controller_seen"]["gains"][GAIN]["differs"]
+    assert "The controller is not what the file says." in text(found)
+    assert not any(one.at_bound for one in found.calibration.parameters.values())
+
+
+def test_a_later_current_is_found_to_be_later(healthy):
+    """How much later, by what the same recording says without: the drive's ripple moves both alike."""
+    (one,) = healthy
+    steps = 8
+    late = one.with_signals(current_A=np.concatenate([one["current_A"][:1].repeat(steps), one["current_A"][:-steps]]))
+    unknown = replace(ACTUATOR, controller=replace(ACTUATOR.controller, kind="unknown"))
+    stories = [calibrated_story([m], delayed(unknown), (), None, quiet, guarded=True) for m in (one, late)]
+    first, second = (story.current.calibration.parameters["sensors.delay_s"].value for story in stories)
+    assert second - first == pytest.approx(steps * one.sample_period_s, rel=0.3)
+
+
+def test_a_stated_noise_passes_the_filter(healthy):
+    model = InverseDynamics(healthy, ACTUATOR, guarded=True)
+    own, stated = model.noise(0, {})["current_A"], model.noise(0, {"current_A": 0.4})["current_A"]
+    assert 0.0 < stated < 0.4 and stated == pytest.approx(2.0 * model.noise(0, {"current_A": 0.2})["current_A"])
+    assert own == pytest.approx(0.5 * stated, rel=0.5)
+
+
+def _spoilt(one, how):
+    if how == "sign":
+        return one.with_signals(user_position_rad=-one["user_position_rad"])
+    if how == "unit":
+        return one.with_signals(command_rad=1e3 * one["command_rad"])
+    return one
+
+
+@pytest.mark.parametrize("how", ["right", "sign", "unit"])
+def test_a_held_out_recording_at_odds_is_told_with_the_reason(how, healthy):
+    held = [replace(_spoilt(one, how), name="unseen") for one in recorded(11, commands=[MOTION], plant_seed=11)]
+    story = begun(healthy, ACTUATOR, held)
+    found = contradictions(story, quiet)
+    if how == "right":
+        assert not found
+        return
+    (one,) = found
+    assert (one.recording, one.how) == ("unseen", how)
+    assert one.signal == ("user_position_rad" if how == "sign" else "command_rad")
+    assert one.after < 0.4 * one.before and "unseen contradicts the fitted recordings" in one.sentence
+
+
+def test_a_held_out_recording_of_another_actuator_is_told(healthy):
+    heavier = {"motor.inertia_kgm2": 0.8 * ACTUATOR.value("motor.inertia_kgm2")}
+    held = [replace(one, name="other") for one in recorded(11, commands=[MOTION], extra=heavier)]
+    (one,) = contradictions(begun(healthy, ACTUATOR, held), quiet)
+    assert one.how == "actuator" and "inertia" in one.sentence

@@ -6,6 +6,8 @@ play-head stays away; nothing else depends on them.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from emaviz.figures.theme import DARK, MARK
 from emaviz.text.html import Html, html, unescaped
 
@@ -58,6 +60,12 @@ def _strip() -> Html:
         f"{row} > div:nth-of-type(5){{width:200px}}"
     )
     return unescaped(f"<style>@media (min-width: 900px){{{rules}}}</style>")
+
+
+def unseen(controls: Sequence[str]) -> Html:
+    """Takes controls off the screen, by their ids, for scripts to press."""
+    rows = ",".join(f"div:has(> [id='{one}'])" for one in controls)
+    return unescaped(f"<style>{rows}{{display:none!important}}</style>")
 
 
 def caption(text: str) -> Html:

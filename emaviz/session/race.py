@@ -83,6 +83,7 @@ class Race:
     truth: Array | None  # (8,), of the sliders' plant
     measurement: Measurement  # what is identified
     objective: Objective  # and its cost
+    known: bool = False  # the actuator's own parameters are exact, as in a simulation of the same file
     growing: Path | None = None  # of the recording, while it is written
     path: Path | None = None  # and once it is whole
 
@@ -176,13 +177,22 @@ def _elsewhere(read: Callable[[], Measurement]) -> Generator[None, None, Measure
     return found[0]
 
 
-def begin(settings: Settings, objective: Objective, truth: Array | None) -> Race:
-    """A race that has not started."""
+def begin(settings: Settings, objective: Objective, truth: Array | None, known: bool | None = None) -> Race:
+    """A race that has not started; known: see `Race`, by default where the truth is."""
     window = objective.windows[0]
     time = objective.measurements[0].time_s[0] + window.block_s * (1.0 + np.arange(window.blocks))
     tracks = {name: Track(name, settings.iterations) for name in settings.algorithms}
     measured_A = objective.target[: window.blocks]
-    return Race(settings, tracks, time, measured_A, truth, objective.recorded[0], objective)
+    return Race(
+        settings,
+        tracks,
+        time,
+        measured_A,
+        truth,
+        objective.recorded[0],
+        objective,
+        known=truth is not None if known is None else known,
+    )
 
 
 def run(race: Race, objective: Objective, reins: Reins, tell: Callable[[Race, Progress | None], None]) -> Steps:
@@ -199,7 +209,7 @@ def run(race: Race, objective: Objective, reins: Reins, tell: Callable[[Race, Pr
             iterations=settings.iterations,
             seed=settings.seed,
             truth=race.truth,
-            parameters_known=race.truth is not None,
+            parameters_known=race.known,
         )
         for name in race.tracks
     }

@@ -12,6 +12,7 @@ from ema_model.discovery.snapshot import AT_FLOOR, Look
 from ema_model.effects import CATALOGUE
 from ema_model.quantities.numbers import number
 from emaviz.page.discover import cards
+from emaviz.page.discover.entries import EntriesControl
 from emaviz.page.discover.guide import Guide
 from emaviz.page.discover.own_effect import OwnEffect
 from emaviz.page.discover.result import DiscoveryPanel
@@ -26,7 +27,7 @@ _MOST_ADDED = 6
 
 
 class DiscoverPanel:
-    """The tab's controls.  `result` is the panel on the right; to_front() brings that one forward."""
+    """The tab's controls.  `result` is the panel on the right."""
 
     def __init__(self, page: Page, discovering: Discovering, result: DiscoveryPanel, uploads: Uploads) -> None:
         self._page, self._discovering, self._result = page, discovering, result
@@ -34,6 +35,7 @@ class DiscoverPanel:
         self._opened: str | None = None
         self._title = ""  # of the step that runs
         gui = page.server.gui
+        self._entries = EntriesControl(page, discovering)
         self._guide = Guide(page, discovering, lambda: self.source.choose_first())
         self.source = SourceControls(page, discovering, uploads, self._chosen, self._source_shown)
         self._start = gui.add_button("Start", icon=viser.Icon.PLAYER_PLAY)
@@ -86,7 +88,6 @@ class DiscoverPanel:
         """Another source is chosen; on the screen's thread."""
         self._opened = None
         self._say_plain("")
-        self._result.to_front()
 
     def _source_shown(self) -> None:
         self._start.disabled = self._discovering.running or not self._discovering.source.ready
@@ -127,6 +128,7 @@ class DiscoverPanel:
             for control in (self._undo, self._all, *self._removes):
                 control.disabled = busy
             self.source.busy(busy)
+            self._entries.busy(busy)
             if self._look is not None and not busy:
                 self._undo.disabled = self._look.steps < 2
             self._own.busy(busy)
@@ -168,6 +170,7 @@ class DiscoverPanel:
                 self._result.open(None)
             else:
                 self._open(self._opened)
+        self._entries.show()
         self._start.label, self._start.color = ("Start", None) if look is None else ("Start again", "gray")
         self.source.show(look)
 

@@ -11,6 +11,7 @@ import viser
 from ema_model.identification.run import ALGORITHMS
 from ema_model.simulation.plant import FITNESSES
 from emaviz.figures.convergence import colour
+from emaviz.page.identify import WORKSPACE
 from emaviz.page.identify.result import IdentifyResult
 from emaviz.page.page import Page
 from emaviz.recording.viewer import ViewerHost
@@ -29,7 +30,7 @@ class IdentifyPanel:
     def __init__(self, page: Page, comparing: Comparing, viewer: ViewerHost | None, result: IdentifyResult) -> None:
         self._page, self._comparing, self._viewer, self._result = page, comparing, viewer, result
         self._race: Race | None = None
-        self.open_viewer: Callable[[str, str], None] = lambda url, name: None  # on the right
+        self.open_viewer: Callable[[str, str], None] = lambda url, name: None  # on the right of Recordings
         self.to_discover: Callable[[Race], None] = lambda race: None  # takes its recording there
         gui, settings = page.server.gui, page.session.settings
         self._source: Any = gui.add_dropdown(
@@ -70,16 +71,17 @@ class IdentifyPanel:
             visible=False,
             hint="The model does not fit: takes the same recording to Discover",
         )
-        self._again = gui.add_button("Show the search", icon=viser.Icon.CHART_DOTS, color="gray")
         self._source.on_update(lambda event: event.client and page.screen.post("identify source", self._take_source))
         for tick in self._ticks.values():
             tick.on_update(lambda event: event.client and page.screen.post("algorithms", self._take_algorithms))
         self._start.on_click(lambda _: self._begin())
         self._pause.on_click(lambda _: page.screen.post("pause", self._toggle))
         self._stop.on_click(lambda _: page.session.stop())
-        self._again.on_click(lambda _: page.screen.post("bring", result.to_front))
-        self._watch.on_click(lambda _: page.screen.post("watch", self._watch_growing))
-        self._missing.on_click(lambda _: page.screen.post("to discover", self._look_for_missing))
+        self._watch.on_click(lambda event: page.screen.post("watch", lambda: self._watch_growing(event.client)))
+        self._missing.on_click(
+            lambda event: page.screen.post("to discover", lambda: self._look_for_missing(event.client))
+        )
+        page.workspaces.entered.append(lambda name: name == WORKSPACE.name and self.refresh_sources())
         events = page.session.events
         events.progressed.append(self._progressed)
         events.identified.append(lambda race: page.screen.post("identification", lambda: self._draw_answer(race)))
@@ -139,17 +141,17 @@ class IdentifyPanel:
         self._link.content = ""
         self._missing.visible = False
         self._text.content = _line("Starting…")
-        self._page.screen.post("bring", self._result.to_front)
 
-    def _watch_growing(self) -> None:
+    def _watch_growing(self, client: viser.ClientHandle | None) -> None:
         race = self._race
         if self._viewer is not None and race is not None and race.growing is not None:
             self.open_viewer(self._viewer.url_of(race.growing.name), race.growing.name)
+            self._page.workspaces.go("recordings", client)
 
-    def _look_for_missing(self) -> None:
+    def _look_for_missing(self, client: viser.ClientHandle | None) -> None:
         race = self._race
-        if race is not None:
-            self._page.checked(lambda: self.to_discover(race))
+        if race is not None and self._page.checked(lambda: self.to_discover(race)):
+            self._page.workspaces.go("discover", client)
 
     def _toggle(self) -> None:
         session = self._page.session

@@ -205,6 +205,8 @@ class Session:
                 if story is not None and progress is not None:
                     story.iteration(progress)
                 notify(self.events.progressed, race)
+                if progress is None:
+                    self.worker.breathe()  # the sliders, while the answer is fitted
 
             yield from run(race, objective, reins, tell)
             self._keep(race, story)

@@ -155,7 +155,10 @@ class IdentifyResult:
         if track is None or track.k is None:
             return
         sure = track.answer.uncertainty if track.answer is not None else None
-        bars: dict[str, Any] = {} if sure is None else {"interval90": sure.interval90, "alarms": sure.alarms}
+        bars: dict[str, Any] = {}
+        if sure is not None:
+            bars = {"interval90": sure.interval90, "alarms": sure.alarms}
+            bars |= {"detectable": sure.detectable, "adequate": sure.adequate}
         fitted = {name: one.current_A for name, one in race.tracks.items() if one.current_A is not None}
         with self._page.server.atomic():
             self._bars.content = fault_bars(track.k, self._page.session.actuator, race.truth, **bars)

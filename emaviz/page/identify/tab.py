@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import viser
 
 from ema_model.identification.run import ALGORITHMS
@@ -20,6 +22,7 @@ from emaviz.session.race import Race
 from emaviz.session.settings import SLIDERS
 from emaviz.text.html import Html, add_html, html, joined
 from emaviz.text.identification import verdict
+from emaviz.text.time_left import time_left
 
 PLANT = "The plant of Explore's sliders"
 
@@ -176,13 +179,18 @@ class IdentifyPanel:
         self._page.screen.post("identification", lambda: self._draw(race))
 
     def _draw(self, race: Race) -> None:
-        shares = [1.0 if track.answer else len(track.rmse) / (track.iterations + 2.0) for track in race.tracks.values()]
-        self._progress.value = 100.0 * sum(shares) / len(shares)
-        lines = []
+        share = race.share
+        self._progress.value = 100.0 * share
+        left = time_left(time.monotonic() - race.began_s, share)
+        lines = [_line(html("<b>{:.0f} %</b>{}", 100.0 * share, f", {left}" if left else ""))]
         for name, track in race.tracks.items():
             if not track.rmse:
                 continue
-            at = "done" if track.answer else f"iteration {len(track.rmse) - 1} of {track.iterations}"
+            at = f"iteration {len(track.rmse) - 1} of {track.iterations}"
+            if track.answer is not None:
+                at = "done"
+            elif track.fitting is not None:
+                at = f"searched; {track.fitting[0]}"
             lines.append(_line(html("{} · {} · rmse {:.4f} A", _title(name), at, track.rmse[-1])))
         if race.growing is not None and race is not self._race:
             self._link.content = recording_link(self._viewer, race.growing, "Watch it live ↗")
@@ -198,21 +206,25 @@ class IdentifyPanel:
             stopped = "stopped · " if answer.stopped else ""
             error = "" if answer.error_percent is None else f"Err {answer.error_percent:.2f} % · "
             star = "★ " if best is not None and len(race.tracks) > 1 and answer is best.answer else ""
+            corrected = "" if np.isnan(answer.corrected_rmse) else f", {answer.corrected_rmse:.4f} A corrected"
             lines.append(
                 _line(
                     html(
-                        "{}{} · {}{}rmse {:.4f} A · {} simulations in {:.2f} s · <b>{}</b>",
+                        "{}{} · {}{}rmse {:.4f} A{} · {} simulations in {:.2f} s · <b>{}</b>",
                         star,
                         _title(answer.algorithm),
                         stopped,
                         error,
                         answer.rmse,
+                        corrected,
                         answer.evaluations,
                         answer.elapsed_s,
                         verdict(answer),
                     )
                 )
             )
+        if best is not None and len(race.answers) > 1:
+            lines.append(_line(_why_best(race)))
         self._text.content = joined(lines)
         self._race = race
         self._missing.visible = best is not None and best.answer is not None and not best.answer.uncertainty.adequate
@@ -231,6 +243,20 @@ def recording_link(viewer: ViewerHost | None, path: Path, text: str = "") -> Htm
         viewer.url_of(path.name),
         text or f"Open {path.name} in Rerun ↗",
     )
+
+
+def _why_best(race: Race) -> Html:
+    """What the star is for."""
+    best = race.best
+    assert best is not None and best.answer is not None, "the race is over"
+    if best.answer.polished and not all(answer.polished for answer in race.answers):
+        why = "its answer was fitted with the model's own bias taken out; the others are where their searches ended"
+    elif best.answer.polished:
+        why = "its fitted answer has the least rmse"
+    else:
+        why = "it has the least rmse"
+    told = "Corrected: the rmse with what the simplified model is known to lack added."
+    return html('<span style="opacity:.75">★ {}. {}</span>', why, told)
 
 
 def _title(name: str) -> Html:

@@ -39,6 +39,7 @@ from emaviz.page.explore.tab import ExplorePanel
 from emaviz.page.identify.result import IdentifyResult
 from emaviz.page.identify.tab import IdentifyPanel
 from emaviz.page.identify.to_discover import take_to_discover
+from emaviz.page.keys import add_keys
 from emaviz.page.library.tab import EffectPage, LibraryPanel
 from emaviz.page.members import workspaces
 from emaviz.page.page import Page
@@ -180,6 +181,7 @@ class App:
             with tabs.add_tab(one.title, one.icon):
                 builders[one.name]()
         self.compare.add_drop()
+        add_keys(self.page, self.strip, members)
         search.to_explore = partial(take_separating, self.explore)
         self.compare.session_uploaded = self.sessions.uploaded
         self.compare.challenge_uploaded = self.discover.source.uploaded

@@ -32,6 +32,12 @@ def page() -> Html:
         "[data-dock-region=left] [data-dock-tab]{padding-left:4px!important;padding-right:4px!important;"
         "font-size:12.5px!important}[data-dock-region=left] [data-dock-tab] *{font-size:inherit!important}"
         "[data-dock-region=left] [data-dock-tab] > div:has(svg){display:none!important}"
+        # a slider's number in full: viser's box has room for five characters
+        ".mantine-Slider-root ~ .mantine-NumberInput-root,"
+        "div:has(> .mantine-Slider-root) + .mantine-NumberInput-root,"
+        "div:has(> * .mantine-Slider-root) > .mantine-NumberInput-root{width:3.9rem!important}"
+        # what stands last in a panel ends above its edge
+        "[data-dock-region=right] .mantine-ScrollArea-viewport{padding-bottom:14px}"
         f"div:has(> div > .emaviz-long) {_LABEL}{{width:10.4em!important}}"
         "</style>"
     )

@@ -19,9 +19,11 @@ from emaviz.page.discover.result import DiscoveryPanel
 from emaviz.page.discover.source import SourceControls
 from emaviz.page.page import Page
 from emaviz.session.discover.discovering import Discovering
+from emaviz.session.pace import Pace
 from emaviz.session.uploads import Uploads
 from emaviz.text.discovery import effect_title
 from emaviz.text.html import add_html, html
+from emaviz.text.time_left import going_on
 
 _MOST_ADDED = 6
 
@@ -34,6 +36,7 @@ class DiscoverPanel:
         self._look: Look | None = None
         self._opened: str | None = None
         self._title = ""  # of the step that runs
+        self._pace = Pace()
         gui = page.server.gui
         self._entries = EntriesControl(page, discovering)
         self._guide = Guide(page, discovering, lambda: self.source.choose_first())
@@ -116,6 +119,8 @@ class DiscoverPanel:
 
     def _began(self, title: str) -> None:
         self._title = title
+        self._pace.begin(title)
+        self._bar.value, self._bar.animated = 100.0, True
         self._busy(True)
         self._say(title, 0.0)
 
@@ -137,7 +142,10 @@ class DiscoverPanel:
     def _say(self, text: str, seconds: float) -> None:
         if self._discovering.running or seconds == 0.0:
             said = "" if text == self._title else f": {text}"
-            self._say_plain(f"{self._title}{said} … {seconds:.0f} s")
+            _, share = self._pace.at(text)
+            if share is not None:
+                self._bar.value, self._bar.animated = 100.0 * share, False
+            self._say_plain(f"{self._title}{said} … {going_on(seconds, share)}")
 
     def _say_plain(self, text: str) -> None:
         self._status.content = html("<div {}>{}</div>", cards.BOX, text)
@@ -150,6 +158,8 @@ class DiscoverPanel:
 
     def _ended(self, text: str) -> None:
         self._busy(False)
+        if self._discovering.run.finished:
+            self._pace.end()
         self._say_plain(text)
         self._guide.show(self._look, self._opened)
 

@@ -27,9 +27,10 @@ class Leads:
 
     def __init__(self, page: Page, leads: Sequence[Lead]) -> None:
         self._page = page
-        self._buttons = [self._add(one) for one in leads]
+        for one in leads:
+            self._add(one)
 
-    def _add(self, lead: Lead) -> Any:
+    def _add(self, lead: Lead) -> None:
         button = self._page.server.gui.add_button(lead.label, icon=lead.icon, hint=lead.hint)
 
         def follow(event: viser.GuiEvent[Any]) -> None:
@@ -40,9 +41,3 @@ class Leads:
             self._page.screen.post(f"lead {lead.label}", taken)
 
         button.on_click(follow)
-        return button
-
-    def show(self, visible: bool) -> None:
-        """Shows or hides them all."""
-        for button in self._buttons:
-            button.visible = visible

@@ -79,9 +79,9 @@ class Playback:
             self._stale = True
         self._wake.set()
 
-    def show(self, simulation: Simulation, on: str = FIRST) -> None:
-        """Puts a simulated run on a reel, which keeps its moment."""
-        self.put(motion(simulation.reference, simulation.k, self._actuator), on)
+    def show(self, simulation: Simulation) -> None:
+        """Puts Explore's run on its reel, which keeps its moment."""
+        self.put(motion(simulation.reference, simulation.k, self._actuator), FIRST)
 
     def put(self, shown: Motion | None, on: str) -> None:
         """Puts a run on a reel, or takes it off."""

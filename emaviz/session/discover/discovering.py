@@ -96,7 +96,6 @@ class Discovering:
             raise InputError(NOTHING)
 
         def job(tell: Tell) -> None:
-            self.entries.leave()
             told = self._begin(self.source.recipe(), tell)
             self._restoring = None  # what a session brought is put away
             self._assess(told, tell)
@@ -242,8 +241,8 @@ class Discovering:
         tell("reading")
         given = self.source.read(recipe)
         told = Telling(begun(given.fitted, given.actuator, given.held, given.signals, tell), recipe)
-        self._told, self.look, self.source.revealed = told, None, False
         self.entries.begin(told)
+        self._told, self.look, self.source.revealed = told, None, False
         return told
 
     def _take(self, told: Telling, trial: Trial, alike: Sequence[str], tell: Tell) -> None:

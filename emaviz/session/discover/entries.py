@@ -69,7 +69,10 @@ class Entries:
 
     def begin(self, told: Telling) -> Entry:
         """A new one, or the one that was brought and is taken again now, is shown."""
-        entry = self.current if self.current is not None and self.current.told is None else self._new(told.recipe)
+        entry = self.current
+        if entry is None or entry.told is not None:
+            self.leave()
+            entry = self._new(told.recipe)
         entry.told, entry.look, entry.brought, entry.revealed = told, None, None, False
         entry.challenge = self._source.challenge
         self.current = entry
@@ -86,11 +89,6 @@ class Entries:
         if self.current is not None and self.current.told is not None:
             self.current.revealed = self._source.revealed
         self.current = None
-
-    def drop(self, entry: Entry) -> None:
-        """Takes one that never came to a story off the list."""
-        if entry.look is None and entry.brought is None and entry in self.all:
-            self.all.remove(entry)
 
     def _new(self, recipe: Mapping[str, Any]) -> Entry:
         entry = Entry(1 + max((one.number for one in self.all), default=0), recipe)

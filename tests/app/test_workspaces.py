@@ -202,7 +202,7 @@ def test_a_note_stays_when_the_status_changes(tab, app):
 
 def test_keys_change_the_workspace_and_play(tab, app):
     go(tab, "Explore")
-    tab.locator("canvas").first.click(position={"x": 5, "y": 5})
+    tab.evaluate("document.activeElement?.blur()")
     tab.keyboard.press("3")
     tab.get_by_role("tab", name="Comparison", exact=True).wait_for()
     wait_until(lambda: app.playback.on == "compare", 10.0)

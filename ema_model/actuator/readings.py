@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from ema_model.actuator.actuator import Actuator
 from ema_model.faults import physical
-from ema_model.quantities.numbers import amount
+from ema_model.quantities.numbers import amount, with_uncertainty
 from ema_model.quantities.sides import USER
 
 
@@ -24,6 +24,34 @@ def readings(k: ArrayLike, actuator: Actuator) -> dict[str, float]:
         "eccentricity_phase_rad": float(p.phase_rad),
         "position_gain_1_s": float(p.gain_factor * actuator.controller.position_gain_1_s),
     }
+
+
+def between(k: ArrayLike, interval: ArrayLike, actuator: Actuator) -> tuple[str, ...]:
+    """k (8,) and its interval (8, 2) as values in physical units, one phrase for each: 'friction × 1.60 ± 0.02'."""
+    k, ends = np.asarray(k, dtype=float), np.asarray(interval, dtype=float).T
+    p, low, high = physical(k), physical(ends[0]), physical(ends[1])
+    play = actuator.transmission.backlash_rad
+    unit = actuator.axes.unit("rad", USER)
+    half = 0.5 * play * abs(float(high.backlash_factor) - float(low.backlash_factor))
+    phrases = [
+        f"friction × {_within(p.friction_factor, low.friction_factor, high.friction_factor)}",
+        f"backlash {with_uncertainty(play * float(p.backlash_factor), half, unit)}",
+    ]
+    for phase, *values in zip("ABC", p.turns, low.turns, high.turns):
+        phrases.append(f"phase {phase}: {_within(*(100.0 * float(one) for one in values))} % of turns")
+    phrases.append(f"eccentricity ζ = {_within(p.eccentricity, low.eccentricity, high.eccentricity)}")
+    angles = [float(np.degrees(one)) for one in (p.phase_rad, low.phase_rad, high.phase_rad)]
+    phrases.append(f"thinnest gap at {_within(*angles)}°")
+    phrases.append(f"gain × {_within(p.gain_factor, low.gain_factor, high.gain_factor)}")
+    return tuple(phrases)
+
+
+def _within(value: ArrayLike, low: ArrayLike, high: ArrayLike) -> str:
+    """'1.60 ± 0.02': half the width with two digits, the value with as many decimals."""
+    at, bottom, top = (float(np.asarray(one)) for one in (value, low, high))
+    half = 0.5 * abs(top - bottom)
+    decimals = 3 if half < 5e-4 else min(3, max(0, 1 - int(np.floor(np.log10(half)))))
+    return f"{at:.{decimals}f} ± {max(half, 0.5 * 10.0**-decimals):.{decimals}f}".replace("-", "−")
 
 
 def _backlash(actuator: Actuator) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,6 +18,13 @@ from ema_model.models import ClosedLoop
 from ema_model.models.closed_loop import LOAD
 
 Array = NDArray[np.float64]
+Tell = Callable[[str, float], None]
+CURRENT = "current_A"
+
+
+def _silent(text: str, share: float) -> None:
+    pass
+
 
 _ROUNDS = 6  # of twin and refit, at most
 _STEPS = 25  # of a refit
@@ -84,27 +91,37 @@ def setting(objective: ClosedLoop, *, parameters_known: bool) -> Setting:
     return Setting(plant, floors, unknowns_of(actuator, NAMES), others)
 
 
-def refine_best(given: Setting, k: ArrayLike, seed: int = 0) -> Fitted:
-    """The best fit near any of k (n, 8), or near health: of those that the search cannot tell from its best."""
+def refine_best(given: Setting, k: ArrayLike, seed: int = 0, tell: Tell = _silent) -> Fitted:
+    """The best fit near any of k (n, 8), or near health: of those that the search cannot tell from its best.
+
+    tell(text, share): what goes on, and how much of the work is done, 0 … 1.
+    """
     candidates = np.concatenate([np.atleast_2d(np.asarray(k, dtype=float)), [HEALTHY]])
     coarse = given.coarse()
     costs = np.sum(coarse.residuals(coarse.at(candidates)) ** 2, axis=1)
     order = np.argsort(costs, kind="stable")
     close = order[costs[order] < costs[order[0]] + _CLOSE][:_CANDIDATES]
-    fits = sorted((refine(given, candidates[i], seed) for i in close), key=lambda one: one.cost)
+
+    def told(number: int) -> Tell:
+        return lambda text, share: tell(f"{text}, start {number + 1} of {len(close)}", (number + share) / len(close))
+
+    fits = sorted(
+        (refine(given, candidates[i], seed, told(number)) for number, i in enumerate(close)), key=lambda one: one.cost
+    )
     best = fits[0]
     within = max(best.cost, best.problem.values) + _RIVAL
     return replace(best, rivals=tuple(one for one in fits[1:] if one.cost < within))
 
 
-def refine(given: Setting, k: ArrayLike, seed: int = 0) -> Fitted:
-    """The best fit near k (8,): refits with the twin's difference added, until the answer stays.
+def refine(given: Setting, k: ArrayLike, seed: int = 0, tell: Tell = _silent) -> Fitted:
+    """The best fit near k (8,): refits with the twin's difference added, until the answer stays; tell: `refine_best`'s.
 
     The base parameters keep their file's values at first, and then move as far as the data want them to.
     """
     problem = given.problem(with_base=False)
+    phases = 2 if any(one.is_base for one in given.others) else 1
     x, _, evaluations = _descend(problem, problem.at(k))
-    x, found, more = _with_twins(given, problem, x, None, seed)
+    x, found, more = _with_twins(given, problem, x, None, seed, lambda text, share: tell(text, share / phases))
     spread = 0.0
     if any(one.is_base for one in given.others):
         full = given.problem(with_base=True)
@@ -117,7 +134,15 @@ def refine(given: Setting, k: ArrayLike, seed: int = 0) -> Fitted:
         if spread > 0.0:
             problem.believe(spread)
             x, _, again = _descend(problem, x)
-            x, found, again2 = _with_twins(given, problem, x, found, seed + _ROUNDS + 1)
+            said = "with the parameters' tolerances"
+            x, found, again2 = _with_twins(
+                given,
+                problem,
+                x,
+                found,
+                seed + _ROUNDS + 1,
+                lambda text, done: tell(f"{text}, {said}", 0.5 + 0.5 * done),
+            )
             more += again + again2
             if not _better(problem, given, x, start, seed + 2 * _ROUNDS + 1):
                 x, spread = start, 0.0  # the twin does not follow where the Monitor Model led
@@ -132,11 +157,12 @@ def refine(given: Setting, k: ArrayLike, seed: int = 0) -> Fitted:
 
 
 def _with_twins(
-    given: Setting, problem: Problem, x: Array, found: Twins | None, seed: int
+    given: Setting, problem: Problem, x: Array, found: Twins | None, seed: int, tell: Tell
 ) -> tuple[Array, Twins | None, int]:
     """Twin and refit in turn, back halfway where the Reference Model does not follow; ends with the best x's twins."""
     evaluations, least, best, kept = 0, np.inf, x, found
     for number in range(_ROUNDS):
+        tell(f"model bias and refit, round {number + 1} of at most {_ROUNDS}", number / _ROUNDS)
         found = twins(problem, x, seed + number, found)
         _reweight(problem, given, found)
         if found is None:
@@ -159,6 +185,21 @@ def _with_twins(
     kept = replace(kept, deviations=found.deviations)  # of all rounds: the more, the better known is their spread
     _reweight(problem, given, kept)
     return best, kept, evaluations
+
+
+def current_error(found: Fitted, k: ArrayLike | None = None) -> float:
+    """Rms of measured less model current with the model's own bias added, A: of the fit, or with faults k (8,).
+
+    What the rmse alone counts against an answer of the simplified model, this leaves out.
+    """
+    problem = found.problem
+    residual = found.residual if k is None else problem.residuals(problem.at(k)[None, :])[0]
+    parts = [
+        residual[rows] / problem.over_sigma(i, name, np.ones(rows.stop - rows.start))
+        for i, name, rows in problem.parts()
+        if name == CURRENT
+    ]
+    return float(np.sqrt(np.mean(np.concatenate(parts) ** 2))) if parts else float("nan")
 
 
 def _better(problem: Problem, given: Setting, x: Array, other: Array, seed: int) -> bool:

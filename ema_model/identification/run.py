@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from ema_model import faults
 from ema_model.actuator import Actuator
 from ema_model.errors import InputError, quoted
-from ema_model.identification.fit import Setting, refine, refine_best, setting
+from ema_model.identification.fit import Setting, current_error, refine, refine_best, setting
 from ema_model.identification.objective import Objective
 from ema_model.identification.optimisers import OPTIMISERS, Optimiser, create
 from ema_model.identification.search import search
@@ -61,6 +61,7 @@ class Identification(InWords):
     polished: bool = False  # by a least-squares fit after the search
     searched_k: Array | None = None  # (8,), where the search alone ended
     parameters: dict[str, float] = field(default_factory=dict)  # of the actuator, where the fit moved them beside k
+    corrected_rmse: float = float("nan")  # A, with the model's own bias taken out
 
     @property
     def error_percent(self) -> float | None:
@@ -78,6 +79,7 @@ def steps(
     truth: ArrayLike | None = None,
     parameters_known: bool = False,
     polish: bool = False,
+    on_fit: Callable[[str, float], None] = lambda text, share: None,
     **settings: float,
 ) -> Generator[Progress, bool | None, Identification]:
     """Fits k1…k8 to the objective's recordings, an iteration (about 5 ms) at a time.
@@ -85,6 +87,7 @@ def steps(
     Yields where it stands after each iteration; a true value sent back stops it there.  Returns the answer.
     `robust` starts `population` niches, which settle long before 150 iterations, and always polishes; the
     others answer what they found unless `polish` is true.
+    on_fit(text, share): what goes on after the last iteration, and how much of that is done, 0 … 1.
     parameters_known: the actuator's own parameters are exact, as in a simulation of the same file, so that
     they do not move and their tolerances do not widen the intervals.  settings: the algorithm's own.
     Raises InputError for an unknown algorithm or impossible settings.
@@ -117,7 +120,11 @@ def steps(
     last = history[-1]
     given = setting(objective, parameters_known=parameters_known)
     first_compile = _warm_up_fit(given)
-    found = refine_best(given, last.population, seed) if algorithm == ROBUST else refine(given, last.k, seed)
+    if algorithm == ROBUST:
+        found = refine_best(given, last.population, seed, on_fit)
+    else:
+        found = refine(given, last.k, seed, on_fit)
+    on_fit("intervals", 1.0)
     polishes = (polish or algorithm == ROBUST) and not stopped
     k = found.k if polishes else last.k
     sure = uncertainty(found, k)
@@ -139,6 +146,7 @@ def steps(
         polished=polishes,
         searched_k=last.k,
         parameters=found.problem.parameters(found.x) if polishes else {},
+        corrected_rmse=current_error(found, None if polishes else k),
     )
 
 

@@ -53,6 +53,7 @@ class Uncertainty:
     warnings: tuple[str, ...] = ()
     separated_by: Suggestion | None = None  # the run that would tell the groups apart, and the hardly known
     covariance: Array = field(default_factory=lambda: np.zeros((FAULTS, FAULTS)))  # of k
+    detectable: Array = field(default_factory=lambda: np.zeros(8))  # (8,) from healthy, where an alarm begins; k7: NaN
 
 
 def uncertainty(found: Fitted, k: Array) -> Uncertainty:
@@ -80,6 +81,7 @@ def uncertainty(found: Fitted, k: Array) -> Uncertainty:
         warnings=_warnings(best.fit),
         separated_by=separating(found, best.covariance, unclear) if unclear else None,
         covariance=best.covariance,
+        detectable=_detectable(best),
     )
 
 
@@ -219,6 +221,14 @@ def _alarms(free: Array, covariance: Array) -> tuple[str, ...]:
     if abs(free[_GAIN] - faults.HEALTHY[7]) > _ALARM_Z_BOTH * sigma[_GAIN]:
         outside.append("k8")
     return tuple(outside)
+
+
+def _detectable(basin: _Basin) -> Array:
+    """How far from healthy each k would have to be found for an alarm of its own; an angle has none."""
+    sigma = np.sqrt(np.diag(basin.covariance))
+    at = list(ECCENTRICITY)
+    along = float(np.sqrt(np.linalg.eigvalsh(basin.covariance[np.ix_(at, at)])[-1]))  # in whatever direction
+    return np.array([*(_ALARM_Z * sigma[:5]), _ALARM_LENGTH * along, np.nan, _ALARM_Z_BOTH * sigma[_GAIN]])
 
 
 def _groups(covariance: Array) -> tuple[tuple[str, ...], ...]:

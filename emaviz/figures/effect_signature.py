@@ -39,7 +39,7 @@ class EffectCharts:
                 series=({}, _line("difference", DIFFERENCE, 1.5)),
                 title="",
                 axes=(time_axis(chart.signal == SHOWN[-1]), value_axis(chart.difference_unit)),
-                **_layout(height - 18),
+                **_layout(height - 10, above=8),  # its topmost number has no title above it
             )
             self._charts.append((chart, both, change))
 
@@ -56,12 +56,12 @@ def _line(label: str, colour: str, width: float) -> Any:
     return {"label": label, "stroke": colour, "width": width}
 
 
-def _layout(height: int) -> dict[str, Any]:
+def _layout(height: int, above: int = 0) -> dict[str, Any]:
     return {
         "scales": {"x": {"time": False}, "y": {"auto": True}},
         "cursor": {"sync": {"key": "library"}},
         "legend": {"show": False},
-        "padding": (0, 8, 0, 0),
+        "padding": (above, 8, 0, 0),
         "height": height,
     }
 

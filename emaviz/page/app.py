@@ -8,23 +8,26 @@ import threading
 import time
 import traceback
 import webbrowser
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
 import viser
 
 from ema_model.actuator import load_actuator
-from ema_model.comparison.result import Comparison
+from ema_model.discovery.result import Experiment
 from ema_model.faults import HEALTHY
 from ema_model.recordings import Measurement
 from ema_model.simulation import plant
+from emaviz.page import compare, discover, explore, identify, library
+from emaviz.page import recordings as recordings_tab
 from emaviz.page.campaigns.controls import CampaignControls
 from emaviz.page.compare.keep import KeepControls
-from emaviz.page.compare.moment import hold
+from emaviz.page.compare.leads import leads as compare_leads
 from emaviz.page.compare.result import ResultPanel
 from emaviz.page.compare.tab import ComparePanel
 from emaviz.page.discover.keep import DiscoveryKeep
+from emaviz.page.discover.leads import leads as discover_leads
 from emaviz.page.discover.result import DiscoveryPanel
 from emaviz.page.discover.tab import DiscoverPanel
 from emaviz.page.docked import LEFT_PX, Docked
@@ -36,15 +39,18 @@ from emaviz.page.explore.tab import ExplorePanel
 from emaviz.page.identify.result import IdentifyResult
 from emaviz.page.identify.tab import IdentifyPanel
 from emaviz.page.identify.to_discover import take_to_discover
+from emaviz.page.keys import add_keys
 from emaviz.page.library.tab import EffectPage, LibraryPanel
+from emaviz.page.members import workspaces
 from emaviz.page.page import Page
 from emaviz.page.playback import PlaybackStrip
 from emaviz.page.recordings.result import RecordingsResult
 from emaviz.page.recordings.sessions import SessionControls, parts
 from emaviz.page.recordings.tab import RecordingsPanel
+from emaviz.page.workspaces import Workspaces
 from emaviz.recording.viewer import ViewerHost
 from emaviz.scene.actuator import ActuatorScene
-from emaviz.scene.playback import Playback
+from emaviz.scene.motion import motion
 from emaviz.server.door import Door
 from emaviz.server.safe_server import open_server
 from emaviz.server.viser_private import Inside
@@ -53,7 +59,6 @@ from emaviz.session.campaigns import Campaigns
 from emaviz.session.compare.comparing import Comparing
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.discover.discovering import Discovering
-from emaviz.session.discover.source import COMPARED
 from emaviz.session.library import Library
 from emaviz.session.session import Session, Simulation
 from emaviz.session.worker import Worker
@@ -79,7 +84,7 @@ class App:
         allow_hosts: Sequence[str] = (),
         campaigns: Sequence[Path] = (),
     ) -> None:
-        """files: recordings to open on Compare, which is then the first tab.  InputError: one of them is none.
+        """files: recordings to open on Compare, where a window then begins.  InputError: one of them is none.
 
         campaigns: folders of campaigns to open, beside those below `folder`.
         allow_hosts: names by which other machines may ask for the page (InputError: none, but host is no loopback).
@@ -97,17 +102,15 @@ class App:
         self.screen = Worker("emaviz-screen", self._on_screen_error, rest_s=_FASTEST_REDRAW_S)
         self._slow_screen = Worker("emaviz-slow-screen", self._on_screen_error, rest_s=_SLOW_REDRAW_S)
         self._recording_files = Worker("emaviz-recordings", self._on_screen_error)
-        self.page = Page(self.server, self.session, self.screen)
         self._docked = Docked(self.server)
+        first = compare.WORKSPACE if given else explore.WORKSPACE
+        self.workspaces = Workspaces(self.server, self.screen, self._docked, first.name)
+        self.page = Page(self.server, self.session, self.screen, self.workspaces)
         self.comparing = Comparing(self.session, data)
         self.session.open_file = self.comparing.measurement
         self.discovering = Discovering(self.session, self.comparing)
         self.campaigns = Campaigns(self.session, data, campaigns)
-        self.scene = ActuatorScene(self.server, round(actuator.motor.pole_pairs))
-        self.strip = PlaybackStrip(self.page, self.scene, lambda: self.charts.window_s, self._theme)
-        self.playback = Playback(self.scene, actuator, self.strip.moved)
-        self._build(recordings, compare_first=bool(given))
-        self.strip.connect(self.playback)
+        self._build(recordings)
         self._first = threading.Event()
         self.first_picture_s = 0.0
         if not plant.can_be_explored(actuator):
@@ -119,140 +122,119 @@ class App:
         self.session.start()
         for path in given:
             self.comparing.add(data.name_of(path))
-        for line in recovered(recordings):
-            self.explore.status.content = said(line)
+        self.explore.note("\n".join(recovered(recordings)))
         if no_viewer:
             self.server.on_client_connect(lambda _: self.page.notify("The Rerun viewer cannot be shown", no_viewer))
         elif self.door.token:
             self.server.on_client_connect(self._greet)
 
-    def _build(self, recordings: Path, compare_first: bool) -> None:
+    def _build(self, recordings: Path) -> None:
         gui = self.server.gui
         self._theme(dark=False)
         gui.set_panel_label("emaviz")
         gui.main_panel.dock_left()
         gui.main_panel.set_width(LEFT_PX)
-        docked = self._docked
-        self.signals_panel, self._result_panel, self._discovery_panel = docked.add(), docked.add(), docked.add()
-        self._library_panel, self._search_panel = docked.add(), docked.add()
-        self._recordings_panel = docked.add(viewer=True)
-        search = IdentifyResult(
-            self.page, self._slow_screen, self._search_panel, lambda: docked.bring(self._search_panel)
-        )
-        opened = RecordingsResult(self.page, self._recordings_panel, lambda: docked.bring(self._recordings_panel))
+        members = workspaces()
+        panels = {one.name: self.workspaces.add(one) for one in members}
+        self.signals_panel = panels[explore.WORKSPACE.name]
+        actuator = self.session.actuator
+        self.scene = ActuatorScene(self.server, round(actuator.motor.pole_pairs))
+        self.strip = PlaybackStrip(self.page, self.scene, actuator, self._theme)
+        self.playback = self.strip.playback
+        search = IdentifyResult(self.page, self._slow_screen, panels[identify.WORKSPACE.name], self.strip)
+        opened = RecordingsResult(self.page, panels[recordings_tab.WORKSPACE.name])
         export = ExportControls(self.page, self.scene, self.playback)
-        self.charts = ChartsPanel(self.page, self._slow_screen, self.signals_panel, export.build)
+        self.charts = ChartsPanel(self.page, self._slow_screen, self.signals_panel, self.strip, export.build)
         export.connect(lambda: self.charts.ghost, lambda: self.charts.window_s)
-        with self._result_panel.add_tab("Comparison", viser.Icon.ARROWS_DIFF):
+        with panels[compare.WORKSPACE.name].add_tab("Comparison", viser.Icon.ARROWS_DIFF):
             result = ResultPanel(
                 self.page,
-                lambda: docked.bring(self._result_panel),
-                self._hold,
+                self.strip,
+                lambda: compare_leads(self.page, self.discovering),
                 lambda: KeepControls(self.page, self.comparing, self.viewer),
             )
-        with self._discovery_panel.add_tab("Discovery", viser.Icon.BULB):
+        with panels[discover.WORKSPACE.name].add_tab("Discovery", viser.Icon.BULB):
             discovery = DiscoveryPanel(
                 self.page,
                 self.discovering,
-                lambda: docked.bring(self._discovery_panel),
-                lambda: DiscoveryKeep(self.page, self.discovering, self.viewer),
-                lambda one: take_experiment(self.explore, one),
-                self._play,
-            )
-        library = Library(self.session)
-        with self._library_panel.add_tab("Effect", viser.Icon.BOOK):
-            effect = EffectPage(self.page, library, lambda: docked.bring(self._library_panel))
-        docked.dock()
-        builders = [
-            lambda tabs: self._build_explore(tabs),
-            lambda tabs: self._build_identify(tabs, search, opened),
-            lambda tabs: self._build_compare(tabs, result),
-            lambda tabs: self._build_discover(tabs, discovery),
-            lambda tabs: self._build_library(tabs, library, effect),
-            lambda tabs: self._build_recordings(tabs, Recorded(recordings), opened),
-        ]
-        if compare_first:
-            builders.insert(0, builders.pop(2))
-        tabs = gui.add_tab_group()
-        for build in builders:
-            build(tabs)
-        self.compare.add_drop()
-        self.sessions.connect(
-            parts(
-                self.page,
-                self.comparing,
                 self.strip,
-                self.explore,
-                self.identify,
-                search,
-                self.compare,
-                self.discovering,
+                lambda: DiscoveryKeep(self.page, self.discovering, self.viewer),
+                lambda: discover_leads(self.page, self.discovering),
+                self._load_experiment,
             )
-        )
+        effects = Library(self.session)
+        with panels[library.WORKSPACE.name].add_tab("Effect", viser.Icon.BOOK):
+            effect = EffectPage(self.page, effects, self.strip)
+        self._docked.dock()
+        builders: dict[str, Callable[[], None]] = {
+            explore.WORKSPACE.name: self._build_explore,
+            identify.WORKSPACE.name: lambda: self._build_identify(search, opened),
+            compare.WORKSPACE.name: lambda: self._build_compare(result),
+            discover.WORKSPACE.name: lambda: self._build_discover(discovery),
+            library.WORKSPACE.name: lambda: self._build_library(effects, effect),
+            recordings_tab.WORKSPACE.name: lambda: self._build_recordings(
+                Recorded(recordings), opened, panels[recordings_tab.WORKSPACE.name], search
+            ),
+        }
+        tabs = gui.add_tab_group()
+        for one in members:
+            with tabs.add_tab(one.title, one.icon):
+                builders[one.name]()
+        self.compare.add_drop()
+        add_keys(self.page, self.strip, members)
         search.to_explore = partial(take_separating, self.explore)
         self.compare.session_uploaded = self.sessions.uploaded
         self.compare.challenge_uploaded = self.discover.source.uploaded
-        self.identify.to_discover = partial(
-            take_to_discover, self.page, self.discovering, lambda: self.discover.source.choose(COMPARED)
-        )
+        self.identify.to_discover = partial(take_to_discover, self.page, self.discovering)
+
+    def _load_experiment(self, one: Experiment, client: viser.ClientHandle | None) -> None:
+        take_experiment(self.explore, one)
+        self.workspaces.go(explore.WORKSPACE.name, client)
 
     def _theme(self, dark: bool) -> None:
         self.server.gui.configure_theme(show_logo=False, show_share_button=False, brand_color=_BRAND, dark_mode=dark)
 
-    def _build_explore(self, tabs: viser.GuiTabGroupHandle) -> None:
-        with tabs.add_tab("Explore", viser.Icon.ADJUSTMENTS):
-            if text := plant.note(self.session.actuator):
-                add_html(self.server.gui, html('<div style="{}">{}</div>', _NOTE, text))
-            self.explore = ExplorePanel(self.page)
-            SealControls(self.page, self.discovering.sealing)
+    def _build_explore(self) -> None:
+        if text := plant.note(self.session.actuator):
+            add_html(self.server.gui, html('<div style="{}">{}</div>', _NOTE, text))
+        self.explore = ExplorePanel(self.page)
+        SealControls(self.page, self.discovering.sealing)
 
-    def _build_recordings(self, tabs: viser.GuiTabGroupHandle, recorded: Recorded, result: RecordingsResult) -> None:
-        with tabs.add_tab("Recordings", viser.Icon.LIST):
-            panel = RecordingsPanel(self.page, self.viewer, recorded, self._recording_files, result)
-            self.sessions = SessionControls(self.page, self.comparing, self._recording_files)
-            campaigns = CampaignControls(
-                self.page,
-                self.campaigns,
-                self._recording_files,
-                self._recordings_panel,
-                lambda: self._docked.bring(self._recordings_panel),
-            )
+    def _build_recordings(
+        self, recorded: Recorded, result: RecordingsResult, right: viser.PanelHandle, search: IdentifyResult
+    ) -> None:
+        panel = RecordingsPanel(self.page, self.viewer, recorded, self._recording_files, result)
+        kept = parts(
+            self.page,
+            self.comparing,
+            self.strip,
+            self.explore,
+            self.identify,
+            search,
+            self.compare,
+            self.discovering,
+        )
+        self.sessions = SessionControls(self.page, self.comparing, self._recording_files, kept)
 
         def opened(path: Path, run: Measurement) -> None:
             panel.choose(path.name)
-            self._play(run)
+            self.strip.put(motion(run, HEALTHY, self.session.actuator), recordings_tab.WORKSPACE.name)
 
-        campaigns.opened = opened
+        CampaignControls(self.page, self.campaigns, self._recording_files, right, opened)
         self.comparing.events.kept.append(lambda _: panel.refresh_soon())
 
-    def _build_identify(
-        self, tabs: viser.GuiTabGroupHandle, result: IdentifyResult, recordings: RecordingsResult
-    ) -> None:
-        with tabs.add_tab("Identify", viser.Icon.SEARCH):
-            self.identify = IdentifyPanel(self.page, self.comparing, self.viewer, result)
+    def _build_identify(self, result: IdentifyResult, recordings: RecordingsResult) -> None:
+        self.identify = IdentifyPanel(self.page, self.comparing, self.viewer, result)
         self.identify.open_viewer = recordings.open
 
-    def _build_compare(self, tabs: viser.GuiTabGroupHandle, result: ResultPanel) -> None:
-        with tabs.add_tab("Compare", viser.Icon.ARROWS_DIFF):
-            self.compare = ComparePanel(self.page, self.comparing, result)
+    def _build_compare(self, result: ResultPanel) -> None:
+        self.compare = ComparePanel(self.page, self.comparing, result)
 
-    def _build_discover(self, tabs: viser.GuiTabGroupHandle, result: DiscoveryPanel) -> None:
-        with tabs.add_tab("Discover", viser.Icon.BULB):
-            self.discover = DiscoverPanel(self.page, self.discovering, result, self.compare.uploads)
+    def _build_discover(self, result: DiscoveryPanel) -> None:
+        self.discover = DiscoverPanel(self.page, self.discovering, result, self.compare.uploads)
 
-    def _build_library(self, tabs: viser.GuiTabGroupHandle, library: Library, effect: EffectPage) -> None:
-        with tabs.add_tab("Library", viser.Icon.BOOK):
-            LibraryPanel(self.page, library, effect)
-
-    def _play(self, run: Measurement | None) -> None:
-        """A run on the 3D actuator; without one, Explore's."""
-        shown = self.session.simulation if run is None else Simulation(run, run, HEALTHY, 0.0)
-        if shown is not None:
-            self.playback.show(shown)
-
-    def _hold(self, comparison: Comparison, recording: int, time_s: float) -> None:
-        self.strip.play(False)
-        hold(self.playback, self.scene, comparison, recording, time_s)
+    def _build_library(self, effects: Library, effect: EffectPage) -> None:
+        LibraryPanel(self.page, effects, effect)
 
     @property
     def address(self) -> str:
@@ -279,16 +261,12 @@ class App:
     def _draw(self, simulation: Simulation, started: float) -> None:
         self.charts.show(simulation)
         self.playback.show(simulation)
-        if self.playback.motion is not None:
-            self.strip.say(self.playback.motion.sentence())
+        self.strip.say()
         self.explore.show_preset()
-        if self.explore.monitor.value != self.session.settings.monitor:
-            self.explore.show_monitor(self.session.settings.monitor)
+        self.explore.show_model(simulation)
         if not self._first.is_set():
             self.first_picture_s = time.perf_counter() - started
             self._first.set()
-        elif simulation.asked:
-            self._docked.bring(self.signals_panel)
 
     def _status(self, text: str) -> None:
         self.explore.status.content = said(text)

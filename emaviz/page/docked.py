@@ -1,4 +1,4 @@
-"""The panels on the right, of which one is seen: wider where every open browser is."""
+"""The panels on the right, of which each window sees one: wider where the window is."""
 
 from __future__ import annotations
 
@@ -6,22 +6,24 @@ import threading
 
 import viser
 
+from emaviz.server.viser_private import Inside
+
 LEFT_PX = 380
 _USUAL_PX, _WIDE_PX = 500, 680
-_VIEWER_MORE_PX = 140  # the Rerun viewer needs more
 _WIDE_WINDOW_PX = 1750
 _SHOWN_S = 0.15
 _SETTLED_S = 2.0  # after which a browser that has connected knows the size of its picture
 
 
 class Docked:
-    """Panels that give way to each other; `add` makes one, the first is in front."""
+    """Panels that give way to each other, in each window for itself."""
 
     def __init__(self, server: viser.ViserServer) -> None:
-        self._server = server
-        self._panels: list[tuple[viser.PanelHandle, int]] = []  # each with its px beyond the usual width
-        self._windows: dict[int, float] = {}  # px, by browser
-        self._wide = False
+        self._server, self._inside = server, Inside(server)
+        self._panels: dict[str, tuple[viser.PanelHandle, int]] = {}  # by name, each with its px beyond the usual width
+        self._first = ""  # what a window sees at first
+        self._seen: dict[int, str] = {}  # by window, where it is another one
+        self._wide: set[int] = set()  # windows
 
         @server.on_client_connect
         def _(client: viser.ClientHandle) -> None:
@@ -31,35 +33,39 @@ class Docked:
 
         @server.on_client_disconnect
         def _(client: viser.ClientHandle) -> None:
-            self._windows.pop(client.client_id, None)
-            self._decide()
+            self._wide.discard(client.client_id)
+            self._seen.pop(client.client_id, None)
 
-    def add(self, *, viewer: bool = False) -> viser.PanelHandle:
-        """A panel; viewer: it is to hold the Rerun viewer.  To be `dock`ed once it is built."""
-        panel = self._server.gui.add_panel(visible=not self._panels)
-        self._panels.append((panel, _VIEWER_MORE_PX if viewer else 0))
+    def add(self, name: str, wider_px: int = 0, *, in_front: bool = False) -> viser.PanelHandle:
+        """A panel; in_front: windows begin with it.  To be `dock`ed once it is built."""
+        panel = self._server.gui.add_panel(visible=in_front)
+        self._panels[name] = panel, wider_px
+        if in_front:
+            self._first = name
         return panel
 
     def dock(self) -> None:
         """Puts all of them to the right, where later changes leave them."""
-        for panel, more in self._panels:
+        for panel, more in self._panels.values():
             panel.dock_right()
-            panel.set_width(self._usual + more)
+            panel.set_width(_USUAL_PX + more)
 
-    def bring(self, panel: viser.PanelHandle) -> None:
-        """To the front; the others give way."""
-        for one, more in self._panels:
-            if one is not panel:
-                if one.visible:
-                    one.visible = False
-            elif not one.visible:
-                one.visible = True
-                # a panel that was hidden comes back narrow, and takes a width once it is there
-                threading.Timer(_SHOWN_S, one.set_width, (self._usual + more,)).start()
+    def show(self, client: int, name: str) -> None:
+        """The panel that this window sees from now on; the others give way there."""
+        before = self._seen.get(client, self._first)
+        if before == name:
+            return
+        self._seen[client] = name
+        self._inside.show_panel(client, self._panels[before][0], False)
+        self._inside.show_panel(client, self._panels[name][0], True)
+        # a panel that was hidden comes back narrow, and takes a width once it is there
+        timer = threading.Timer(_SHOWN_S, self._set_width, (client,))
+        timer.daemon = True
+        timer.start()
 
-    @property
-    def _usual(self) -> int:
-        return _WIDE_PX if self._wide else _USUAL_PX
+    def _set_width(self, client: int) -> None:
+        panel, more = self._panels[self._seen.get(client, self._first)]
+        self._inside.set_width(client, panel, (_WIDE_PX if client in self._wide else _USUAL_PX) + more)
 
     def _measure(self, client: viser.ClientHandle) -> None:
         """Once, so that a panel that somebody draws wider later is left alone."""
@@ -67,14 +73,6 @@ class Docked:
             window = client.camera.image_width  # the picture lies behind the panels
         except Exception:  # gone again
             return
-        if window > 0:
-            self._windows[client.client_id] = window
-            self._decide()
-
-    def _decide(self) -> None:
-        wide = bool(self._windows) and min(self._windows.values()) >= _WIDE_WINDOW_PX
-        if self._windows and wide != self._wide:
-            self._wide = wide
-            for panel, more in self._panels:
-                if panel.visible:
-                    panel.set_width(self._usual + more)
+        if window >= _WIDE_WINDOW_PX:
+            self._wide.add(client.client_id)
+            self._set_width(client.client_id)

@@ -1,4 +1,4 @@
-"""What panels share: the server, the session, the screen's thread, and messages to the user."""
+"""What panels share: the server, the session, the screen's thread, the workspaces, and messages to the user."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 import viser
 
 from ema_model.errors import InputError
+from emaviz.page.workspaces import Workspaces
 from emaviz.session.session import Session
 from emaviz.session.worker import Worker
 
@@ -20,6 +21,7 @@ class Page:
     server: viser.ViserServer
     session: Session
     screen: Worker  # draws, at a pace that browsers can follow
+    workspaces: Workspaces  # which windows are where
 
     def notify(self, title: str, text: str, colour: Any = "red") -> None:
         """A message in every open browser."""

@@ -7,10 +7,12 @@ from typing import Any
 
 import viser
 
+from ema_model.actuator import Actuator
 from emaviz.page.page import Page
-from emaviz.page.style import STRIP, caption, figures, play_head
+from emaviz.page.style import STRIP, caption, figures
 from emaviz.page.style import page as style
 from emaviz.scene.actuator import ActuatorScene
+from emaviz.scene.motion import Motion
 from emaviz.scene.playback import SPEEDS, Playback
 from emaviz.text.html import add_html
 
@@ -18,43 +20,39 @@ _SLOWEST_STEP_S = 1e-4
 
 
 class PlaybackStrip:
-    """window_s(): from and to when the charts show the run, which the play-head needs; theme(dark) sets the page's."""
+    """One strip for all workspaces: it shows the clock of the one that was used last.
 
-    def __init__(
-        self,
-        page: Page,
-        scene: ActuatorScene,
-        window_s: Callable[[], tuple[float, float]],
-        theme: Callable[[bool], None],
-    ) -> None:
-        self._page, self._scene, self._window_s, self._theme = page, scene, window_s, theme
-        self._playback: Playback | None = None
-        self._duration_s = 0.5
+    theme(dark) sets the page's.  moves: called with the reel's name, the moment and from–to, s of the recording's own
+    time, on the screen's thread.
+    """
+
+    def __init__(self, page: Page, scene: ActuatorScene, actuator: Actuator, theme: Callable[[bool], None]) -> None:
+        self._page, self._scene, self._theme = page, scene, theme
+        self._span_s = (0.0, 0.5)
+        self.moves: list[Callable[[str, float, tuple[float, float]], None]] = []
+        self.playback = Playback(scene, actuator, self._moved)
         gui = page.server.gui
         self._panel = gui.add_panel()
         with self._panel.add_tab("Playback", viser.Icon.PLAYER_PLAY):
             add_html(gui, STRIP + style())
             self._play = gui.add_button("Pause", icon=viser.Icon.PLAYER_PAUSE)
             self._speed = gui.add_dropdown("Speed", tuple(SPEEDS), initial_value="1 : 10")
-            self._moment = gui.add_slider("Moment [s]", 0.0, self._duration_s, _SLOWEST_STEP_S, 0.0)
+            self._moment = gui.add_slider("Moment [s]", *self._span_s, _SLOWEST_STEP_S, 0.0)
             self._opacity = gui.add_slider("Housing", 0.0, 1.0, 0.05, 0.35)
             self._labels = gui.add_checkbox("Labels", False)
             self._dark = gui.add_checkbox("Dark", False)
             self._view = gui.add_button("Reset view", icon=viser.Icon.FOCUS_CENTERED, color="gray")
-            self._head = add_html(gui)
             self._figures = add_html(gui)
             self._caption = add_html(gui)
+            page.workspaces.connect()
         self._panel.float(x=0, y=-1, width=480)
-
-    def connect(self, playback: Playback) -> None:
-        """Its controls act from now on."""
-        self._playback = playback
-        self._play.on_click(lambda _: self.play(not playback.playing))
-        self._speed.on_update(lambda _: self._set_speed(playback))
-        self._moment.on_update(lambda event: event.client and self._scrub(playback))
+        self._play.on_click(lambda _: self.play(not self.playback.playing))
+        self._speed.on_update(lambda _: self._set_speed())
+        self._moment.on_update(lambda event: event.client and self._scrub())
         self._opacity.on_update(lambda _: self._scene.set_opacity(min(max(float(self._opacity.value), 0.0), 1.0)))
         self._labels.on_update(lambda _: self._scene.show_labels(bool(self._labels.value)))
         self._dark.on_update(lambda _: self._set_dark())
+        page.workspaces.entered.append(self._enter)
 
         @self._view.on_click
         def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
@@ -63,10 +61,33 @@ class PlaybackStrip:
 
     def play(self, playing: bool) -> None:
         """Lets the picture move or rest."""
-        if self._playback is not None:
-            self._playback.play(playing)
+        self.playback.play(playing)
+        self._show_playing()
+
+    def _show_playing(self) -> None:
+        playing = self.playback.playing
         self._play.label = "Pause" if playing else "Play"
         self._play.icon = viser.Icon.PLAYER_PAUSE if playing else viser.Icon.PLAYER_PLAY
+
+    def _enter(self, workspace: str) -> None:
+        self.playback.enter(workspace)
+        with self._page.server.atomic():
+            self._show_playing()
+            self.say()
+
+    def put(self, shown: Motion | None, on: str, time_s: float | None = None) -> None:
+        """Puts a run on a workspace's reel, or takes it off; time_s: where it is to rest, in its own time."""
+        self.playback.put(shown, on)
+        if time_s is not None:
+            self.rest_at(time_s, on)
+        self.say()
+
+    def rest_at(self, time_s: float, on: str) -> None:
+        """Stops a workspace's reel at a moment, s of the recording's own time."""
+        shown = self.playback.reels[on].motion if on in self.playback.reels else None
+        if on == self.playback.on:
+            self.play(False)
+        self.playback.seek(time_s - (shown.start_s if shown is not None else 0.0), on)
 
     def saved(self) -> dict[str, object]:
         """How the actuator and the page look, for a session's file."""
@@ -83,31 +104,34 @@ class PlaybackStrip:
         looks = {"speed": self._speed, "opacity": self._opacity, "labels": self._labels, "dark": self._dark}
         return dict(looks)
 
-    def say(self, text: str) -> None:
+    def say(self) -> None:
         """The small print: what of the picture is not to scale."""
-        line = caption(text)
+        motion = self.playback.motion
+        line = caption("" if motion is None else motion.sentence())
         if self._caption.content != line:
             self._caption.content = line
 
-    def moved(self, time_s: float, duration_s: float) -> None:
+    def _moved(self, time_s: float, duration_s: float) -> None:
         """The scene shows another moment; called on the playback's thread."""
-        self._page.screen.post("play-head", lambda: self._draw(time_s, duration_s))
+        on, shown = self.playback.on, self.playback.motion
+        start = shown.start_s if shown is not None else 0.0
+        self._page.screen.post("play-head", lambda: self._draw(on, start + time_s, (start, start + duration_s)))
 
-    def _draw(self, time_s: float, duration_s: float) -> None:
-        low, high = self._window_s()
+    def _draw(self, on: str, time_s: float, span_s: tuple[float, float]) -> None:
         with self._page.server.atomic():
-            if duration_s != self._duration_s:
-                self._duration_s = duration_s
-                self._moment.max = duration_s
+            if span_s != self._span_s:
+                self._span_s = span_s
+                self._moment.min, self._moment.max = (round(edge, 4) for edge in span_s)
             self._moment.value = round(time_s, 4)
-            self._head.content = play_head((time_s - low) / (high - low) if high > low else None)
+            for listener in self.moves:
+                listener(on, time_s, span_s)
 
-    def _scrub(self, playback: Playback) -> None:
+    def _scrub(self) -> None:
         self.play(False)
-        playback.seek(float(self._moment.value))
+        self.playback.seek(float(self._moment.value) - self._span_s[0])
 
-    def _set_speed(self, playback: Playback) -> None:
-        playback.speed = SPEEDS.get(str(self._speed.value), playback.speed)
+    def _set_speed(self) -> None:
+        self.playback.speed = SPEEDS.get(str(self._speed.value), self.playback.speed)
 
     def _set_dark(self) -> None:
         dark = bool(self._dark.value)

@@ -6,6 +6,8 @@ play-head stays away; nothing else depends on them.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from emaviz.figures.theme import DARK, MARK
 from emaviz.text.html import Html, html, unescaped
 
@@ -30,6 +32,12 @@ def page() -> Html:
         "[data-dock-region=left] [data-dock-tab]{padding-left:4px!important;padding-right:4px!important;"
         "font-size:12.5px!important}[data-dock-region=left] [data-dock-tab] *{font-size:inherit!important}"
         "[data-dock-region=left] [data-dock-tab] > div:has(svg){display:none!important}"
+        # a slider's number in full: viser's box has room for five characters
+        ".mantine-Slider-root ~ .mantine-NumberInput-root,"
+        "div:has(> .mantine-Slider-root) + .mantine-NumberInput-root,"
+        "div:has(> * .mantine-Slider-root) > .mantine-NumberInput-root{width:3.9rem!important}"
+        # what stands last in a panel ends above its edge
+        "[data-dock-region=right] .mantine-ScrollArea-viewport{padding-bottom:14px}"
         f"div:has(> div > .emaviz-long) {_LABEL}{{width:10.4em!important}}"
         "</style>"
     )
@@ -58,6 +66,12 @@ def _strip() -> Html:
         f"{row} > div:nth-of-type(5){{width:200px}}"
     )
     return unescaped(f"<style>@media (min-width: 900px){{{rules}}}</style>")
+
+
+def unseen(controls: Sequence[str]) -> Html:
+    """Takes controls off the screen, by their ids, for scripts to press."""
+    rows = ",".join(f"div:has(> [id='{one}'])" for one in controls)
+    return unescaped(f"<style>{rows}{{display:none!important}}</style>")
 
 
 def caption(text: str) -> Html:

@@ -32,6 +32,7 @@ _LABELS = (
     ("horn", (1.34, 0.0, -0.05)),
     ("control surface (user)", (1.62, 0.0, 0.2)),
 )
+_MOST_PLACED = 20  # places of a camera that are remembered
 
 
 class ActuatorScene:
@@ -74,17 +75,22 @@ class ActuatorScene:
     def _keep_framed(self, client: viser.ClientHandle) -> None:
         """Frames the actuator anew when the picture changes its shape, until the user moves the camera."""
         camera = client.camera
-        framed: list[Any] = [0.0, None]  # aspect and position
+        aspects = [0.0]
+        placed: list[
+            Any
+        ] = []  # where it was put; the browser may tell of an earlier place when a later one is on its way
 
         @camera.on_update
         def _(_: Any) -> None:
             if camera.image_height <= 0:
                 return
             aspect = camera.image_width / camera.image_height
-            untouched = framed[1] is None or np.allclose(camera.position, framed[1], atol=0.02)
-            if untouched and abs(aspect - framed[0]) > 0.01:
+            untouched = not placed or any(np.allclose(camera.position, one, atol=0.02) for one in placed)
+            if untouched and abs(aspect - aspects[-1]) > 0.01:
                 self._frame_camera(camera, aspect)
-                framed[:] = aspect, self._place(aspect)
+                aspects[:] = [aspect]
+                placed.append(self._place(aspect))
+                del placed[:-_MOST_PLACED]
 
     def set_opacity(self, opacity: float) -> None:
         """Of the housing, 0 … 1."""

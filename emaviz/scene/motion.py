@@ -16,6 +16,8 @@ from emaviz.scene.drivetrain import ARM
 _LARGEST_TURN_RAD = 0.6  # to which the surface's motion is enlarged
 _PLAY_MORE = 4.0  # play is enlarged more than motion
 _WIDEST = 0.08  # of the pin's room between the jaws, as drawn
+# what a run must have to be shown
+PLAYED = ("current_A", "motor_position_rad", "motor_speed_rad_s", "user_position_rad")
 _PHASE_CURRENTS = ("phase_a_current_A", "phase_b_current_A", "phase_c_current_A")
 _GAP_ENLARGED = 20.0  # the drawn gap is 1/5 of the rotor's radius, a usual one 1/100
 
@@ -46,6 +48,8 @@ class Motion:
     eccentricity: float
     phase_rad: float
     room: float  # of the pin between the jaws, as drawn
+    start_s: float = 0.0  # of the recording's own time, which time 0 here is
+    says: str = ""  # what its glow means, beyond `sentence`
 
     @property
     def duration_s(self) -> float:
@@ -71,8 +75,8 @@ class Motion:
         """What is not to scale."""
         return (
             f"Not to scale: surface motion × {self.enlarged:g}, play × {self.play_enlarged:g}, "
-            f"air gap and rotor offset × {_GAP_ENLARGED:g}. Full glow: {self.full_A:g} A."
-        )
+            f"air gap and rotor offset × {_GAP_ENLARGED:g}. Full glow: {self.full_A:g} A. {self.says}"
+        ).rstrip()
 
 
 def motion(run: Measurement, k: ArrayLike, actuator: Actuator) -> Motion:
@@ -110,6 +114,7 @@ def motion(run: Measurement, k: ArrayLike, actuator: Actuator) -> Motion:
         float(faults.eccentricity),
         float(faults.phase_rad),
         room,
+        float(run.time_s[0]),
     )
 
 

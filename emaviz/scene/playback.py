@@ -1,4 +1,4 @@
-"""Plays a simulated run on the 3D actuator, slower than life, over and over."""
+"""Plays runs on the 3D actuator, slower than life, over and over: a reel for each workspace, each with its clock."""
 
 from __future__ import annotations
 
@@ -7,12 +7,13 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
 from ema_model.actuator import Actuator
 from emaviz.scene.actuator import ActuatorScene
-from emaviz.scene.motion import Motion, enlargement, motion
+from emaviz.scene.motion import Motion, motion
 from emaviz.session.session import Simulation
 
 _POSES_PER_S = 30.0
@@ -27,18 +28,31 @@ _TOLD_PER_S = 8.0  # play-heads are redrawn at this pace
 SPEEDS = {"1 : 1": 1.0, "1 : 5": 0.2, "1 : 10": 0.1, "1 : 20": 0.05, "1 : 50": 0.02, "1 : 200": 0.005}
 
 
+FIRST = "explore"  # the reel that is played at first, and in place of an empty one
+
+
+@dataclass(eq=False)
+class Reel:
+    """A run to play, and where its clock stands."""
+
+    motion: Motion | None = None
+    clock_s: float = 0.0
+    playing: bool = True
+
+
 class Playback:
     """A thread that poses the scene: a second on the screen is `speed` seconds of the run.
 
-    moved(time_s, duration_s) is called on that thread, a few times a second, and after `seek`.
+    moved(time_s, duration_s) is called on that thread, a few times a second, and after `seek`; times from the run's
+    start.
     """
 
     def __init__(self, scene: ActuatorScene, actuator: Actuator, moved: Callable[[float, float], None]) -> None:
         self._scene, self._actuator, self._moved = scene, actuator, moved
         self.speed = 0.1
-        self.playing = True
-        self.motion: Motion | None = None
-        self._clock_s = 0.0
+        self.reels: dict[str, Reel] = {FIRST: Reel()}
+        self._reel = self.reels[FIRST]
+        self.on = FIRST  # the name of the reel that is played
         self._stale = False  # what the scene shows is not the run at the clock
         self._damaged: Motion | None = None  # whose faults the scene shows
         self._came_s: deque[float] = deque([-1e9] * 6, maxlen=6)  # when the last runs came
@@ -48,35 +62,54 @@ class Playback:
         self._thread = threading.Thread(target=self._run, name="emaviz-playback", daemon=True)
         self._thread.start()
 
-    def show(self, simulation: Simulation) -> None:
-        """Plays this run from now on, from the same moment."""
-        shown = motion(simulation.reference, simulation.k, self._actuator)
+    @property
+    def playing(self) -> bool:
+        """Whether the picture moves."""
+        return self._reel.playing
+
+    @property
+    def motion(self) -> Motion | None:
+        """The run that is shown."""
+        return self._reel.motion or self.reels[FIRST].motion
+
+    def enter(self, on: str) -> None:
+        """Goes on with another reel, from where its clock stood."""
         with self._posing:
-            self.motion = shown
+            self._reel, self.on = self.reels.setdefault(on, Reel(playing=False)), on
             self._stale = True
-            self._came_s.append(time.monotonic())
+        self._wake.set()
+
+    def show(self, simulation: Simulation) -> None:
+        """Puts Explore's run on its reel, which keeps its moment."""
+        self.put(motion(simulation.reference, simulation.k, self._actuator), FIRST)
+
+    def put(self, shown: Motion | None, on: str) -> None:
+        """Puts a run on a reel, or takes it off."""
+        with self._posing:
+            reel = self.reels.setdefault(on, Reel(playing=False))
+            reel.motion = shown
+            if reel is self._reel or self._reel.motion is None:
+                self._stale = True
+                self._came_s.append(time.monotonic())
         self._wake.set()
 
     def play(self, playing: bool) -> None:
         """Lets the picture move or rest."""
-        self.playing = playing
+        self._reel.playing = playing
         self._wake.set()
 
-    def seek(self, time_s: float) -> None:
-        """Goes to a moment of the run."""
+    def seek(self, time_s: float, on: str | None = None) -> None:
+        """Goes to a moment of the run, or of another reel's, s from its start."""
+        reel = self._reel if on is None else self.reels.setdefault(on, Reel(playing=False))
         if np.isfinite(time_s):
-            self._clock_s = max(time_s, 0.0)
+            reel.clock_s = max(time_s, 0.0)
             self._stale = True
             self._wake.set()
 
     @property
     def time_s(self) -> float:
         """The moment that is shown."""
-        return self._clock_s
-
-    def exaggeration(self, simulation: Simulation) -> float:
-        """By how much the surface's motion of a run is enlarged: a round number."""
-        return enlargement(float(np.max(np.abs(simulation.reference["user_position_rad"]))))
+        return self._reel.clock_s
 
     @contextlib.contextmanager
     def still(self) -> Iterator[Motion | None]:
@@ -98,22 +131,22 @@ class Playback:
             now = time.monotonic()
             passed, last = now - last, now
             with self._posing:
-                shown = self.motion
+                shown, reel = self.motion, self._reel
                 if shown is not None:
-                    if self.playing:
-                        self._clock_s += passed * self.speed
-                    if self._clock_s > shown.duration_s:
-                        self._clock_s = self._clock_s % shown.duration_s if self.playing else shown.duration_s
-                    moves = self.playing or self._stale
+                    if reel.playing:
+                        reel.clock_s += passed * self.speed
+                    if reel.clock_s > shown.duration_s:
+                        reel.clock_s = reel.clock_s % shown.duration_s if reel.playing else shown.duration_s
+                    moves = reel.playing or self._stale
                     if moves:
                         self._show_damage(shown)
-                        shown.pose(self._scene, self._clock_s)
+                        shown.pose(self._scene, reel.clock_s)
                 else:
                     moves = False
                 stale, self._stale = self._stale, False
             if shown is not None and moves and (stale or now - told >= 1.0 / _TOLD_PER_S):
                 told = now
-                self._moved(self._clock_s, shown.duration_s)
+                self._moved(reel.clock_s, shown.duration_s)
             if self.playing or self._changing:
                 while not self._closing and (left := 1.0 / self._pace - (time.monotonic() - now)) > 0.0:
                     time.sleep(min(left, 1.0 / _POSES_PER_S))  # the pace may change meanwhile

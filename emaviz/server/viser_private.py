@@ -49,6 +49,31 @@ class Inside:
         if state is not None and not control._impl.is_button:
             state.message_buffer.push(_messages.GuiUpdateMessage(control._impl.uuid, {"value": control.value}))
 
+    def show_panel(self, client: int, panel: viser.PanelHandle, visible: bool, width_px: int | None = None) -> None:
+        """Shows a panel in one page alone, or hides it there; every other page keeps its own."""
+        self._push(client, _messages.GuiUpdateMessage(panel._impl.uuid, {"visible": visible}))
+        if width_px is not None:
+            self.set_width(client, panel, width_px)
+
+    def set_width(self, client: int, panel: viser.PanelHandle, width_px: int) -> None:
+        """How wide a panel is in one page."""
+        gui = self._server.gui
+        placed = gui._next_layout_counter(), gui._layout_run_id
+        self._push(client, _messages.GuiSetPanelWidthMessage(panel._placement_uuid, width_px, *placed))
+
+    def run(self, source: str, client: int | None = None) -> None:
+        """Runs JavaScript in one page, or in every page that is or will be open; `source` is never a user's text."""
+        message = _messages.RunJavascriptMessage(source=source)
+        if client is None:
+            self._server.gui._websock_interface.queue_message(message)
+        else:
+            self._push(client, message)
+
+    def _push(self, client: int, message: Any) -> None:
+        state = self._server._websock_server._client_state_from_id.get(client)
+        if state is not None:
+            state.message_buffer.push(message)
+
     def _guis(self, client: int | None) -> list[Any]:
         page = self._server.get_clients().get(client) if client is not None else None
         return [self._server.gui] + ([page.gui] if page else [])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -24,6 +25,7 @@ Array = NDArray[np.float64]
 MOST_FRAMES = 200  # of a swarm, kept to look at again
 _PAUSE_S = 0.01  # between two looks whether to go on; sliders are answered in between
 _CURRENT_EVERY = 4  # iterations
+_SEARCH_SHARE = 0.6  # of an identification's time, about; model bias and intervals take the rest
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +50,16 @@ class Track:
     stride: int = 1
     current_A: Array | None = None  # (blocks,), of the best
     answer: Identification | None = None
+    fitting: tuple[str, float] | None = None  # after the last iteration: what goes on, and its share done
+
+    @property
+    def share(self) -> float:
+        """Of its work that is done, 0 … 1."""
+        if self.answer is not None:
+            return 1.0
+        if self.fitting is not None:
+            return _SEARCH_SHARE + (1.0 - _SEARCH_SHARE) * min(self.fitting[1], 0.99)
+        return _SEARCH_SHARE * len(self.rmse) / (self.iterations + 1.0)
 
     @property
     def k(self) -> Array | None:
@@ -83,6 +95,8 @@ class Race:
     truth: Array | None  # (8,), of the sliders' plant
     measurement: Measurement  # what is identified
     objective: Objective  # and its cost
+    began_s: float = field(default_factory=time.monotonic)
+    known: bool = False  # the actuator's own parameters are exact, as in a simulation of the same file
     growing: Path | None = None  # of the recording, while it is written
     path: Path | None = None  # and once it is whole
 
@@ -90,6 +104,11 @@ class Race:
     def source(self) -> str:
         """What is identified, as a person reads it."""
         return self.settings.source or "the sliders' plant"
+
+    @property
+    def share(self) -> float:
+        """Of the work that is done, 0 … 1."""
+        return sum(track.share for track in self.tracks.values()) / len(self.tracks)
 
     @property
     def answers(self) -> list[Identification]:
@@ -176,21 +195,38 @@ def _elsewhere(read: Callable[[], Measurement]) -> Generator[None, None, Measure
     return found[0]
 
 
-def begin(settings: Settings, objective: Objective, truth: Array | None) -> Race:
-    """A race that has not started."""
+def begin(settings: Settings, objective: Objective, truth: Array | None, known: bool | None = None) -> Race:
+    """A race that has not started; known: see `Race`, by default where the truth is."""
     window = objective.windows[0]
     time = objective.measurements[0].time_s[0] + window.block_s * (1.0 + np.arange(window.blocks))
     tracks = {name: Track(name, settings.iterations) for name in settings.algorithms}
     measured_A = objective.target[: window.blocks]
-    return Race(settings, tracks, time, measured_A, truth, objective.recorded[0], objective)
+    return Race(
+        settings,
+        tracks,
+        time,
+        measured_A,
+        truth,
+        objective.recorded[0],
+        objective,
+        known=truth is not None if known is None else known,
+    )
 
 
 def run(race: Race, objective: Objective, reins: Reins, tell: Callable[[Race, Progress | None], None]) -> Steps:
     """All optimisers to their ends, an iteration of each in turn.
 
-    tell(race, progress): after each iteration; progress is None after an optimiser's end.
+    tell(race, progress): after each iteration; progress is None while the answer is fitted, and after its end.
     """
     settings = race.settings
+
+    def fitting(track: Track) -> Callable[[str, float], None]:
+        def told(text: str, share: float) -> None:
+            track.fitting = text, max(share, track.fitting[1] if track.fitting else 0.0)
+            tell(race, None)
+
+        return told
+
     searches = {
         name: steps(
             objective,
@@ -199,7 +235,8 @@ def run(race: Race, objective: Objective, reins: Reins, tell: Callable[[Race, Pr
             iterations=settings.iterations,
             seed=settings.seed,
             truth=race.truth,
-            parameters_known=race.truth is not None,
+            parameters_known=race.known,
+            on_fit=fitting(race.tracks[name]),
         )
         for name in race.tracks
     }

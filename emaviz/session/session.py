@@ -32,6 +32,9 @@ if TYPE_CHECKING:  # rerun may be missing or broken, and takes a second to impor
     from emaviz.recording.story import IdentificationStory
 
 
+OWN_PLANT = "the actuator's file"
+
+
 @dataclass(frozen=True)
 class Simulation:
     """A run of both models, and what it was asked for."""
@@ -41,8 +44,8 @@ class Simulation:
     k: NDArray[np.float64]
     elapsed_s: float
     command: str = ""  # its family
-    monitor_faults: str = "healthy"  # whose faults the monitor model has
-    asked: bool = True  # by the user, and not because something else has ended
+    model: str = "healthy"  # whose faults the monitor model has, in words
+    plant: str = ""  # which model plays the plant, in words, where it is not the actuator's file
 
 
 @dataclass
@@ -55,6 +58,7 @@ class Events:
     ended: list[Callable[[], None]] = field(default_factory=list)  # an identification, with an answer or without
     told: list[Callable[[str, str], None]] = field(default_factory=list)  # title, one line
     status: list[Callable[[str], None]] = field(default_factory=list)
+    plants: list[Callable[[], None]] = field(default_factory=list)  # the plant is another model's
 
 
 class Session:
@@ -66,6 +70,9 @@ class Session:
         self.settings = Settings(axes=actuator.axes, k=actuator.k)  # the plant, as its file knows this unit
         self.events = Events()
         self.identified: Identification | None = None
+        self.identified_at: datetime | None = None
+        self.plants: dict[str, Actuator] = {OWN_PLANT: actuator}  # that may play the plant, by what they are
+        self.plant = OWN_PLANT
         self.simulation: Simulation | None = None
         self.ready = threading.Event()
         self.reins = Reins()  # of the identification that runs, or ran last
@@ -81,17 +88,45 @@ class Session:
         self.reins.stop()
         self.worker.close()
 
+    # --- the plant's model ------------------------------------------------------------------------------------------
+
+    def take_plant(self, name: str, actuator: Actuator) -> None:
+        """An improved actuator plays the plant from now on; InputError where Explore cannot simulate it."""
+        own = self.actuator
+        if actuator.axes != own.axes or actuator.has_reference_model != own.has_reference_model:
+            raise InputError(f"Explore was started with {own.name}, of which this is no improved model")
+        if not plant.can_be_explored(actuator):
+            raise InputError(plant.note(actuator))
+        self.plants[name] = actuator
+        self.choose_plant(name)
+
+    def choose_plant(self, name: Any) -> None:
+        """One of `plants` plays the plant from now on; the sliders go to its own faults."""
+        if name not in self.plants:
+            raise InputError(f"no such model: {quoted(name, 60)}; choose one of the list")
+        self.plant = str(name)
+        for index, value in enumerate(self.plants[self.plant].k):
+            self.settings.set_fault(index, value)
+        notify(self.events.plants)
+
+    def model_in_words(self, monitor: str) -> str:
+        """'healthy', 'same faults', 'identified 16:09'."""
+        if monitor != "identified":
+            return monitor
+        return "identified: nothing yet" if self.identified_at is None else f"identified {self.identified_at:%H:%M}"
+
     # --- simulation -------------------------------------------------------------------------------------------------
 
-    def refresh(self, asked: bool = True) -> None:
+    def refresh(self) -> None:
         """Simulates the current settings soon; of several requests the last one counts."""
-        self.worker.post("simulate", lambda: self._simulate(asked))
+        self.worker.post("simulate", self._simulate)
 
-    def _simulate(self, asked: bool = True) -> None:
+    def _simulate(self) -> None:
         if not self.ready.is_set() or not plant.can_be_explored(self.actuator):
             return  # the warm-up ends with a simulation
         settings = copy.deepcopy(self.settings)
-        compiling = not plant.is_compiled(self.actuator, settings.effects)
+        name, actuator = self.plant, self.plants[self.plant]
+        compiling = not plant.is_compiled(actuator, settings.effects)
         if compiling:
             notify(self.events.status, "Compiling the plant with the library of effects…")
         started = time.perf_counter()
@@ -101,12 +136,12 @@ class Session:
         try:
             reference = plant.simulate(
                 run,
-                self.actuator,
+                actuator,
                 settings.k,
                 settings.effects,
                 start_rad=start,
                 start_speed_rad_s=settings.start_speed_rad_s,
-                start_play_rad=settings.start_play_rad(self.actuator),
+                start_play_rad=settings.start_play_rad(actuator),
             )
             monitor = simulate_monitor(run, self.actuator, shown, start_rad=start)
         except FloatingPointError as error:
@@ -115,7 +150,10 @@ class Session:
         if compiling:
             notify(self.events.status, f"Ready ({elapsed:.1f} s).")
         reference = settings.sensors.record(reference, settings.seed)
-        self.simulation = Simulation(reference, monitor, settings.k, elapsed, settings.command, settings.monitor, asked)
+        model = self.model_in_words(settings.monitor)
+        self.simulation = Simulation(
+            reference, monitor, settings.k, elapsed, settings.command, model, "" if name == OWN_PLANT else name
+        )
         notify(self.events.simulated, self.simulation)
 
     def _warm_up(self) -> None:
@@ -157,9 +195,9 @@ class Session:
     def _identification(self, settings: Settings, reins: Reins) -> Steps:
         story = None
         try:
-            measurement, truth = yield from target(settings, self.actuator, self.open_file)
+            measurement, truth = yield from target(settings, self.plants[self.plant], self.open_file)
             objective = Objective([measurement], self.actuator, fitness=settings.fitness)
-            race = begin(settings, objective, truth)
+            race = begin(settings, objective, truth, known=truth is not None and self.plant == OWN_PLANT)
             story = self._story(race, objective, measurement)
             race.growing = None if story is None else story.path
 
@@ -167,6 +205,8 @@ class Session:
                 if story is not None and progress is not None:
                     story.iteration(progress)
                 notify(self.events.progressed, race)
+                if progress is None:
+                    self.worker.breathe()  # the sliders, while the answer is fitted
 
             yield from run(race, objective, reins, tell)
             self._keep(race, story)
@@ -180,9 +220,7 @@ class Session:
     def _keep(self, race: Race, story: IdentificationStory | None) -> None:
         best = race.best
         assert best is not None and best.answer is not None, "the race is over"
-        self.identified = best.answer
-        if race.truth is not None:
-            self.settings.monitor = "identified"
+        self.identified, self.identified_at = best.answer, datetime.now()
         if story is not None:
             others = [answer for answer in race.answers if answer is not best.answer]
             story.finish(best.answer, *others)
@@ -190,8 +228,8 @@ class Session:
             if story.failed:
                 notify(self.events.told, "The recording could not be written", story.failed)
         notify(self.events.identified, race)
-        if race.truth is not None:
-            self.refresh(asked=False)
+        if self.settings.monitor == "identified":
+            self.refresh()
 
     def _story(self, race: Race, objective: Objective, measurement: Measurement) -> IdentificationStory | None:
         settings = race.settings

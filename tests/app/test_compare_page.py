@@ -219,7 +219,7 @@ def test_files_of_the_command_line_open_on_compare(browser, recording, tmp_path)
         page.goto(app.address)
         page.get_by_role("button", name="Upload a recording").wait_for(timeout=60_000)
         page.get_by_text("Compared in").wait_for(timeout=60_000)
-        page.get_by_text("Where the model fails").wait_for()
+        page.get_by_text("Where the model fails", exact=True).wait_for()
         page.close()
     finally:
         app.close()

@@ -264,7 +264,6 @@ def test_a_landscape_is_stopped(page, app, monkeypatch):
 
     monkeypatch.setattr(type(race.objective), "__call__", slow)
     show(page, "Identify")
-    page.get_by_role("button", name="Show the search").click()
     show(page, "Landscape")
     choose(page, "Map upwards", "k2 backlash")
     page.get_by_role("button", name="Draw the landscape").click()
@@ -303,7 +302,6 @@ def test_a_separating_command_is_set_in_explore(page, app):
     answer = race.best.answer
     race.best.answer = replace(answer, uncertainty=replace(answer.uncertainty, separated_by=sine))
     show(page, "Identify")
-    page.get_by_role("button", name="Show the search").click()
     show(page, "Answer")
     app.identify._result.draw()
     page.get_by_text("a sine with amplitude 0.05 rad, frequency 2 Hz, for 0.4 s").wait_for()

@@ -135,13 +135,13 @@ def test_two_effects_undo_and_a_wrong_answer(discover, app):
     fitted, held = errors(app)
     assert fitted[0] > fitted[1] > fitted[2] and fitted[2] < 1.1 and held[2] < 1.1
     page.get_by_text("Your answer agrees.").wait_for()
-    explored = app.playback.motion
+    measured = app.playback.motion
     page.get_by_label("3D actuator", exact=True).click()
     page.get_by_role("option", name="model with them").click()
-    wait_until(lambda: app.playback.motion is not explored, 20.0)
+    wait_until(lambda: app.playback.motion is not measured, 20.0)
     page.get_by_label("3D actuator", exact=True).click()
-    page.get_by_role("option", name="Explore's plant").click()
-    wait_until(lambda: np.array_equal(app.playback.motion.motor_rad, explored.motor_rad), 20.0)
+    page.get_by_role("option", name="as measured").click()
+    wait_until(lambda: np.array_equal(app.playback.motion.motor_rad, measured.motor_rad), 20.0)
     page.get_by_text("Load-dependent friction had been masked").wait_for()
     page.get_by_text("Nothing of the library would take away more than chance does.").wait_for()
 

@@ -26,11 +26,16 @@ class CampaignControls:
     """Controls on the left, the tables in a panel on the right; files are read on the worker `files`."""
 
     def __init__(
-        self, page: Page, campaigns: Campaigns, files: Worker, panel: viser.PanelHandle, to_front: Callable[[], None]
+        self,
+        page: Page,
+        campaigns: Campaigns,
+        files: Worker,
+        panel: viser.PanelHandle,
+        opened: Callable[[Path, Measurement], None],
     ) -> None:
-        self._page, self._campaigns, self._files, self._to_front = page, campaigns, files, to_front
+        """opened(path, run): a row was simulated again, and is recorded there."""
+        self._page, self._campaigns, self._files = page, campaigns, files
         self._rows: dict[str, str] = {}  # names of the rows, by what the list says of them
-        self.opened: Callable[[Path, Measurement], None] = lambda path, run: None
         gui = page.server.gui
         with gui.add_folder("Campaigns", expand_by_default=False):
             self._choice: Any = gui.add_dropdown("Campaign", (NONE,))
@@ -41,12 +46,12 @@ class CampaignControls:
             again = gui.add_button("Look for campaigns again", icon=viser.Icon.REFRESH, color="gray")
         with panel.add_tab("Campaign", viser.Icon.TABLE):
             self._tables = add_html(gui, _box("Choose a campaign on the left."))
-        self._choice.on_update(lambda event: event.client and self._post(lambda: self._show(True)))
+        self._choice.on_update(lambda event: event.client and self._post(self._show))
         self._group.on_update(lambda event: event.client and self._post(self._show_rows))
         self._open.on_click(lambda _: self._post(self._open_chosen))
         again.on_click(lambda _: self._post(self.refresh))
         campaigns.events.said.append(lambda text: page.screen.post("campaign", lambda: self._say(text)))
-        campaigns.events.opened.append(lambda path, run: self._post(lambda: self.opened(path, run)))
+        campaigns.events.opened.append(lambda path, run: self._post(lambda: opened(path, run)))
         self._post(self.refresh)
 
     # --- on the files' thread ---------------------------------------------------------------------------------------
@@ -57,9 +62,9 @@ class CampaignControls:
         self._choice.options = names
         if self._choice.value not in names:
             self._choice.value = names[0]
-        self._show(False)
+        self._show()
 
-    def _show(self, bring: bool) -> None:
+    def _show(self) -> None:
         name = str(self._choice.value)
         if name == NONE:
             return
@@ -68,8 +73,6 @@ class CampaignControls:
         self._tables.content = tables(store)
         self._say(_progress(store))
         self._show_rows()
-        if bring:
-            self._to_front()
 
     def _show_rows(self) -> None:
         if self._choice.value == NONE:

@@ -32,6 +32,10 @@ class KeepControls:
         record.on_click(lambda _: comparing.record())
         comparing.events.kept.append(lambda path: page.screen.post("kept", lambda: self._kept(path)))
 
+    def clear(self) -> None:
+        """Another comparison is shown: what was kept of the one before is told no more."""
+        self._links.content = ""
+
     def _kept(self, path: Path) -> None:
         if path.suffix == ".rrd":
             self._links.content = recording_link(self._viewer, path)

@@ -1,25 +1,42 @@
-"""Holds the 3D actuator where it was at one moment of a recording."""
+"""A compared recording on the 3D actuator: as measured, the screw glowing where the model fails."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from ema_model.comparison.result import Comparison
+from ema_model.actuator import Actuator
+from ema_model.comparison.result import Compared, Comparison
 from ema_model.faults import HEALTHY
-from emaviz.scene.actuator import ActuatorScene
-from emaviz.scene.playback import Playback
-from emaviz.session.session import Simulation
+from ema_model.recordings import Measurement
+from emaviz.scene.motion import Motion, motion
+
+_FULL = 4.0  # times its floor, at which a residual glows fully
 
 
-def hold(playback: Playback, scene: ActuatorScene, comparison: Comparison, recording: int, time_s: float) -> None:
-    """Stops the playing picture, and turns rotor and surface as measured (or, unmeasured, as the model has them)."""
-    playback.play(False)
-    compared = comparison.recordings[recording]
-    at = int(np.argmin(np.abs(compared.time_s - time_s)))
+def motion_of(comparison: Comparison, compared: Compared, actuator: Actuator) -> Motion | None:
+    """What was measured of it, and of the model what was not; None without a motor position, as of a static map."""
     signals = {**compared.model, **compared.measured}
-    motor, user = (signals.get(name) for name in ("motor_position_rad", "user_position_rad"))
-    enlarged = 1.0
-    if "user_position_rad" in compared.measurement:
-        whole = compared.measurement
-        enlarged = playback.exaggeration(Simulation(whole, whole, HEALTHY, 0.0))
-    scene.pose(0.0 if motor is None else float(motor[at]), 0.0 if user is None else enlarged * float(user[at]))
+    motor = signals.get("motor_position_rad")
+    if motor is None or comparison.residuals.is_map or len(compared.time_s) < 2:
+        return None
+    still = np.zeros_like(motor)
+    time_s = compared.time_s
+    run = Measurement(
+        {
+            "time_s": time_s,
+            "current_A": signals.get("current_A", still),
+            "motor_position_rad": motor,
+            "motor_speed_rad_s": np.gradient(motor, time_s),
+            "user_position_rad": signals.get("user_position_rad", actuator.transmission.gear_ratio * motor),
+        },
+        compared.name,
+    )
+    shown = motion(run, HEALTHY, actuator)
+    name = comparison.primary
+    if name not in compared.measured:
+        return shown
+    error = np.abs(compared.measured[name] - compared.model[name]) / compared.sigma[name]
+    glow = np.clip((error - 1.0) / (_FULL - 1.0), 0.0, 1.0)
+    return replace(shown, heat=glow, says=f"Screw: the residual (full at {_FULL:g} times its floor).")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -11,8 +12,12 @@ import viser
 from ema_model.comparison.result import Comparison, Region
 from ema_model.quantities.numbers import number
 from emaviz.figures import mapped_columns, quantity
+from emaviz.page.compare import WORKSPACE
+from emaviz.page.compare.moment import motion_of
 from emaviz.page.compare.plots import ComparePlots, View
+from emaviz.page.kept import Cleared
 from emaviz.page.page import Page
+from emaviz.page.playback import PlaybackStrip
 from emaviz.session.opened import Opened
 from emaviz.text.html import Html, add_html, html, joined, unescaped
 
@@ -23,24 +28,27 @@ _RESTING = (
 )
 _CHOSEN = "background:rgba(224,49,49,.14)!important;color:inherit!important;border-left:3px solid #e03131;"
 _CONFIG = {"displayModeBar": False, "responsive": False}
+_PLAYING_REDRAW_S, _LEAST_MOVE_S = 1.0, 1e-4
 
 
 class ResultPanel:
     """Everything here is built and changed on the screen's thread.
 
-    to_front(): makes this panel the one that is seen; moment(comparison, recording, time_s): moves the 3D actuator;
+    strip: its clock, for Compare's recording on the 3D actuator; leads(): adds what may follow, below the answer;
     keep(): adds what saves a comparison, below the plots.
     """
 
     def __init__(
         self,
         page: Page,
-        to_front: Callable[[], None],
-        moment: Callable[[Comparison, int, float], None],
-        keep: Callable[[], object],
+        strip: PlaybackStrip,
+        leads: Callable[[], object],
+        keep: Callable[[], Cleared],
     ) -> None:
-        self._page, self._to_front, self._moment = page, to_front, moment
+        self._page, self._strip = page, strip
+        self._drawn_at = 0.0
         self._comparison: Comparison | None = None
+        self._time_s = 0.0  # where the clock stood when the plots were drawn last
         self._region: Region | None = None
         self._preview: Any = None
         self._buttons: list[Any] = []
@@ -51,15 +59,17 @@ class ResultPanel:
         with self._answer:
             self._hint = add_html(gui)
             self._style = add_html(gui)
+        self._next = gui.add_folder("Next", visible=False)
+        with self._next:
+            leads()
         self._plots_folder = gui.add_folder("Plots", visible=False)
         with self._plots_folder:
             self._recording = gui.add_dropdown("Recording", ["–"], visible=False)
-            self._playhead = gui.add_slider("Moment [s]", 0.0, 1.0, 1e-3, 0.0)
             self._plots = ComparePlots(page)
         self._save = gui.add_folder("Keep it", visible=False)
         with self._save:
-            keep()
-        self._playhead.on_update(lambda event: event.client and self._scrubbed())
+            self._kept = keep()
+        strip.moves.append(self._moved)
         self._recording.on_update(lambda event: event.client and self._chosen())
 
     # --- before a comparison ----------------------------------------------------------------------------------------
@@ -75,7 +85,6 @@ class ResultPanel:
         self._headline.content = html("<div {}><b>{}</b>, as its columns are read</div>", _BOX, opened.path.name)
         self._place.visible = True
         self._show_answer(False)
-        self._to_front()
 
     def end_preview(self) -> None:
         """Back to the comparison, if there is one."""
@@ -85,7 +94,7 @@ class ResultPanel:
             self._show_answer(True)
 
     def _show_answer(self, visible: bool) -> None:
-        for folder in (self._answer, self._plots_folder, self._save):
+        for folder in (self._answer, self._next, self._plots_folder, self._save):
             folder.visible = visible
 
     # --- the comparison ---------------------------------------------------------------------------------------------
@@ -99,8 +108,8 @@ class ResultPanel:
             names = [f"{i + 1}. {one.name}" for i, one in enumerate(comparison.recordings)]
             self._recording.options, self._recording.value = names, names[0]
             self._recording.visible = len(names) > 1
-            self._fit_playhead(0)
-        self._to_front()
+            self._kept.clear()
+        self._put(0)
         self._plots.begin(View(comparison))
 
     def select(self, index: int) -> None:
@@ -113,8 +122,7 @@ class ResultPanel:
         recording, time_s = worst_moment(comparison, region)
         self._style_regions(index)
         self._recording.value = self._recording.options[recording]
-        self._fit_playhead(recording, time_s)
-        self._moment(comparison, recording, time_s)
+        self._put(recording, time_s)
         self._plots.show(View(comparison, recording, region, time_s))
 
     def _list_regions(self, comparison: Comparison) -> None:
@@ -143,11 +151,13 @@ class ResultPanel:
             rules.append(f"{one} .mantine-Button-label{{white-space:normal;text-align:left;line-height:1.3}}")
         self._style.content = unescaped(f"<style>{''.join(rules)}</style>")
 
-    def _fit_playhead(self, recording: int, time_s: float | None = None) -> None:
-        assert self._comparison is not None
-        times = self._comparison.recordings[recording].time_s
-        self._playhead.min, self._playhead.max = float(times[0]), float(times[-1])
-        self._playhead.value = float(times[0]) if time_s is None else time_s
+    def _put(self, recording: int, time_s: float | None = None) -> None:
+        """Another recording on the actuator, at a moment or at its start."""
+        comparison = self._comparison
+        assert comparison is not None
+        one = comparison.recordings[recording]
+        self._time_s = float(one.time_s[0]) if time_s is None else time_s
+        self._strip.put(motion_of(comparison, one, comparison.actuator), WORKSPACE.name, self._time_s)
 
     def _at(self) -> int:
         options = list(self._recording.options)
@@ -156,19 +166,21 @@ class ResultPanel:
     def _chosen(self) -> None:
         def change() -> None:
             if self._comparison is not None:
-                self._fit_playhead(self._at())
+                self._put(self._at())
                 self._plots.show(View(self._comparison, self._at(), self._region))
 
         self._page.screen.post("recording shown", change)
 
-    def _scrubbed(self) -> None:
-        def change() -> None:
-            if self._comparison is not None:
-                time_s = float(self._playhead.value)
-                self._moment(self._comparison, self._at(), time_s)
-                self._plots.move(View(self._comparison, self._at(), self._region, time_s))
-
-        self._page.screen.post("play-head", change)
+    def _moved(self, on: str, time_s: float, _: tuple[float, float]) -> None:
+        """The clock has moved: the charts' line follows, while it plays once a second, as drawing them takes long."""
+        comparison = self._comparison
+        if on != WORKSPACE.name or comparison is None or abs(time_s - self._time_s) < _LEAST_MOVE_S:
+            return
+        if self._strip.playback.playing and time.monotonic() - self._drawn_at < _PLAYING_REDRAW_S:
+            return
+        self._time_s = time_s
+        self._plots.move(View(comparison, self._at(), self._region, time_s))
+        self._drawn_at = time.monotonic()
 
 
 def worst_moment(comparison: Comparison, region: Region) -> tuple[int, float]:

@@ -20,8 +20,10 @@ from emaviz.session.actuators import UPLOADED
 from emaviz.session.compare.comparing import Comparing
 from emaviz.session.data_folder import ACTUATOR_SUFFIX, CHALLENGE_SUFFIX, SESSION_SUFFIX
 from emaviz.session.opened import Opened
+from emaviz.session.pace import Pace
 from emaviz.session.uploads import Uploads
 from emaviz.text.html import Html, add_html, said
+from emaviz.text.time_left import going_on
 
 _NONE = "–"
 
@@ -33,6 +35,7 @@ class ComparePanel:
         self._page, self._comparing, self._result = page, comparing, result
         self._shown: str | None = None
         self._again = False
+        self._pace = Pace()
         self.session_uploaded: Callable[[Path], None] = lambda path: None  # a whole session, not a recording
         self.challenge_uploaded: Callable[[Path], None] = lambda path: None  # a sealed one, for Discover
         gui = page.server.gui
@@ -49,6 +52,7 @@ class ComparePanel:
         self._mapping = MappingStep(page, comparing, result.preview)
         self._start = gui.add_button("Compare", icon=viser.Icon.ARROWS_DIFF, disabled=True)
         self._stop = gui.add_button("Stop", icon=viser.Icon.PLAYER_STOP, color="red", disabled=True)
+        self._bar = gui.add_progress_bar(0.0, visible=False)
         self._status = add_html(gui)
         self._health_folder = gui.add_folder("Data health", visible=False)
         with self._health_folder:
@@ -63,7 +67,7 @@ class ComparePanel:
         events = comparing.events
         events.opened.append(lambda opened: page.screen.post(f"opened {opened.name}", lambda: self._opened(opened)))
         events.removed.append(lambda: page.screen.post("removed", self._removed))
-        events.progressed.append(lambda text: page.screen.post("compare progress", lambda: self._say(text)))
+        events.progressed.append(lambda text: page.screen.post("compare progress", lambda: self._progressed(text)))
         events.compared.append(lambda *found: page.screen.post("compared", lambda: self._compared(*found)))
         events.ended.append(lambda why: page.screen.post("compare ended", lambda: self._ended(why)))
         self.refresh_files()
@@ -165,6 +169,8 @@ class ComparePanel:
             return
         if started:
             self._again = False
+            self._pace.begin("compare, calibrated" if self._comparing.calibrate else "compare")
+            self._bar.value, self._bar.visible = 0.0, True
             self._start.disabled, self._stop.disabled = True, False
             ready = self._comparing.session.ready.is_set()
             self._say("Comparing…" if ready else "Waiting for the models to be compiled…")
@@ -176,7 +182,15 @@ class ComparePanel:
     def _say(self, text: str) -> None:
         self._status.content = said(text)
 
+    def _progressed(self, text: str) -> None:
+        if not self._comparing.running:
+            return
+        elapsed, share = self._pace.at(text)
+        self._bar.value, self._bar.animated = (100.0, True) if share is None else (100.0 * share, False)
+        self._say(f"{text[:1].upper()}{text[1:]} … {going_on(elapsed, share)}")
+
     def _compared(self, comparison: Comparison, elapsed_s: float) -> None:
+        self._pace.end()
         self._free()
         fitted = "" if comparison.calibration is None else f", calibrated in {comparison.calibration.evaluations} steps"
         self._say(f"Compared in {elapsed_s:.1f} s{fitted}.")
@@ -189,6 +203,7 @@ class ComparePanel:
         self._follow()
 
     def _free(self) -> None:
+        self._bar.visible = False
         self._start.disabled, self._stop.disabled = not self._comparing.opened, True
 
     def _follow(self) -> None:

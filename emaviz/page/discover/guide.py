@@ -56,11 +56,12 @@ def step(look: Look | None, running: bool, opened: str | None, revealed: bool) -
 
 
 class Guide:
-    """A box on top of the tab; begin() chooses the first challenge, on the screen's thread."""
+    """A box on top of the tab, there while its challenge is shown; begin() chooses that, on the screen's thread."""
 
     def __init__(self, page: Page, discovering: Discovering, begin: Callable[[], None]) -> None:
         self._discovering, self._begin = discovering, begin
         self._on = False
+        self._challenge = ""  # that it speaks of
         self._last: tuple[Look | None, str | None] = (None, None)
         gui = page.server.gui
         self._offer = gui.add_button("Guided first challenge", icon=viser.Icon.SCHOOL, hint="About three minutes")
@@ -80,8 +81,10 @@ class Guide:
 
     def refresh(self) -> None:
         """Says what is to be done now; on the screen's thread."""
+        here = self._on and self._discovering.source.chosen == self._challenge
+        self._folder.visible = here
         self._offer.visible = not self._on and self._last[0] is None
-        if self._on:
+        if here:
             look, opened = self._last
             at, text = step(look, self._discovering.running, opened, self._discovering.source.revealed)
             line = said(html("<b>Step {} of {}.</b> {}", at, STEPS, text))
@@ -89,12 +92,11 @@ class Guide:
                 self._text.content = line
 
     def _start(self) -> None:
-        self._on = True
-        self._folder.visible = True
         self._begin()
+        self._on = True
+        self._challenge = self._discovering.source.chosen
         self.refresh()
 
     def _end(self) -> None:
         self._on = False
-        self._folder.visible = False
         self.refresh()

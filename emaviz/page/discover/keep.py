@@ -32,6 +32,10 @@ class DiscoveryKeep:
         events.kept.append(lambda path: page.screen.post(f"kept {path.suffix}", lambda: self._kept(path)))
         events.verified.append(lambda path, text: page.screen.post("verified", lambda: self._name(path, text)))
 
+    def clear(self) -> None:
+        """Another model is shown: what was kept of the one before is told no more."""
+        self._links.content = ""
+
     def _ask(self, client: viser.ClientHandle | None, suffix: str) -> None:
         self._asked = client
         self._discovering.keep(suffix)

@@ -23,9 +23,11 @@ _ASK = "Of all tests that the actuator can follow, the one that would tell the t
 
 
 class NextTest:
-    """A folder of the panel on the right.  load(experiment) puts a test into Explore."""
+    """A folder of the panel on the right.  load(experiment, client) takes a test, and the window, to Explore."""
 
-    def __init__(self, page: Page, discovering: Discovering, load: Callable[[Experiment], None]) -> None:
+    def __init__(
+        self, page: Page, discovering: Discovering, load: Callable[[Experiment, viser.ClientHandle | None], None]
+    ) -> None:
         self._page, self._discovering = page, discovering
         gui = page.server.gui
         self._folder = gui.add_folder("Try this test next", visible=False)
@@ -36,7 +38,9 @@ class NextTest:
             self._csv = gui.add_button(
                 "Command as CSV", icon=viser.Icon.FILE_SPREADSHEET, color="gray", visible=False, hint="For a test rig"
             )
-        self._load.on_click(lambda _: page.screen.post("load test", lambda: self._with(load)))
+        self._load.on_click(
+            lambda event: page.screen.post("load test", lambda: self._with(lambda one: load(one, event.client)))
+        )
         self._csv.on_click(self._send)
         discovering.events.unsuggested.append(lambda: page.screen.post("unsuggested", self._nothing))
 

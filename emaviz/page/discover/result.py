@@ -13,7 +13,7 @@ from ema_model.discovery.tracks import Track, tracks
 from ema_model.discovery.words import FLOOR_NOTE, headline, sentences
 from ema_model.effects import CATALOGUE
 from ema_model.quantities.numbers import number
-from ema_model.recordings import SIGNALS, Measurement
+from ema_model.recordings import SIGNALS
 from emaviz.figures import error_ladder, explained_steps, missing_curve, residual_steps
 from emaviz.figures.model_equation import equation
 from emaviz.page.discover import cards
@@ -21,7 +21,9 @@ from emaviz.page.discover.actuator import ActuatorSwitch
 from emaviz.page.discover.effect import CONFIG, EffectView
 from emaviz.page.discover.next_experiment import NextTest
 from emaviz.page.discover.reveal import reveal
+from emaviz.page.kept import Cleared
 from emaviz.page.page import Page
+from emaviz.page.playback import PlaybackStrip
 from emaviz.session.discover.discovering import Discovering
 from emaviz.text.html import Html, add_html, html, joined
 
@@ -34,19 +36,20 @@ _RESTING = Html(
 class DiscoveryPanel:
     """Everything here is built and changed on the screen's thread.
 
-    keep() adds what saves a discovery, load(test) puts a test into Explore, play(run) shows a run on the 3D actuator.
+    keep() adds what saves a discovery, load(test, client) puts a test into Explore; strip: its clock, for the recording
+    on the 3D actuator; leads() adds what may follow.
     """
 
     def __init__(
         self,
         page: Page,
         discovering: Discovering,
-        to_front: Callable[[], None],
-        keep: Callable[[], object],
-        load: Callable[[Any], None],
-        play: Callable[[Measurement | None], None],
+        strip: PlaybackStrip,
+        keep: Callable[[], Cleared],
+        leads: Callable[[], object],
+        load: Callable[[Any, viser.ClientHandle | None], None],
     ) -> None:
-        self._page, self._discovering, self.to_front = page, discovering, to_front
+        self._page, self._discovering = page, discovering
         self._look: Look | None = None
         self._titles: dict[str, str] = {}
         gui = page.server.gui
@@ -64,7 +67,7 @@ class DiscoveryPanel:
         with self._before_folder:
             self._recording = gui.add_dropdown("Recording", ["–"])
             self._signal = gui.add_dropdown("Signal", ["–"])
-            self._actuator = ActuatorSwitch(page, self._track, play)
+            self._actuator = ActuatorSwitch(page, discovering, self._track, strip)
             self._residual: Any = gui.add_plotly(go.Figure(), config=CONFIG, aspect=0.5, visible=False)
             self._explained: Any = gui.add_plotly(go.Figure(), config=CONFIG, aspect=0.6, visible=False)
         self._left_folder = gui.add_folder("What is left", visible=False, expand_by_default=False)
@@ -73,7 +76,8 @@ class DiscoveryPanel:
         self._next = NextTest(page, discovering, load)
         self._keep_folder = gui.add_folder("Keep it", visible=False)
         with self._keep_folder:
-            keep()
+            self._kept = keep()
+            leads()
         self._recording.on_update(lambda event: event.client and page.screen.post("residual", self._draw_residual))
         self._signal.on_update(lambda event: event.client and page.screen.post("residual", self._draw_residual))
         self._reveal.on_click(lambda _: page.screen.post("reveal", self._revealed))
@@ -91,11 +95,11 @@ class DiscoveryPanel:
     def open(self, name: str | None) -> None:
         """Opens a candidate, or closes it."""
         self._effect.open(self._look, name)
-        if name is not None:
-            self.to_front()
 
     def show(self, look: Look | None) -> None:
         """A story as it stands."""
+        if look is None or self._look is None or look.found.actuator is not self._look.found.actuator:
+            self._kept.clear()  # what was saved is of another model
         self._look = look
         for folder in (self._before_folder, self._keep_folder):
             folder.visible = look is not None
@@ -108,6 +112,7 @@ class DiscoveryPanel:
             self._truth.content = ""
         if look is None:
             self._headline.content = html("<div {}>{}</div>", cards.BOX, _RESTING)
+            self._actuator.refresh()
             return
         found = look.found
         self._headline.content = answer(look)
@@ -126,7 +131,6 @@ class DiscoveryPanel:
         self._draw_explained(look)
         if self._discovering.source.revealed:
             self._show_truth()
-        self.to_front()
 
     def _draw_residual(self) -> None:
         if self._look is None:
@@ -136,8 +140,7 @@ class DiscoveryPanel:
         if track is not None:
             self._residual.figure = residual_steps.figure(track, signal)
             self._residual.visible = True
-        if self._actuator.active:
-            self._actuator.refresh()
+        self._actuator.refresh()
 
     def _track(self) -> Track | None:
         """The recording that is looked at."""

@@ -13,27 +13,32 @@ from ema_model.discovery.words import effect_title
 from ema_model.effects import CATALOGUE
 from ema_model.quantities.numbers import number
 from emaviz.page.discover import cards
+from emaviz.page.discover.entries import EntriesControl
 from emaviz.page.discover.guide import Guide
 from emaviz.page.discover.own_effect import OwnEffect
 from emaviz.page.discover.result import DiscoveryPanel
 from emaviz.page.discover.source import SourceControls
 from emaviz.page.page import Page
 from emaviz.session.discover.discovering import Discovering
+from emaviz.session.pace import Pace
 from emaviz.session.uploads import Uploads
 from emaviz.text.html import add_html, html
+from emaviz.text.time_left import going_on
 
 _MOST_ADDED = 6
 
 
 class DiscoverPanel:
-    """The tab's controls.  `result` is the panel on the right; to_front() brings that one forward."""
+    """The tab's controls.  `result` is the panel on the right."""
 
     def __init__(self, page: Page, discovering: Discovering, result: DiscoveryPanel, uploads: Uploads) -> None:
         self._page, self._discovering, self._result = page, discovering, result
         self._look: Look | None = None
         self._opened: str | None = None
         self._title = ""  # of the step that runs
+        self._pace = Pace()
         gui = page.server.gui
+        self._entries = EntriesControl(page, discovering)
         self._guide = Guide(page, discovering, lambda: self.source.choose_first())
         self.source = SourceControls(page, discovering, uploads, self._chosen, self._source_shown)
         self._start = gui.add_button("Start", icon=viser.Icon.PLAYER_PLAY)
@@ -86,7 +91,6 @@ class DiscoverPanel:
         """Another source is chosen; on the screen's thread."""
         self._opened = None
         self._say_plain("")
-        self._result.to_front()
 
     def _source_shown(self) -> None:
         self._start.disabled = self._discovering.running or not self._discovering.source.ready
@@ -115,6 +119,8 @@ class DiscoverPanel:
 
     def _began(self, title: str) -> None:
         self._title = title
+        self._pace.begin(title)
+        self._bar.value, self._bar.animated = 100.0, True
         self._busy(True)
         self._say(title, 0.0)
 
@@ -127,6 +133,7 @@ class DiscoverPanel:
             for control in (self._undo, self._all, *self._removes):
                 control.disabled = busy
             self.source.busy(busy)
+            self._entries.busy(busy)
             if self._look is not None and not busy:
                 self._undo.disabled = self._look.steps < 2
             self._own.busy(busy)
@@ -135,7 +142,10 @@ class DiscoverPanel:
     def _say(self, text: str, seconds: float) -> None:
         if self._discovering.running or seconds == 0.0:
             said = "" if text == self._title else f": {text}"
-            self._say_plain(f"{self._title}{said} … {seconds:.0f} s")
+            _, share = self._pace.at(text)
+            if share is not None:
+                self._bar.value, self._bar.animated = 100.0 * share, False
+            self._say_plain(f"{self._title}{said} … {going_on(seconds, share)}")
 
     def _say_plain(self, text: str) -> None:
         self._status.content = html("<div {}>{}</div>", cards.BOX, text)
@@ -148,6 +158,8 @@ class DiscoverPanel:
 
     def _ended(self, text: str) -> None:
         self._busy(False)
+        if self._discovering.run.finished:
+            self._pace.end()
         self._say_plain(text)
         self._guide.show(self._look, self._opened)
 
@@ -168,6 +180,7 @@ class DiscoverPanel:
                 self._result.open(None)
             else:
                 self._open(self._opened)
+        self._entries.show()
         self._start.label, self._start.color = ("Start", None) if look is None else ("Start again", "gray")
         self.source.show(look)
 

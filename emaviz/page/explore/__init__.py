@@ -1,1 +1,7 @@
 """The Explore tab and its panels."""
+
+import viser
+
+from emaviz.page.workspaces import Workspace
+
+WORKSPACE = Workspace("explore", "Explore", viser.Icon.ADJUSTMENTS, 1)

@@ -11,7 +11,9 @@ from emaviz.colours import GHOST, MONITOR, REFERENCE
 from emaviz.figures.run_metrics import differences, metrics, table
 from emaviz.figures.signals import PHASE_SIGNALS, LivePhases, LiveSignals
 from emaviz.page.page import Page
-from emaviz.page.style import TIME_CHARTS
+from emaviz.page.playback import PlaybackStrip
+from emaviz.page.style import TIME_CHARTS, play_head
+from emaviz.scene.playback import FIRST
 from emaviz.session.session import Simulation
 from emaviz.session.worker import Worker
 from emaviz.text.html import add_html
@@ -20,7 +22,9 @@ from emaviz.text.html import add_html
 class ChartsPanel:
     """Draws runs.  The signals are drawn at once, the rest, which nobody watches while dragging, a little later."""
 
-    def __init__(self, page: Page, slow: Worker, panel: viser.PanelHandle, export: Callable[[], object]) -> None:
+    def __init__(
+        self, page: Page, slow: Worker, panel: viser.PanelHandle, strip: PlaybackStrip, export: Callable[[], object]
+    ) -> None:
         self._page, self._slow = page, slow
         self._simulation: Simulation | None = None
         self.ghost: Simulation | None = None
@@ -28,6 +32,7 @@ class ChartsPanel:
         gui = page.server.gui
         with panel.add_tab("Signals", viser.Icon.CHART_LINE):
             add_html(gui, TIME_CHARTS)
+            self._head = add_html(gui)
             # Above the charts, which fill the panel.
             self._freeze = gui.add_button(
                 "Freeze this run", icon=viser.Icon.SNOWFLAKE, color="gray", hint="Keeps it as a dashed line"
@@ -44,6 +49,7 @@ class ChartsPanel:
             self._table: Any = add_html(gui)
         with panel.add_tab("Export", viser.Icon.DOWNLOAD):
             export()
+        strip.moves.append(self._moved)
         self._range.on_update(lambda _: page.screen.post("window", self._zoom))
         self._freeze.on_click(lambda _: page.screen.post("freeze", lambda: self._set_ghost(self._simulation)))
         self._melt.on_click(lambda _: page.screen.post("freeze", lambda: self._set_ghost(None)))
@@ -62,6 +68,11 @@ class ChartsPanel:
         reference = self._simulation.reference
         low, high = self._window
         return low * reference.duration_s, high * reference.duration_s
+
+    def _moved(self, on: str, time_s: float, _: tuple[float, float]) -> None:
+        if on == FIRST:
+            low, high = self.window_s
+            self._head.content = play_head((time_s - low) / (high - low) if high > low else None)
 
     def _draw_signals(self, simulation: Simulation) -> None:
         ghost = self.ghost.reference if self.ghost is not None else None

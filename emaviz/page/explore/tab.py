@@ -21,8 +21,9 @@ from emaviz.page.explore.plant import PlantControls
 from emaviz.page.explore.presets import CUSTOM, PRESETS, name_of
 from emaviz.page.page import Page
 from emaviz.page.style import LONG_LABELS
+from emaviz.session.session import Simulation
 from emaviz.session.settings import MONITORS
-from emaviz.text.html import add_html, said
+from emaviz.text.html import add_html, html, said
 
 _DECIMALS = 6  # that a command's settings may have
 
@@ -35,6 +36,8 @@ class ExplorePanel:
         self._reads: list[tuple[Any, Callable[[], Any]]] = []  # controls, and what the session holds for them
         gui = page.server.gui
         self.status = add_html(gui, said("Starting…"))
+        self._note = add_html(gui)
+        self._model = add_html(gui)
         self.start = StartHere(page)
         with gui.add_folder("Faults of the plant"):
             add_html(gui, LONG_LABELS)
@@ -54,6 +57,9 @@ class ExplorePanel:
                 of_signal("load_torque_Nm", page.session.actuator.axes).label, 0.0, min=-1000.0, max=1000.0, step=1.0
             )
         self._plant = PlantControls(page)
+        self._own = gui.add_dropdown(
+            "Plant's model", tuple(page.session.plants), visible=False, hint="What Discover has improved may play it"
+        )
         with gui.add_folder("Monitor model"):
             self.monitor = gui.add_dropdown(
                 "Its faults", MONITORS, initial_value="healthy", hint="Whose faults the monitor model is drawn with"
@@ -65,9 +71,33 @@ class ExplorePanel:
         self._listen(load, settings.set_load, lambda: settings.load_torque_Nm)
         # Set by the session as well, after which nothing is to be simulated again.
         self.monitor.on_update(lambda event: event.client and self._take_monitor())
+        self._own.on_update(lambda event: event.client and page.screen.post("plant's model", self._take_plant))
+        page.session.events.plants.append(lambda: page.screen.post("plants", self._plant_taken))
 
     def _take_monitor(self) -> None:
         self._change(lambda: self._page.session.settings.set_monitor(self.monitor.value))
+
+    def note(self, text: str) -> None:
+        """What is to be read once, and stays: below the status."""
+        self._note.content = said(text) if text else ""
+
+    def show_model(self, simulation: Simulation) -> None:
+        """Says which model is drawn beside which plant; on the screen's thread."""
+        plant = html(" · plant: <b>{}</b>", simulation.plant) if simulation.plant else ""
+        line = said(html("model: <b>{}</b>{}", simulation.model, plant))
+        if self._model.content != line:
+            self._model.content = line
+
+    def _take_plant(self) -> None:
+        session = self._page.session
+        if not self._page.checked(lambda: session.choose_plant(self._own.value)):
+            self._own.value = session.plant
+
+    def _plant_taken(self) -> None:
+        session = self._page.session
+        self._own.options, self._own.value = tuple(session.plants), session.plant
+        self._own.visible = len(session.plants) > 1
+        self.set_faults(session.settings.k)
 
     def _take_preset(self) -> None:
         k = PRESETS.get(str(self._preset.value))

@@ -15,9 +15,12 @@ from emaviz.figures.convergence import LiveConvergence
 from emaviz.figures.fault_bars import fault_bars
 from emaviz.figures.fitted_current import LiveFit
 from emaviz.figures.identified_table import Row, table
+from emaviz.page.identify import WORKSPACE
 from emaviz.page.identify.landscape import LandscapeView
 from emaviz.page.identify.swarm import SwarmView
 from emaviz.page.page import Page
+from emaviz.page.playback import PlaybackStrip
+from emaviz.scene.motion import PLAYED, motion
 from emaviz.session.race import Race
 from emaviz.session.worker import Worker
 from emaviz.text.html import add_html
@@ -29,13 +32,10 @@ _MOST_ROWS = 200
 
 
 class IdentifyResult:
-    """Drawn on the screen's thread, what changes slowly on the slow one's.
+    """Drawn on the screen's thread, what changes slowly on the slow one's; strip: its clock, for what is identified."""
 
-    to_front(): makes this panel the one that is seen.
-    """
-
-    def __init__(self, page: Page, slow: Worker, panel: viser.PanelHandle, to_front: Callable[[], None]) -> None:
-        self._page, self._slow, self._panel, self._bring = page, slow, panel, to_front
+    def __init__(self, page: Page, slow: Worker, panel: viser.PanelHandle, strip: PlaybackStrip) -> None:
+        self._page, self._slow, self._strip = page, slow, strip
         self._race: Race | None = None
         self._begun: Race | None = None  # of which something was drawn
         self._separating: Suggestion | None = None
@@ -63,25 +63,21 @@ class IdentifyResult:
         with panel.add_tab("Runs", viser.Icon.TABLE):
             self._table = add_html(gui, table([]))
             clear = gui.add_button("Clear the table", icon=viser.Icon.ERASER, color="gray")
-        self._try.on_click(lambda _: page.screen.post("separating", self._try_separating))
+        self._try.on_click(lambda event: page.screen.post("separating", lambda: self._try_separating(event.client)))
         self._whose.on_update(lambda _: slow.post("answer", self._draw_answer))
         clear.on_click(lambda _: page.screen.post("runs", self._clear))
+        page.workspaces.entered.append(lambda name: name == WORKSPACE.name and self.draw())
 
     # --- from the compute thread ------------------------------------------------------------------------------------
 
     def progressed(self, race: Race) -> None:
         """A race has gone on; on any thread."""
         self._race = race
-        if self._panel.visible:  # what nobody sees is not drawn
+        if self._page.workspaces.anyone(WORKSPACE.name):  # what nobody sees is not drawn
             self._page.screen.post("swarm", lambda: self._draw(race, soon=False))
             self._slow.post("answer", self._draw_answer)
 
     # --- on the screen's thread -------------------------------------------------------------------------------------
-
-    def to_front(self) -> None:
-        """Makes this panel the one that is seen, and draws what has happened meanwhile."""
-        self._bring()
-        self.draw()
 
     def draw(self) -> None:
         """Everything as it stands now."""
@@ -94,6 +90,9 @@ class IdentifyResult:
         self._draw(race, soon=True)
         self._slow.post("answer", self._draw_answer)
         self._landscape.answered(race)
+        best = race.best
+        if best is not None and best.k is not None and all(name in race.measurement for name in PLAYED):
+            self._strip.put(motion(race.measurement, best.k, self._page.session.actuator), WORKSPACE.name)
         performance = race.performance()
         number = 1 + max((row.race for row in self.rows), default=0)
         settings = race.settings
@@ -129,10 +128,11 @@ class IdentifyResult:
     def _clear(self) -> None:
         self.show_rows([])
 
-    def _try_separating(self) -> None:
+    def _try_separating(self, client: viser.ClientHandle | None) -> None:
         run = self._separating
         if run is not None and self._page.checked(lambda: self.to_explore(run)):
             self._page.notify("Explore has the command", "On Identify, press Identify again.", "green")
+            self._page.workspaces.go("explore", client)
 
     def _draw(self, race: Race, soon: bool) -> None:
         begun = race is not self._begun
@@ -155,7 +155,10 @@ class IdentifyResult:
         if track is None or track.k is None:
             return
         sure = track.answer.uncertainty if track.answer is not None else None
-        bars: dict[str, Any] = {} if sure is None else {"interval90": sure.interval90, "alarms": sure.alarms}
+        bars: dict[str, Any] = {}
+        if sure is not None:
+            bars = {"interval90": sure.interval90, "alarms": sure.alarms}
+            bars |= {"detectable": sure.detectable, "adequate": sure.adequate}
         fitted = {name: one.current_A for name, one in race.tracks.items() if one.current_A is not None}
         with self._page.server.atomic():
             self._bars.content = fault_bars(track.k, self._page.session.actuator, race.truth, **bars)

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import viser
 
 from ema_model.identification.run import ALGORITHMS
 from ema_model.identification.words import verdict
 from ema_model.simulation.plant import FITNESSES
 from emaviz.figures.convergence import colour
+from emaviz.page.identify import WORKSPACE
 from emaviz.page.identify.result import IdentifyResult
 from emaviz.page.page import Page
 from emaviz.recording.viewer import ViewerHost
@@ -19,6 +22,7 @@ from emaviz.session.compare.comparing import Comparing
 from emaviz.session.race import Race
 from emaviz.session.settings import SLIDERS
 from emaviz.text.html import Html, add_html, html, joined
+from emaviz.text.time_left import time_left
 
 PLANT = "The plant of Explore's sliders"
 
@@ -29,7 +33,7 @@ class IdentifyPanel:
     def __init__(self, page: Page, comparing: Comparing, viewer: ViewerHost | None, result: IdentifyResult) -> None:
         self._page, self._comparing, self._viewer, self._result = page, comparing, viewer, result
         self._race: Race | None = None
-        self.open_viewer: Callable[[str, str], None] = lambda url, name: None  # on the right
+        self.open_viewer: Callable[[str, str], None] = lambda url, name: None  # on the right of Recordings
         self.to_discover: Callable[[Race], None] = lambda race: None  # takes its recording there
         gui, settings = page.server.gui, page.session.settings
         self._source: Any = gui.add_dropdown(
@@ -70,16 +74,17 @@ class IdentifyPanel:
             visible=False,
             hint="The model does not fit: takes the same recording to Discover",
         )
-        self._again = gui.add_button("Show the search", icon=viser.Icon.CHART_DOTS, color="gray")
         self._source.on_update(lambda event: event.client and page.screen.post("identify source", self._take_source))
         for tick in self._ticks.values():
             tick.on_update(lambda event: event.client and page.screen.post("algorithms", self._take_algorithms))
         self._start.on_click(lambda _: self._begin())
         self._pause.on_click(lambda _: page.screen.post("pause", self._toggle))
         self._stop.on_click(lambda _: page.session.stop())
-        self._again.on_click(lambda _: page.screen.post("bring", result.to_front))
-        self._watch.on_click(lambda _: page.screen.post("watch", self._watch_growing))
-        self._missing.on_click(lambda _: page.screen.post("to discover", self._look_for_missing))
+        self._watch.on_click(lambda event: page.screen.post("watch", lambda: self._watch_growing(event.client)))
+        self._missing.on_click(
+            lambda event: page.screen.post("to discover", lambda: self._look_for_missing(event.client))
+        )
+        page.workspaces.entered.append(lambda name: name == WORKSPACE.name and self.refresh_sources())
         events = page.session.events
         events.progressed.append(self._progressed)
         events.identified.append(lambda race: page.screen.post("identification", lambda: self._draw_answer(race)))
@@ -139,17 +144,17 @@ class IdentifyPanel:
         self._link.content = ""
         self._missing.visible = False
         self._text.content = _line("Starting…")
-        self._page.screen.post("bring", self._result.to_front)
 
-    def _watch_growing(self) -> None:
+    def _watch_growing(self, client: viser.ClientHandle | None) -> None:
         race = self._race
         if self._viewer is not None and race is not None and race.growing is not None:
             self.open_viewer(self._viewer.url_of(race.growing.name), race.growing.name)
+            self._page.workspaces.go("recordings", client)
 
-    def _look_for_missing(self) -> None:
+    def _look_for_missing(self, client: viser.ClientHandle | None) -> None:
         race = self._race
-        if race is not None:
-            self._page.checked(lambda: self.to_discover(race))
+        if race is not None and self._page.checked(lambda: self.to_discover(race)):
+            self._page.workspaces.go("discover", client)
 
     def _toggle(self) -> None:
         session = self._page.session
@@ -174,13 +179,18 @@ class IdentifyPanel:
         self._page.screen.post("identification", lambda: self._draw(race))
 
     def _draw(self, race: Race) -> None:
-        shares = [1.0 if track.answer else len(track.rmse) / (track.iterations + 2.0) for track in race.tracks.values()]
-        self._progress.value = 100.0 * sum(shares) / len(shares)
-        lines = []
+        share = race.share
+        self._progress.value = 100.0 * share
+        left = time_left(time.monotonic() - race.began_s, share)
+        lines = [_line(html("<b>{:.0f} %</b>{}", 100.0 * share, f", {left}" if left else ""))]
         for name, track in race.tracks.items():
             if not track.rmse:
                 continue
-            at = "done" if track.answer else f"iteration {len(track.rmse) - 1} of {track.iterations}"
+            at = f"iteration {len(track.rmse) - 1} of {track.iterations}"
+            if track.answer is not None:
+                at = "done"
+            elif track.fitting is not None:
+                at = f"searched; {track.fitting[0]}"
             lines.append(_line(html("{} · {} · rmse {:.4f} A", _title(name), at, track.rmse[-1])))
         if race.growing is not None and race is not self._race:
             self._link.content = recording_link(self._viewer, race.growing, "Watch it live ↗")
@@ -196,21 +206,25 @@ class IdentifyPanel:
             stopped = "stopped · " if answer.stopped else ""
             error = "" if answer.error_percent is None else f"Err {answer.error_percent:.2f} % · "
             star = "★ " if best is not None and len(race.tracks) > 1 and answer is best.answer else ""
+            corrected = "" if np.isnan(answer.corrected_rmse) else f", {answer.corrected_rmse:.4f} A corrected"
             lines.append(
                 _line(
                     html(
-                        "{}{} · {}{}rmse {:.4f} A · {} simulations in {:.2f} s · <b>{}</b>",
+                        "{}{} · {}{}rmse {:.4f} A{} · {} simulations in {:.2f} s · <b>{}</b>",
                         star,
                         _title(answer.algorithm),
                         stopped,
                         error,
                         answer.rmse,
+                        corrected,
                         answer.evaluations,
                         answer.elapsed_s,
                         verdict(answer),
                     )
                 )
             )
+        if best is not None and len(race.answers) > 1:
+            lines.append(_line(_why_best(race)))
         self._text.content = joined(lines)
         self._race = race
         self._missing.visible = best is not None and best.answer is not None and not best.answer.uncertainty.adequate
@@ -229,6 +243,20 @@ def recording_link(viewer: ViewerHost | None, path: Path, text: str = "") -> Htm
         viewer.url_of(path.name),
         text or f"Open {path.name} in Rerun ↗",
     )
+
+
+def _why_best(race: Race) -> Html:
+    """What the star is for."""
+    best = race.best
+    assert best is not None and best.answer is not None, "the race is over"
+    if best.answer.polished and not all(answer.polished for answer in race.answers):
+        why = "its answer was fitted with the model's own bias taken out; the others are where their searches ended"
+    elif best.answer.polished:
+        why = "its fitted answer has the least rmse"
+    else:
+        why = "it has the least rmse"
+    told = "Corrected: the rmse with what the simplified model is known to lack added."
+    return html('<span style="opacity:.75">★ {}. {}</span>', why, told)
 
 
 def _title(name: str) -> Html:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from ema_model.errors import InputError
 from ema_model.recordings import write_measurement
 from emaviz.page.page import Page
@@ -13,10 +11,10 @@ from emaviz.session.race import Race
 _NAME = "identified plant.csv"  # of the sliders' plant, which has no file yet
 
 
-def take_to_discover(page: Page, discovering: Discovering, choose: Callable[[], None], race: Race) -> None:
+def take_to_discover(page: Page, discovering: Discovering, race: Race) -> None:
     """Opens the race's recording on Compare, alone, and chooses Compare's recordings on Discover.
 
-    choose(): sets Discover's own control.  The sliders' plant is written into the data folder first.
+    The sliders' plant is written into the data folder first.
     Raises InputError if that cannot be done; on the screen's thread.
     """
     comparing = discovering.comparing
@@ -36,5 +34,5 @@ def take_to_discover(page: Page, discovering: Discovering, choose: Callable[[], 
     for other in [other for other in comparing.opened if other != name]:
         comparing.remove(other)
     comparing.add(name)
-    choose()
-    page.notify("Discover has the recording", f"{name}: open the Discover tab and press Start.", "green")
+    discovering.choose("")
+    page.notify("Discover has the recording", f"{name}: press Start.", "green")

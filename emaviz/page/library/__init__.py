@@ -1,1 +1,7 @@
 """The Library tab."""
+
+import viser
+
+from emaviz.page.workspaces import Workspace
+
+WORKSPACE = Workspace("library", "Library", viser.Icon.BOOK, 5)

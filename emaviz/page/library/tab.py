@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import viser
 
 from ema_model.effects import CATALOGUE, Effect, find
+from ema_model.faults import HEALTHY
 from ema_model.simulation.with_effect import WithEffect
 from emaviz.figures.effect_signature import EffectCharts, small_picture
 from emaviz.page.discover import cards
 from emaviz.page.discover.effect import about
+from emaviz.page.library import WORKSPACE
 from emaviz.page.page import Page
+from emaviz.page.playback import PlaybackStrip
+from emaviz.scene.motion import motion
 from emaviz.session.library import RUNS, Library
 from emaviz.text.html import add_html, html, unescaped
 
@@ -96,8 +99,8 @@ class LibraryPanel:
 class EffectPage:
     """An effect on the right: what it is, a slider for each parameter, the run with and without it."""
 
-    def __init__(self, page: Page, library: Library, to_front: Callable[[], None]) -> None:
-        self._page, self._library, self._to_front = page, library, to_front
+    def __init__(self, page: Page, library: Library, strip: PlaybackStrip) -> None:
+        self._page, self._library, self._strip = page, library, strip
         self._name = ""
         self.best_runs: dict[str, str] = {}  # by effect, where it shows most
         self._sliders: dict[str, Any] = {}
@@ -127,7 +130,6 @@ class EffectPage:
             slider.remove()
         with self._place:
             self._sliders = {parameter.name: self._slider(effect, i) for i, parameter in enumerate(effect.parameters)}
-        self._to_front()
         self._ask()
 
     def show(self, felt: WithEffect) -> None:
@@ -135,6 +137,7 @@ class EffectPage:
         if felt.name == self._name:
             with self._page.server.atomic():
                 self._charts.show(felt)
+            self._strip.put(motion(felt.with_it, HEALTHY, self._page.session.actuator), WORKSPACE.name)
 
     def say(self, text: str) -> None:
         """What goes on."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import viser
@@ -16,13 +15,10 @@ _CONFIG = {"displayModeBar": False}
 
 
 class RecordingsResult:
-    """Called on the files' thread.
+    """Called on the files' thread."""
 
-    to_front(): makes this panel the one that is seen.
-    """
-
-    def __init__(self, page: Page, panel: viser.PanelHandle, to_front: Callable[[], None]) -> None:
-        self._page, self._to_front = page, to_front
+    def __init__(self, page: Page, panel: viser.PanelHandle) -> None:
+        self._page = page
         self._pair: tuple[tuple[Entry, Any], tuple[Entry, Any]] | None = None
         self._plot: Any = None
         self._tab = panel.add_tab("Rerun", viser.Icon.PLAYER_PLAY)
@@ -40,7 +36,6 @@ class RecordingsResult:
 
     def open(self, url: str, name: str) -> None:
         """The viewer with a recording, in the page."""
-        self._to_front()
         self._frame.content = html(
             '<div style="padding:0 10px 4px;font-size:12px;overflow-wrap:anywhere"><b>{}</b> · '
             '<a href="{}" target="_blank" rel="noopener">in a tab of its own ↗</a></div>'
@@ -75,7 +70,6 @@ class RecordingsResult:
         )
         self._draw()
         self._table.content = two_recordings.table(first[0], second[0])
-        self._to_front()
 
     def _draw(self) -> None:
         if self._pair is None:

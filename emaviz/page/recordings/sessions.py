@@ -103,9 +103,9 @@ def parts(
 class SessionControls:
     """Save, and load; files are packed on the worker `files`, controls are set on the screen's thread."""
 
-    def __init__(self, page: Page, comparing: Comparing, files: Worker) -> None:
-        self._page, self._comparing, self._files = page, comparing, files
-        self._parts: Mapping[str, Part] = {}
+    def __init__(self, page: Page, comparing: Comparing, files: Worker, kept: Mapping[str, Part]) -> None:
+        """kept: the parts of the page."""
+        self._page, self._comparing, self._files, self._parts = page, comparing, files, kept
         gui = page.server.gui
         with gui.add_folder("Session: everything on the page"):
             self._name = gui.add_text("Session name", f"session-{datetime.now():%Y%m%d}")
@@ -123,10 +123,6 @@ class SessionControls:
         save.on_click(lambda event: self._post("save session", lambda: self._save(event.client)))
         self._load.on_click(lambda _: self._load_named(str(self._choice.value)))
         self.refresh()
-
-    def connect(self, kept: Mapping[str, Part]) -> None:
-        """The parts of the page, once it is built."""
-        self._parts = kept
 
     def refresh(self) -> None:
         """Reads the folder's list again."""

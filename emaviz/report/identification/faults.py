@@ -39,7 +39,9 @@ class Faults(Section[Identified]):
         return "".join(
             [
                 sure_words(answer),
-                fault_bars(answer.k, actuator, answer.truth, sure.interval90, sure.alarms),
+                fault_bars(
+                    answer.k, actuator, answer.truth, sure.interval90, sure.alarms, sure.detectable, sure.adequate
+                ),
                 table(heads, rows, text_columns=2, marked=_MARK),
                 table(["Physical reading", "value"], physical),
                 bullets(sure.warnings, "warning"),

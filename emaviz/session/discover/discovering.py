@@ -17,6 +17,7 @@ from ema_model.effects.user import UserEffect
 from ema_model.errors import InputError, quoted
 from ema_model.quantities.titles import in_sentence
 from emaviz.session.compare.comparing import Comparing
+from emaviz.session.discover.entries import Entries, Entry
 from emaviz.session.discover.keep import keep
 from emaviz.session.discover.own_effect import OwnPreview
 from emaviz.session.discover.progress import Telling
@@ -28,6 +29,9 @@ from emaviz.session.discover.source import NOTHING, DiscoverySource, files_of
 from emaviz.session.events import notify
 from emaviz.session.session import Session
 from emaviz.session.worker import Worker
+
+_MOST_BROUGHT = 50  # discoveries beside the shown one, of a session's file
+_KEPT = ("recipe", "steps", "experiment", "revealed", "says")
 
 
 class Discovering:
@@ -41,6 +45,7 @@ class Discovering:
         self.sealing = Sealing(session, comparing.folder)
         self.look: Look | None = None
         self.run = DiscoveryRun(session, self.events, self._stopped)
+        self.entries = Entries(self.source)
         self._told: Telling | None = None
         self._restoring: dict[str, Any] | None = None  # what a session brought, until its steps are taken again
         self._own = OwnPreview()
@@ -59,13 +64,29 @@ class Discovering:
         return self.run.running
 
     def choose(self, name: str) -> None:
-        """A challenge by its name, or Compare's recordings with any other; the story so far is put away."""
+        """A challenge by its name, or Compare's recordings with ""; the story so far stays among the entries."""
+        self._leave()
+        self.source.choose(name)
+        notify(self.events.looked, None)
+
+    def show(self, entry: Entry) -> None:
+        """Another discovery, as it was left; InputError while a step runs."""
+        if entry is self.entries.current:
+            return
+        self._leave()
+        if entry.told is None:
+            self._take_again(entry)
+            return
+        self.source.recall(entry.recipe, entry.challenge, entry.revealed)
+        self.entries.current, self._told, self.look = entry, entry.told, entry.look
+        notify(self.events.looked, self.look)
+
+    def _leave(self) -> None:
         if self.running:
             raise InputError("a step is running; stop it first")
         self.run.stop()  # one that waits to begin
-        self.source.choose(name)
+        self.entries.leave()
         self._told = self.look = self._restoring = None
-        notify(self.events.looked, None)
 
     # --- steps ------------------------------------------------------------------------------------------------------
 
@@ -220,6 +241,7 @@ class Discovering:
         tell("reading")
         given = self.source.read(recipe)
         told = Telling(begun(given.fitted, given.actuator, given.held, given.signals, tell), recipe)
+        self.entries.begin(told)
         self._told, self.look, self.source.revealed = told, None, False
         return told
 
@@ -239,6 +261,8 @@ class Discovering:
 
     def _show(self, told: Telling) -> None:
         self.look = told.look()
+        if self.entries.current is not None:
+            self.entries.current.look = self.look
         notify(self.events.looked, self.look)
 
     def _seen(self) -> tuple[Telling, Look]:
@@ -251,18 +275,28 @@ class Discovering:
     # --- a session --------------------------------------------------------------------------------------------------
 
     def saved(self) -> dict[str, Any] | None:
-        """The story as it stands, or the session's whose steps are still to be taken again; None without one.
+        """Every discovery, the one that is shown (else the last) first and the rest as its "others"; None without one.
 
         In what JSON can hold.
         """
+        current = self.entries.current or (self.entries.all[-1] if self.entries.all else None)
+        others = [one.saved() for one in self.entries.all if one is not current]
         if self._restoring is not None:
-            return self._restoring
-        return None if self._told is None else {**self._told.saved(), "revealed": self.source.revealed}
+            first = self._restoring
+        elif current is None:
+            return None
+        else:
+            if current is self.entries.current:
+                current.revealed = self.source.revealed
+            first = current.saved()
+        return {**first, "others": others} if others else first
 
     def files(self) -> list[str]:
-        """Names in the data folder of what the saved story is of."""
+        """Names in the data folder of what the saved stories are of."""
         saved = self.saved()
-        return [] if saved is None else files_of(saved["recipe"])
+        return [] if saved is None else [
+            name for one in (saved, *saved.get("others", ())) for name in files_of(one["recipe"])
+        ]  # fmt: skip
 
     def restore(self, saved: Any, names: Mapping[str, str]) -> None:
         """Takes the steps of a session's story again, once no other long run goes on; InputError if it is none.
@@ -273,10 +307,24 @@ class Discovering:
             raise InputError("a step of Discover is running; stop it, and load the session again")
         if saved is None:
             return self.choose("")
-        if not isinstance(saved, dict) or not isinstance(saved.get("recipe"), dict):
-            raise InputError("the session's part of Discover is damaged; save it anew")
+        stories = [saved, *(saved.get("others") or () if isinstance(saved, dict) else ())]
+        for one in stories:
+            if not isinstance(one, dict) or not isinstance(one.get("recipe"), dict):
+                raise InputError("the session's part of Discover is damaged; save it anew")
+            checked(one.get("steps"))
+            experiment_of(one.get("experiment"))
+        self._leave()
+        for one in stories[1:][:_MOST_BROUGHT]:
+            self.entries.bring({key: one.get(key) for key in _KEPT if key in one}, names)
+        first = {key: value for key, value in saved.items() if key != "others"}
+        self._take_again(self.entries.bring(first, names))
+
+    def _take_again(self, entry: Entry) -> None:
+        """The steps of one that a session's file brought; its fits begin where they ended then."""
+        saved = entry.brought or {}
         steps, experiment = checked(saved.get("steps")), experiment_of(saved.get("experiment"))
-        recipe = self.source.take(saved["recipe"], names)
+        recipe = self.source.take(saved["recipe"], entry.names)
+        self.entries.current = entry
         self._told = self.look = None
         self._restoring = {**saved, "recipe": dict(recipe)}
         notify(self.events.looked, None)

@@ -45,6 +45,7 @@ class DiscoveryRun:
 
     def __init__(self, session: Session, events: DiscoverEvents, stopped: Callable[[], str]) -> None:
         self.running = False
+        self.finished = False  # the last one, and was not stopped
         self._session, self._events, self._stopped = session, events, stopped
         self._stop = threading.Event()
         self._waits = threading.Event()  # set: whoever waits to begin shall not any more
@@ -55,7 +56,7 @@ class DiscoveryRun:
         started = self._session.worker.start(self._steps(title, job, stop))
         if started:
             self._waits.set()
-            self._stop, self.running = stop, True
+            self._stop, self.running, self.finished = stop, True, False
             notify(self._events.began, title)
         return started
 
@@ -111,6 +112,7 @@ class DiscoveryRun:
             raise
         finally:
             over.set()
+        self.finished = True
         self._end(f"{title}: done in {time.perf_counter() - began:.1f} s.")
 
     def _end(self, text: str) -> None:

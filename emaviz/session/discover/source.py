@@ -106,6 +106,11 @@ class DiscoverySource:
         self.held_out = set(given.get("held", ()))
         return given
 
+    def recall(self, recipe: Mapping[str, Any], challenge: Challenge | None, revealed: bool) -> None:
+        """Chooses again what a story was made from, without reading anything."""
+        self.challenge, self.chosen, self.revealed = challenge, str(recipe.get("challenge", "")), revealed
+        self.held_out = set(recipe.get("held", ()))
+
     def read(self, recipe: Mapping[str, Any]) -> Material:
         """Reads what a recipe says; InputError for files that are gone, or a recipe that is none."""
         if self.challenge is not None:

@@ -1,0 +1,131 @@
+"""The workspaces: a window's tab, its panel on the right, its address and the actuator's run change together.
+
+Each window has its own: the server is told which tab is in front there by a button that nobody sees, and shows that
+window alone the panel that belongs to it.  The 3D scene is the server's, so the actuator plays for the window that
+was used last.
+"""
+
+from __future__ import annotations
+
+import json
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import viser
+
+from emaviz.page.docked import Docked
+from emaviz.page.style import unseen
+from emaviz.server.viser_private import Inside
+from emaviz.session.worker import Worker
+from emaviz.text.html import add_html
+
+# On the page: the tab in front goes into the address and to the server; `go` and a reload's address choose a tab.
+_SCRIPT = """
+(() => {
+  const views = VIEWS, titles = Object.fromEntries(views.map(v => [v.title, v]));
+  window.emavizViews?.end();
+  const asked = new URLSearchParams(location.search).get('view');
+  let wanted = views.some(v => v.name === asked) ? asked : FIRST, told = null, pressed = 0;
+  const tabs = () => [...document.querySelectorAll('[role=tab]')].filter(t => t.textContent.trim() in titles);
+  const view = (tab) => titles[tab.textContent.trim()];
+  const press = (tab) => {
+    const at = tab.getBoundingClientRect();
+    const where = { bubbles: true, cancelable: true, button: 0, pointerId: 1, isPrimary: true,
+                    clientX: at.x + at.width / 2, clientY: at.y + at.height / 2 };
+    for (const type of ['pointerdown', 'mousedown', 'pointerup', 'mouseup', 'click'])
+      tab.dispatchEvent(new (type.startsWith('p') ? PointerEvent : MouseEvent)(type, where));
+  };
+  const look = () => {
+    const all = tabs(), front = all.find(t => t.getAttribute('aria-selected') === 'true');
+    const now = front && view(front), button = now && document.getElementById(now.button);
+    if (!button) return;
+    if (wanted !== null && now.name !== wanted) {
+      const tab = all.find(t => view(t).name === wanted);
+      if (tab && Date.now() - pressed > 300) { pressed = Date.now(); press(tab); }
+      return;
+    }
+    wanted = null;
+    if (now.name === told) return;
+    told = now.name;
+    const address = new URL(location.href);
+    address.searchParams.set('view', told);
+    history.replaceState(history.state, '', address);
+    button.click();
+  };
+  const seen = new MutationObserver(look);
+  seen.observe(document.body, { subtree: true, attributes: true, attributeFilter: ['aria-selected'] });
+  const timer = setInterval(() => { if (told === null || wanted !== null) look(); }, 100);
+  window.emavizViews = {
+    go: (name) => { wanted = name; look(); },
+    end: () => { seen.disconnect(); clearInterval(timer); },
+  };
+})();
+"""
+
+
+@dataclass(frozen=True)
+class Workspace:
+    """What a tab's folder says of itself; place: among the tabs, name: in the address (`/?view=compare`)."""
+
+    name: str
+    title: str
+    icon: viser.IconName
+    place: int
+    wider_px: int = 0  # than other panels on the right
+
+
+class Workspaces:
+    """Which windows are where.  entered: called with the name, on the screen's thread, when a window comes there."""
+
+    def __init__(self, server: viser.ViserServer, screen: Worker, docked: Docked, first: str) -> None:
+        self._server, self._inside, self._screen, self._docked = server, Inside(server), screen, docked
+        self.first = first  # where a window without a place in its address begins
+        self.entered: list[Callable[[str], object]] = []
+        self._members: dict[str, Workspace] = {}
+        self._at: dict[int, str] = {}  # by window
+        self._changing = threading.Lock()
+        server.on_client_disconnect(self._left)
+
+    def add(self, one: Workspace) -> viser.PanelHandle:
+        """A workspace; returns its panel on the right."""
+        self._members[one.name] = one
+        return self._docked.add(one.name, one.wider_px, in_front=one.name == self.first)
+
+    def connect(self) -> None:
+        """Begins to follow the windows; to be called where the unseen buttons may stand, once all are added."""
+        gui = self._server.gui
+        buttons: dict[str, Any] = {}
+        for name in self._members:
+            buttons[name] = button = gui.add_button(f"view:{name}")
+            button.on_click(lambda event, name=name: event.client and self._came(event.client, name))
+        add_html(gui, unseen([button._impl.uuid for button in buttons.values()]))
+        views = [
+            {"name": name, "title": one.title, "button": buttons[name]._impl.uuid}
+            for name, one in self._members.items()
+        ]
+        self._inside.run(_SCRIPT.replace("VIEWS", json.dumps(views)).replace("FIRST", json.dumps(self.first)))
+
+    def go(self, name: str, client: viser.ClientHandle | None) -> None:
+        """Takes one window there, as a click on the tab would; without a window, nothing happens."""
+        if client is not None and name in self._members:
+            self._inside.run(f"window.emavizViews?.go({json.dumps(name)})", client.client_id)
+
+    def anyone(self, name: str) -> bool:
+        """Whether a window shows this workspace."""
+        return name in self._at.values()
+
+    def _came(self, client: viser.ClientHandle, name: str) -> None:
+        with self._changing:
+            self._at[client.client_id] = name
+        self._docked.show(client.client_id, name)
+        self._screen.post("workspace", lambda: self._enter(name))
+
+    def _enter(self, name: str) -> None:
+        for listener in self.entered:
+            listener(name)
+
+    def _left(self, client: viser.ClientHandle) -> None:
+        with self._changing:
+            self._at.pop(client.client_id, None)

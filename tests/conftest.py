@@ -8,12 +8,16 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
+from hypothesis import settings
 from support.browser import SOFTWARE_GL
 
 # As `emaviz` says it, before any test imports numpy: two processes' threads would wait for each other.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # Tests take what a first use takes; what is compiled behind it, they would wait for elsewhere.
 os.environ["EMAVIZ_COMPILE_AHEAD"] = "0"
+# An example's time is the machine's: the first one compiles what it calls, and others wait for a busy core.
+settings.register_profile("any time", deadline=None)
+settings.load_profile("any time")
 
 
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:

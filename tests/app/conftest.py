@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 from support.on_page import wait_until
+from support.one_tab import Tab
 
 from emaviz.page.app import App
 
@@ -21,24 +22,42 @@ def app(tmp_path_factory: pytest.TempPathFactory) -> Iterator[App]:
 
 
 @pytest.fixture
-def page(browser: Any, app: App) -> Iterator[Any]:
-    """A browser tab on the app, its controls and charts drawn, that failed on no request to elsewhere."""
-    tab = browser.new_page(viewport={"width": 1400, "height": 900})
-    asked: list[str] = []
-    # An earlier test may have left work that brings another panel to the front when it ends.
-    wait_until(lambda: not (app.comparing.running or app.discovering.running or app.session.worker.busy))
-    app.session.refresh()  # brings the signals there
-    app.strip.play(False)  # software GL draws a moving actuator with most of a core
-    tab.on("request", lambda request: asked.append(request.url))
-    tab.goto(app.address)
-    tab.get_by_role("tab", name="Explore").wait_for(timeout=60_000)
-    tab.wait_for_function("Object.keys(window.__viserTestpoints?.uplots ?? {}).length >= 4", timeout=60_000)
-    yield tab
-    seen = tab.inner_text("body")
+def page(new_page: Any) -> Any:
+    """A new tab; a module whose tests can share one says so by a `page` of its own that is `shared_page`."""
+    return new_page
+
+
+@pytest.fixture
+def new_page(browser: Any, app: App) -> Iterator[Any]:
+    """A browser tab of the test's own on the app, its controls and charts drawn; it may ask nobody else."""
+    tab = Tab(browser, app)
+    _at_rest(app)
+    yield tab.as_new()
+    tab.check()
     tab.close()
-    assert "<style" not in seen and "<div" not in seen, "markup of ours is shown letter by letter"
-    outside = [url for url in asked if not url.startswith((app.address, "ws://127.0.0.1", "data:", "blob:"))]
-    assert not outside, "nothing may be fetched from elsewhere"
+
+
+@pytest.fixture(scope="module")
+def tab(browser: Any, app: App) -> Iterator[Tab]:
+    """One browser tab on the app for all tests of a module: a load of the page takes seconds of a core."""
+    tab = Tab(browser, app)
+    yield tab
+    tab.close()
+
+
+@pytest.fixture
+def shared_page(tab: Tab, app: App) -> Iterator[Any]:
+    """As `page`, in the module's one tab: what a test has opened, chosen and been told there is taken back."""
+    _at_rest(app)
+    yield tab.as_new()
+    tab.check()
+
+
+def _at_rest(app: App) -> None:
+    """Waits for work of an earlier test, which brings another panel to the front when it ends; then the signals are."""
+    wait_until(lambda: not (app.comparing.running or app.discovering.running or app.session.worker.busy))
+    app.session.refresh()
+    app.strip.play(False)  # software GL draws a moving actuator with most of a core
 
 
 @pytest.fixture

@@ -31,6 +31,12 @@ CHART = """(title) => {
 }"""
 
 
+@pytest.fixture
+def page(shared_page):
+    """The module's one tab."""
+    return shared_page
+
+
 def chart(page, title):
     return np.array(page.evaluate(CHART, title))
 

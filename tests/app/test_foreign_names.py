@@ -26,6 +26,12 @@ def app(tmp_path_factory):
     app.close()
 
 
+@pytest.fixture
+def page(shared_page):
+    """The module's one tab."""
+    return shared_page
+
+
 def seen(page, *texts):
     """Each is there, letter by letter, and nothing has grown out of any."""
     for text in texts:

@@ -17,6 +17,12 @@ CHART = """(title) => {
 }"""
 
 
+@pytest.fixture
+def page(shared_page):
+    """The module's one tab."""
+    return shared_page
+
+
 def row(page, label):
     """The row of a control, by how its label begins."""
     found = page.locator("label", has_text=label).first
@@ -81,7 +87,8 @@ def test_a_bad_value_is_told_and_the_page_goes_on(page, app):
     wait_until(lambda: app.session.settings.k[1] == 0.0)
 
 
-def test_identify_runs_ends_and_is_recorded(page, app):
+def test_identify_runs_ends_and_is_recorded(new_page, app):
+    page = new_page
     set_slider(page, "k1", 0.25)
     wait_until(lambda: app.session.settings.k[0] == 0.25)
     page.get_by_role("tab", name="Identify").click()

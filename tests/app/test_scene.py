@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from support.one_tab import Tab
 
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
@@ -222,14 +223,25 @@ def test_coils_burn_from_the_first_shorted_turn_on():
     assert coils[0] is None, "all of phase A is burnt"
 
 
+@pytest.fixture
+def drawn(browser, app):
+    """A tab in which the scene is drawn."""
+    tab = Tab(browser, app, scene=True)
+    app.session.refresh()
+    app.strip.play(False)
+    yield tab.as_new()
+    tab.check()
+    tab.close()
+
+
 @pytest.mark.browser
-def test_the_rotor_in_the_browser_follows_the_run_at_a_pace(page, app):
+def test_the_rotor_in_the_browser_follows_the_run_at_a_pace(drawn, app):
     """Poses that reach the browser; drawing them all at 25/s needs two free cores and is measured in benchmarks."""
-    page.evaluate(
+    drawn.evaluate(
         """() => { window.__poses = new Set(); const watch = () => {
              const pose = window.__viserMutable.nodePoseData['/actuator/motor/axis/rotor'];
              if (pose) window.__poses.add(String(pose.wxyz)); requestAnimationFrame(watch); }; watch(); }"""
     )
     app.strip.play(True)
-    page.wait_for_timeout(3000)
-    assert page.evaluate("window.__poses.size") > 9
+    drawn.wait_for_timeout(3000)
+    assert drawn.evaluate("window.__poses.size") > 9

@@ -165,6 +165,12 @@ def test_files_of_a_session_stay_inside_the_data_folder(folder, tmp_path):
 # --- in the browser ---------------------------------------------------------------------------------------------------
 
 
+@pytest.fixture
+def page(shared_page):
+    """The module's one tab."""
+    return shared_page
+
+
 def slider(page, label):
     found = page.locator("label", has_text=label).first
     row = found.locator("xpath=ancestor::div[contains(@class,'mantine-Flex-root')][1]")

@@ -160,13 +160,23 @@ def test_kernels_import_nothing_of_ours_that_is_not_hashed():
 
 # --- caches, processes, threads -------------------------------------------------------------------------------------
 
+# The kernel that is compiled soonest stands for all: they are composed, hashed and kept by the same means.
 PROGRAM = """
+import numpy as np
 from ema_model.actuator import load_actuator
-from ema_model.commands import command
-from ema_model.simulation.run import Run, simulate_monitor
-effects = {{"cogging_torque": {{"amplitude_Nm": 0.02}}}} if {effect} else {{}}
-s = simulate_monitor(Run(command("chirp"), 0.05), load_actuator(), effects=effects)
-print("RESULT", repr(float((s["current_A"] ** 2).mean())))
+from ema_model.effects import find
+from ema_model.faults import HEALTHY
+from ema_model.physics.rows import LANES
+from ema_model.simulation.pack import monitor_rows
+from ema_model.stacks import exclusive, find_stack
+effects = {{"cogging_torque": find("cogging_torque").settings({{"amplitude_Nm": 0.02}})}} if {effect} else {{}}
+stack = find_stack("reduced", effects)
+turn = np.linspace(0.0, 6.0, 200)
+motion = [turn, 50.0 * np.sin(turn), 20.0 * np.cos(turn)]
+needed = np.empty((1, 200, LANES))
+rows = monitor_rows(load_actuator(), HEALTHY, stack, effects)
+exclusive(stack.inverse.currents, rows, *motion, np.full(200, 5.0), 0.1, needed)
+print("RESULT", repr(float((needed ** 2).mean())))
 """
 
 
@@ -231,13 +241,13 @@ def test_edited_effect_is_never_served_from_the_cache(copy):
 
 
 def test_edited_physics_is_never_served_from_the_cache(copy):
-    """The circuit is inlined from another file than the kernel's: numba alone would not notice."""
+    """Friction's softened sign is inlined from another file than the kernel's: numba alone would not notice."""
     cache = copy / "cache"
     program, env = PROGRAM.format(effect=False), environment(copy, cache)
     first = result(start(program, copy, env))
-    file = copy / "ema_model" / "physics" / "controller.py"
+    file = copy / "ema_model" / "physics" / "elementary.py"
     source = file.read_text(encoding="utf-8")
-    edited = source.replace("clamp(position_gain * (", "clamp(0.8 * position_gain * (")
+    edited = source.replace("return high if raised > high else raised", "return 0.8 * raised")
     assert edited != source
     file.write_text(edited, encoding="utf-8")
     assert abs(result(start(program, copy, env)) - first) > 1e-6 * first
@@ -249,7 +259,7 @@ def test_two_processes_may_build_the_same_stack_at_once(tmp_path):
     values = [result(process) for process in both]
     assert values[0] == values[1] > 0.0
     [kernel] = (tmp_path / "cache" / "kernels").glob("*/*")  # and no draft
-    assert ".monitor.traces-" in kernel.name
+    assert ".inverse.currents-" in kernel.name
 
     kernel.write_bytes(kernel.read_bytes()[:-1000])
     assert result(start(PROGRAM.format(effect=False), tmp_path, env)) == values[0], "a damaged kernel heals"

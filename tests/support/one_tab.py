@@ -1,0 +1,80 @@
+"""A browser tab that the tests of a module share, and that each of them finds as a new one would be."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from emaviz.page.app import App
+
+CHARTS_DRAWN = "Object.keys(window.__viserTestpoints?.uplots ?? {}).length >= 4"
+BEHIND = "[role=tablist] > [role=tab]:first-child[aria-selected=false]:visible"  # first tabs that are not in front
+# Software GL draws the scene again and again, with a third of a core for nothing that these tests look at; what moves
+# there is asked of its poses.
+UNDRAWN = """for (const gl of [WebGL2RenderingContext.prototype, WebGLRenderingContext.prototype])
+  for (const draw of ['drawElements', 'drawArrays', 'drawElementsInstanced', 'drawArraysInstanced'])
+    gl[draw] = () => {};"""
+MARKED = "window.__viserMutable.nodePoseData['/said_so_far']"
+SAID = ".mantine-Notification-closeButton"
+# Whether each folder is open, by its title; and what turns those that a test has left otherwise.
+FOLDERS = """() => Object.fromEntries(Array.from(document.querySelectorAll('svg[class*=tabler-icon-chevron]'))
+  .filter(icon => icon.parentElement.style.cursor === 'pointer')
+  .map(icon => [icon.parentElement.textContent, icon.classList.contains('tabler-icon-chevron-up')]))"""
+TURN_BACK = """(open) => {
+  for (const icon of document.querySelectorAll('svg[class*=tabler-icon-chevron]')) {
+    const head = icon.parentElement, before = open[head.textContent];
+    if (before !== undefined && before !== icon.classList.contains('tabler-icon-chevron-up')) head.click();
+  }
+}"""
+
+
+class Tab:
+    """The tab, loaded at its first use; all of it is drawn, the scene where that is asked for."""
+
+    def __init__(self, browser: Any, app: App, scene: bool = False) -> None:
+        self._browser, self._app, self._scene = browser, app, scene
+        self._page: Any = None
+        self._folders: dict[str, bool] = {}
+        self._asked: list[str] = []
+
+    def as_new(self) -> Any:
+        """The page with each group's first tab in front, folders as at first, nothing told, and its charts drawn."""
+        if self._page is None:
+            self._page = self._browser.new_page(viewport={"width": 1400, "height": 900})
+            if not self._scene:
+                self._page.add_init_script(UNDRAWN)
+            self._page.on("request", lambda request: self._asked.append(request.url))
+            self._page.goto(self._app.address)
+            self._page.get_by_role("tab", name="Explore").wait_for(timeout=60_000)
+            self._page.wait_for_function(CHARTS_DRAWN, timeout=60_000)
+            self._folders = self._page.evaluate(FOLDERS)
+            return self._page
+        self._page.set_default_timeout(30_000)
+        self._page.evaluate(TURN_BACK, self._folders)
+        for front in self._page.locator(BEHIND).all():
+            front.click()
+        while said := self._page.locator(SAID).count():
+            self._page.evaluate(f"document.querySelectorAll('{SAID}').forEach(one => one.click())")
+            self._page.wait_for_function(f"document.querySelectorAll('{SAID}').length < {said}")
+        self._page.wait_for_function(CHARTS_DRAWN, timeout=60_000)
+        self._hear_out()
+        return self._page
+
+    def _hear_out(self) -> None:
+        """Returns when the tab has taken all that the app has said, which would undo what a test does meanwhile."""
+        mark = self._app.server.scene.add_frame("/said_so_far", show_axes=False)
+        self._page.wait_for_function(f"{MARKED} !== undefined")
+        mark.remove()
+        self._page.wait_for_function(f"{MARKED} === undefined")
+
+    def check(self) -> None:
+        """No markup of ours is text on the page, and it has asked nobody but the app."""
+        seen = self._page.inner_text("body")
+        assert "<style" not in seen and "<div" not in seen, "markup of ours is shown letter by letter"
+        own = (self._app.address, "ws://127.0.0.1", "data:", "blob:")
+        outside = [url for url in self._asked if not url.startswith(own)]
+        assert not outside, "nothing may be fetched from elsewhere"
+
+    def close(self) -> None:
+        """Ends the tab."""
+        if self._page is not None:
+            self._page.close()

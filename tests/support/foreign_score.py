@@ -20,7 +20,6 @@ _PARAMETERS = {  # effects that are a wrong value of a parameter, by what the pa
     "demagnetisation": "torque_constant",
     "winding_resistance": "resistance",
 }
-_DRIVE = {"position_sensor_delay"}
 COLUMNS = ("right", "false", "silent", "hardly showable", "unknown with its variable", "contradicts", "at bound",
            "drive told")  # fmt: skip
 
@@ -36,14 +35,14 @@ def tally(row: Mapping[str, Any], truth: Mapping[str, Any]) -> Counter[str]:
     wrong = [
         name
         for name, group in zip(row["effects"], groups)
-        if not group & right and not _is_the_drives(name, values[name], truth["drive"]["rate"])
+        if not group & right and not _drives(name) and not _is_the_drives_delay(name, values, truth["drive"]["rate"])
     ]
     outside = any(part in path for name, part in _PARAMETERS.items() if name in right for path in row["outside"])
     named = bool(groups) and bool(groups[0] & right) and len(groups[0]) <= _LARGEST_GROUP
     curve = bool(right & {"curve", "unknown"}) and not groups and bool(row["unknown"])
     above = row["ladder"][-1] is None or row["ladder"][-1] > BAND
     correct = (named or outside) and not wrong
-    drive = bool(row.get("controller_mismatch")) or any(not group.isdisjoint(_DRIVE) for group in groups)
+    drive = bool(row.get("controller_mismatch")) or any(map(_drives, row["effects"]))
     return Counter(
         {
             "cases": 1,
@@ -71,7 +70,9 @@ def line(row: Mapping[str, Any]) -> str:
     return f"{row['verdict']:16} {names or '-'} | {ladder}{goes}{outside}{bound}{drive}"
 
 
-def _is_the_drives(name: str, values: Mapping[str, float], rate: float) -> bool:
-    if name == "position_sensor_delay":
-        return values.get("delay_s", 0.0) <= _OWN_DELAY_SAMPLES / rate
-    return name in _DRIVE and name in CATALOGUE
+def _drives(name: str) -> bool:
+    return name in CATALOGUE and CATALOGUE[name].family == "drive"
+
+
+def _is_the_drives_delay(name: str, values: Mapping[str, Mapping[str, float]], rate: float) -> bool:
+    return name == "position_sensor_delay" and values[name].get("delay_s", 0.0) <= _OWN_DELAY_SAMPLES / rate

@@ -10,7 +10,7 @@ from typing import Any
 import pyarrow as pa
 
 from ema_model.campaign.given import Given
-from ema_model.campaign.kinds.kind import NUMBER, NUMBERS, TEXT, TEXTS, Kind
+from ema_model.campaign.kinds.kind import FLAG, NUMBER, NUMBERS, TEXT, TEXTS, Kind
 from ema_model.campaign.showable import showable
 from ema_model.discovery import as_dict, discover
 from ema_model.errors import InputError, quoted
@@ -56,6 +56,7 @@ def _run(given: Given, settings: Settings, seed: int) -> dict[str, Any]:
         ),
         "outside": found["parameters_outside_tolerance"],
         "at_bound": [name for name, one in found["calibration"]["parameters"].items() if one["at_bound"]],
+        "controller_mismatch": found["controller_mismatch"],
         "unknown": None if unknown is None else f"{unknown['variable']} × {unknown['modulator']}",
         "rungs": [rung["label"] for rung in ladder],
         "ladder": [rung["rmse"] for rung in ladder],
@@ -114,6 +115,7 @@ KIND = Kind(
             ("parameters", TEXT),  # of the effects, as JSON: their values by name
             ("outside", TEXTS),
             ("at_bound", TEXTS),  # calibrated parameters
+            ("controller_mismatch", FLAG),
             ("unknown", TEXT),  # what the rest goes with: variable × modulator
             ("rungs", TEXTS),
             ("ladder", NUMBERS),  # in units of the floor

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ema_model.actuator.naming import on_axes
 from ema_model.discovery.criteria import ANOTHER, MISSED, PUT_RIGHT, WIDER
 from ema_model.discovery.model_fit import Data, Fit, fit, floor_ratio, gather, resimulated
+from ema_model.discovery.result import Contradiction
 from ema_model.errors import InputError
 from ema_model.estimation import calibrate
 from ema_model.quantities.axes import Axes
@@ -35,18 +36,6 @@ _POSITIONS = ("user_position_rad", "motor_position_rad")
 _DEGREES = ("degrees", 180.0 / math.pi)
 _THOUSAND = 1e3
 _CLOSE = 6.0  # times, within which a ratio of sizes may be that of two units: motions differ, too
-
-
-@dataclass(frozen=True)
-class Contradiction:
-    """A held-out recording at odds with the fitted ones."""
-
-    recording: str
-    signal: str | None  # whose reading explains it, by its name inside
-    how: str  # "sign", "zero", "unit", "actuator" or "unknown"
-    sentence: str
-    before: float  # its error, in floors
-    after: float  # the same once that is put right
 
 
 @dataclass(frozen=True, eq=False)

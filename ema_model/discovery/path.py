@@ -17,7 +17,6 @@ from ema_model.actuator.naming import on_axes
 from ema_model.actuator.unread import idle
 from ema_model.comparison.compare import weights_of
 from ema_model.comparison.explain import Explanation
-from ema_model.discovery.contradiction import Contradiction
 from ema_model.discovery.controller_seen import ControllerSeen
 from ema_model.discovery.evidence import predicted_evidence
 from ema_model.discovery.faults import fault_for
@@ -35,7 +34,7 @@ from ema_model.discovery.model_fit import (
 from ema_model.discovery.refit import Trial, promising, tried
 from ema_model.discovery.remaining import Left, at_floor, left_by
 from ema_model.discovery.repeatability import by_inverse_dynamics, is_lost, with_divergence
-from ema_model.discovery.result import Added, Candidate, Rung, StoodIn
+from ema_model.discovery.result import Added, Candidate, Contradiction, Rung, StoodIn
 from ema_model.discovery.score import scored, signatures
 from ema_model.discovery.sentences import NOT_REPEATABLE
 from ema_model.discovery.uncertainty import settled

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.comparison.explain import Explanation
-from ema_model.discovery.contradiction import Contradiction
 from ema_model.discovery.controller_seen import ControllerSeen
 from ema_model.discovery.model_fit import Data
 from ema_model.estimation import Calibrated, Calibration, Floor
@@ -87,6 +86,18 @@ class Experiment:
     add_signal: str | None  # to record as well
     separates: tuple[str, str]
     expected_chi2: float
+
+
+@dataclass(frozen=True)
+class Contradiction:
+    """A held-out recording at odds with the fitted ones."""
+
+    recording: str
+    signal: str | None  # whose reading explains it, by its name inside
+    how: str  # "sign", "zero", "unit", "actuator" or "unknown"
+    sentence: str
+    before: float  # its error, in floors
+    after: float  # the same once that is put right
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import importlib
 import pkgutil
 from dataclasses import replace
+from difflib import get_close_matches
 from typing import TypeVar
 
 from ema_model.effects.effect import Effect, Parameter
@@ -28,7 +29,7 @@ _OF_THE_USER: dict[str, Effect] = {}  # made at run time by `ema_model.effects.u
 
 
 def find(name: str, axes: Axes = ROTARY) -> Effect:
-    """The effect of that name, of the catalogue or registered, on these axes; InputError lists the catalogue's names.
+    """The effect of that name, of the catalogue or registered, on these axes; InputError names those like it.
 
     A model may hold an effect several times, as cogging at several orders: the second is `cogging_torque_2`.
     """
@@ -36,7 +37,9 @@ def find(name: str, axes: Axes = ROTARY) -> Effect:
     if effect is None:
         again = CATALOGUE.get(catalogue_name(name))
         if again is None:
-            raise InputError(f"no effect {name!r}; effects are {', '.join(CATALOGUE)}")
+            like = get_close_matches(str(name), CATALOGUE, 3, 0.5)
+            known = f"did you mean {' or '.join(like)}?" if like else f"`emaviz effects` lists the {len(CATALOGUE)}"
+            raise InputError(f"no effect {name!r}; {known}")
         effect = replace(again, name=name)
     return effect.on(axes)
 

@@ -141,14 +141,14 @@ def test_a_recording_is_played_as_measured_and_as_each_model_has_it(fresh):
     fresh.add("cogging_torque")
     wait_until(lambda: not fresh.running)
     track = tracks(fresh.look.found)[2]
-    runs = [run_of(track, shown) for shown in _SHOWN[1:]]
+    runs = [run_of(track, shown) for shown in _SHOWN]
     off = [np.sqrt(np.mean((run["current_A"] - runs[0]["current_A"]) ** 2)) for run in runs[1:]]
     assert 0.0 < off[1] < off[0], "with the effect, the actuator moves more like the measured one"
     for run in runs:
         shown = motion(run, HEALTHY, fresh.look.found.actuator)
         assert shown.duration_s == pytest.approx(1.0, abs=0.02) and np.ptp(shown.surface_rad) > 0.1
     with pytest.raises(InputError, match="current_A was not fitted"):
-        run_of(replace(track, measured={}, models=[{}]), _SHOWN[1])
+        run_of(replace(track, measured={}, models=[{}]), _SHOWN[0])
 
 
 def previewed(discovering, text, values):

@@ -15,7 +15,6 @@ from ema_model.discovery.controller_seen import controller_seen
 from ema_model.discovery.path import begun, calibrated_story
 from ema_model.discovery.second_opinion import delayed, second_opinion
 from ema_model.models.inverse_dynamics import InverseDynamics
-from emaviz.cli.discover import text
 
 GAIN = "controller.speed_gain_Nms_rad"
 MOTION = ("multisine", {"amplitude_rad": 0.012, "frequencies_Hz": (2, 5, 9)}, 1.2)
@@ -65,7 +64,7 @@ def test_inverse_dynamics_names_what_the_wrong_loop_cannot(cogging):
     assert one.parameters["amplitude_Nm"].value == pytest.approx(0.02, rel=0.15)
     told = json.loads(json.dumps(as_dict(found), allow_nan=False))
     assert told["controller_mismatch"] is True and told["controller_seen"]["gains"][GAIN]["differs"]
-    assert "The controller is not what the file says." in text(found)
+    assert "The controller is not what the file says." in str(found)
     assert not any(one.at_bound for one in found.calibration.parameters.values())
 
 

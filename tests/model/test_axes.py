@@ -80,6 +80,7 @@ AT_USER = {
     "effects.hinge_moment.offset_Nm": "torque",
     "effects.pendulum_load.moment_Nm": "torque",
     "effects.pendulum_load.angle_rad": "angle",
+    "effects.dead_band.half_width_rad": "angle",
     "effects.position_sensor_bias.bias_rad": "angle",
     "effects.screw_lead_error.amplitude_rad": "angle",
     "effects.torsional_compliance.stiffness_Nm_rad": "stiffness",
@@ -89,6 +90,7 @@ AT_USER = {
 }
 OF_BOTH = {  # on a rotary, a linear, a screw's and a rack's axes
     "controller.position_gain_1_s": ("1/s", "1/s", "rad/(m·s)", "m/(rad·s)"),
+    "effects.speed_loop_integral.rate_1_s": ("1/s", "1/s", "1/s", "1/s"),
     "transmission.gear_ratio": ("", "", "m/rad", "rad/m"),
     "effects.cogging_torque.order": ("", "rad/m", "", "rad/m"),
     "effects.torque_ripple.order": ("", "rad/m", "", "rad/m"),

@@ -30,7 +30,7 @@ ACTUATOR = load_actuator()
 RUN = Run(command("chirp"), 0.15, load_torque_Nm=5.0)
 SATURATING = Run(command("step"), 0.1)
 # Effects that show only where the voltage is at its limit.
-ELECTRIC = {"bus_voltage_sag", "dead_time", "winding_resistance"}
+AT_LIMITS = {"acceleration_limit", "bus_voltage_sag", "dead_time", "winding_resistance"}
 MODELS = {"reference": simulate_reference, "monitor": simulate_monitor}
 SIGNALS = ("current_A", "motor_position_rad", "motor_speed_rad_s", "user_position_rad")
 
@@ -51,7 +51,7 @@ def assert_same(a, b, tolerance):
 @pytest.mark.parametrize("effect", SWITCHABLE)
 def test_effect_of_no_amplitude_is_no_effect(effect, model):
     first = CATALOGUE[effect].parameters[0].name
-    run = SATURATING if effect in ELECTRIC else RUN
+    run = SATURATING if effect in AT_LIMITS else RUN
     plain = MODELS[model](run, ACTUATOR)
     off = MODELS[model](run, ACTUATOR, effects={effect: {first: 0.0}})
     assert_same(off, plain, 1e-6)
@@ -103,7 +103,7 @@ def test_parameter_rows_follow_the_base_rows():
 def test_unknown_circuit_and_effect_are_refused():
     with pytest.raises(InputError, match="circuits are thesis, reduced"):
         find_stack("three-phase")
-    with pytest.raises(InputError, match="no effect 'rust'; effects are"):
+    with pytest.raises(InputError, match="no effect 'rust'; `emaviz effects` lists"):
         find_stack("reduced", ["rust"])
 
 

@@ -313,6 +313,7 @@ class Discovering:
                 raise InputError("the session's part of Discover is damaged; save it anew")
             checked(one.get("steps"))
             experiment_of(one.get("experiment"))
+            self.source.checked(one["recipe"], names)
         self._leave()
         for one in stories[1:][:_MOST_BROUGHT]:
             self.entries.bring({key: one.get(key) for key in _KEPT if key in one}, names)

@@ -53,10 +53,12 @@ class DiscoverySource:
 
     def choose(self, name: str) -> None:
         """A challenge by its name, a sealed one by its file's, or Compare's recordings with ""; InputError else."""
-        challenge = self.challenges.get(name)
-        if name and challenge is None:
-            challenge = sealed_challenge(self._comparing.folder.challenge(name))
-        self.challenge, self.chosen, self.revealed = challenge, name, False
+        self.challenge, self.chosen, self.revealed = self._challenge(name), name, False
+
+    def _challenge(self, name: str) -> Challenge | None:
+        if name and name not in self.challenges:
+            return sealed_challenge(self._comparing.folder.challenge(name))
+        return self.challenges.get(name)
 
     def hold_out(self, name: str, held: bool) -> None:
         """Whether one of Compare's recordings is kept from the fit, to judge by."""
@@ -92,8 +94,8 @@ class DiscoverySource:
             "actuator": as_toml(replace(actuator, tolerances=freed)),
         }
 
-    def take(self, recipe: Mapping[str, Any], names: Mapping[str, str]) -> dict[str, Any]:
-        """Chooses what a saved recipe says; returns it with the files' names of now, by those of then in `names`."""
+    def checked(self, recipe: Mapping[str, Any], names: Mapping[str, str]) -> dict[str, Any]:
+        """A saved recipe with the files' names of now, by those of then in `names`; InputError if it is none."""
         try:
             named = str(recipe["challenge"])
             given = {**recipe, "challenge": names.get(named, named)}
@@ -102,6 +104,12 @@ class DiscoverySource:
                     given[which] = [names.get(str(name), str(name)) for name in recipe[which]]
         except (KeyError, TypeError, AttributeError):
             raise InputError(_DAMAGED) from None
+        self._challenge(given["challenge"])
+        return given
+
+    def take(self, recipe: Mapping[str, Any], names: Mapping[str, str]) -> dict[str, Any]:
+        """Chooses what a saved recipe says; returns it as of `checked`."""
+        given = self.checked(recipe, names)
         self.choose(given["challenge"])
         self.held_out = set(given.get("held", ()))
         return given

@@ -68,6 +68,10 @@ LAW_HOLDS = 0.2
 # before it is said to explain what the loop does not: the two floors count different things.
 MUCH_BETTER = 1.0 / 3.0
 
+# Of the closed loop's error, that may be left where an effect of the drive was added, for the loop's account to stand:
+# what takes away nineteen parts of twenty is not given up for a model that has no drive.
+LOOP_TOLD = 0.05
+
 # Floors that inverse dynamics may leave before any effect, up to which it may contradict one; and how much of an effect
 # it may leave then, that is said to be none of it.
 HEARD, GONE = 2.0, 0.3

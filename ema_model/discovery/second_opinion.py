@@ -13,7 +13,7 @@ from ema_model.actuator import Actuator, Tolerance
 from ema_model.actuator.unread import INVERSE_PLACES, unread
 from ema_model.comparison.criteria import BAND
 from ema_model.discovery.controller_seen import ControllerSeen, controller_seen
-from ema_model.discovery.criteria import APART, GONE, HEARD, MUCH_BETTER
+from ema_model.discovery.criteria import APART, GONE, HEARD, LOOP_TOLD, MUCH_BETTER
 from ema_model.discovery.path import Story, calibrated_story
 from ema_model.discovery.refit import pays
 from ema_model.discovery.remaining import at_floor
@@ -47,6 +47,10 @@ class Opinion:
 
         A gain that is another than the file's is seen without any plant: better is then enough.
         """
+        first, last = closed.ladder[0].rmse, closed.ladder[-1].rmse
+        of_drive = any(find(one.name).family == "drive" for one in closed.added if one.name in CATALOGUE)
+        if last <= BAND or (of_drive and last <= LOOP_TOLD * first):  # what was added to the drive's loop explains it
+            return False
         left = self.story.ladder[-1].rmse
         sure = self.seen is not None and self.seen.holds and any(gain.differs for gain in self.seen.gains)
         return left <= BAND or left <= (1.0 if sure else MUCH_BETTER) * closed.ladder[-1].rmse

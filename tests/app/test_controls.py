@@ -345,9 +345,10 @@ def test_a_recording_is_chosen_and_watched_while_it_grows(page, app):
     frame.wait_for()
     growing = session.folder / app.identify._race.growing.name
     assert growing.name in frame.get_attribute("src") and not growing.exists(), "it is still being written"
-    page.get_by_role("link", name="Watch it live").wait_for()
     page.get_by_role("button", name="Close the viewer").click()
     frame.wait_for(state="detached")
+    show(page, "Identify")
+    page.get_by_role("link", name="Watch it live").wait_for()
     page.get_by_role("button", name="Stop", exact=True).first.click()
     wait_until(growing.exists)
     page.get_by_role("button", name="Watch it in Rerun, here").wait_for(state="hidden")

@@ -147,7 +147,7 @@ def _claimed(story: Story, accepted: Sequence[Trial], tell: Progress) -> tuple[T
     while left:
         best, others = _chosen(story, left)
         further = _further(story, best, tell)
-        # A drive's commutation makes orders of its own; where no controller is simulated no twin tells of them.
+        # Without a controller there is no twin, whose floor would tell a further order from what is left.
         more, reason = None if further is None or story.data.guarded else further.trial, ""
         apart = _of_other_parts(best, others)
         if len(apart) >= LARGEST_GROUP:

@@ -116,7 +116,10 @@ def table(
 
 
 def _rms(values: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))
+    largest = float(np.max(np.abs(values)))
+    if not math.isfinite(largest) or largest == 0.0:
+        return largest
+    return largest * float(np.sqrt(np.mean(np.square(values / largest))))  # a diverged run's own squares overflow
 
 
 def _shown(value: float) -> str:

@@ -85,6 +85,12 @@ def test_metrics_are_those_of_the_signals(runs):
     assert all(value == 0.0 for value, _ in differences(reference, reference).values())
 
 
+def test_a_run_that_diverged_has_its_numbers(runs):
+    reference, _ = runs
+    far = Measurement({**reference.signals, "current_A": np.full(len(reference.time_s), -3e200)}, name="diverged")
+    assert metrics(far, "step")["rms current"] == pytest.approx(3e200)
+
+
 def test_a_frozen_run_is_hidden_where_it_has_no_values(runs):
     reference, _ = runs
     later = reference.time_s + 0.25

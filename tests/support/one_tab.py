@@ -7,7 +7,13 @@ from typing import Any
 from emaviz.page.app import App
 
 CHARTS_DRAWN = "Object.keys(window.__viserTestpoints?.uplots ?? {}).length >= 4"
-BEHIND = "[role=tablist] > [role=tab]:first-child[aria-selected=false]:visible"  # first tabs that are not in front
+# Clicks each group's first tab that is not in front; whether none was left.
+FIRST_IN_FRONT = """() => {
+  const behind = Array.from(document.querySelectorAll('[role=tablist] > [role=tab]:first-child[aria-selected=false]'))
+    .filter(tab => tab.offsetParent);
+  behind.forEach(tab => tab.click());
+  return behind.length === 0;
+}"""
 # Software GL draws the scene again and again, with a third of a core for nothing that these tests look at; what moves
 # there is asked of its poses.
 UNDRAWN = """for (const gl of [WebGL2RenderingContext.prototype, WebGLRenderingContext.prototype])
@@ -50,8 +56,7 @@ class Tab:
             return self._page
         self._page.set_default_timeout(30_000)
         self._page.evaluate(TURN_BACK, self._folders)
-        for front in self._page.locator(BEHIND).all():
-            front.click()
+        self._page.wait_for_function(FIRST_IN_FRONT)
         while said := self._page.locator(SAID).count():
             self._page.evaluate(f"document.querySelectorAll('{SAID}').forEach(one => one.click())")
             self._page.wait_for_function(f"document.querySelectorAll('{SAID}').length < {said}")

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 from typing import Any
+
+from playwright.sync_api import TimeoutError
 
 from emaviz.page.app import App
 
 CHARTS_DRAWN = "Object.keys(window.__viserTestpoints?.uplots ?? {}).length >= 4"
-# Clicks each group's first tab that is not in front; whether none was left.
-FIRST_IN_FRONT = """() => {
-  const behind = Array.from(document.querySelectorAll('[role=tablist] > [role=tab]:first-child[aria-selected=false]'))
-    .filter(tab => tab.offsetParent);
-  behind.forEach(tab => tab.click());
-  return behind.length === 0;
-}"""
+BEHIND = "[role=tablist] > [role=tab]:first-child[aria-selected=false]:visible"  # first tabs that are not in front
+IN_FRONT = "tab => tab.ariaSelected === 'true' || !tab.isConnected"
 # Software GL draws the scene again and again, with a third of a core for nothing that these tests look at; what moves
 # there is asked of its poses.
 UNDRAWN = """for (const gl of [WebGL2RenderingContext.prototype, WebGLRenderingContext.prototype])
@@ -56,7 +54,10 @@ class Tab:
             return self._page
         self._page.set_default_timeout(30_000)
         self._page.evaluate(TURN_BACK, self._folders)
-        self._page.wait_for_function(FIRST_IN_FRONT)
+        while (tab := self._page.query_selector(BEHIND)) is not None:
+            with contextlib.suppress(TimeoutError):  # the app may put the tab's whole group away meanwhile
+                tab.click(timeout=2_000)
+                self._page.wait_for_function(IN_FRONT, arg=tab)
         while said := self._page.locator(SAID).count():
             self._page.evaluate(f"document.querySelectorAll('{SAID}').forEach(one => one.click())")
             self._page.wait_for_function(f"document.querySelectorAll('{SAID}').length < {said}")

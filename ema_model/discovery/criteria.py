@@ -72,6 +72,9 @@ MUCH_BETTER = 1.0 / 3.0
 # what takes away nineteen parts of twenty is not given up for a model that has no drive.
 LOOP_TOLD = 0.05
 
+# Of the closed loop's error, that its first step must leave before a model without the controller may take over early.
+HALF = 0.5
+
 # Floors that inverse dynamics may leave before any effect, up to which it may contradict one; and how much of an effect
 # it may leave then, that is said to be none of it.
 HEARD, GONE = 2.0, 0.3

@@ -23,7 +23,7 @@ from ema_model.discovery.path import Story, begun, refreshed, with_drops
 from ema_model.discovery.refit import Trial, fitted_count, pays
 from ema_model.discovery.remaining import at_floor
 from ema_model.discovery.result import Candidate, Discovery, Experiment
-from ema_model.discovery.second_opinion import compared, second_opinion, support_of, taken_over
+from ema_model.discovery.second_opinion import Opinion, compared, second_opinion, support_of, taken_over
 from ema_model.discovery.sentences import as_well, held_back, masked, mismatch, untold
 from ema_model.discovery.uncertainty import with_intervals
 from ema_model.discovery.unknown import curve_instead, is_a_shape
@@ -83,59 +83,90 @@ def walk(
     Where a closed loop is left unexplained, inverse dynamics is asked as well, and takes over if the controller is to
     blame.  tell is told after each step, too, and may raise to stop; the story then stands at its last whole step.
     """
-    walked = _walked(story, tell, candidates, most_effects)
+    own = _Walk(story, tell, candidates, most_effects)
+    own.go()
+    # Asked early, for a loop whose controller is another one is walked in vain; and again at its end, if it went on.
     opinion = second_opinion(story, tell)
-    if opinion is not None:
-        other = None
-        if opinion.blames_controller:
-            other = _walked(opinion.story, tell, candidates, most_effects)
-        if other is not None and opinion.explains_better(story):
+    other = _other(opinion, tell, candidates, most_effects)
+    if opinion is not None and other is not None and opinion.settles(story):
+        taken_over(story, opinion)
+        walked = other
+    else:
+        walked = own.ended()
+        opinion = second_opinion(story, tell, opinion)
+        other = other or _other(opinion, tell, candidates, most_effects)
+        if opinion is not None and other is not None and opinion.explains_better(story):
             taken_over(story, opinion)
             walked = other
-        else:
+        elif opinion is not None:
             compared(story, opinion, tell)
     story.disagreements = contradictions(story, tell)
     return walked
 
 
-def _walked(story: Story, tell: Progress, candidates: Sequence[str] | None, most_effects: int) -> Walked:
-    first: list[Candidate] = []
-    rivals: list[Trial] = []
-    curve: Trial | None = None
-    # Each round looks whether or not anything is seen to be left: a fingerprint knows better what to look for.
-    while len({one.name for one in story.added}) < most_effects:
+def _other(
+    opinion: Opinion | None, tell: Progress, candidates: Sequence[str] | None, most_effects: int
+) -> Walked | None:
+    """Inverse dynamics walked to its end, where the controller is to blame."""
+    if opinion is None or not opinion.blames_controller:
+        return None
+    return _Walk(opinion.story, tell, candidates, most_effects).ended()
+
+
+class _Walk:
+    """A story that goes on step by step."""
+
+    def __init__(self, story: Story, tell: Progress, candidates: Sequence[str] | None, most_effects: int) -> None:
+        self.story, self._tell, self._names, self._most = story, tell, candidates, most_effects
+        self._first: list[Candidate] = []
+        self._rivals: list[Trial] = []
+        self._curve: Trial | None = None
+        self._going = True
+
+    def go(self) -> None:
+        """One step, of a fault or an effect; where nothing pays, it has come to its end."""
+        self._going = len({one.name for one in self.story.added}) < self._most and self._step()
+
+    def ended(self) -> Walked:
+        """Goes on to the end; takes out what became idle or doubtful, draws what is unknown, and settles."""
+        # Each round looks whether or not anything is seen to be left: a fingerprint knows better what to look for.
+        while self._going:
+            self.go()
+        story, tell = self.story, self._tell
+        _drop_idle(story, tell)
+        _drop_doubtful(story, tell)
+        unknown = story.left().explanation
+        if unknown is not None and not _named(story):
+            unknown = _with_curve(story, self._curve, unknown, tell)
+        story.settle(tell)  # last: beside a settled model any refit falls that only goes back to the sensors' noise
+        return Walked(self._first, self._rivals, unknown)
+
+    def _step(self) -> bool:
+        story, tell = self.story, self._tell
         tell("scoring the candidates")
         left = story.left()
-        ranked = story.ranked(candidates, left)
+        ranked = story.ranked(self._names, left)
         trials = story.tried(ranked, _REFITTED_SHARE, _MOST_REFITTED, tell)
-        fault = story.fault(ranked, lambda trials=trials: trials, tell)
+        fault = story.fault(ranked, lambda: trials, tell)
         if fault:
             story.add(fault)
-            continue
-        first = first or with_drops(ranked, trials)
+            return True
+        self._first = self._first or with_drops(ranked, trials)
         accepted = [trial for trial in trials if pays(story.current, trial, story.data, story.held)]
-        if not accepted:
-            break
-        claim = _claimed(story, accepted, tell)
+        claim = _claimed(story, accepted, tell) if accepted else None
         if claim is None:
-            break
+            return False
         best, others, more = claim
-        curve = curve_instead(story.data, story.held, story.current, best, left.explanation, tell)
+        self._curve = curve_instead(story.data, story.held, story.current, best, left.explanation, tell)
         orders = [settings["order"] for settings in more.effects.values()] if more else []
-        if curve or is_a_shape([best.candidate.settings.get("order", 0.0), *orders]):
-            break
-        if others and not rivals:
-            rivals = [best, *others]
+        if self._curve or is_a_shape([best.candidate.settings.get("order", 0.0), *orders]):
+            return False
+        if others and not self._rivals:
+            self._rivals = [best, *others]
         story.add(best, ties=[trial.candidate.name for trial in others])
         if more:
             story.add(more, f"+ {best.candidate.name} of orders {', '.join(f'{order:g}' for order in orders)}")
-    _drop_idle(story, tell)
-    _drop_doubtful(story, tell)
-    unknown = story.left().explanation
-    if unknown is not None and not _named(story):
-        unknown = _with_curve(story, curve, unknown, tell)
-    story.settle(tell)  # last: beside a settled model any refit falls that only goes back to the sensors' noise
-    return Walked(first, rivals, unknown)
+        return True
 
 
 def _claimed(story: Story, accepted: Sequence[Trial], tell: Progress) -> tuple[Trial, list[Trial], Trial | None] | None:

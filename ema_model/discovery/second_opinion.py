@@ -13,7 +13,7 @@ from ema_model.actuator import Actuator, Tolerance
 from ema_model.actuator.unread import INVERSE_PLACES, unread
 from ema_model.comparison.criteria import BAND
 from ema_model.discovery.controller_seen import ControllerSeen, controller_seen
-from ema_model.discovery.criteria import APART, GONE, HEARD, LOOP_TOLD, MUCH_BETTER
+from ema_model.discovery.criteria import APART, GONE, HALF, HEARD, LOOP_TOLD, MUCH_BETTER
 from ema_model.discovery.path import Story, calibrated_story
 from ema_model.discovery.refit import pays
 from ema_model.discovery.remaining import at_floor
@@ -55,11 +55,25 @@ class Opinion:
         sure = self.seen is not None and self.seen.holds and any(gain.differs for gain in self.seen.gains)
         return left <= BAND or left <= (1.0 if sure else MUCH_BETTER) * closed.ladder[-1].rmse
 
+    def settles(self, closed: Story) -> bool:
+        """Whether the loop need not be walked on: this explains what flowed to its floor, the first step hardly half.
 
-def second_opinion(story: Story, tell: Callable[[str], None]) -> Opinion | None:
-    """Inverse dynamics, calibrated; None where the closed loop leaves no more than its band, or it cannot be asked."""
+        A drive's own effect beside another one is left to the loop, which alone can tell the two.
+        """
+        first, last = closed.ladder[0].rmse, closed.ladder[-1].rmse
+        return self.story.ladder[-1].rmse <= BAND and last > HALF * first and self.explains_better(closed)
+
+
+def second_opinion(story: Story, tell: Callable[[str], None], before: Opinion | None = None) -> Opinion | None:
+    """Inverse dynamics, calibrated; None where the closed loop leaves no more than its band, or it cannot be asked.
+
+    before: what was said of an earlier step; the motion needs the same of the motor, and only the controller is seen
+    anew.
+    """
     if not story.repeatable or not story.current.plant.simulates_commands or at_floor(story.data, story.current):
         return None
+    if before is not None:
+        return Opinion(before.story, _seen(story, before.story))
     without = by_inverse_dynamics(story.data, story.base.actuator)
     if without is None:
         return None
@@ -69,9 +83,12 @@ def second_opinion(story: Story, tell: Callable[[str], None]) -> Opinion | None:
         other = calibrated_story(story.data.measurements, delayed(without), held, None, tell, guarded=True)
     except InputError:  # too little motion, or a held-out recording without a current
         return None
-    late = other.current.calibration.actuator.sensors.delay_s
-    fitted = story.current.calibration.actuator
-    return Opinion(other, controller_seen(story.current.plant, fitted, late))
+    return Opinion(other, _seen(story, other))
+
+
+def _seen(story: Story, other: Story) -> ControllerSeen | None:
+    late = other.base.calibration.actuator.sensors.delay_s
+    return controller_seen(story.current.plant, story.current.calibration.actuator, late)
 
 
 def taken_over(story: Story, opinion: Opinion) -> None:

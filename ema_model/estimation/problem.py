@@ -78,29 +78,49 @@ class Problem:
 
     def residuals(self, x: Array) -> Array:
         """(n, unknowns) → (n, values + unknowns)."""
-        parts = []
-        for i, (window, weights) in enumerate(zip(self.model.windows, self.weights)):
-            shown = self.simulate(x, i)
-            for name, weight in weights.items():
-                error = shown[name] - window.measured[name]
-                if self.added:
-                    error += self.added[i][name]
-                parts.append(error * weight)
-        # A run that diverges is a very bad one, but a number.
-        return np.nan_to_num(np.concatenate([*parts, x * self.prior], axis=1), nan=1e6, posinf=1e6, neginf=-1e6)
+        errors = [self._errors(x, window) for window in range(len(self.weights))]
+        return np.concatenate([*errors, x * self.prior], axis=1)
 
     def jacobians(self, x: Array) -> tuple[Array, Array]:
-        """Residuals (n, m) and their derivatives (n, m, unknowns) by central differences, all in one population."""
-        n, count = x.shape
-        low, high = np.repeat(x[:, None, :], count, axis=1), np.repeat(x[:, None, :], count, axis=1)
-        at = np.arange(count)
-        low[:, at, at] = np.maximum(x - self._step, self.low)
-        high[:, at, at] = np.minimum(x + self._step, self.high)
-        points = np.concatenate([x[:, None, :], low, high], axis=1).reshape(-1, count)
-        all_ = self.residuals(points).reshape(n, 2 * count + 1, -1)
-        width = (high[:, at, at] - low[:, at, at])[:, :, None]
-        slopes = (all_[:, 1 + count :] - all_[:, 1 : 1 + count]) / width
-        return all_[:, 0], np.swapaxes(slopes, 1, 2)
+        """Residuals (n, m) and their derivatives (n, m, unknowns) by central differences.
+
+        A window is simulated in one population, for the unknowns that act in it: not for where the others start.
+        """
+        n = len(x)
+        low, high = np.maximum(x - self._step, self.low), np.minimum(x + self._step, self.high)
+        residuals, slopes = [], np.zeros((n, self.count, self.values + self.count))
+        first = 0
+        for window in range(len(self.weights)):
+            acting = np.array([i for i, u in enumerate(self.unknowns) if self._acts(u, window)], dtype=int)
+            count = len(acting)
+            points = np.repeat(x[:, None, :], 2 * count + 1, axis=1)
+            points[:, 1 + np.arange(count), acting] = low[:, acting]
+            points[:, 1 + count + np.arange(count), acting] = high[:, acting]
+            errors = self._errors(points.reshape(-1, self.count), window).reshape(n, 2 * count + 1, -1)
+            rows = slice(first, first + errors.shape[2])
+            width = (high - low)[:, acting, None]
+            slopes[:, acting, rows] = (errors[:, 1 + count :] - errors[:, 1 : 1 + count]) / width
+            residuals.append(errors[:, 0])
+            first = rows.stop
+        at = np.arange(self.count)
+        slopes[:, at, self.values + at] = self.prior
+        return np.concatenate([*residuals, x * self.prior], axis=1), np.swapaxes(slopes, 1, 2)
+
+    def _errors(self, x: Array, window: int) -> Array:
+        """A window's part of the residuals of x (n, unknowns): (n, values); of a run that diverges a very great one."""
+        shown, measured = self.simulate(x, window), self.model.windows[window].measured
+        added = self.added[window] if self.added else {}
+        parts = [
+            (shown[name] - measured[name] + added.get(name, 0.0)) * weight
+            for name, weight in self.weights[window].items()
+        ]
+        return np.nan_to_num(np.concatenate([np.zeros((len(x), 0)), *parts], axis=1), nan=1e6, posinf=1e6, neginf=-1e6)
+
+    def _acts(self, unknown: Unknown, window: int) -> bool:
+        """Whether an unknown is anything to a window: a start is its own window's, a load its recording's."""
+        if unknown.kind in ("turned", "play"):
+            return unknown.place == window
+        return unknown.kind != "load" or unknown.place == self.model.windows[window].recording
 
     def parts(self) -> list[tuple[int, str, slice]]:
         """Where the residuals of each window's signals stand: window, signal, rows."""

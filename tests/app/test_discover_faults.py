@@ -10,6 +10,7 @@ from support.rig import Rig
 
 from ema_model.actuator import load_actuator
 from ema_model.challenges.truth import Truth
+from ema_model.discovery.criteria import LEAST_BIC
 from ema_model.discovery.words import faults, headline, sentences
 from ema_model.errors import InputError
 from emaviz.page.discover.result import answer
@@ -41,7 +42,8 @@ def worn(rig):
 
 def test_start_takes_the_fault_into_the_model(worn):
     look = worn.look
-    assert list(look.found.faults) == ["k2"] and not look.added and not look.promising
+    assert list(look.found.faults) == ["k2"] and not look.added
+    assert all(one.predicted_drop < 2.0 * LEAST_BIC for one in look.promising), "what is left asks for no effect"
     assert [rung.label for rung in look.found.ladder] == ["calibrated", "fault k2 backlash"]
     assert look.rmse < 1.1 < look.found.ladder[0].rmse
     assert headline(look.found) == "No physics is missing: the actuator has the fault k2 backlash."

@@ -151,7 +151,7 @@ def _covariance(found: Fitted) -> Array:
     return 0.5 * (covariance + covariance.T)
 
 
-def _curvature(found: Fitted) -> tuple[Array, Array]:
+def _curvature(found: Fitted) -> tuple[Array, NDArray[np.floating]]:
     """The weight by which each unknown was held to its prior, and the inverse of the fit's Hessian with it."""
     problem, rows = found.problem, slice(0, found.problem.values)
     held = problem.prior.copy()  # as the fit had it; what is really unknown is the whole tolerance

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,7 +12,7 @@ from ema_model.tracking.criteria import JUMP_AFTER, JUMP_BACK, JUMP_LEAST, JUMP_
 Array = NDArray[np.float64]
 
 
-def jump(k: Array, variance: Array, common: Array, healthy: float) -> int | None:
+def jump(k: Array, variance: Array, common: Sequence[Array], healthy: float) -> int | None:
     """The place of the first flight after a step, of the flights (n,) of one k; None where there is none.
 
     Only one that JUMP_AFTER flights follow is looked for, so that it is found as soon as it can be.  Medians of three
@@ -21,8 +23,6 @@ def jump(k: Array, variance: Array, common: Array, healthy: float) -> int | None
     if at < JUMP_AFTER + 1:
         return None
     before, after = float(np.median(k[at - 3 : at])), float(np.median(k[at : at + 3]))
-    if abs(after - before) <= JUMP_LEAST:
-        return None
     window = k[max(0, at - JUMP_WINDOW) :]
     steps = np.diff(window)
     beside = np.delete(steps, len(window) - JUMP_AFTER - 1)
@@ -31,7 +31,7 @@ def jump(k: Array, variance: Array, common: Array, healthy: float) -> int | None
         float(np.sqrt(2.0 * np.median(variance[max(0, at - JUMP_WINDOW) :]))),
     )
     step = after - before - 3.0 * float(np.median(beside))
-    of_unit = np.linalg.norm(common[at : at + 3].mean(axis=0) - common[at - 3 : at].mean(axis=0))
+    of_unit = np.linalg.norm(np.mean(common[at : at + 3], axis=0) - np.mean(common[at - 3 : at], axis=0))
     spread = float(np.hypot(spread, of_unit))
     back = abs(after - healthy) < abs(before - healthy)
     if abs(step) <= max(JUMP_LEAST, (JUMP_BACK if back else JUMP_ON) * spread):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,12 +15,13 @@ from ema_model.tracking.criteria import LEAST_FLIGHTS, LONGEST, MISFIT_SHARE, MI
 from ema_model.tracking.flight import Flight
 from ema_model.tracking.remaining import remaining
 from ema_model.tracking.result import FaultTrack, Jump, Tracked
-from ema_model.tracking.series import COMPONENTS, Series
+from ema_model.tracking.series import Series
 from ema_model.tracking.wear import Wear, wear
 
 Array = NDArray[np.float64]
 
 TRACKED = tuple(name for name in faults.NAMES if name != "k7")  # an angle wears nothing
+COMPONENTS = len(faults.NAMES)
 _ONE_SIDED = 5  # k1 … k5 grow
 _GAIN = 7
 _RECENT = 10  # flights, over which the unit's share of k̂ is averaged
@@ -37,6 +39,15 @@ def check_thresholds(thresholds: Mapping[str, float]) -> None:
             raise InputError(f"threshold {name} = {value:g}: must lie in 0 … 1, away from the healthy value")
 
 
+@dataclass(frozen=True, eq=False)
+class _Whole:
+    """All usable flights: k (n, 8), own (n, 8, 8), common (n, 8, base parameters)."""
+
+    k: Array
+    own: Array
+    common: Array
+
+
 class Tracker:
     """Takes one flight after another; `look` tells what is known after the last one."""
 
@@ -47,25 +58,25 @@ class Tracker:
         self._seed = seed
         self._flights: list[Flight] = []
         self._usable: list[Flight] = []
-        self._series: list[Series] = []
+        self._series: Series | None = None
 
     def add(self, flight: Flight) -> None:
         """The next flight in order of time; InputError where its base parameters are others than before."""
-        if not self._series and not flight.excluded:
-            base, healthy = flight.common.shape[1], [0.0] * 7 + [faults.HEALTHY[_GAIN]]
-            self._series = [Series(base, i < _ONE_SIDED, float(healthy[i])) for i in range(COMPONENTS)]
         if self._usable and not flight.excluded and flight.common.shape != self._usable[0].common.shape:
             raise InputError(f"{quoted(flight.name)}: is of another actuator than {quoted(self._usable[0].name)}")
         self._flights.append(flight)
         if flight.excluded:
             return
+        if self._series is None:
+            healthy = np.array([*[0.0] * _GAIN, faults.HEALTHY[_GAIN]])
+            self._series = Series(flight.common.shape[1], np.arange(COMPONENTS) < _ONE_SIDED, healthy)
         self._usable.append(flight)
-        for i, series in enumerate(self._series):
-            series.add(float(len(self._flights)), float(flight.k[i]), float(flight.own[i, i]), flight.common[i])
+        self._series.add(float(len(self._flights)), flight)
 
     def has_trend(self, name: str) -> bool:
         """Whether there is evidence so far that this k drifts."""
-        return len(self._usable) >= LEAST_FLIGHTS and any(self._series[i].trend_at is not None for i in _places(name))
+        known = self._series
+        return known is not None and any(known.trend_at[i] is not None for i in _places(name))
 
     def look(self) -> Tracked:
         """What is known; InputError before there are enough flights to tell anything."""
@@ -81,35 +92,35 @@ class Tracker:
                 f"The model does not fit {bad} of the last {len(last)} flights: no trend is trusted; physics that it "
                 "lacks may stand behind it, and `emaviz discover` on these recordings looks for it."
             )
-        own = np.mean([one.own for one in self._usable], axis=0)
+        whole = _Whole(*(np.stack([getattr(one, part) for one in self._usable]) for part in ("k", "own", "common")))
+        own = whole.own.mean(axis=0)
         sigma = np.sqrt(np.diag(own))
         return Tracked(
             flights=tuple(self._flights),
-            faults={name: self._fault(name, trusted) for name in TRACKED},
+            faults={name: self._fault(name, trusted, whole) for name in TRACKED},
             correlation=own / np.outer(sigma, sigma),
             trusted=trusted,
             warnings=tuple(warnings),
             seed=self._seed,
         )
 
-    def _fault(self, name: str, trusted: bool) -> FaultTrack:
-        lead = max(
-            (self._series[i] for i in _places(name)), key=lambda one: (one.trend_at is not None, one.log_evidence)
-        )
+    def _fault(self, name: str, trusted: bool, whole: _Whole) -> FaultTrack:
+        known = self._series
+        assert known is not None  # there are flights
+        lead = max(_places(name), key=lambda i: (known.trend_at[i] is not None, known.log_evidence[i]))
         trend, threshold = self.has_trend(name), self.thresholds.get(name)
-        begin = max(self._series[i].start for i in _places(name))
+        begin = max(known.start(i) for i in _places(name))
         healthy = faults.BY_NAME[name].healthy
         now = float(len(self._flights))
-        way, sign = self._direction(name, lead, begin, threshold)
-        k = np.array([way @ one.k for one in self._usable])
-        own = np.array([way @ one.own @ way for one in self._usable])
-        common = np.array([way @ one.common for one in self._usable])
-        factor = max(self._series[i].noise_factor for i in _places(name))
+        way, sign = self._direction(name, begin, threshold)
+        k, own = whole.k @ way, (whole.own @ way) @ way
+        common = np.tensordot(whole.common, way, (1, 0))
+        factor = float(max(known.noise_factor[list(_places(name))]))
         unit = _unit(common[begin:])
         reason, left, drift, drift90 = "", None, 0.0, (0.0, 0.0)
         if trend:
             stray = np.sum((common[begin:] - _smoothed(common[begin:])) ** 2, axis=1)
-            at = np.array(lead.at[begin:])
+            at = np.array(known.at[begin:])
             worn = wear(at, sign * (k[begin:] - healthy), factor * own[begin:] + stray, now)
             level, sigma = _mixed(worn.weight, worn.level, worn.covariance[:, 0])
             level = healthy + sign * level
@@ -127,7 +138,8 @@ class Tracker:
             reason, left = "the model does not fit the last flights; remaining life not told", None
         sigma = float(np.sqrt(sigma**2 + unit[1, 1]))
         low, high = (float(np.clip(level + z * sigma, 0.0, 1.0)) for z in (-_Z90, _Z90))
-        since = self._usable[lead.trend_at].name if lead.trend_at is not None else ""
+        seen = known.trend_at[lead]
+        since = "" if seen is None else self._usable[seen].name
         return FaultTrack(
             name=name,
             trend=trend,
@@ -139,8 +151,8 @@ class Tracker:
             threshold=threshold,
             remaining=left,
             reason=reason,
-            jumps=self._jumps(name),
-            evidence=lead.log_evidence,
+            jumps=self._jumps(name, known),
+            evidence=float(known.log_evidence[lead]),
             k=k,
             sigma=np.sqrt(factor * own),
         )
@@ -155,7 +167,7 @@ class Tracker:
             return f"more than {LONGEST:g} flights remain", None
         return "", left
 
-    def _direction(self, name: str, lead: Series, begin: int, threshold: float | None) -> tuple[Array, float]:
+    def _direction(self, name: str, begin: int, threshold: float | None) -> tuple[Array, float]:
         """By which a vector of k becomes this k, (8,), and the sign with which it grows."""
         way = np.zeros(COMPONENTS)
         if name == "k6":
@@ -168,18 +180,17 @@ class Tracker:
             return way, 1.0
         if threshold is not None:
             return way, float(np.sign(threshold - faults.HEALTHY[_GAIN]))
-        half = max(1, len(lead.k[begin:]) // 2)
-        return way, 1.0 if np.mean(lead.k[begin:][-half:]) >= np.mean(lead.k[begin:][:half]) else -1.0
+        gain = [one.k[_GAIN] for one in self._usable[begin:]]
+        half = max(1, len(gain) // 2)
+        return way, 1.0 if np.mean(gain[-half:]) >= np.mean(gain[:half]) else -1.0
 
-    def _jumps(self, name: str) -> tuple[Jump, ...]:
-        found = []
+    def _jumps(self, name: str, known: Series) -> tuple[Jump, ...]:
+        found, healthy = [], 0.0 if name == "k6" else faults.BY_NAME[name].healthy
         for i in _places(name):
-            series = self._series[i]
-            for place in series.jumps:
-                before, after = (
-                    float(np.median(series.k[max(0, a) : b])) for a, b in ((place - 3, place), (place, place + 3))
-                )
-                back = abs(after - series.healthy) < abs(before - series.healthy)
+            k = [one.k[i] for one in self._usable]
+            for place in known.jumps[i]:
+                before, after = float(np.median(k[max(0, place - 3) : place])), float(np.median(k[place : place + 3]))
+                back = abs(after - healthy) < abs(before - healthy)
                 found.append(Jump(self._usable[place].name, before, after, back))
         return tuple(found)
 

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 POWERS = (1.0, 1.5, 2.0, 3.0)  # k ∝ (flights since the onset)ᵖ
 GROWTHS = (1.0 / 150.0, 1.0 / 75.0, 1.0 / 40.0)  # the rate's share a flight
 UNEVEN = (0.3, 0.7, 1.2)  # coefficient of variation of a flight's wear
-_ONSETS = 16  # that are tried
+_ONSETS = 10  # that are tried
 _SHAPE_PRIOR = (0.4, *[0.1] * 6)
 _RATE = 0.03  # of k in a flight, 1 σ of the prior of today's rate
 _PASSES = 2
@@ -45,31 +45,33 @@ def wear(at: Array, k: Array, variance: Array, now: float) -> Wear:
     """at (n,): the flights' numbers; k (n,), so turned that it grows; variance (n,) of their own noise."""
     first = at[0]
     onsets = np.unique(np.round(np.linspace(first - 1.0, max(now - 4.0, first - 1.0), _ONSETS)))
-    shapes = [(p, 0.0) for p in POWERS] + [(0.0, g) for g in GROWTHS]
     steps = np.arange(first + 1.0, now + 1.0)  # the flights in which something wears
-    pieces, ways, prior = [], [], []
-    for onset in onsets:
-        since = np.maximum(steps - onset, 0.0)
-        age = max(now - onset, 1.0)
-        for (power, growth), share in zip(shapes, _SHAPE_PRIOR):
-            with np.errstate(divide="ignore"):
-                rate = (since / age) ** (power - 1.0) if power else np.exp(-growth * (now - steps))
-            rate = np.where(since > 0.0, rate, 0.0)
-            pieces.append([np.concatenate([[0.0], np.cumsum(rate)]), np.concatenate([[0.0], np.cumsum(rate**2)])])
-            for uneven in UNEVEN:
-                ways.append((len(pieces) - 1, age, power, growth, uneven))
-                prior.append(np.log(share))
-    table = np.array(pieces)
-    shape, age, power, growth, uneven = np.array(ways).T
+    since = np.maximum(steps - onsets[:, None], 0.0)  # (onsets, steps)
+    ages = np.maximum(now - onsets, 1.0)
+    by_power = (since / ages[:, None])[:, None, :] ** (np.array(POWERS)[:, None] - 1.0)
+    by_growth = np.exp(-np.array(GROWTHS)[:, None] * (now - steps))
+    rates = np.concatenate([by_power, np.broadcast_to(by_growth, (len(onsets), *by_growth.shape))], axis=1)
+    rates = (rates * (since > 0.0)[:, None, :]).reshape(-1, len(steps))
+    table = np.zeros((len(rates), 2, len(steps) + 1))
+    table[:, 0, 1:], table[:, 1, 1:] = np.cumsum(rates, axis=1), np.cumsum(rates**2, axis=1)
+    # ways: onsets × shapes × unevenness
+    shapes = len(POWERS) + len(GROWTHS)
+    count = len(rates) * len(UNEVEN)
+    shape = np.repeat(np.arange(len(rates)), len(UNEVEN))
+    age = np.repeat(ages, shapes * len(UNEVEN))
+    kind = shape % shapes
+    power, growth = np.array([*POWERS, *[0.0] * len(GROWTHS)])[kind], np.array([*[0.0] * len(POWERS), *GROWTHS])[kind]
+    uneven = np.tile(np.array(UNEVEN), count // len(UNEVEN))
+    prior = np.log(np.array(_SHAPE_PRIOR))[kind]
     places = (at - first).astype(np.int64)
     last = np.append(places, int(now - first))  # the state is today's, whether today's flight is usable or not
     path = table[:, :, last]
-    found = _filtered(path, shape.astype(np.int64), uneven, k, variance, _RATE, _PASSES)
+    found = _filtered(path, shape, uneven, k, variance, _RATE, _PASSES)
     level, rate, a, b, c, fit = found.T
     sigma = np.sqrt(np.maximum(c, 1e-18))
-    weight = fit + np.array(prior) + log_ndtr(rate / sigma)
+    weight = fit + prior + log_ndtr(rate / sigma)
     weight = np.exp(weight - weight.max())
-    worn = table[:, 0, -1][shape.astype(np.int64)]
+    worn = table[:, 0, -1][shape]
     return Wear(weight / weight.sum(), level, rate, np.stack([a, b, c], axis=1), age, power, growth, uneven, worn)
 
 

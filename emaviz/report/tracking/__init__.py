@@ -8,8 +8,8 @@ from ema_model.tracking.result import Tracked
 from ema_model.tracking.words import answer
 from emaviz.report.page import page, write
 from emaviz.report.section import Section
-from emaviz.report.tracking.answer import Answer
 from emaviz.report.tracking.flights import Flights
+from emaviz.report.tracking.in_words import Answer
 from emaviz.report.tracking.remaining import RemainingLife
 
 SECTIONS: tuple[Section[Tracked], ...] = (Answer(), RemainingLife(), Flights())

@@ -48,7 +48,8 @@ def given(task: Task) -> Given:
             for files in (task.recorded.files, task.recorded.holdout)
         )
         return Given(actuator, fitted, held)
-    assert task.simulated is not None
+    if task.simulated is None:
+        return Given(actuator, [], [])
     source = task.simulated
     fitted, held = (recorded(source, runs, actuator) for runs in (source.runs, source.holdout))
     return Given(actuator, fitted, held, vector(source.faults), effects_of(source.effects))

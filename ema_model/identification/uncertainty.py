@@ -54,6 +54,11 @@ class Uncertainty:
     separated_by: Suggestion | None = None  # the run that would tell the groups apart, and the hardly known
     covariance: Array = field(default_factory=lambda: np.zeros((FAULTS, FAULTS)))  # of k
     detectable: Array = field(default_factory=lambda: np.zeros(8))  # (8,) from healthy, where an alarm begins; k7: NaN
+    # Of k with the eccentricity as a vector: the best one without bounds (8,), and its covariance in two parts, what
+    # the base parameters do, in σ of each (8, base parameters), and what is this recording's own (8, 8).
+    unbounded: Array = field(default_factory=lambda: np.zeros(FAULTS))
+    common: Array = field(default_factory=lambda: np.zeros((FAULTS, 0)))
+    own: Array = field(default_factory=lambda: np.zeros((FAULTS, FAULTS)))
 
 
 def uncertainty(found: Fitted, k: Array) -> Uncertainty:
@@ -82,6 +87,9 @@ def uncertainty(found: Fitted, k: Array) -> Uncertainty:
         separated_by=separating(found, best.covariance, unclear) if unclear else None,
         covariance=best.covariance,
         detectable=_detectable(best),
+        unbounded=best.free,
+        common=best.common,
+        own=best.own,
     )
 
 
@@ -90,6 +98,9 @@ class _Basin:
     """What one best fit alone says."""
 
     covariance: Array  # of the faults, the eccentricity as a vector
+    free: Array  # (8,), without bounds
+    common: Array  # (8, base parameters), the part of the covariance that all recordings of a unit share
+    own: Array  # (8, 8), the other part
     fit: Adequacy
     interval90: Array  # (8, 2)
     healthy: bool
@@ -103,8 +114,12 @@ def _basin(found: Fitted, k: Array) -> _Basin:
         covariance = covariance * max(1.0, fit.ratio) ** 2
     free = found.problem.vector(_unbounded(found))
     healthy = _from_healthy(free, covariance) < float(chdtri(FAULTS, 0.01))
+    common = K_SIGMA * _of_base(found)[:FAULTS]
     return _Basin(
         covariance,
+        free,
+        common,
+        _positive(covariance - common @ common.T),
         fit,
         _intervals(free, covariance, k),
         bool(healthy and fit.adequate),
@@ -115,11 +130,7 @@ def _basin(found: Fitted, k: Array) -> _Basin:
 def _covariance(found: Fitted) -> Array:
     """Of x, (unknowns, unknowns), such that z of the normal distribution is right for 90 %."""
     problem, slopes = found.problem, found.slopes
-    rows = slice(0, problem.values)
-    held = problem.prior.copy()  # as the fit had it; what is really unknown is the whole tolerance
-    held[problem.base] /= max(found.spread, _LEAST_SPREAD)
-    hessian = slopes[rows].T @ slopes[rows] + np.diag(held**2)
-    inverse = np.linalg.inv(hessian)
+    held, inverse = _curvature(found)
     meat = np.diag(held**4 / problem.prior**2)
     for window, name, rows in problem.parts():
         part = slopes[rows]
@@ -138,6 +149,30 @@ def _covariance(found: Fitted) -> Array:
         wider = stdtrit(freedom / np.maximum(share, 1e-6) ** 2, 0.95) / _Z90  # Welch and Satterthwaite's freedom
         covariance *= np.outer(wider, wider)
     return 0.5 * (covariance + covariance.T)
+
+
+def _curvature(found: Fitted) -> tuple[Array, NDArray[np.floating]]:
+    """The weight by which each unknown was held to its prior, and the inverse of the fit's Hessian with it."""
+    problem, rows = found.problem, slice(0, found.problem.values)
+    held = problem.prior.copy()  # as the fit had it; what is really unknown is the whole tolerance
+    held[problem.base] /= max(found.spread, _LEAST_SPREAD)
+    return held, np.linalg.inv(found.slopes[rows].T @ found.slopes[rows] + np.diag(held**2))
+
+
+def _of_base(found: Fitted) -> Array:
+    """What each base parameter moves x by when it is 1 σ of its tolerance off, (unknowns, base parameters).
+
+    A fit that holds x by H⁻¹ held² moves as much against what is true: it is the same in each recording of a unit.
+    """
+    held, inverse = _curvature(found)
+    base = found.problem.base
+    return -inverse[:, base] * (held**2 / found.problem.prior)[base]
+
+
+def _positive(covariance: Array) -> Array:
+    """The nearest covariance: what rounding, and a widening of the whole, left below zero is taken out."""
+    values, vectors = np.linalg.eigh(0.5 * (covariance + covariance.T))
+    return (vectors * np.maximum(values, _SLIGHT**2)) @ vectors.T
 
 
 def _twin_scores(found: Fitted) -> Array:

@@ -35,3 +35,6 @@ kernel: Callable[[Any], Any] = kept(numba.njit(**_MODEL))
 
 parallel_kernel: Callable[[Any], Any] = kept(numba.njit(parallel=True, **_MODEL))
 """An outer kernel over blocks of lanes on all cores.  Call it through `stacks.exclusive` only."""
+
+recursion: Callable[[Any], Any] = numba.njit(**_MODEL)
+"""A loop over time that Python calls, of one thread; compiled anew in each process, so only what does so quickly."""

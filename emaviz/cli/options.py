@@ -180,7 +180,7 @@ def actuator_of(arguments: argparse.Namespace) -> Actuator:
 
 def faults_of(arguments: argparse.Namespace, known: Mapping[str, float] | None = None) -> Any:
     """k (8,) from --fault, before what is known of the unit."""
-    return faults.vector({**(known or {}), **dict(_pair(text, "--fault") for text in arguments.fault)})
+    return faults.vector({**(known or {}), **dict(pair(text, "--fault") for text in arguments.fault)})
 
 
 def effects_of(arguments: argparse.Namespace, axes: Axes) -> dict[str, dict[str, float]]:
@@ -191,7 +191,7 @@ def effects_of(arguments: argparse.Namespace, axes: Axes) -> dict[str, dict[str,
         parts = split_at_commas(rest)
         if (kind := kind_of(name)) is None:
             effect = find(name, axes)
-            given = effect.inside(dict(_pair(part, f"--effect {quoted(name)}") for part in parts))
+            given = effect.inside(dict(pair(part, f"--effect {quoted(name)}") for part in parts))
         else:
             try:
                 effect, given = read_entries(kind, dict(_user_entry(part) for part in parts))
@@ -235,7 +235,7 @@ def weights_of(texts: list[str] | None) -> dict[str, float] | None:
     """Weights from --signal NAME or NAME=weight."""
     if texts is None:
         return None
-    return dict(_pair(text, "--signal") if "=" in text else (text, 1.0) for text in texts)
+    return dict(pair(text, "--signal") if "=" in text else (text, 1.0) for text in texts)
 
 
 def run_of(arguments: argparse.Namespace, actuator: Actuator, sample_rate_Hz: float = 10_000.0) -> Run:
@@ -262,7 +262,8 @@ def _command(arguments: argparse.Namespace, actuator: Actuator) -> tuple[Command
     return Recorded(recording.time_s, recording["command_rad"], str(name)), recording.duration_s
 
 
-def _pair(text: str, option: str) -> tuple[str, float]:
+def pair(text: str, option: str) -> tuple[str, float]:
+    """`name=number`; InputError that names the option."""
     name, separator, value = text.partition("=")
     try:
         if not separator:

@@ -12,12 +12,12 @@ Style = rr.SeriesLines | rr.SeriesPoints
 
 def signal_style(group: str, name: str) -> Style:
     """A signal's line: colour of its group, name with unit."""
-    return _line(style.series_title(group, name), style.signal_colour(group, name), style.GROUP_WIDTHS[group])
+    return line(style.series_title(group, name), style.signal_colour(group, name), style.GROUP_WIDTHS[group])
 
 
 def monitor_style(index: int) -> Style:
     """The monitor's current on an iteration: the later, the more the monitor's own colour."""
-    return _line(f"MM iteration {index} [A]", style.iteration_colour(index), 1.2)
+    return line(f"MM iteration {index} [A]", style.iteration_colour(index), 1.2)
 
 
 def iteration_style(path: str) -> Style:
@@ -30,12 +30,12 @@ def iteration_style(path: str) -> Style:
             names=f"population {name}", colors=[style.POPULATION_COLOUR], markers="circle", marker_sizes=[1.3]
         )
     if kind == "best":
-        return _line(f"{algorithm} best {name} [-]", colour, 2.5)
+        return line(f"{algorithm} best {name} [-]", colour, 2.5)
     if kind == "truth":
-        return _line(f"true {name} [-]", style.TRUTH_COLOUR, 2.0)
-    return _line("log10 of best RMSE [A]" if kind == "log10_rmse" else "best RMSE [A]", colour, 2.0)
+        return line(f"true {name} [-]", style.TRUTH_COLOUR, 2.0)
+    return line("log10 of best RMSE [A]" if kind == "log10_rmse" else "best RMSE [A]", colour, 2.0)
 
 
-def _line(name: str, colour: Colour, width: float) -> Style:
+def line(name: str, colour: Colour, width: float) -> Style:
     # The default aggregation averages, which hides the chopping ripple's peaks.
     return rr.SeriesLines(names=name, colors=[colour], widths=[width], aggregation_policy="MinMax")

@@ -3,5 +3,6 @@
 from emaviz.report.comparison import write_report
 from emaviz.report.discovery import write_discovery_report
 from emaviz.report.identification import write_identification_report
+from emaviz.report.tracking import write_tracking_report
 
-__all__ = ["write_discovery_report", "write_identification_report", "write_report"]
+__all__ = ["write_discovery_report", "write_identification_report", "write_report", "write_tracking_report"]

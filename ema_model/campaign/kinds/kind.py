@@ -45,6 +45,7 @@ class Kind:
     run: Callable[[Given, Any, int], dict[str, Any]]
     seconds: Callable[[Any], float]  # about how long one takes on one core, from its settings
     told: Callable[[list[dict[str, Any]]], dict[str, Any]]  # what rows without errors say together, by its title
+    from_recordings: bool = True  # else it makes all that it needs from its settings and the seed
     name: str = ""  # of the file; `KINDS` fills it in
 
     @property

@@ -37,11 +37,15 @@ class Group:
         self._kind = KINDS[table["does"]]
         options = [field.name for field in fields(self._kind.settings)]
         source = _RECORDED if "recordings" in table else _SIMULATED
+        source = source if self._kind.from_recordings else ()
         check_names(table, (*_SHARED, *source, *options), where)
         self._text, self._actuator = self._told("actuator", self._actuator_file)
         self._seeds = self._told("seeds", lambda: _seeds(table.get("seeds", [0])))
         self._settings = self._told("", lambda: self._all_settings(options))
-        self._sources = self._recorded() if "recordings" in table else self._simulated()
+        if not self._kind.from_recordings:
+            self._sources: list[tuple[str, Any]] = [("", lambda seed: None)]
+        else:
+            self._sources = self._recorded() if "recordings" in table else self._simulated()
 
     @property
     def count(self) -> int:

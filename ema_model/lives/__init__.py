@@ -1,0 +1,11 @@
+"""Lives of units, made for tests and for teaching: wear from flight to flight until a fault crosses its threshold.
+
+A life is drawn from a seed.  Its flights are recordings of the three-phase model (`recorded`), or k̂ drawn directly
+from what identifications of such recordings were found to be able to tell (`drawn`), thousands of lives in minutes.
+"""
+
+from ema_model.lives.drawn import drawn
+from ema_model.lives.life import LAWS, Life, healthy_life, worn_life
+from ema_model.lives.recorded import recorded
+
+__all__ = ["LAWS", "Life", "drawn", "healthy_life", "recorded", "worn_life"]

@@ -1,0 +1,66 @@
+"""The flights of a unit in order of time, as their files' names tell it: by the numbers in them, date or count."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from itertools import pairwise
+from pathlib import Path
+
+from ema_model.errors import InputError, quoted
+from ema_model.recordings import find_side_file, read_side_file
+from ema_model.recordings.formats import FORMATS
+
+_NUMBER = re.compile(r"\d+")
+
+
+def flights_in(folder: Path) -> list[Path]:
+    """The recordings of a folder in order; InputError where it is none, holds none, or tells no order."""
+    found = [path for path in sorted(folder.iterdir()) if _is_recording(path)]
+    if not found:
+        raise InputError(f"{quoted(folder)}: holds no recording ({', '.join(FORMATS)})")
+    for inner in (path for path in sorted(folder.iterdir()) if path.is_dir()):
+        if any(map(_is_recording, inner.iterdir())):
+            told = f"{quoted(folder)}: there are recordings beside it in its folder {quoted(inner.name)}"
+            raise InputError(f"{told}; a folder holds the flights of one unit, so move them or name the files")
+    ordered = sorted(found, key=lambda path: _when(path))
+    check_order(ordered)
+    return ordered
+
+
+def check_order(paths: Sequence[Path]) -> None:
+    """InputError for flights out of order, at the same time, or of several actuators, by what their files say."""
+    for before, after in pairwise(paths):
+        if _when(before) == _when(after):
+            raise InputError(
+                f"{quoted(before.name)} and {quoted(after.name)}: have the same number or date in their names, so that "
+                "nothing tells which flew first; rename them"
+            )
+        if _when(before) > _when(after):
+            raise InputError(
+                f"{quoted(after.name)}: comes after {quoted(before.name)}, though its name says that it flew before; "
+                "give the flights in order of time"
+            )
+    known: tuple[str, Path] | None = None
+    for path in paths:
+        beside = find_side_file(path)
+        actuator = read_side_file(beside).actuator if beside else None
+        if actuator is None:
+            continue
+        if known is not None and actuator != known[0]:
+            raise InputError(
+                f"{quoted(path.name)}: is of the actuator {quoted(actuator)}, and {quoted(known[1].name)} of "
+                f"{quoted(known[0])}; the flights are of one unit"
+            )
+        known = known or (actuator, path)
+
+
+def _is_recording(path: Path) -> bool:
+    return path.is_file() and path.suffix.lower() in FORMATS
+
+
+def _when(path: Path) -> tuple[int, ...]:
+    numbers = tuple(int(one) for one in _NUMBER.findall(path.stem))
+    if not numbers:
+        raise InputError(f"{quoted(path.name)}: its name has no number or date that tells when it flew; rename it")
+    return numbers

@@ -1,0 +1,82 @@
+"""All k over the flights so far: their evidence, and where each jumped, from where on it is judged anew."""
+
+from __future__ import annotations
+
+from math import log
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ema_model.tracking.criteria import FALSE_TREND, JUMP_AFTER, JUMP_LEAST, JUMP_WINDOW
+from ema_model.tracking.evidence import Evidence
+from ema_model.tracking.flight import Flight
+from ema_model.tracking.jumps import jump
+
+Array = NDArray[np.float64]
+
+
+class Series:
+    """The components of k, (8,), flight by flight; a place is that of a usable flight."""
+
+    def __init__(self, base: int, one_sided: NDArray[np.bool_], healthy: Array) -> None:
+        """one_sided, healthy (8,): whether each only grows, and where it begins."""
+        self._healthy, count = healthy, len(healthy)
+        self._evidence = Evidence(base, one_sided)
+        self.at: list[float] = []
+        self.flights: list[Flight] = []
+        self.jumps: list[list[int]] = [[] for _ in range(count)]  # places of the first flight after each
+        self.trend_at: list[int | None] = [None] * count  # place of the flight after which the evidence sufficed
+        self.log_evidence = np.zeros(count)
+
+    def add(self, at: float, flight: Flight) -> None:
+        """One usable flight more, and its number."""
+        self.at.append(at)
+        self.flights.append(flight)
+        self._weigh(len(self.at) - 1, np.arange(len(self._healthy)))
+        for i in range(len(self._healthy)):
+            self._jump(i)
+
+    def start(self, i: int) -> int:
+        """Place of the first flight since the last jump of a component."""
+        return self.jumps[i][-1] if self.jumps[i] else 0
+
+    @property
+    def noise_factor(self) -> Array:
+        """(8,), seen over stated variance."""
+        return self._evidence.noise_factor
+
+    def _jump(self, i: int) -> None:
+        if not self._may_have_jumped(i):
+            return
+        first = max(self.start(i), len(self.at) - JUMP_WINDOW - JUMP_AFTER)
+        last = self.flights[first:]
+        found = jump(
+            np.array([one.k[i] for one in last]),
+            np.array([one.own[i, i] for one in last]),
+            [one.common[i] for one in last],
+            float(self._healthy[i]),
+        )
+        if found is None:
+            return
+        self.jumps[i].append(first + found)
+        self.trend_at[i], self.log_evidence[i] = None, 0.0
+        self._evidence.forget(i)
+        for place in range(self.start(i), len(self.at)):
+            self._weigh(place, np.array([i]))
+
+    def _may_have_jumped(self, i: int) -> bool:
+        """Whether the last flights stand far enough from those before them; asked of all, so it must be quick."""
+        last = [float(one.k[i]) for one in self.flights[-2 * JUMP_AFTER :]]
+        middle = JUMP_AFTER // 2
+        before, after = sorted(last[:JUMP_AFTER]), sorted(last[JUMP_AFTER:])
+        return len(last) == 2 * JUMP_AFTER and abs(after[middle] - before[middle]) > JUMP_LEAST
+
+    def _weigh(self, place: int, which: NDArray[np.int64]) -> None:
+        flight = self.flights[place]
+        own = np.diagonal(flight.own)
+        self.log_evidence[which] = self._evidence.add(self.at[place], flight.k, own, flight.common, which)
+        for i in which:
+            # After each jump half of the probability of a false trend is spent, so that all together stay below it.
+            needed = log(len(self._healthy) / FALSE_TREND) + (len(self.jumps[i]) + 1) * log(2.0)
+            if self.trend_at[i] is None and self.log_evidence[i] >= needed:
+                self.trend_at[i] = place

@@ -1,0 +1,110 @@
+"""How one k wears: level and drift of today, for each of many ways in which it may have come there.
+
+A way is an onset, a shape of the rate of wear since (constant, growing as a power of the time since the onset,
+growing by a constant share a flight), and how unevenly flights wear.  For each, level and today's rate are the state
+of a Kalman filter, and the flights' likelihood is its weight: the maximum over the process noise has the most of it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import log_ndtr
+
+from ema_model.physics.jit import recursion
+
+Array = NDArray[np.float64]
+
+POWERS = (1.0, 1.5, 2.0, 3.0)  # k ∝ (flights since the onset)ᵖ
+GROWTHS = (1.0 / 150.0, 1.0 / 75.0, 1.0 / 40.0)  # the rate's share a flight
+UNEVEN = (0.3, 0.7, 1.2)  # coefficient of variation of a flight's wear
+_ONSETS = 10  # that are tried
+_SHAPE_PRIOR = (0.4, *[0.1] * 6)
+_RATE = 0.03  # of k in a flight, 1 σ of the prior of today's rate
+_PASSES = 2
+
+
+@dataclass(frozen=True, eq=False)
+class Wear:
+    """By way, (ways,): weight, mean of level and today's rate, their covariance, and the way itself."""
+
+    weight: Array
+    level: Array
+    rate: Array
+    covariance: Array  # (ways, 3): of the level, of both, of the rate
+    age: Array  # flights since the onset
+    power: Array  # 0 where the rate grows by a share
+    growth: Array
+    uneven: Array
+    worn: Array  # today's level less the first flight's, in units of today's rate
+
+
+def wear(at: Array, k: Array, variance: Array, now: float) -> Wear:
+    """at (n,): the flights' numbers; k (n,), so turned that it grows; variance (n,) of their own noise."""
+    first = at[0]
+    onsets = np.unique(np.round(np.linspace(first - 1.0, max(now - 4.0, first - 1.0), _ONSETS)))
+    steps = np.arange(first + 1.0, now + 1.0)  # the flights in which something wears
+    since = np.maximum(steps - onsets[:, None], 0.0)  # (onsets, steps)
+    ages = np.maximum(now - onsets, 1.0)
+    by_power = (since / ages[:, None])[:, None, :] ** (np.array(POWERS)[:, None] - 1.0)
+    by_growth = np.exp(-np.array(GROWTHS)[:, None] * (now - steps))
+    rates = np.concatenate([by_power, np.broadcast_to(by_growth, (len(onsets), *by_growth.shape))], axis=1)
+    rates = (rates * (since > 0.0)[:, None, :]).reshape(-1, len(steps))
+    table = np.zeros((len(rates), 2, len(steps) + 1))
+    table[:, 0, 1:], table[:, 1, 1:] = np.cumsum(rates, axis=1), np.cumsum(rates**2, axis=1)
+    # ways: onsets × shapes × unevenness
+    shapes = len(POWERS) + len(GROWTHS)
+    count = len(rates) * len(UNEVEN)
+    shape = np.repeat(np.arange(len(rates)), len(UNEVEN))
+    age = np.repeat(ages, shapes * len(UNEVEN))
+    kind = shape % shapes
+    power, growth = np.array([*POWERS, *[0.0] * len(GROWTHS)])[kind], np.array([*[0.0] * len(POWERS), *GROWTHS])[kind]
+    uneven = np.tile(np.array(UNEVEN), count // len(UNEVEN))
+    prior = np.log(np.array(_SHAPE_PRIOR))[kind]
+    places = (at - first).astype(np.int64)
+    last = np.append(places, int(now - first))  # the state is today's, whether today's flight is usable or not
+    path = table[:, :, last]
+    found = _filtered(path, shape, uneven, k, variance, _RATE, _PASSES)
+    level, rate, a, b, c, fit = found.T
+    sigma = np.sqrt(np.maximum(c, 1e-18))
+    weight = fit + prior + log_ndtr(rate / sigma)
+    weight = np.exp(weight - weight.max())
+    worn = table[:, 0, -1][shape]
+    return Wear(weight / weight.sum(), level, rate, np.stack([a, b, c], axis=1), age, power, growth, uneven, worn)
+
+
+@recursion
+def _filtered(path, shape, uneven, k, variance, rate_sigma, passes):  # pragma: no cover (compiled)
+    """(ways, 6): level, rate, their (co)variances, log likelihood."""
+    ways, flights = len(shape), len(k)
+    found = np.zeros((ways, 6))
+    for way in range(ways):
+        walked = path[shape[way], 0]
+        squares = path[shape[way], 1]
+        usual = max((k[flights - 1] - k[0]) / max(walked[flights] - walked[0], 1.0), 1e-5)
+        for _ in range(passes):
+            x, r = k[0], 0.0
+            a, b, c = variance[0], 0.0, rate_sigma**2
+            fit = 0.0
+            for i in range(1, flights + 1):
+                d = walked[i] - walked[i - 1]
+                q = (uneven[way] * usual) ** 2 * (squares[i] - squares[i - 1])
+                x += d * r
+                a += 2.0 * d * b + d * d * c + q
+                b += d * c
+                if i == flights:
+                    break
+                s = a + variance[i]
+                gap = k[i] - x
+                fit -= 0.5 * (np.log(s) + gap * gap / s)
+                ga, gb = a / s, b / s
+                x += ga * gap
+                r += gb * gap
+                c -= gb * b
+                b -= gb * a
+                a -= ga * a
+            usual = max(r, 1e-5)
+        found[way, 0], found[way, 1], found[way, 2], found[way, 3], found[way, 4], found[way, 5] = x, r, a, b, c, fit
+    return found

@@ -1,0 +1,57 @@
+"""One k over the flights of a unit, with its band, its jumps, and the fan to its threshold."""
+
+from __future__ import annotations
+
+import plotly.graph_objects as go
+
+from ema_model.faults import BY_NAME
+from ema_model.tracking.result import FaultTrack, Tracked
+from emaviz.colours import DIFFERENCE, MONITOR, REFERENCE
+from emaviz.figures import theme
+
+_Z90 = 1.645
+_FAN = "rgba(224,49,49,0.18)"
+
+
+def figure(result: Tracked, name: str, *, dark: bool = False) -> go.Figure:
+    """k by flight; a flight that was left out is a gap."""
+    one = result.faults[name]
+    at = [i for i, flight in enumerate(result.flights, 1) if not flight.excluded]
+    chart = theme.new(BY_NAME[name].label, "Flight", name, dark=dark)
+    names = [theme.plain(flight.name) for flight in result.usable]
+    error = {"type": "data", "array": _Z90 * one.sigma, "thickness": 0.7, "width": 0}
+    dots = {"size": 4, "color": REFERENCE}
+    chart.add_trace(go.Scatter(x=at, y=one.k, error_y=error, mode="markers", marker=dots, text=names, name="measured"))
+    now = len(result.flights)
+    if one.trend:
+        start = _since(result, one)
+        line = {"color": MONITOR, "width": 2}
+        back = one.level - one.drift * (now - start)
+        chart.add_trace(go.Scatter(x=[start, now], y=[back, one.level], mode="lines", line=line, name="trend of today"))
+    for jump in one.jumps:
+        number = next(i for i, flight in enumerate(result.flights, 1) if flight.name == jump.flight)
+        chart.add_vline(x=number - 0.5, line={"width": 1, "dash": "dot", "color": DIFFERENCE})
+    if one.threshold is not None:
+        chart.add_hline(y=one.threshold, line={"width": 1, "dash": "dash", "color": theme.MARK})
+    if one.remaining is not None and one.threshold is not None:
+        left, end = one.remaining, one.threshold
+        hidden = {"line": {"width": 0}, "hoverinfo": "skip", "mode": "lines", "showlegend": False}
+        fan = go.Scatter(
+            x=[now, now + left.p05, now + left.p95, now],
+            y=[one.level, end, end, one.level],
+            fill="toself",
+            fillcolor=_FAN,
+            **hidden,
+        )
+        chart.add_trace(fan)
+        middle = {"color": DIFFERENCE, "width": 1.5}
+        x, y = [now, now + left.p50], [one.level, end]
+        chart.add_trace(go.Scatter(x=x, y=y, mode="lines", line=middle, name="to the threshold, median"))
+    return chart
+
+
+def _since(result: Tracked, one: FaultTrack) -> int:
+    """The first flight that today's trend can be drawn through: no longer ago than k moves by what it has grown."""
+    start = max((i for i, f in enumerate(result.flights, 1) for jump in one.jumps if f.name == jump.flight), default=1)
+    grown = abs(one.level - BY_NAME[one.name].healthy)
+    return max(start, len(result.flights) - int(grown / max(abs(one.drift), 1e-9)))

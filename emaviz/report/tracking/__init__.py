@@ -1,0 +1,22 @@
+"""The report of a unit's flights."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ema_model.tracking.result import Tracked
+from ema_model.tracking.words import answer
+from emaviz.report.page import page, write
+from emaviz.report.section import Section
+from emaviz.report.tracking.flights import Flights
+from emaviz.report.tracking.in_words import Answer
+from emaviz.report.tracking.remaining import RemainingLife
+
+SECTIONS: tuple[Section[Tracked], ...] = (Answer(), RemainingLife(), Flights())
+
+
+def write_tracking_report(result: Tracked, actuator: str, path: str | Path) -> None:
+    """Writes one HTML file that opens offline, whole or not at all; InputError where it cannot be written."""
+    told = answer(result)
+    lead = f"{actuator}, {len(result.flights)} flights"
+    write(path, page(told[:1].upper() + told[1:], lead, SECTIONS, result))

@@ -1,0 +1,29 @@
+"""All that the terminal says, first of all."""
+
+from __future__ import annotations
+
+from ema_model.text import Lines, Note, Table
+from ema_model.tracking.result import Tracked
+from emaviz.report.markup import bullets, paragraph, table
+from emaviz.report.section import Figures, Section
+
+
+class Answer(Section[Tracked]):
+    """The document of the result, block by block."""
+
+    title = "The answer"
+    anchor = "answer"
+
+    def body(self, subject: Tracked, figures: Figures) -> str:
+        """Always there."""
+        written = []
+        for block in subject.document.blocks:
+            if isinstance(block, Lines):
+                written += [paragraph(line) for line in block.lines]
+            elif isinstance(block, Note):
+                written.append(bullets([block.line], "warning"))
+            elif isinstance(block, Table):
+                remarks = block.remarks or [""] * len(block.rows)
+                rows = [[*row, remark] for row, remark in zip(block.rows, remarks)]
+                written.append(table([block.title, *block.head, ""], rows))
+        return "".join(written)

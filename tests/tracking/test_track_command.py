@@ -1,0 +1,84 @@
+"""`emaviz track`: its outputs, and one clear line for each thing that is wrong."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from ema_model.lives import drawn, worn_life
+from emaviz.cli import main
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Eight small recordings; what they hold is looked at by the test that identifies none."""
+    made = tmp_path / "first.csv"
+    assert main(["simulate", "--model", "mm", "--duration", "0.05", "--out", str(made)]) == 0
+    there = tmp_path / "unit"
+    there.mkdir()
+    for number in range(1, 10):
+        shutil.copy(made, there / f"flight_{number}.csv")
+    return there
+
+
+def test_all_outputs(folder, tmp_path, monkeypatch, capsys):
+    """The identification, which takes seconds a flight, is replaced by a drawn life's."""
+    life = worn_life("linear", 1)
+    flights = drawn(life)[: int(0.6 * life.flights)]
+    monkeypatch.setattr("emaviz.cli.track.identify_all", lambda *_: iter(flights))
+    written = [tmp_path / name for name in ("track.json", "track.html", "track.rrd")]
+    options = [text for name, path in zip(("--json", "--report", "--record"), written) for text in (name, str(path))]
+    assert main(["track", str(folder), "--threshold", f"{life.fault}={life.threshold}", *options]) == 0
+    found = json.loads(written[0].read_text())["faults"]
+    one = found[life.fault]
+    assert set(found) == {"k1", "k2", "k3", "k4", "k5", "k6", "k8"} and one["trend"]
+    left = one["remaining_flights"]
+    assert left["p05"] <= left["p50"] <= left["p95"]
+    assert one["crossing_probability"][0]["flights"] == 1 and one["excluded"]
+    page = written[1].read_text()
+    assert "Remaining life" in page and life.fault in page
+    assert f"{life.fault} " in capsys.readouterr().out
+    assert written[2].stat().st_size > 1000
+
+
+@pytest.mark.parametrize(
+    ("names", "more", "words"),
+    [
+        (["flight_1.csv"], [], "1 flight tell"),
+        (["flight_2.csv", "flight_1.csv"], [], "give the flights in order"),
+        (["flight_1.csv", "copy_1.csv"], [], "nothing tells which flew first"),
+        (["flight_1.csv", "nameless.csv"], [], "no number or date"),
+        ([], ["--threshold", "k9=0.1"], "no such fault"),
+        ([], ["--threshold", "k1"], "--threshold"),
+        ([], ["--threshold", "k1=0.3", "--threshold", "k1=0.4"], "given twice"),
+    ],
+)
+def test_bad_input_is_one_clear_line(folder, names, more, words, capsys):
+    for name in ("copy_1.csv", "nameless.csv"):
+        if name in names:
+            shutil.copy(folder / "flight_1.csv", folder / name)
+    given = [str(folder / name) for name in names] or [str(folder)]
+    assert main(["track", *given, *more]) == 2
+    told = capsys.readouterr().err
+    assert told.count("\n") == 1
+    assert re.search(words, told), told
+
+
+def test_mixed_actuators_and_units_are_refused(folder, capsys):
+    (folder / "flight_2.toml").write_text('actuator = "a.toml"\n')
+    (folder / "flight_5.toml").write_text('actuator = "b.toml"\n')
+    assert main(["track", str(folder)]) == 2
+    assert "flight_5.csv" in (told := capsys.readouterr().err) and "one unit" in told and told.count("\n") == 1
+    (folder / "other").mkdir()
+    shutil.copy(folder / "flight_1.csv", folder / "other" / "flight_1.csv")
+    assert main(["track", str(folder)]) == 2
+    assert "one unit" in (told := capsys.readouterr().err) and told.count("\n") == 1
+
+
+def test_an_empty_folder(tmp_path, capsys):
+    assert main(["track", str(tmp_path)]) == 2
+    assert "holds no recording" in capsys.readouterr().err

@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,7 @@ from ema_model.files.refusal import listed, reason, refusal, shown
 from ema_model.files.user_file import check_user_file
 from ema_model.recordings.checks import check_finite, check_length, check_names, check_values, choose_columns
 from ema_model.recordings.columns.mapping import ColumnMapping, apply_mapping, parse_mapping
+from ema_model.recordings.columns.reading import Reading
 from ema_model.recordings.formats import format_of
 from ema_model.recordings.measurement import Measurement
 from ema_model.recordings.side_file.read import SideFile, find_side_file, read_side_file
@@ -67,7 +69,8 @@ def read_measurement(
         signals = {"time_s": np.arange(float(next(iter(signals.values())).size)), **signals}
         done = (*done, "a static map without time: time_s counts the samples")
     check_values(path, signals, columns.place)
-    measurement = _measurement(path, signals, (*columns.notes, *notes, *done), foreign, side)
+    told = (*([columns.layout] if columns.layout else []), *columns.notes, *notes, *done)
+    measurement = replace(_measurement(path, signals, told, foreign, side), reading=Reading(layout=columns.layout))
     if side.window_s is not None or side.segments is not None:
         try:
             measurement = measurement.selected(side.window_s, side.segments)

@@ -72,7 +72,7 @@ def recorded(
         needs = needed(actuator, is_map=side.kind == "map")
     _ask(path, actuator, reading, read_header(path, max_bytes), needs)
     measurement = read_measurement(path, reading.mapping, side=side, max_bytes=max_bytes)
-    return replace(measurement, reading=reading)
+    return replace(measurement, reading=replace(reading, layout=measurement.reading.layout))
 
 
 def how_to_read(

@@ -79,10 +79,10 @@ def _read(
     needs: Needs | None = None,
 ) -> Measurement:
     measurement = read(file, actuator, arguments.mapping, needs=needs)
-    if assumed := measurement.reading.assumed:
+    if told := measurement.reading.told:
         if progress is not None:
             progress.done()
-        print(f"{Path(file).name}: {assumed}", file=sys.stderr)
+        print(f"{Path(file).name}: {told}", file=sys.stderr)
     return measurement
 
 

@@ -1,4 +1,4 @@
-"""What NumPy and MATLAB write is read: alone, structured, in structs, packed or not; the four formats agree."""
+"""What NumPy and MATLAB write is read: alone, structured, in structs, packed or not; all formats that are written agree."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from scipy.io import savemat
 from ema_model.errors import InputError
 from ema_model.recordings import SIGNALS, Measurement, read_columns, write_measurement
 from ema_model.recordings.file import read_measurement
-from ema_model.recordings.formats import FORMATS
+from ema_model.recordings.formats import FORMATS, WRITTEN
 
 N = 150
 k = np.arange(float(N))
@@ -23,12 +23,12 @@ def assert_same(measurement, columns=COLUMNS):
         assert measurement[name].dtype == np.float64 and measurement[name].dtype.isnative
 
 
-def test_the_four_formats():
-    assert list(FORMATS)[:2] == [".csv", ".parquet"] and set(FORMATS) == {".csv", ".parquet", ".npz", ".mat"}
-    assert all(file_format.suffix == suffix and file_format.title for suffix, file_format in FORMATS.items())
+def test_the_formats_that_are_written():
+    assert list(FORMATS)[:2] == [".csv", ".parquet"] and set(WRITTEN) == {".csv", ".parquet", ".npz", ".mat"}
+    assert all(suffix in file_format.suffixes and file_format.title for suffix, file_format in FORMATS.items())
 
 
-@pytest.mark.parametrize("suffix", sorted(FORMATS))
+@pytest.mark.parametrize("suffix", sorted(WRITTEN))
 def test_round_trip(suffix, tmp_path):
     states = {"segment": k // 50, "drive_enabled": k % 2}
     values = {name: np.sin(k * (1.0 + i)) * 10.0 ** (i - 9) for i, name in enumerate(SIGNALS)}
@@ -122,16 +122,10 @@ def test_mat_of_a_big_endian_machine(tmp_path):
     assert_same(read_measurement(tmp_path / "a.mat"))
 
 
-def test_newer_and_older_mat_refused(tmp_path):
+def test_older_mat_refused(tmp_path):
     path = tmp_path / "a.mat"
-    for header in (b"MATLAB 7.3 MAT-file".ljust(124) + b"\0\2IM", b"\x89HDF\r\n\x1a\n" + bytes(500)):
-        path.write_bytes(header + bytes(1000))
-        with pytest.raises(
-            InputError, match=r"a\.mat: is a MATLAB v7\.3 \(HDF5\) file, which is not read; save .* -v7$"
-        ):
-            read_measurement(path)
     savemat(path, COLUMNS, format="4")
-    with pytest.raises(InputError, match="not a MATLAB file of version 5 to 7; save it with -v7"):
+    with pytest.raises(InputError, match=r"not a MATLAB file of version 5 to 7\.3; save it with -v7"):
         read_measurement(path)
 
 

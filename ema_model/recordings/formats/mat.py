@@ -9,16 +9,21 @@ import numpy as np
 
 from ema_model.files.limits import ARRAYS, megabytes
 from ema_model.files.refusal import refusal, shown
+from ema_model.recordings.formats import hdf5
 from ema_model.recordings.formats.arrays import Kind, column_names, take
 from ema_model.recordings.formats.format import Array, Columns, Format
 from ema_model.recordings.formats.mat5 import HEADER_BYTES, Damaged, Leaf, TooLarge, TooMany, leaves
 
 
 def _header(path: str, max_bytes: int) -> list[str]:
+    if _is_hdf5(path):
+        return hdf5.FORMAT.header(path, max_bytes)
     return column_names(_kinds(_load(path, max_bytes)))
 
 
 def _read(path: str, names: Sequence[str], max_bytes: int, strict: bool) -> Columns:
+    if _is_hdf5(path):
+        return hdf5.FORMAT.read(path, names, max_bytes, strict)
     arrays = _load(path, max_bytes)
     return take(path, _kinds(arrays), names, max_bytes, strict, lambda name: arrays.pop(name).values())
 
@@ -60,12 +65,16 @@ def _load(path: str, max_bytes: int) -> dict[str, Leaf]:
     return {leaf.path[-1] if count[leaf.path[-1]] == 1 else ".".join(leaf.path): leaf for leaf in found}
 
 
+def _is_hdf5(path: str) -> bool:
+    """Whether it is of version 7.3, which is HDF5 behind a header of MATLAB's."""
+    with open(path, "rb") as file:
+        header = file.read(HEADER_BYTES)
+    return header[124:128] == b"\0\2IM" or header.startswith(b"\x89HDF")
+
+
 def _check_version(path: str, header: bytes) -> None:
-    version = header[124:128]
-    if version == b"\0\2IM" or header.startswith(b"\x89HDF"):
-        raise refusal(path, "is a MATLAB v7.3 (HDF5) file, which is not read; save it with -v7")
-    if version not in (b"\0\1IM", b"\1\0MI"):
-        raise refusal(path, "is not a MATLAB file of version 5 to 7; save it with -v7")
+    if header[124:128] not in (b"\0\1IM", b"\1\0MI"):
+        raise refusal(path, "is not a MATLAB file of version 5 to 7.3; save it with -v7")
 
 
 FORMAT = Format(".mat", "MATLAB", _header, _read, _write)

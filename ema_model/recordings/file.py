@@ -70,7 +70,9 @@ def read_measurement(
         done = (*done, "a static map without time: time_s counts the samples")
     check_values(path, signals, columns.place)
     told = (*([columns.layout] if columns.layout else []), *columns.notes, *notes, *done)
-    measurement = replace(_measurement(path, signals, told, foreign, side), reading=Reading(layout=columns.layout))
+    bare = _measurement(path, signals, told, foreign, side)
+    name = " ".join(filter(None, (bare.name, columns.title)))
+    measurement = replace(bare, name=name, reading=Reading(layout=columns.layout))
     if side.window_s is not None or side.segments is not None:
         try:
             measurement = measurement.selected(side.window_s, side.segments)

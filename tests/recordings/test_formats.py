@@ -1,4 +1,4 @@
-"""What NumPy and MATLAB write is read: alone, structured, in structs, packed or not; all formats that are written agree."""
+"""What NumPy and MATLAB write is read: alone, structured, in structs, packed or not; those that are written agree."""
 
 from __future__ import annotations
 

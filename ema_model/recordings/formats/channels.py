@@ -41,6 +41,7 @@ class Log:
     parameters: dict[str, float] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     left_aside: tuple[str, ...] = ()  # names of what is no row of numbers
+    title: str = ""  # what it calls the run, beside its file's name
 
 
 Opened = Callable[[str, int], AbstractContextManager[Log]]  # path, most bytes

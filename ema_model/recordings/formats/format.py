@@ -21,6 +21,7 @@ class Columns:
     arrays: dict[str, Array]
     place: Callable[[int], str]  # the sample's index → where it stands: "line 2", "row 1"
     notes: tuple[str, ...] = ()
+    title: str = ""  # what the file calls the run, beside its own name
     layout: str = ""  # what was found out by itself of how the file is laid out, for a person to look at
 
 

@@ -43,11 +43,11 @@ def log_format(module: str, title: str, *suffixes: str, needs: str = "") -> Form
         return names
 
     def read(path: str, names: Sequence[str], max_bytes: int, strict: bool) -> Columns:
-        (found, notes), arrays = ask("columns_of", path, max_bytes, list(names), strict)
+        (found, notes, title), arrays = ask("columns_of", path, max_bytes, list(names), strict)
         columns = dict(zip(found, arrays))
         if strict:
             check_lengths(path, columns)
-        return Columns(columns, lambda row: f"sample {row + 1}", tuple(notes))
+        return Columns(columns, lambda row: f"sample {row + 1}", tuple(notes), title)
 
     return Format(suffixes[0], title, header, read, others=suffixes[1:])
 
@@ -63,7 +63,7 @@ def names_of(module: str, path: str, max_bytes: int) -> tuple[list[str], list[Ar
 
 def columns_of(
     module: str, path: str, max_bytes: int, names: Sequence[str], strict: bool
-) -> tuple[tuple[list[str], list[str]], list[Array]]:
+) -> tuple[tuple[list[str], list[str], str], list[Array]]:
     """Names and notes, and the columns; asked in the process of its own."""
     log = _opened(module, path, max_bytes)
     columns = _columns(path, log)
@@ -79,7 +79,7 @@ def columns_of(
         arrays, done = _on_one_clock(path, {name: columns[name] for name in names}, log, strict)
     if strict:
         _close()
-    return (list(arrays), notes + done), list(arrays.values())
+    return (list(arrays), notes + done, log.title), list(arrays.values())
 
 
 def _opened(module: str, path: str, max_bytes: int) -> Log:

@@ -59,7 +59,9 @@ def _log(file: Any) -> Log:
                     clocks.setdefault(clock[0], clock[1])
                 unit = next((str(channel.properties[name]) for name in _UNITS if name in channel.properties), "")
                 name = clock[0] if clock else ""
-                channels.append(Channel(path, samples, lambda c=channel: _read(c), unit, name, kind in "iub" and not unit))
+                channels.append(
+                    Channel(path, samples, lambda c=channel: _read(c), unit, name, kind in "iub" and not unit)
+                )
     return Log(channels, clocks, parameters, left_aside=tuple(aside))
 
 

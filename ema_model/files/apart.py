@@ -6,6 +6,7 @@ process beside, with a bound to its memory and its time; when it ends, the next 
 
 from __future__ import annotations
 
+import atexit
 import json
 import os
 import subprocess
@@ -90,9 +91,10 @@ def _started() -> subprocess.Popen[bytes]:
     return _process
 
 
+@atexit.register
 def _end() -> None:
     global _process
-    if _process is not None:
+    if _process is not None and _owner == os.getpid():
         _process.kill()
         with suppress(OSError):  # of what was still to be sent
             _process.communicate()

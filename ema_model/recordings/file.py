@@ -22,11 +22,13 @@ from ema_model.files.user_file import check_user_file
 from ema_model.recordings.checks import check_finite, check_length, check_names, check_values, choose_columns
 from ema_model.recordings.columns.mapping import ColumnMapping, apply_mapping, parse_mapping
 from ema_model.recordings.columns.reading import Reading
-from ema_model.recordings.formats import format_of
+from ema_model.recordings.formats import Format, format_of
+from ema_model.recordings.formats.text_layout import Hints
 from ema_model.recordings.measurement import Measurement
 from ema_model.recordings.side_file.read import SideFile, find_side_file, read_side_file
 
 Array = NDArray[np.float64]
+NONE = Hints()
 
 
 def read_measurement(
@@ -35,6 +37,7 @@ def read_measurement(
     *,
     side: SideFile | None = None,
     max_bytes: int = FILE_BYTES,
+    hints: Hints = NONE,
 ) -> Measurement:
     """The measurement in a file, its name the file's stem, its notes what was found and left aside.
 
@@ -46,7 +49,7 @@ def read_measurement(
     """
     path = os.fspath(path)
     check_file(path, max_bytes)
-    file_format = format_of(path)
+    file_format = said_format(path, hints)
     notes = []
     if side is None:
         found = find_side_file(path)
@@ -82,21 +85,21 @@ def read_measurement(
     return measurement
 
 
-def read_header(path: str, max_bytes: int) -> list[str]:
+def read_header(path: str, max_bytes: int, hints: Hints = NONE) -> list[str]:
     """The columns' names in the file's order; InputError for a file that cannot be read as a table."""
     check_file(path, max_bytes)
     with _told(path):
-        return format_of(path).header(path, max_bytes)
+        return said_format(path, hints).header(path, max_bytes)
 
 
-def read_columns(path: str | os.PathLike[str], *, max_bytes: int = FILE_BYTES) -> dict[str, Array]:
+def read_columns(path: str | os.PathLike[str], *, max_bytes: int = FILE_BYTES, hints: Hints = NONE) -> dict[str, Array]:
     """The columns of numbers as they stand in the file, for a mapping step to show; others are left out.
 
     Raises InputError for a file that cannot be read as a table at all; the values are not checked.
     """
     path = os.fspath(path)
     check_file(path, max_bytes)
-    file_format = format_of(path)
+    file_format = said_format(path, hints)
     with _told(path):
         names = [name for name in file_format.header(path, max_bytes) if name]
         check_names(path, names)
@@ -107,6 +110,16 @@ def read_columns(path: str | os.PathLike[str], *, max_bytes: int = FILE_BYTES) -
             file_format.read(path, names, max_bytes, False).arrays
             or file_format.read(path, names, max_bytes, True).arrays
         )
+
+
+def said_format(path: str, hints: Hints) -> Format:
+    """The file's format, reading it as somebody has said that it is laid out; InputError where it is no text."""
+    found = format_of(path)
+    if hints == NONE:
+        return found
+    if found.hinted is None:
+        raise refusal(path, f"is {found.title}, no text; leave --header-line and --encoding out")
+    return found.hinted(hints)
 
 
 @contextmanager

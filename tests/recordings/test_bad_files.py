@@ -123,9 +123,9 @@ GARBAGE = bytes(range(256)) * 10
 FILES = {
     ".csv": {
         "empty": (b"", "is empty"),
-        "garbage": (GARBAGE, "not text in UTF-8"),
+        "garbage": (GARBAGE, "is not text (neither UTF-8"),
         "other_encoding": ("Zeit,Störung\n1,2\n".encode("latin-1"), "not text in UTF-8"),
-        "archive": (npz(), "not text in UTF-8"),
+        "archive": (npz(), "is not text (neither UTF-8"),
         "header_only": (b"time_s,current_A\n", "0 samples"),
         "no_header": (b"\n".join(text().split(b"\n")[1:]), "add a header line"),
         "no_time": (text("x,current_A"), "no column time_s"),

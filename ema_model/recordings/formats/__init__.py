@@ -38,5 +38,5 @@ def format_of(path: str, known: dict[str, Format] = FORMATS) -> Format:
 
 _modules = [importlib.import_module(f"{__name__}.{module.name}") for module in pkgutil.iter_modules(__path__)]
 _found = [module.FORMAT for module in _modules if hasattr(module, "FORMAT")]
-for _one in sorted(_found, key=lambda one: one.suffix not in (".csv", ".parquet")):
+for _one in sorted(_found, key=lambda one: (one.suffix not in (".csv", ".parquet"), one.write is None)):
     add_format(_one)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ema_model.files.limits import megabytes
 from ema_model.files.refusal import refusal
+from ema_model.recordings.formats.text_layout import Hints
 
 Array = NDArray[np.float64]
 
@@ -49,6 +50,7 @@ class Format:
     read: Callable[[str, Sequence[str], int, bool], Columns]  # path, names, max_bytes in memory, strict
     write: Callable[[Mapping[str, Array], str], None] | None = None
     others: tuple[str, ...] = ()  # further suffixes of the same kind of file
+    hinted: Callable[[Hints], Format] | None = None  # the same for a text of which somebody has said the layout
 
     @property
     def suffixes(self) -> tuple[str, ...]:

@@ -32,6 +32,8 @@ def log_format(module: str, title: str, *suffixes: str, needs: str = "") -> Form
     def ask(function: str, path: str, max_bytes: int, *more: Any) -> apart.Answer:
         if needs and importlib.util.find_spec(needs) is None:
             raise refusal(path, f"{title} files are read with {needs}, which is not installed: {INSTALL}")
+        with open(path, "rb"):
+            pass  # what the system does not let us read, is told as for any file
         question = f"{__name__}:{function}"
         try:
             return apart.ask(question, module, path, max_bytes, *more, most_bytes=3 * max_bytes, patience_s=_PATIENCE_S)

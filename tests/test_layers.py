@@ -29,7 +29,7 @@ FLOORS = {
         ["face"],
     ],
     "emaviz": [
-        ["colours", "text"],
+        ["colours", "formats", "text"],
         ["recording"],
         ["figures"],
         ["report"],

@@ -40,6 +40,13 @@ def opened(path: str, most_bytes: int) -> Iterator[Log]:
     yield Log(found.channels, parameters=found.parameters, left_aside=tuple(found.aside), title=title)
 
 
+def numbers_of_records(records: Sequence[Any]) -> list[tuple[tuple[str, ...], Any]]:
+    """What records have numbers under, all of them: the keys' path, and the numbers (n,)."""
+    found = _Found()
+    found.walk(list(records), ())
+    return [(channel.path, np.asarray(channel.values())) for channel in found.channels]
+
+
 def _lines(text: bytes, error: Exception) -> Any:
     """Records of which each has a line; what was wrong with the whole otherwise."""
     first = text.split(b"\n", 1)[0].strip()

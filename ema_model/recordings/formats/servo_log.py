@@ -30,11 +30,11 @@ def is_one(document: Any) -> bool:
 def with_units(document: dict[str, Any]) -> dict[str, Any]:
     """The log with the units in its names, and the duty as a ratio where the motor's limit is known."""
     entries = [entry for entry in document["entries"] if isinstance(entry, dict)]
-    loads = [entry.get("load") for entry in entries]
+    loads = [load for entry in entries if isinstance(load := entry.get("load"), (int, float))]
     limit = _PWM_LIMITS.get(document["motor"]) if isinstance(document["motor"], str) else None
-    is_duty = limit is not None and all(isinstance(load, (int, float)) for load in loads)
+    is_duty = limit is not None and len(loads) == len(entries) > 0
     if limit is not None and is_duty:
-        full = limit if max(map(abs, loads)) > 1.0 else 1  # later versions of the recorder write the ratio
+        full = limit if max(abs(load) for load in loads) > 1.0 else 1  # later versions of the recorder write the ratio
         entries = [{**entry, "load": entry["load"] / full} for entry in entries]
     names = (
         _SIGNALS | {name: f"{name} [{unit}]" for name, unit in _UNITS.items()} | ({"load": "duty"} if is_duty else {})

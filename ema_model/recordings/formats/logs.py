@@ -22,7 +22,7 @@ from ema_model.recordings.formats.clocks import between, covered, main_clock, us
 from ema_model.recordings.formats.format import Array, Columns, Format, check_size
 
 _PATIENCE_S = 60.0  # for one question; a file of a million samples takes ten
-_TIMES = ("time [s]", "log time [s]")  # what the common clock's column is called: the first that is free
+_TIME = "time_s"  # what the common clock's column is called: it is in seconds
 INSTALL = "pip install 'emaviz[rigs]'"
 
 
@@ -124,9 +124,8 @@ def _columns(path: str, log: Log) -> dict[str, Channel | str]:
     if not columns:
         aside = f" ({listed(log.left_aside)})" if log.left_aside else ""
         raise refusal(path, f"holds no rows of numbers{aside}; a time and its signals are expected")
-    if log.clocks and "time_s" not in columns:
-        name = next((name for name in _TIMES if name not in columns), _TIMES[0])
-        return {name: "", **columns}
+    if log.clocks and _TIME not in columns:
+        return {_TIME: "", **columns}
     return columns
 
 

@@ -38,6 +38,7 @@ def ask(function: str, *arguments: Any, most_bytes: int, patience_s: float) -> A
     and `most_bytes`, or more than `patience_s` of time.  One question is answered at a time.
     """
     request = {"function": function, "arguments": arguments, "most_bytes": most_bytes + _GROUND}
+    request["most_seconds"] = 2.0 * patience_s  # of computing on all cores, should nobody be left to end it
     with _lock:
         process = _started()
         assert process.stdin is not None and process.stdout is not None

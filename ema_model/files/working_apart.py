@@ -6,6 +6,7 @@ import importlib
 import json
 import os
 import sys
+import time
 import warnings
 from pathlib import Path
 from typing import Any
@@ -22,7 +23,7 @@ def work() -> None:
     warnings.simplefilter("ignore")
     for line in sys.stdin.buffer:
         request = json.loads(line)
-        _bound(request["most_bytes"])
+        _bound(request["most_bytes"], request["most_seconds"])
         result: dict[str, Any] = {}
         arrays = []
         try:
@@ -43,13 +44,18 @@ def work() -> None:
         del arrays
 
 
-def _bound(most_bytes: int) -> None:
-    """No more memory than that from here on; where the system does not know such a bound, the time's alone holds."""
+def _bound(most_bytes: int, most_seconds: float) -> None:
+    """No more memory than that, and no more of computing, though nobody should wait any longer.
+
+    Where the system does not know such bounds, whoever asks ends the process when its patience does.
+    """
     try:
         import resource
 
         hard = resource.getrlimit(resource.RLIMIT_DATA)[1]
         resource.setrlimit(resource.RLIMIT_DATA, (most_bytes, hard))
+        hard = resource.getrlimit(resource.RLIMIT_CPU)[1]
+        resource.setrlimit(resource.RLIMIT_CPU, (int(time.process_time() + most_seconds) + 2, hard))
     except (ImportError, ValueError, OSError):
         return
 

@@ -78,7 +78,27 @@ def test_mat_of_vectors(packed, oned_as, tmp_path):
     savemat(path, COLUMNS | more, do_compression=packed, oned_as=oned_as)
     measurement = read_measurement(path)
     assert_same(measurement)
-    assert measurement.notes == ("left aside, as they are no columns of numbers: gain, label, table, cells",)
+    assert measurement.notes == (
+        "single numbers in the file: gain = 3, cells{1} = 1",
+        "left aside, as they are no columns of numbers: label, cells{2}",
+        "left aside, as their names are not known: table(:,1), table(:,2)",
+    )
+
+
+def test_mat_matrices_structs_in_a_row_and_cells(tmp_path):
+    table = np.column_stack([k / 1e3, np.sin(k), np.cos(k)])
+    two = np.array([(k, 2.0 * k), (3.0 * k, 4.0 * k)], dtype=[("speed", object), ("angle", object)])
+    savemat(tmp_path / "a.mat", {"data": table, "log": two, "cells": np.array([k, "x", table], object), "kp": 7.0})
+    columns = read_columns(tmp_path / "a.mat")
+    assert list(columns) == [
+        *("data(:,1)", "data(:,2)", "data(:,3)", "log(1).speed", "log(1).angle", "log(2).speed", "log(2).angle"),
+        *("cells{1}", "cells{3}(:,1)", "cells{3}(:,2)", "cells{3}(:,3)"),
+    ]
+    np.testing.assert_array_equal(columns["data(:,2)"], np.sin(k))
+    np.testing.assert_array_equal(columns["log(2).angle"], 4.0 * k)
+    mapped = read_measurement(tmp_path / "a.mat", ["time_s=data(:,1)", "current_A=data(:,3)[mA]"])
+    np.testing.assert_allclose(mapped["current_A"], np.cos(k) / 1e3)
+    assert "single numbers in the file: kp = 7" in mapped.notes
 
 
 @pytest.mark.parametrize("packed", [False, True])

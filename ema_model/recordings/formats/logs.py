@@ -21,7 +21,8 @@ from ema_model.recordings.formats.channels import Channel, Log, NoLog, named, to
 from ema_model.recordings.formats.clocks import between, covered, main_clock, usable
 from ema_model.recordings.formats.format import Array, Columns, Format, check_size
 
-_PATIENCE_S = 60.0  # for one question; a file of a million samples takes ten
+_PATIENCE_S = 10.0  # for one question, and as long again for each so many bytes; some libraries never end
+_PATIENCE_BYTES = 40_000_000
 _TIME = "time_s"  # what the common clock's column is called: it is in seconds
 INSTALL = "pip install 'emaviz[rigs]'"
 
@@ -54,6 +55,7 @@ def log_format(module: str, title: str, *suffixes: str, needs: str = "") -> Form
     return Format(suffixes[0], title, header, read, others=suffixes[1:])
 
 
+_broken: dict[tuple[object, ...], str] = {}  # the file that broke its reader last, which is not asked of it again
 _last: tuple[object, Log, ExitStack] | None = None  # the file that is looked at: it is asked about more than once
 
 

@@ -1,16 +1,20 @@
-"""MATLAB's .mat, version 5 to 7: one vector per signal, alone or as a field of a struct."""
+"""MATLAB's .mat, version 5 to 7: a vector per signal, or the columns of a matrix, alone or in structs and cells."""
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from ema_model.files.limits import ARRAYS, megabytes
 from ema_model.files.refusal import refusal, shown
+from ema_model.quantities.signals import SIGNALS
 from ema_model.recordings.formats import hdf5
 from ema_model.recordings.formats.arrays import Kind, column_names, take
+from ema_model.recordings.formats.channels import is_table, told
 from ema_model.recordings.formats.format import Array, Columns, Format
 from ema_model.recordings.formats.mat5 import HEADER_BYTES, Damaged, Leaf, TooLarge, TooMany, leaves
 
@@ -25,7 +29,11 @@ def _read(path: str, names: Sequence[str], max_bytes: int, strict: bool) -> Colu
     if _is_hdf5(path):
         return hdf5.FORMAT.read(path, names, max_bytes, strict)
     arrays = _load(path, max_bytes)
-    return take(path, _kinds(arrays), names, max_bytes, strict, lambda name: arrays.pop(name).values())
+    numbers = {name: float(leaf.values()[0]) for name, leaf in arrays.items() if _is_number(leaf)}
+    kinds = {name: kind for name, kind in _kinds(arrays).items() if name not in numbers or name in names}
+    columns = take(path, kinds, names, max_bytes, strict, lambda name: arrays.pop(name).values())
+    notes = (f"single numbers in the file: {told(numbers)}",) if numbers else ()
+    return replace(columns, notes=(*notes, *columns.notes))
 
 
 def _write(signals: Mapping[str, Array], path: str) -> None:
@@ -33,6 +41,23 @@ def _write(signals: Mapping[str, Array], path: str) -> None:
         from scipy.io import savemat  # reading does without it
 
         savemat(file, dict(signals), oned_as="column", long_field_names=True)
+
+
+def _is_number(leaf: Leaf) -> bool:
+    return not leaf.other and math.prod(leaf.shape) == 1
+
+
+def _columns(leaf: Leaf) -> list[Leaf]:
+    """A matrix of a few long columns as these; anything else as it is."""
+    if leaf.other or leaf.path[-1] in SIGNALS or not is_table(leaf.shape):
+        return [leaf]
+    rows, count = leaf.shape
+    size = rows * np.dtype(leaf.dtype).itemsize
+    names = [f"{leaf.path[-1]}(:,{i + 1})" for i in range(count)]
+    return [
+        Leaf((*leaf.path[:-1], name), (rows, 1), leaf.data[i * size : (i + 1) * size], leaf.dtype)
+        for i, name in enumerate(names)
+    ]
 
 
 def _kinds(arrays: Mapping[str, Leaf]) -> dict[str, Kind]:
@@ -51,7 +76,7 @@ def _load(path: str, max_bytes: int) -> dict[str, Leaf]:
     with open(path, "rb") as file:
         _check_version(path, file.read(HEADER_BYTES))
         try:
-            found = [leaf for leaf in leaves(file, max_bytes) if leaf.path[-1]]
+            found = [one for leaf in leaves(file, max_bytes) if leaf.path[-1] for one in _columns(leaf)]
         except Damaged as error:
             raise refusal(path, f"is not a whole .mat file ({error}); save it again") from None
         except TooLarge:

@@ -1,4 +1,4 @@
-"""Formats of recordings that rerun reads, which the science must not know: each other file here is one.
+"""Formats of recordings that rerun reads, which the science must not know: a file each.
 
 They join the family of `ema_model.recordings.formats` when emaviz is imported, and do their work in the process that
 reads logs, so that rerun is loaded there alone.

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 
 from ema_model.recordings.formats.channels import Log
 from ema_model.recordings.formats.logs import log_format
+from emaviz.formats import mcap_chunks
 
 # A message's own stamp goes before the time at which it was logged.
 _TIMELINES = ("ros2_timestamp", "timestamp", "message_publish_time", "message_log_time")
@@ -20,15 +21,15 @@ def opened(path: str, most_bytes: int) -> Iterator[Log]:
 
     from emaviz.formats.chunks import Chunks, told
 
+    with open(path, "rb") as file:
+        mcap_chunks.check(file, most_bytes)
     with told():
-        info = McapReader(path, recover=True).info()
-        if sum(one.uncompressed_size_bytes for one in info.compression) > most_bytes:
-            raise MemoryError
+        info = McapReader(path).info()
         chunks = Chunks(_TIMELINES, most_bytes)
         decoders = [one for one in McapReader.available_decoders() if one not in ("raw", "schema", "stats", "urdf")]
         if any(channel.message_encoding == _JSON for channel in info.channels):
             decoders.append("raw")
-        chunks.take(McapReader(path, decoders=decoders, recover=True).stream())
+        chunks.take(McapReader(path, decoders=decoders).stream())
         log = chunks.log()
     yield log
 

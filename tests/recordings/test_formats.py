@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from scipy.io import savemat
 
@@ -147,6 +151,24 @@ def test_older_mat_refused(tmp_path):
     savemat(path, COLUMNS, format="4")
     with pytest.raises(InputError, match=r"not a MATLAB file of version 5 to 7\.3; save it with -v7"):
         read_measurement(path)
+
+
+def test_an_episode_of_lerobot(tmp_path):
+    """As LeRobot 2.1 writes one: lists of fixed length, the joints' names in meta/info.json."""
+    path = tmp_path / "data" / "chunk-000" / "episode_000000.parquet"
+    path.parent.mkdir(parents=True)
+    (tmp_path / "meta").mkdir()
+    features = {"action": {"dtype": "float32", "shape": [2], "names": ["hip", "knee"]}}
+    (tmp_path / "meta" / "info.json").write_text(json.dumps({"codebase_version": "v2.1", "features": features}))
+    rows = np.column_stack([np.sin(k), np.cos(k)]).astype("f4")
+    lists = pa.FixedSizeListArray.from_arrays(pa.array(rows.ravel()), 2)
+    columns = {"action": lists, "observation.state": lists, "timestamp": (k / 30.0).astype("f4"), "task_index": k}
+    pq.write_table(pa.table(columns), path)
+    found = read_columns(path)
+    assert list(found) == [
+        *("action.hip", "action.knee", "observation.state.0", "observation.state.1", "timestamp", "task_index")
+    ]
+    np.testing.assert_array_equal(found["action.knee"], rows[:, 1])
 
 
 def test_a_static_map_needs_no_time(tmp_path):

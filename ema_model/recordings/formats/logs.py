@@ -21,7 +21,7 @@ from ema_model.recordings.formats.channels import Channel, Log, NoLog, named, to
 from ema_model.recordings.formats.clocks import between, covered, main_clock, usable
 from ema_model.recordings.formats.format import Array, Columns, Format, check_size
 
-_PATIENCE_S = 10.0  # for one question, and as long again for each so many bytes; some libraries never end
+_PATIENCE_S = 20.0  # for one question, and as long again for each so many bytes; some libraries never end
 _PATIENCE_BYTES = 40_000_000
 _TIME = "time_s"  # what the common clock's column is called: it is in seconds
 INSTALL = "pip install 'emaviz[rigs]'"

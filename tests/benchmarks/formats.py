@@ -41,9 +41,9 @@ def signals(samples: int) -> dict[str, np.ndarray]:
 
 
 def _computing() -> float:
-    """Seconds that this process has computed, and the one that reads logs."""
-    apart_too = apart.process_id()
-    return sum(sum(psutil.Process(one).cpu_times()[:2]) for one in (os.getpid(), apart_too) if one)
+    """Seconds that this process has computed, and those that read logs, the one that lives and those before it."""
+    alive = apart.process_id()
+    return sum(os.times()[:4]) + (sum(psutil.Process(alive).cpu_times()[:2]) if alive else 0.0)
 
 
 def main(samples: int, kinds: list[str]) -> None:

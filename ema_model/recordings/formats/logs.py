@@ -30,7 +30,7 @@ INSTALL = "pip install 'emaviz[rigs]'"
 def log_format(module: str, title: str, *suffixes: str, needs: str = "") -> Format:
     """A format whose file is `module`; `needs` is the library that reads it, if it is not always installed."""
 
-    def ask(function: str, path: str, max_bytes: int, *more: Any) -> apart.Answer:
+    def ask(function: str, path: str, max_bytes: int, *more: Any, again: bool = True) -> apart.Answer:
         if needs and importlib.util.find_spec(needs) is None:
             raise refusal(path, f"{title} files are read with {needs}, which is not installed: {INSTALL}")
         with open(path, "rb"):
@@ -46,7 +46,7 @@ def log_format(module: str, title: str, *suffixes: str, needs: str = "") -> Form
         return names
 
     def read(path: str, names: Sequence[str], max_bytes: int, strict: bool) -> Columns:
-        (found, notes, title), arrays = ask("columns_of", path, max_bytes, list(names), strict)
+        (found, notes, title), arrays = ask("columns_of", path, max_bytes, list(names), strict, again=not strict)
         columns = dict(zip(found, arrays))
         if strict:
             check_lengths(path, columns)

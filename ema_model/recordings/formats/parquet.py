@@ -33,7 +33,8 @@ def _header(path: str, max_bytes: int) -> list[str]:
         version = (file.schema_arrow.metadata or {}).get(_KEY, _VERSION)
         if version != _VERSION:
             raise refusal(path, f"{_KEY.decode()} {shown(version.decode(errors='replace'))} is not known; expected 1")
-        return list(_places(path, file.schema_arrow))
+        names = file.schema_arrow.names
+        return list(_places(path, file.schema_arrow)) if len(set(names)) == len(names) else names
 
 
 def _read(path: str, names: Sequence[str], max_bytes: int, strict: bool) -> Columns:

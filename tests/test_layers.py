@@ -30,7 +30,7 @@ FLOORS = {
         ["face"],
     ],
     "emaviz": [
-        ["colours", "text"],
+        ["colours", "formats", "text"],
         ["recording"],
         ["figures"],
         ["report"],

@@ -45,7 +45,7 @@ def test_locks_hold_what_the_project_asks_for_and_its_build_backend() -> None:
     )
     assert set(needed) <= set(_locked(RUN))
     extras = project["project"]["optional-dependencies"]
-    assert set(_asked(*extras["dev"], *extras["cluster"])) <= set(_locked(TESTS))
+    assert set(_asked(*extras["dev"], *extras["cluster"], *extras["rigs"])) <= set(_locked(TESTS))
 
 
 def test_whoever_runs_no_cluster_installs_none() -> None:

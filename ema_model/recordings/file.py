@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,11 +21,14 @@ from ema_model.files.refusal import listed, reason, refusal, shown
 from ema_model.files.user_file import check_user_file
 from ema_model.recordings.checks import check_finite, check_length, check_names, check_values, choose_columns
 from ema_model.recordings.columns.mapping import ColumnMapping, apply_mapping, parse_mapping
-from ema_model.recordings.formats import format_of
+from ema_model.recordings.columns.reading import Reading
+from ema_model.recordings.formats import Format, format_of
+from ema_model.recordings.formats.text_layout import Hints
 from ema_model.recordings.measurement import Measurement
 from ema_model.recordings.side_file.read import SideFile, find_side_file, read_side_file
 
 Array = NDArray[np.float64]
+NONE = Hints()
 
 
 def read_measurement(
@@ -33,6 +37,7 @@ def read_measurement(
     *,
     side: SideFile | None = None,
     max_bytes: int = FILE_BYTES,
+    hints: Hints = NONE,
 ) -> Measurement:
     """The measurement in a file, its name the file's stem, its notes what was found and left aside.
 
@@ -44,7 +49,7 @@ def read_measurement(
     """
     path = os.fspath(path)
     check_file(path, max_bytes)
-    file_format = format_of(path)
+    file_format = said_format(path, hints)
     notes = []
     if side is None:
         found = find_side_file(path)
@@ -67,7 +72,10 @@ def read_measurement(
         signals = {"time_s": np.arange(float(next(iter(signals.values())).size)), **signals}
         done = (*done, "a static map without time: time_s counts the samples")
     check_values(path, signals, columns.place)
-    measurement = _measurement(path, signals, (*columns.notes, *notes, *done), foreign, side)
+    told = (*([columns.layout] if columns.layout else []), *columns.notes, *notes, *done)
+    bare = _measurement(path, signals, told, foreign, side)
+    name = " ".join(filter(None, (bare.name, columns.title)))
+    measurement = replace(bare, name=name, reading=Reading(layout=columns.layout))
     if side.window_s is not None or side.segments is not None:
         try:
             measurement = measurement.selected(side.window_s, side.segments)
@@ -77,21 +85,21 @@ def read_measurement(
     return measurement
 
 
-def read_header(path: str, max_bytes: int) -> list[str]:
+def read_header(path: str, max_bytes: int, hints: Hints = NONE) -> list[str]:
     """The columns' names in the file's order; InputError for a file that cannot be read as a table."""
     check_file(path, max_bytes)
     with _told(path):
-        return format_of(path).header(path, max_bytes)
+        return said_format(path, hints).header(path, max_bytes)
 
 
-def read_columns(path: str | os.PathLike[str], *, max_bytes: int = FILE_BYTES) -> dict[str, Array]:
+def read_columns(path: str | os.PathLike[str], *, max_bytes: int = FILE_BYTES, hints: Hints = NONE) -> dict[str, Array]:
     """The columns of numbers as they stand in the file, for a mapping step to show; others are left out.
 
     Raises InputError for a file that cannot be read as a table at all; the values are not checked.
     """
     path = os.fspath(path)
     check_file(path, max_bytes)
-    file_format = format_of(path)
+    file_format = said_format(path, hints)
     with _told(path):
         names = [name for name in file_format.header(path, max_bytes) if name]
         check_names(path, names)
@@ -102,6 +110,16 @@ def read_columns(path: str | os.PathLike[str], *, max_bytes: int = FILE_BYTES) -
             file_format.read(path, names, max_bytes, False).arrays
             or file_format.read(path, names, max_bytes, True).arrays
         )
+
+
+def said_format(path: str, hints: Hints) -> Format:
+    """The file's format, reading it as somebody has said that it is laid out; InputError where it is no text."""
+    found = format_of(path)
+    if hints == NONE:
+        return found
+    if found.hinted is None:
+        raise refusal(path, f"is {found.title}, no text; leave --header-line and --encoding out")
+    return found.hinted(hints)
 
 
 @contextmanager

@@ -24,7 +24,8 @@ from ema_model.recordings.columns.guess import doubt, guess_mapping
 from ema_model.recordings.columns.mapping import ColumnMapping, MappedColumn, parse_mapping, unit_in_name
 from ema_model.recordings.columns.reading import Reading, without_unit
 from ema_model.recordings.equivalent_current import PHASES
-from ema_model.recordings.file import check_file, read_columns, read_header, read_measurement
+from ema_model.recordings.file import NONE, check_file, read_columns, read_header, read_measurement
+from ema_model.recordings.formats.text_layout import Hints
 from ema_model.recordings.measurement import Measurement
 from ema_model.recordings.prepared import prepared
 from ema_model.recordings.side_file.read import SideFile, find_side_file, read_side_file
@@ -43,16 +44,19 @@ def read(
     side: SideFile | None = None,
     needs: Needs | None = None,
     max_bytes: int = FILE_BYTES,
+    hints: Hints = NONE,
 ) -> Measurement:
     """A recording for the model of this actuator: in SI, under the names inside, with a current where one can be made.
 
     `mapping`, or texts as of `--map`, goes before what the side file says.  `side` is the side file, where it is
-    known already.  `needs` are the signals that must be there, and sure, when columns have to be guessed; without
-    it what the actuator's model needs.  The measurement's `reading` tells how it was read.  Raises InputError, one
-    line, for whatever is wrong with the file, and for columns that are not clear: it lists them, with the `--map`
-    to give.
+    known already.  `hints` say how a text is laid out that is read wrongly without.  `needs` are the signals that
+    must be there, and sure, when columns have to be guessed; without it what the actuator's model needs.  The
+    measurement's `reading` tells how it was read.  Raises InputError, one line, for whatever is wrong with the
+    file, and for columns that are not clear: it lists them, with the `--map` to give.
     """
-    return prepared(recorded(path, actuator, mapping, side=side, needs=needs, max_bytes=max_bytes), actuator)
+    return prepared(
+        recorded(path, actuator, mapping, side=side, needs=needs, max_bytes=max_bytes, hints=hints), actuator
+    )
 
 
 def recorded(
@@ -63,16 +67,17 @@ def recorded(
     side: SideFile | None = None,
     needs: Needs | None = None,
     max_bytes: int = FILE_BYTES,
+    hints: Hints = NONE,
 ) -> Measurement:
     """The first half of `read`: under the names of files, so that `prepared` makes it fit any actuator."""
     path = os.fspath(path)
     side = _side_file(path, actuator, side, max_bytes)
-    reading = how_to_read(path, actuator, mapping, side=side, max_bytes=max_bytes)
+    reading = how_to_read(path, actuator, mapping, side=side, max_bytes=max_bytes, hints=hints)
     if needs is None:
         needs = needed(actuator, is_map=side.kind == "map")
-    _ask(path, actuator, reading, read_header(path, max_bytes), needs)
-    measurement = read_measurement(path, reading.mapping, side=side, max_bytes=max_bytes)
-    return replace(measurement, reading=reading)
+    _ask(path, actuator, reading, read_header(path, max_bytes, hints), needs)
+    measurement = read_measurement(path, reading.mapping, side=side, max_bytes=max_bytes, hints=hints)
+    return replace(measurement, reading=replace(reading, layout=measurement.reading.layout))
 
 
 def how_to_read(
@@ -83,11 +88,12 @@ def how_to_read(
     side: SideFile | None = None,
     columns: Mapping[str, NDArray[np.float64]] | None = None,
     max_bytes: int = FILE_BYTES,
+    hints: Hints = NONE,
 ) -> Reading:
     """What `read` takes which column for; `columns` are the file's, where they are read already."""
     path = os.fspath(path)
     side = _side_file(path, actuator, side, max_bytes)
-    header = read_header(path, max_bytes)
+    header = read_header(path, max_bytes, hints)
     given = mapping if isinstance(mapping, ColumnMapping) else parse_mapping(mapping, header)
     by_side = side.mapping is not None and bool(side.mapping.entries)
     known = side.mapping if by_side and side.mapping else _usual(actuator, header)
@@ -100,7 +106,9 @@ def how_to_read(
     missing = {name for group in needs if there.isdisjoint(group) for name in group}
     if by_side or (of_actuator and not missing) or settled.issuperset(header):
         return Reading(known)  # somebody has looked at these columns
-    guess = guess_mapping(read_columns(path, max_bytes=max_bytes) if columns is None else columns, known=known)
+    guess = guess_mapping(
+        read_columns(path, max_bytes=max_bytes, hints=hints) if columns is None else columns, known=known
+    )
     fresh = [entry for entry in guess.entries if entry.column not in settled]
     if of_actuator:  # its file says what matters in its recordings, so that only what is needed is sought beside
         fresh = [entry for entry in fresh if actuator.axes.inside({entry.signal: 0}).keys() & missing]

@@ -7,7 +7,7 @@ import os
 from ema_model.files.refusal import reason, refusal, shown
 from ema_model.files.whole_file import whole_file
 from ema_model.recordings.checks import check_finite
-from ema_model.recordings.formats import format_of
+from ema_model.recordings.formats import WRITTEN, format_of
 from ema_model.recordings.measurement import Measurement
 
 
@@ -19,10 +19,12 @@ def write_measurement(measurement: Measurement, path: str | os.PathLike[str]) ->
     """
     path = os.fspath(path)
     check_target(path)
+    write = format_of(path, WRITTEN).write
+    assert write is not None
     check_finite(path, measurement.signals, lambda row: f"sample {row + 1}")
     try:
         with whole_file(path) as draft:
-            format_of(path).write(measurement.signals, os.fspath(draft))
+            write(measurement.signals, os.fspath(draft))
     except OSError as error:
         raise refusal(path, f"cannot be written ({reason(error)}); check the disk and the permissions") from None
 
@@ -32,7 +34,7 @@ def check_target(path: str | os.PathLike[str]) -> None:
     path = os.fspath(path)
     if os.path.isdir(path):
         raise refusal(path, "is a folder; the name of a file is expected")
-    format_of(path)
+    format_of(path, WRITTEN)
     target = os.path.realpath(path)
     folder = os.path.dirname(target)
     if not os.path.isdir(folder):

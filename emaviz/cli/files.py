@@ -18,7 +18,7 @@ from ema_model.files.refusal import shown
 from ema_model.files.user_file import check_user_file
 from ema_model.files.whole_file import remove_abandoned
 from ema_model.recordings import side_path
-from ema_model.recordings.formats import FORMATS
+from ema_model.recordings.formats import WRITTEN
 from ema_model.recordings.side_file.read import OF_A_FOLDER
 
 
@@ -64,7 +64,7 @@ JSON = Output((".json",), is_kept=False)
 REPORT = Output((".html", ".htm"), is_kept=False)
 RRD = Output((".rrd",))
 SAVED_ACTUATOR = Output((".toml",))
-MEASUREMENT = Output(tuple(FORMATS), has_side_file=True)
+MEASUREMENT = Output(tuple(WRITTEN), has_side_file=True)
 
 
 _Declared = TypeVar("_Declared", Input, Output)

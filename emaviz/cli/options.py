@@ -17,6 +17,7 @@ from ema_model.effects.user.entries import kind_of, read_entries
 from ema_model.errors import InputError, quoted
 from ema_model.quantities.axes import Axes
 from ema_model.recordings import Measurement, read
+from ema_model.recordings.formats.text_layout import Hints, known_encoding
 from ema_model.recordings.read import COMMAND_ALONE, Needs
 from ema_model.simulation.run import Run
 from emaviz.cli import files
@@ -78,11 +79,12 @@ def _read(
     progress: Progress | None = None,
     needs: Needs | None = None,
 ) -> Measurement:
-    measurement = read(file, actuator, arguments.mapping, needs=needs)
-    if assumed := measurement.reading.assumed:
+    hints = Hints(arguments.header_line, arguments.encoding)
+    measurement = read(file, actuator, arguments.mapping, needs=needs, hints=hints)
+    if told := measurement.reading.told:
         if progress is not None:
             progress.done()
-        print(f"{Path(file).name}: {assumed}", file=sys.stderr)
+        print(f"{Path(file).name}: {told}", file=sys.stderr)
     return measurement
 
 
@@ -101,7 +103,7 @@ def add_faults(parser: argparse.ArgumentParser) -> None:
 
 
 def add_mapping(parser: argparse.ArgumentParser) -> None:
-    """--map, repeated"""
+    """--map, repeated; --header-line and --encoding"""
     parser.add_argument(
         "--map",
         action="append",
@@ -110,6 +112,22 @@ def add_mapping(parser: argparse.ArgumentParser) -> None:
         metavar="signal=column",
         help="a column's meaning, with its unit where it is not SI: motor_speed_rad_s=speed[rpm]; repeat for more",
     )
+    parser.add_argument(
+        "--header-line",
+        type=whole(1, 10_000),
+        metavar="N",
+        help="the line with the columns' names, of a text in which another is found by itself",
+    )
+    parser.add_argument(
+        "--encoding", type=_encoding, metavar="NAME", help="of a text: utf-8, cp1252, utf-16, … where another is found"
+    )
+
+
+def _encoding(text: str) -> str:
+    try:
+        return known_encoding(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{quoted(text)} is no encoding; utf-8, cp1252 and utf-16 are usual") from None
 
 
 def add_effects(parser: argparse.ArgumentParser) -> None:

@@ -123,9 +123,9 @@ GARBAGE = bytes(range(256)) * 10
 FILES = {
     ".csv": {
         "empty": (b"", "is empty"),
-        "garbage": (GARBAGE, "not text in UTF-8"),
+        "garbage": (GARBAGE, "is not text (neither UTF-8"),
         "other_encoding": ("Zeit,Störung\n1,2\n".encode("latin-1"), "not text in UTF-8"),
-        "archive": (npz(), "not text in UTF-8"),
+        "archive": (npz(), "is not text (neither UTF-8"),
         "header_only": (b"time_s,current_A\n", "0 samples"),
         "no_header": (b"\n".join(text().split(b"\n")[1:]), "add a header line"),
         "no_time": (text("x,current_A"), "no column time_s"),
@@ -198,7 +198,7 @@ FILES = {
         "header_only": (mat_header(), "no column time_s"),
         "truncated": (mat()[:-30], "not a whole .mat file (it is cut short)"),
         "truncated_packed": (mat(True)[:-30], "not a whole .mat file"),
-        "newer": (b"MATLAB 7.3 MAT-file".ljust(124) + b"\0\2IM" + bytes(400), "v7.3 (HDF5) file, which is not read"),
+        "newer": (b"MATLAB 7.3 MAT-file".ljust(124) + b"\0\2IM" + bytes(400), "is not"),
         "cells": (mat(current_A=np.array([1, "a"], object)), "'current_A' holds objects"),
         "complex": (mat(current_A=k + 1j), "'current_A' holds complex numbers"),
         "words": (mat(current_A="off"), "'current_A' holds text"),

@@ -23,6 +23,7 @@ from ema_model.challenges.sealing import seal
 from ema_model.challenges.truth import Truth
 from emaviz.recording import RecordingWriter
 from emaviz.session.settings import Settings
+from support.foreign_files import FILES
 
 N = 120
 k = np.arange(float(N))
@@ -123,6 +124,10 @@ def whole(reader: str, folder: Path) -> list[bytes]:
     if reader in ("mat", "packed mat"):
         rig = {"rig": {**COLUMNS, "label": "x", "inner": {"x": k}}, "cells": np.array([k, "a"], object)}
         return [written(savemat, arrays, do_compression=reader == "packed mat") for arrays in (COLUMNS, rig)]
+    if reader in FILES:
+        ending, write = FILES[reader]
+        write(folder / f"whole{ending}", COLUMNS)
+        return [(folder / f"whole{ending}").read_bytes()]
     if reader == "side file":
         return [SIDE.encode()]
     if reader == "actuator":

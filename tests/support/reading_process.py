@@ -19,6 +19,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from support.foreign_files import FILES
+
 _MOST_MEMORY = 10 << 30  # of address space, so that the machine survives
 _PATIENCE_S = 120.0
 
@@ -70,6 +72,7 @@ class ReadingProcess:
 
 
 def _measurement(path: Path, most_bytes: int) -> None:
+    import emaviz  # noqa: F401  which adds formats
     from ema_model.errors import InputError
     from ema_model.files.limits import PAGE_BYTES
     from ema_model.recordings import read_columns
@@ -137,7 +140,7 @@ def _recording(path: Path, _: int) -> None:
 
 
 READERS: dict[str, Callable[[Path, int], Any]] = {
-    **dict.fromkeys(("csv", "parquet", "npz", "mat", "packed mat"), _measurement),
+    **dict.fromkeys(("csv", "parquet", "npz", "mat", "packed mat", *FILES), _measurement),
     "side file": _side_file,
     "actuator": _actuator,
     "user effects": _actuator,
@@ -155,9 +158,12 @@ def _checked(line: str) -> str:
 
 def _outcome(reader: str, path: Path, most_bytes: int) -> Outcome:
     from ema_model.errors import InputError
+    from ema_model.files import apart
     from emaviz.recording.errors import RecordingError
 
     before = _memory("VmRSS", reset=True)
+    reader_apart = apart.process_id()
+    before_apart = _memory("VmRSS", reset=True, process=reader_apart) if reader_apart else 0.0
     began = time.process_time()
     try:
         try:
@@ -168,18 +174,21 @@ def _outcome(reader: str, path: Path, most_bytes: int) -> Outcome:
     except BaseException as error:  # a panic of native code is no Exception
         kind, line = "uncaught", f"{type(error).__name__}: {error}"[:300]
     seconds = time.process_time() - began
-    return Outcome(kind, line, seconds, max(_memory("VmHWM") - before, 0.0))
+    grown = max(_memory("VmHWM") - before, 0.0)
+    if reader_apart and reader_apart == apart.process_id():
+        grown += max(_memory("VmHWM", process=reader_apart) - before_apart, 0.0)
+    return Outcome(kind, line, seconds, grown)
 
 
-def _memory(which: str, reset: bool = False) -> float:
-    """Memory of this process now (VmRSS), or at its peak since the last reset (VmHWM), bytes."""
+def _memory(which: str, reset: bool = False, process: int | str = "self") -> float:
+    """Memory of a process now (VmRSS), or at its peak since the last reset (VmHWM), bytes; 0 if it has gone."""
     if reset:
         import pyarrow as pa
 
         pa.default_memory_pool().release_unused()
-        Path("/proc/self/clear_refs").write_text("5")
-    lines = Path("/proc/self/status").read_text().splitlines()
-    return next(1024.0 * int(line.split()[1]) for line in lines if line.startswith(which))
+        Path(f"/proc/{process}/clear_refs").write_text("5")
+    lines = Path(f"/proc/{process}/status").read_text().splitlines()
+    return next((1024.0 * int(line.split()[1]) for line in lines if line.startswith(which)), 0.0)
 
 
 if __name__ == "__main__":

@@ -7,7 +7,9 @@ import re
 _ENGLISH = {
     # what is measured
     "zeitstempel": "timestamp",
+    "uhrzeit": "time",
     "zeit": "time",
+    "datum": "date",
     "drehwinkel": "angle",
     "winkel": "angle",
     "lage": "position",

@@ -18,6 +18,7 @@ class Reading:
     guessed: tuple[MappedColumn, ...] = ()  # those of the mapping that nobody has said
     doubts: tuple[tuple[MappedColumn, str], ...] = ()  # guesses that are not used, and why
     made: tuple[str, ...] = ()  # signals made from others
+    layout: str = ""  # what was found out of how the file is laid out: "header in line 4, units in line 5"
 
     @property
     def is_guess(self) -> bool:
@@ -30,6 +31,11 @@ class Reading:
         used = ", ".join(f"{entry.signal} from {_with_unit(entry)}" for entry in self.guessed)
         aside = ", ".join(f"{shown(entry.column)} ({why})" for entry, why in self.doubts)
         return "; left aside: ".join(filter(None, (used, aside))) if used else aside and f"left aside: {aside}"
+
+    @property
+    def told(self) -> str:
+        """What was found out by itself, of the layout and the columns, in one line; "" where there was no question."""
+        return "; ".join(filter(None, (self.layout, self.assumed)))
 
     def proposed(self, columns: Iterable[str]) -> ColumnMapping:
         """Everything that somebody should look at: what is used, canonical names too, and what is in doubt."""

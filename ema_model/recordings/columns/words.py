@@ -13,7 +13,7 @@ from ema_model.recordings.columns.german import in_english, without_umlauts
 QUANTITIES: dict[str, frozenset[str]] = {
     name: frozenset(words.split())
     for name, words in {
-        "time": "t time times timestamp timestamps timestep clock elapsed stamp",
+        "time": "t time times timestamp timestamps timestep clock elapsed stamp date datetime",
         "position": "pos position positions angle theta q phi encoder enc rotation displacement stroke x joint "
         "resolver",
         "speed": "speed velocity vel omega w rpm dq qd qdot dtheta thetadot dx xdot angularvelocity",

@@ -11,21 +11,32 @@ import pkgutil
 from ema_model.files.refusal import refusal, shown
 from ema_model.recordings.formats.format import Columns, Format
 
-__all__ = ["FORMATS", "Columns", "Format", "format_of"]
+__all__ = ["FORMATS", "WRITTEN", "Columns", "Format", "add_format", "format_of"]
 
-_modules = [importlib.import_module(f"{__name__}.{module.name}") for module in pkgutil.iter_modules(__path__)]
-_found = [module.FORMAT for module in _modules if hasattr(module, "FORMAT")]
-# Those that any program reads stand first in messages and menus.
-_found.sort(key=lambda file_format: file_format.suffix not in (".csv", ".parquet"))
-FORMATS: dict[str, Format] = {file_format.suffix: file_format for file_format in _found}
+FORMATS: dict[str, Format] = {}  # by suffix; those that any program reads stand first in messages and menus
+WRITTEN: dict[str, Format] = {}  # those of them that are written too
 
 
-def format_of(path: str) -> Format:
+def add_format(file_format: Format) -> None:
+    """Makes a format known to all that read recordings; for one that stands outside of this folder."""
+    for suffix in file_format.suffixes:
+        FORMATS[suffix] = file_format
+    if file_format.write is not None:
+        WRITTEN[file_format.suffix] = file_format
+
+
+def format_of(path: str, known: dict[str, Format] = FORMATS) -> Format:
     """The format that the file's suffix names; InputError lists the formats there are."""
     dot = path.rfind(".")
     suffix = path[dot:] if dot > max(path.rfind("/"), path.rfind("\\")) else ""
     try:
-        return FORMATS[suffix.lower()]
+        return known[suffix.lower()]
     except KeyError:
         found = f"the suffix {shown(suffix)!r} is not known" if suffix else "the name has no suffix"
-        raise refusal(path, f"{found}; a measurement ends in {' or '.join(FORMATS)}") from None
+        raise refusal(path, f"{found}; a measurement ends in {' or '.join(known)}") from None
+
+
+_modules = [importlib.import_module(f"{__name__}.{module.name}") for module in pkgutil.iter_modules(__path__)]
+_found = [module.FORMAT for module in _modules if hasattr(module, "FORMAT")]
+for _one in sorted(_found, key=lambda one: (one.suffix not in (".csv", ".parquet"), one.write is None)):
+    add_format(_one)

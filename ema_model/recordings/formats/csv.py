@@ -1,7 +1,7 @@
 """CSV: a header line, then numbers; commas, semicolons or tabs between them.
 
-A file is read at full speed.  Only when that fails it is read again in blocks, and the one that fails is walked line by
-line, to name the bad cell.
+A file of another layout, as instruments write it, is read by `text_table`.  A plain one is read at full speed.  Only
+when that fails it is read again in blocks, and the one that fails is walked line by line, to name the bad cell.
 """
 
 from __future__ import annotations
@@ -22,6 +22,8 @@ from ema_model.errors import quoted
 from ema_model.files.limits import LINE_BYTES, megabytes
 from ema_model.files.refusal import listed, refusal, shown
 from ema_model.recordings.formats.format import Array, Columns, Format, check_size
+from ema_model.recordings.formats.text_layout import Hints, find_layout
+from ema_model.recordings.formats.text_table import TextTable, leaves_out, read_table, table_of
 
 _HEAD_BYTES = 65_536
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)(e[+-]?[0-9]+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE)
@@ -38,15 +40,40 @@ class _Dialect:
     decimal: str
 
 
-def _header(path: str, max_bytes: int) -> list[str]:
-    del max_bytes  # only the header is read
-    return _dialect(path).names
+def hinted(hints: Hints) -> Format:
+    """The format for a file of which somebody has said how it is laid out."""
+
+    def header(path: str, max_bytes: int) -> list[str]:
+        del max_bytes  # only the header is read
+        unusual = _unusual(path, hints)
+        return unusual.names if unusual else _dialect(path).names
+
+    def read(path: str, names: Sequence[str], max_bytes: int, strict: bool) -> Columns:
+        unusual = _unusual(path, hints)
+        return read_table(unusual, names, max_bytes, strict) if unusual else _read(path, names, max_bytes, strict)
+
+    return Format(".csv", "CSV", header, read, _write, (".txt", ".tsv", ".asc", ".lvm"), hinted)
+
+
+def _unusual(path: str, hints: Hints) -> TextTable | None:
+    """The table of a text that has more than a header line and plain numbers below it."""
+    layout = find_layout(path, hints)
+    if layout is None:
+        return None
+    table = table_of(path, layout, hints.encoding)
+    if hints != Hints() or not table.is_plain:
+        return table
+    dialect = _dialect(path)
+    plain = (dialect.names, dialect.header_lines, dialect.separator, dialect.decimal)
+    return None if plain == (table.names, layout.header_line, layout.separator, layout.decimal) else table
 
 
 def _read(path: str, names: Sequence[str], max_bytes: int, strict: bool) -> Columns:
     dialect = _dialect(path)
     _check_size(path, dialect, names, max_bytes)
     table = _table(path, dialect, names)
+    if table is None and strict and (again := find_layout(path, Hints())) and _goes_on(path, dialect, names):
+        return read_table(table_of(path, again), names, max_bytes, strict)
     if table is None:
         if strict:
             _explain(path, dialect, names)
@@ -65,6 +92,20 @@ def _read(path: str, names: Sequence[str], max_bytes: int, strict: bool) -> Colu
     del table  # each column goes when it is converted
     arrays = {name: columns.pop(name).to_numpy() for name in names}
     return Columns(arrays, lambda row: _place(path, dialect, row), tuple(notes))
+
+
+def _goes_on(path: str, dialect: _Dialect, names: Sequence[str]) -> bool:
+    """Whether all that is wrong in a table is its header again, or text at its end."""
+    layout = find_layout(path, Hints())
+    if layout is None or layout.header_line != dialect.header_lines:
+        return False
+    _check_lines(path, dialect)
+    return leaves_out(table_of(path, layout), names)
+
+
+def _check_lines(path: str, dialect: _Dialect) -> None:
+    for _ in _blocks(path, dialect):  # refuses a line that is too long
+        pass
 
 
 def _table(path: str, dialect: _Dialect, names: Sequence[str]) -> pa.Table | None:
@@ -110,7 +151,7 @@ def _dialect(path: str) -> _Dialect:
     except UnicodeDecodeError:
         text = "\0"
     if "\0" in text:
-        raise refusal(path, "is not text in UTF-8; export it again as CSV in UTF-8")
+        raise refusal(path, "is not text in UTF-8, nor a table in another encoding; export it again as CSV in UTF-8")
     lines = re.split(r"\r\n|\r|\n", text)
     first = next((i for i, line in enumerate(lines) if line.strip()), None)
     if first is None:
@@ -259,4 +300,4 @@ def _is_number(cell: str, decimal: str) -> bool:
     return _NUMBER.fullmatch(cell) is not None
 
 
-FORMAT = Format(".csv", "CSV", _header, _read, _write)
+FORMAT = hinted(Hints())

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ema_model.files.limits import megabytes
 from ema_model.files.refusal import refusal
+from ema_model.recordings.formats.text_layout import Hints
 
 Array = NDArray[np.float64]
 
@@ -21,6 +22,8 @@ class Columns:
     arrays: dict[str, Array]
     place: Callable[[int], str]  # the sample's index → where it stands: "line 2", "row 1"
     notes: tuple[str, ...] = ()
+    title: str = ""  # what the file calls the run, beside its own name
+    layout: str = ""  # what was found out by itself of how the file is laid out, for a person to look at
 
 
 def check_size(path: str, numbers: float, max_bytes: int) -> None:
@@ -36,12 +39,20 @@ class Format:
 
     `header` returns the columns' names, in the file's order.  `read` returns those asked for (float64, one
     length; NaN stands for itself, a blank cell is refused); unless `strict`, those that are columns of numbers by
-    themselves, of whatever length.  `write` takes signals of one length and the file to make.  The first two raise
-    InputError for files that are not well formed or take more than `max_bytes` in memory; all may raise OSError.
+    themselves, of whatever length.  `write` takes signals of one length and the file to make; formats that are only
+    read have none.  The first two raise InputError for files that are not well formed or take more than `max_bytes`
+    in memory; all may raise OSError.
     """
 
     suffix: str
     title: str
     header: Callable[[str, int], list[str]]  # path, max_bytes in memory
     read: Callable[[str, Sequence[str], int, bool], Columns]  # path, names, max_bytes in memory, strict
-    write: Callable[[Mapping[str, Array], str], None]
+    write: Callable[[Mapping[str, Array], str], None] | None = None
+    others: tuple[str, ...] = ()  # further suffixes of the same kind of file
+    hinted: Callable[[Hints], Format] | None = None  # the same for a text of which somebody has said the layout
+
+    @property
+    def suffixes(self) -> tuple[str, ...]:
+        """All of them, the usual one first."""
+        return (self.suffix, *self.others)

@@ -1,26 +1,39 @@
-"""MATLAB's .mat, version 5 to 7: one vector per signal, alone or as a field of a struct."""
+"""MATLAB's .mat, version 5 to 7: a vector per signal, or the columns of a matrix, alone or in structs and cells."""
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from ema_model.files.limits import ARRAYS, megabytes
 from ema_model.files.refusal import refusal, shown
+from ema_model.quantities.signals import SIGNALS
+from ema_model.recordings.formats import hdf5
 from ema_model.recordings.formats.arrays import Kind, column_names, take
+from ema_model.recordings.formats.channels import is_table, told
 from ema_model.recordings.formats.format import Array, Columns, Format
 from ema_model.recordings.formats.mat5 import HEADER_BYTES, Damaged, Leaf, TooLarge, TooMany, leaves
 
 
 def _header(path: str, max_bytes: int) -> list[str]:
+    if _is_hdf5(path):
+        return hdf5.FORMAT.header(path, max_bytes)
     return column_names(_kinds(_load(path, max_bytes)))
 
 
 def _read(path: str, names: Sequence[str], max_bytes: int, strict: bool) -> Columns:
+    if _is_hdf5(path):
+        return hdf5.FORMAT.read(path, names, max_bytes, strict)
     arrays = _load(path, max_bytes)
-    return take(path, _kinds(arrays), names, max_bytes, strict, lambda name: arrays.pop(name).values())
+    numbers = {name: float(leaf.values()[0]) for name, leaf in arrays.items() if _is_number(leaf)}
+    kinds = {name: kind for name, kind in _kinds(arrays).items() if name not in numbers or name in names}
+    columns = take(path, kinds, names, max_bytes, strict, lambda name: arrays.pop(name).values())
+    notes = (f"single numbers in the file: {told(numbers)}",) if numbers else ()
+    return replace(columns, notes=(*notes, *columns.notes))
 
 
 def _write(signals: Mapping[str, Array], path: str) -> None:
@@ -28,6 +41,23 @@ def _write(signals: Mapping[str, Array], path: str) -> None:
         from scipy.io import savemat  # reading does without it
 
         savemat(file, dict(signals), oned_as="column", long_field_names=True)
+
+
+def _is_number(leaf: Leaf) -> bool:
+    return not leaf.other and math.prod(leaf.shape) == 1
+
+
+def _columns(leaf: Leaf) -> list[Leaf]:
+    """A matrix of a few long columns as these; anything else as it is."""
+    if leaf.other or leaf.path[-1] in SIGNALS or not is_table(leaf.shape):
+        return [leaf]
+    rows, count = leaf.shape
+    size = rows * np.dtype(leaf.dtype).itemsize
+    names = [f"{leaf.path[-1]}(:,{i + 1})" for i in range(count)]
+    return [
+        Leaf((*leaf.path[:-1], name), (rows, 1), leaf.data[i * size : (i + 1) * size], leaf.dtype)
+        for i, name in enumerate(names)
+    ]
 
 
 def _kinds(arrays: Mapping[str, Leaf]) -> dict[str, Kind]:
@@ -46,7 +76,7 @@ def _load(path: str, max_bytes: int) -> dict[str, Leaf]:
     with open(path, "rb") as file:
         _check_version(path, file.read(HEADER_BYTES))
         try:
-            found = [leaf for leaf in leaves(file, max_bytes) if leaf.path[-1]]
+            found = [one for leaf in leaves(file, max_bytes) if leaf.path[-1] for one in _columns(leaf)]
         except Damaged as error:
             raise refusal(path, f"is not a whole .mat file ({error}); save it again") from None
         except TooLarge:
@@ -60,12 +90,16 @@ def _load(path: str, max_bytes: int) -> dict[str, Leaf]:
     return {leaf.path[-1] if count[leaf.path[-1]] == 1 else ".".join(leaf.path): leaf for leaf in found}
 
 
+def _is_hdf5(path: str) -> bool:
+    """Whether it is of version 7.3, which is HDF5 behind a header of MATLAB's."""
+    with open(path, "rb") as file:
+        header = file.read(HEADER_BYTES)
+    return header[124:128] == b"\0\2IM" or header.startswith(b"\x89HDF")
+
+
 def _check_version(path: str, header: bytes) -> None:
-    version = header[124:128]
-    if version == b"\0\2IM" or header.startswith(b"\x89HDF"):
-        raise refusal(path, "is a MATLAB v7.3 (HDF5) file, which is not read; save it with -v7")
-    if version not in (b"\0\1IM", b"\1\0MI"):
-        raise refusal(path, "is not a MATLAB file of version 5 to 7; save it with -v7")
+    if header[124:128] not in (b"\0\1IM", b"\1\0MI"):
+        raise refusal(path, "is not a MATLAB file of version 5 to 7.3; save it with -v7")
 
 
 FORMAT = Format(".mat", "MATLAB", _header, _read, _write)

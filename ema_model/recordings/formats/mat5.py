@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.files.limits import ARRAYS
+from ema_model.quantities.signals import SIGNALS
 
 HEADER_BYTES = 128
 _MATRIX, _COMPRESSED = 14, 15
@@ -25,9 +26,10 @@ _MATRIX, _COMPRESSED = 14, 15
 _STORED = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
 _NUMERIC = range(6, 16)
 _OTHERS = {1: "cells", 3: "an object", 4: "text", 5: "a sparse matrix", 16: "a function", 17: "an object"}
-_STRUCT, _OPAQUE = 2, 17
+_CELLS, _STRUCT, _OBJECT, _OPAQUE = 1, 2, 3, 17
 _COMPLEX = 0x0800
 _DEEPEST = 8  # structs within structs
+_MOST_STRUCTS = 1_000  # in one array of structs, and cells
 _MOST_DIMENSIONS = 32
 _LONGEST_NAME = 1_000  # MATLAB's have up to 63 characters
 _CHUNK = 1 << 20
@@ -158,8 +160,12 @@ def _matrix(view: memoryview, order: str, above: tuple[str, ...], depth: int, fi
     path = (*above, field or _text(name))
     if kind in _NUMERIC:
         yield _numbers(view, order, path, shape, bool(flag & _COMPLEX))
-    elif kind == _STRUCT and math.prod(shape) == 1 and depth < _DEEPEST:
-        yield from _fields(view, order, path, depth)
+    elif kind in (_STRUCT, _OBJECT) and depth < _DEEPEST and _may_open(shape, path[-1]):
+        if kind == _OBJECT:
+            _, _, view = _element(view, order)  # its class
+        yield from _fields(view, order, path, depth, math.prod(shape))
+    elif kind == _CELLS and depth < _DEEPEST and _may_open(shape, path[-1]) and path[-1] not in SIGNALS:
+        yield from _cells(view, order, path, depth, math.prod(shape))
     else:
         yield Leaf(path, shape, other="structs" if kind == _STRUCT else _OTHERS.get(kind, "of an unknown class"))
 
@@ -176,7 +182,23 @@ def _numbers(view: memoryview, order: str, path: tuple[str, ...], shape: tuple[i
     return Leaf(path, shape, data, dtype)
 
 
-def _fields(view: memoryview, order: str, path: tuple[str, ...], depth: int) -> Iterator[Leaf]:
+def _may_open(shape: tuple[int, ...], name: str) -> bool:
+    """Whether what is inside is offered; under a signal's own name one thing is expected, not several."""
+    count = math.prod(shape)
+    return count == 1 or (0 < count <= _MOST_STRUCTS and name not in SIGNALS)
+
+
+def _cells(view: memoryview, order: str, path: tuple[str, ...], depth: int, count: int) -> Iterator[Leaf]:
+    """What the cells hold, as MATLAB names them: log{2}."""
+    for i in range(count):
+        kind, data, view = _element(view, order)
+        if kind != _MATRIX:
+            raise Damaged("a cell holds no array")
+        yield from _matrix(data, order, path[:-1], depth + 1, f"{path[-1]}{{{i + 1}}}")
+
+
+def _fields(view: memoryview, order: str, path: tuple[str, ...], depth: int, count: int) -> Iterator[Leaf]:
+    """The fields of one struct, or of several in a row: log(2).speed."""
     _, raw, view = _element(view, order)
     width = struct.unpack(f"{order}i", raw)[0] if len(raw) == 4 else 0
     _, names, view = _element(view, order)
@@ -184,11 +206,13 @@ def _fields(view: memoryview, order: str, path: tuple[str, ...], depth: int) -> 
         raise Damaged("a struct's fields have no names")
     if not len(names):
         yield Leaf(path, (1, 1), other="structs")  # counted like any other
-    for start in range(0, len(names), width):
-        kind, data, view = _element(view, order)
-        if kind != _MATRIX:
-            raise Damaged("a struct's field is no array")
-        yield from _matrix(data, order, path, depth + 1, _text(names[start : start + width]))
+    for i in range(count):
+        here = path if count == 1 else (*path[:-1], f"{path[-1]}({i + 1})")
+        for start in range(0, len(names), width):
+            kind, data, view = _element(view, order)
+            if kind != _MATRIX:
+                raise Damaged("a struct's field is no array")
+            yield from _matrix(data, order, here, depth + 1, _text(names[start : start + width]))
 
 
 def _text(name: memoryview) -> str:

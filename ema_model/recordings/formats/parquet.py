@@ -1,21 +1,26 @@
-"""Parquet: one float64 column per signal; the schema's metadata holds emaviz_schema = 1."""
+"""Parquet: a column per signal, or one with several numbers a row; ours say emaviz_schema = 1 in the metadata."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute
 import pyarrow.parquet as pq
 
 from ema_model.errors import quoted
 from ema_model.files.limits import COLUMNS, megabytes
 from ema_model.files.refusal import refusal, shown
+from ema_model.recordings.formats import robot_dataset
+from ema_model.recordings.formats.channels import MOST_COLUMNS
 from ema_model.recordings.formats.format import Array, Columns, Format, check_size
 from ema_model.recordings.formats.parquet_pages import Damaged, TooMany, footer_size, numbers_and_bytes
 
+pc: Any = pyarrow.compute  # its functions are made when it is imported
 _FOOTER_BYTES = 4_000_000
 _BUFFER_BYTES = 1 << 20  # else a column's packed bytes are read at once
 _MOST_PARTS = 2 * COLUMNS  # of any list in the footer: columns, row groups
@@ -28,26 +33,34 @@ def _header(path: str, max_bytes: int) -> list[str]:
         version = (file.schema_arrow.metadata or {}).get(_KEY, _VERSION)
         if version != _VERSION:
             raise refusal(path, f"{_KEY.decode()} {shown(version.decode(errors='replace'))} is not known; expected 1")
-        return file.schema_arrow.names
+        names = file.schema_arrow.names
+        return list(_places(path, file.schema_arrow)) if len(set(names)) == len(names) else names
 
 
 def _read(path: str, names: Sequence[str], max_bytes: int, strict: bool) -> Columns:
     with _opened(path) as file:
         schema = file.schema_arrow
-        kinds = {name: schema.field(name).type for name in names}
+        places = _places(path, schema)
+        kinds = {name: _kind(schema, places[name]) for name in names}
         numeric = [name for name in names if _is_numeric(kinds[name])]
         if strict and len(numeric) < len(names):
             name = next(name for name in names if name not in numeric)
             raise refusal(
                 path, f"column {quoted(name)!r} holds {shown(kinds[name])}; numbers are expected, store it as double"
             )
-        _check_contents(path, numeric, file.metadata.num_rows, max_bytes)
-        table = file.read(columns=numeric)
-    columns = dict(zip(numeric, table.columns))
+        fields = list(dict.fromkeys(places[name][0] for name in numeric))
+        _check_contents(path, fields, file.metadata.num_rows, max_bytes)
+        table = file.read(columns=fields)
+    columns = dict(zip(fields, table.columns))
     del table  # each column goes when it is converted
     arrays = {}
+    left = Counter(places[name][0] for name in numeric)
     for name in numeric:
-        column = columns.pop(name)
+        field, part = places[name]
+        left[field] -= 1
+        column = columns[field] if left[field] else columns.pop(field)
+        if part is not None:
+            column = pc.list_element(column, part)
         if not column.null_count:
             arrays[name] = column.to_numpy().astype(np.float64, copy=False)
         elif strict:
@@ -56,6 +69,26 @@ def _read(path: str, names: Sequence[str], max_bytes: int, strict: bool) -> Colu
                 path, f"{_place(row)}, column {quoted(name)!r}: blank; a number is expected, fill or remove the row"
             )
     return Columns(arrays, _place)
+
+
+def _places(path: str, schema: pa.Schema) -> dict[str, tuple[str, int | None]]:
+    """Where each column stands: a field, or one of the numbers that a field has for each row."""
+    places: dict[str, tuple[str, int | None]] = {}
+    parts = robot_dataset.names_of_parts(path)
+    for field in schema:
+        if pa.types.is_fixed_size_list(field.type) and 0 < field.type.list_size <= MOST_COLUMNS:
+            size = field.type.list_size
+            known = parts.get(field.name, ())
+            names = known if len(known) == size else [f"{i}" for i in range(size)]
+            places |= {f"{field.name}.{name}": (field.name, i) for i, name in enumerate(names)}
+        else:
+            places[field.name] = (field.name, None)
+    return places
+
+
+def _kind(schema: pa.Schema, place: tuple[str, int | None]) -> pa.DataType:
+    kind = schema.field(place[0]).type
+    return kind if place[1] is None else kind.value_type
 
 
 def _is_numeric(kind: pa.DataType) -> bool:

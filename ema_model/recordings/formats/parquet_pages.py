@@ -66,7 +66,7 @@ def _columns(file: BinaryIO, asked: set[bytes]) -> Iterator[tuple[int, dict[int,
         for group in contents.get(_GROUPS, ()):
             for column in group.get(_COLUMNS, ()):
                 known = column.get(_KNOWN, {})
-                if len(known.get(_PATH, ())) == 1 and known[_PATH][0] in asked:
+                if known.get(_PATH, ()) and known[_PATH][0] in asked:
                     yield _count(group, _ROWS), known
     except (IndexError, AttributeError, TypeError):
         raise Damaged from None

@@ -98,8 +98,8 @@ class Comparing:
             return prepared(opened.recorded, actuator)
         path = self.folder.measurement(name)
         measurement = read(path, actuator, side=side_file_of(path, self.folder) or SideFile())
-        if measurement.reading.assumed:
-            notify(self.session.events.told, "Columns were guessed", f"{path.name}: {measurement.reading.assumed}")
+        if measurement.reading.told:
+            notify(self.session.events.told, "Columns were guessed", f"{path.name}: {measurement.reading.told}")
         return measurement
 
     def remove(self, name: str) -> None:

@@ -1,0 +1,166 @@
+"""JSON logs: records, one a line or in a list, or columns as lists, at any depth; single numbers are parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from ema_model.files.limits import ARRAYS
+from ema_model.recordings.formats import servo_log
+from ema_model.recordings.formats.channels import Channel, Log, NoLog, is_table, table
+from ema_model.recordings.formats.logs import log_format
+
+_DEEPEST = 8
+_FEWEST = 2  # numbers that make a column
+_SPLIT = {"columns", "data"}  # pandas' "split": names, and rows of numbers
+
+
+@contextmanager
+def opened(path: str, most_bytes: int) -> Iterator[Log]:
+    """What the document holds; NoLog for what is no JSON, or no log."""
+    del most_bytes  # the file's own size is bounded, and the process's memory
+    with open(path, "rb") as file:
+        text = file.read()
+    text = text.removeprefix(b"\xef\xbb\xbf").strip()
+    try:
+        document = msgspec.json.decode(text)
+    except msgspec.DecodeError as error:
+        document = _lines(text, error)
+    except RecursionError:
+        raise NoLog("it is nested too deeply") from None
+    title = ""
+    if servo_log.is_one(document):
+        title, document = servo_log.title(document), servo_log.with_units(document)
+    found = _Found()
+    found.walk(document, ())
+    yield Log(found.channels, parameters=found.parameters, left_aside=tuple(found.aside), title=title)
+
+
+def numbers_of_records(records: Sequence[Any]) -> list[tuple[tuple[str, ...], Any]]:
+    """What records have numbers under, all of them: the keys' path, and the numbers (n,)."""
+    found = _Found()
+    found.walk(list(records), ())
+    return [(channel.path, np.asarray(channel.values())) for channel in found.channels]
+
+
+def _lines(text: bytes, error: Exception) -> Any:
+    """Records of which each has a line; what was wrong with the whole otherwise."""
+    first = text.split(b"\n", 1)[0].strip()
+    if not (first.startswith(b"{") and first.endswith(b"}")):
+        raise NoLog(str(error)) from None
+    try:
+        return msgspec.json.decode(b"[" + b",".join(filter(None, map(bytes.strip, text.splitlines()))) + b"]")
+    except (msgspec.DecodeError, RecursionError) as problem:
+        raise NoLog(str(problem)) from None
+
+
+class _Found:
+    """Collects what is in a document."""
+
+    def __init__(self) -> None:
+        self.channels: list[Channel] = []
+        self.parameters: dict[str, float] = {}
+        self.aside: list[str] = []
+
+    def walk(self, item: Any, path: tuple[str, ...]) -> None:
+        """Adds what an item holds."""
+        if len(self.channels) + len(self.aside) > ARRAYS:
+            raise NoLog(f"it holds over {ARRAYS} rows of numbers")
+        if isinstance(item, dict):
+            if item.keys() >= _SPLIT and isinstance(item["data"], list) and isinstance(item["columns"], list):
+                if self._rows(item["data"], path or ("data",), [str(name) for name in item["columns"]]):
+                    return
+            if len(path) > _DEEPEST:
+                self.aside.append(".".join(path))
+                return
+            if path and len(item) > _FEWEST and (column := _indexed(item)) is not None:
+                self._list(column, path)
+                return
+            for name, inner in item.items():
+                self.walk(inner, (*path, name))
+        elif isinstance(item, list):
+            self._list(item, path)
+        elif isinstance(item, (int, float)) and not isinstance(item, bool):
+            self.parameters[".".join(path) or "value"] = _number(item)
+        elif item is not None and path:
+            self.aside.append(".".join(path))
+
+    def _list(self, items: list[Any], path: tuple[str, ...]) -> None:
+        name = ".".join(path) or "list"
+        if len(items) < _FEWEST:
+            self.aside.append(name)
+        elif isinstance(items[0], dict):
+            self._records(items, path)
+        elif isinstance(items[0], list):
+            if not self._rows(items, path or ("data",), ()):
+                self.aside.append(name)
+        elif (values := _numbers(items)) is not None:
+            self.channels.append(Channel(path or ("list",), len(items), lambda: values))
+        else:
+            self.aside.append(name)
+
+    def _records(self, records: list[Any], path: tuple[str, ...]) -> None:
+        """A column for each key that all records have a number under; of inner objects too."""
+        if not all(isinstance(record, dict) for record in records):
+            self.aside.append(".".join(path) or "list")
+            return
+        for key, first in records[0].items():
+            inner = [record.get(key) for record in records]
+            if isinstance(first, dict):
+                self._records(inner, (*path, key))
+            elif isinstance(first, list) and all(isinstance(one, list) and len(one) == len(first) for one in inner):
+                if not self._rows(inner, (*path, key), [f"{key}.{i}" for i in range(len(first))]):
+                    self.aside.append(key)
+            elif (values := _numbers(inner)) is not None:
+                self.channels.append(Channel((*path, key), len(inner), lambda values=values: values))
+            else:
+                self.aside.append(key)
+
+    def _rows(self, rows: list[Any], path: tuple[str, ...], names: Sequence[str]) -> bool:
+        """Rows of numbers as a table; False if they are none, or of different widths."""
+        try:
+            values = np.array(rows, np.float64)
+        except (TypeError, ValueError, OverflowError):
+            return False
+        if values.ndim != 2 or not (is_table(values.shape) or (names and values.shape[1] == len(names))):
+            return False
+        self.channels += table(path, values.shape[0], values.shape[1], lambda i: values[:, i], names)
+        return True
+
+
+def _indexed(item: dict[str, Any]) -> list[Any] | None:
+    """The values of an object that is a list in disguise, as pandas writes columns: {"0": 1.5, "1": 1.7}."""
+    if all(name == str(i) for i, name in enumerate(item)):
+        return list(item.values())
+    return None
+
+
+def _numbers(items: Sequence[Any]) -> Any:
+    """The numbers, truth being 0 and 1, stamps of date and time seconds; None for anything else, and for blanks."""
+    kinds = set(map(type, items))
+    if kinds <= {int, float, bool}:
+        try:
+            return np.fromiter(items, np.float64, len(items))
+        except OverflowError:
+            return None
+    if kinds == {str}:
+        try:
+            stamps = np.array([text.removesuffix("Z") for text in items], "datetime64[ns]").astype(np.int64)
+        except ValueError:
+            return None
+        return (stamps - stamps[0]) * 1e-9
+    return None
+
+
+def _number(value: float) -> float:
+    try:
+        return float(value)
+    except OverflowError:
+        return float("inf")
+
+
+FORMAT = log_format(__name__, "JSON", ".json", ".jsonl", ".ndjson")

@@ -1,0 +1,195 @@
+"""Formats of logs: what a library of theirs finds in a file becomes columns on one clock, in a process of its own.
+
+A format's file gives a function `opened(path, most_bytes)`, which yields a `Log`, and makes its `FORMAT` here.
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from typing import Any
+
+import numpy as np
+
+from ema_model.files import apart
+from ema_model.files.refusal import listed, refusal, shown
+from ema_model.recordings.formats.arrays import check_lengths
+from ema_model.recordings.formats.channels import Channel, Log, NoLog, named, told
+from ema_model.recordings.formats.clocks import between, covered, main_clock, usable
+from ema_model.recordings.formats.format import Array, Columns, Format, check_size
+
+_PATIENCE_S = 20.0  # for one question, and as long again for each so many bytes; some libraries never end
+_PATIENCE_BYTES = 40_000_000
+_TIME = "time_s"  # what the common clock's column is called: it is in seconds
+INSTALL = "pip install 'emaviz[rigs]'"
+
+
+def log_format(module: str, title: str, *suffixes: str, needs: str = "") -> Format:
+    """A format whose file is `module`; `needs` is the library that reads it, if it is not always installed."""
+
+    def ask(function: str, path: str, max_bytes: int, *more: Any, again: bool = True) -> apart.Answer:
+        if needs and importlib.util.find_spec(needs) is None:
+            raise refusal(path, f"{title} files are read with {needs}, which is not installed: {INSTALL}")
+        with open(path, "rb"):
+            pass  # what the system does not let us read, is told as for any file
+        question = f"{__name__}:{function}"
+        try:
+            return apart.ask(question, module, path, max_bytes, *more, most_bytes=3 * max_bytes, patience_s=_PATIENCE_S)
+        except apart.Broken as error:
+            raise refusal(path, f"is not a whole {title} file ({error}); save it again, or in parts") from None
+
+    def header(path: str, max_bytes: int) -> list[str]:
+        names, _ = ask("names_of", path, max_bytes)
+        return names
+
+    def read(path: str, names: Sequence[str], max_bytes: int, strict: bool) -> Columns:
+        (found, notes, title), arrays = ask("columns_of", path, max_bytes, list(names), strict, again=not strict)
+        columns = dict(zip(found, arrays))
+        if strict:
+            check_lengths(path, columns)
+        return Columns(columns, lambda row: f"sample {row + 1}", tuple(notes), title)
+
+    return Format(suffixes[0], title, header, read, others=suffixes[1:])
+
+
+_broken: dict[tuple[object, ...], str] = {}  # the file that broke its reader last, which is not asked of it again
+_last: tuple[object, Log, ExitStack] | None = None  # the file that is looked at: it is asked about more than once
+
+
+def names_of(module: str, path: str, max_bytes: int) -> tuple[list[str], list[Array]]:
+    """The columns' names; asked in the process of its own."""
+    log = _opened(module, path, max_bytes)
+    return list(_columns(path, log)), []
+
+
+def columns_of(
+    module: str, path: str, max_bytes: int, names: Sequence[str], strict: bool
+) -> tuple[tuple[list[str], list[str], str], list[Array]]:
+    """Names and notes, and the columns; asked in the process of its own."""
+    log = _opened(module, path, max_bytes)
+    columns = _columns(path, log)
+    if any(name not in columns for name in names):
+        raise refusal(path, "has changed while it was read; read it again")
+    check_size(path, sum(_samples(columns[name], log) for name in names), max_bytes)
+    notes = list(log.notes)
+    if log.parameters:
+        notes.append(f"single numbers in the file: {told(log.parameters)}")
+    if log.left_aside:
+        notes.append(f"left aside, as they are no columns of numbers: {listed(log.left_aside)}")
+    with _told(module, path):
+        arrays, done = _on_one_clock(path, {name: columns[name] for name in names}, log, strict)
+    if strict:
+        _close()
+    return (list(arrays), notes + done, log.title), list(arrays.values())
+
+
+def _opened(module: str, path: str, max_bytes: int) -> Log:
+    global _last
+    status = os.stat(path)
+    key = (module, os.path.realpath(path), status.st_mtime_ns, status.st_size, status.st_ino, max_bytes)
+    if _last is not None and _last[0] == key:
+        return _last[1]
+    _close()
+    files = ExitStack()
+    with _told(module, path):
+        log = files.enter_context(importlib.import_module(module).opened(path, max_bytes))
+    _last = key, log, files
+    return log
+
+
+@contextmanager
+def _told(module: str, path: str) -> Iterator[None]:
+    try:
+        yield
+    except NoLog as error:
+        title = importlib.import_module(module).FORMAT.title
+        raise refusal(path, f"is not a whole {title} file ({shown(error, 120)}); save it again") from None
+
+
+def _close() -> None:
+    global _last
+    if _last is not None:
+        _, _, files = _last
+        _last = None
+        files.close()
+
+
+def _columns(path: str, log: Log) -> dict[str, Channel | str]:
+    """The channels by their names, the common clock first; a clock stands for itself by its name."""
+    try:
+        columns: dict[str, Channel | str] = dict(named(log.channels))
+    except NoLog as error:
+        raise refusal(path, f"{error}; keep fewer columns") from None
+    if not columns:
+        aside = f" ({listed(log.left_aside)})" if log.left_aside else ""
+        raise refusal(path, f"holds no rows of numbers{aside}; a time and its signals are expected")
+    if log.clocks and _TIME not in columns:
+        return {_TIME: "", **columns}
+    return columns
+
+
+def _samples(column: Channel | str, log: Log) -> int:
+    most = max((channel.samples for channel in log.channels), default=0)
+    return most if isinstance(column, str) or column.clock else column.samples
+
+
+def _on_one_clock(
+    path: str, columns: dict[str, Channel | str], log: Log, strict: bool
+) -> tuple[dict[str, Array], list[str]]:
+    """The columns with one length, by the rule of `clocks`: the clock with the most samples is that of all."""
+    samples = {one.clock: one.samples for one in columns.values() if isinstance(one, Channel) and one.clock}
+    if not samples:  # of the clock alone
+        samples = {one.clock: one.samples for one in log.channels if one.clock}
+    if not samples:
+        return {name: _numbers(one.values()) for name, one in columns.items() if isinstance(one, Channel)}, []
+    main = main_clock(samples)
+    clocks = {name: _numbers(log.clocks[name]()) for name in samples}
+    start = min((float(time[0]) for time in clocks.values() if time.size), default=0.0)
+    time = clocks[main]
+    keep = usable(time)
+    repeated = int(keep.size - np.count_nonzero(keep))
+    arrays: dict[str, Array] = {}
+    moved = [one for one in columns.values() if isinstance(one, Channel) and one.clock and _differs(clocks, one, main)]
+    within = keep.copy()
+    for one in moved if strict else ():
+        within &= covered(time, clocks[one.clock], one.holds)
+    if strict and not within.any():
+        raise refusal(path, "its channels have no time in common; choose others, or record them together")
+    for name, one in columns.items():
+        if isinstance(one, str):
+            arrays[name] = (time - start)[within]
+        elif not one.clock:
+            arrays[name] = _numbers(one.values())
+        elif one in moved:
+            arrays[name] = between(time, clocks[one.clock], _numbers(one.values()), one.holds)[within]
+        else:
+            arrays[name] = _numbers(one.values())[within]
+    notes = []
+    if repeated:
+        notes.append(f"{repeated} samples are left out, whose time is not after the one before")
+    if moved:
+        held = any(one.holds for one in moved)
+        rule = "linearly between their samples" + (", states held" if held else "")
+        names = listed(name for name, one in columns.items() if one in moved)
+        notes.append(f"brought onto the clock of {shown(_whose(main))}, {rule}: {names}")
+        if (lost := int(np.count_nonzero(keep & ~within))) > 0:
+            notes.append(f"{lost} samples are left out, where one of these was not recorded")
+    return arrays, notes
+
+
+def _whose(clock: str) -> str:
+    return clock or "the others"
+
+
+def _differs(clocks: dict[str, Array], one: Channel, main: str) -> bool:
+    return one.clock != main and not np.array_equal(clocks[one.clock], clocks[main])
+
+
+def _numbers(values: Any) -> Array:
+    values = np.asarray(values)
+    if values.dtype.kind not in "fiub":
+        raise NoLog("it holds what are no numbers where there should be some")
+    return np.require(values.reshape(-1), np.float64, ["C", "A"])

@@ -1,0 +1,52 @@
+"""NumPy's .npy: a structured array gives a column per field, a matrix its columns."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+
+from ema_model.files.refusal import refusal, shown
+from ema_model.recordings.formats.channels import Channel, Log, NoLog, is_table, table
+from ema_model.recordings.formats.format import check_size
+from ema_model.recordings.formats.logs import log_format
+
+
+@contextmanager
+def opened(path: str, most_bytes: int) -> Iterator[Log]:
+    """The array's columns; NoLog for what is none."""
+    try:
+        array = np.load(path, mmap_mode="r", allow_pickle=False)
+    except (MemoryError, OSError):
+        raise
+    except Exception as error:  # the header is a Python expression, which fails in any way
+        raise NoLog(f"{type(error).__name__}: {error}") from None
+    if not isinstance(array, np.memmap):
+        raise NoLog("it is no array of numbers")
+    check_size(path, math.prod(array.shape) * array.dtype.itemsize / 8, most_bytes)
+    yield Log(_channels(path, array))
+
+
+def _channels(path: str, array: Any) -> list[Channel]:
+    if array.dtype.names:
+        rows = array.reshape(-1)
+        kinds = {name: array.dtype[name] for name in array.dtype.names}
+        return [
+            Channel((name,), rows.size, lambda name=name: np.array(rows[name]))
+            for name, kind in kinds.items()
+            if kind.kind in "fiub" and not kind.shape
+        ]
+    if array.dtype.kind not in "fiub":
+        raise refusal(path, f"holds {shown(array.dtype)}; numbers are expected, store it as double")
+    if array.ndim == 2 and is_table(array.shape[::-1]):
+        array = array.T  # a row for each signal
+    if array.ndim == 2 and is_table(array.shape):
+        return table(("data",), array.shape[0], array.shape[1], lambda i: np.array(array[:, i]))
+    shape = "×".join(map(str, array.shape)) or "a single value"
+    raise refusal(path, f"is {shape}; a structured array, or a matrix with a column for each signal is expected")
+
+
+FORMAT = log_format(__name__, "NumPy array", ".npy")

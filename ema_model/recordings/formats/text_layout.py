@@ -1,0 +1,250 @@
+"""How a table is laid out that an instrument wrote as text: found from its first lines, and told in one.
+
+Oscilloscopes, DIAdem, LabVIEW, TwinCAT and the like write lines about the measurement before the names of the columns,
+a row of units below them, in the encoding and with the decimal sign of their country.
+"""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ema_model.files.refusal import refusal, shown
+from ema_model.quantities.units import UNITS, find_unit
+from ema_model.recordings.formats.stamps import is_stamp
+
+HEAD_BYTES = 65_536
+SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", "|": "bars"}
+_MOST_BETWEEN = 3  # lines between the names and the numbers: units, types, descriptions
+_LOOKED_AT = 50  # rows below a header, to see whether it is one
+_FEWEST_ROWS = 2
+_NUMBER = re.compile(
+    r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?|[+-]?\d{1,3}([.,'\u00a0\u202f ]\d{3})+([.,]\d+)?|[+-]?(nan|inf)",
+    re.IGNORECASE,
+)
+_THOUSANDS = re.compile(r"[+-]?\d{1,3}(['\u00a0\u202f ]\d{3})+([.,]\d+)?")
+_BLANKS = "'\u00a0\u202f "
+_ENCODINGS = {"utf-8": "UTF-8", "cp1252": "Windows-1252", "utf-16-le": "UTF-16", "utf-16-be": "UTF-16"}
+_BOMS = ((codecs.BOM_UTF8, "utf-8"), (codecs.BOM_UTF16_LE, "utf-16-le"), (codecs.BOM_UTF16_BE, "utf-16-be"))
+_CONTROL = re.compile(r"[\0-\x08\x0e-\x1f]")
+_UNIT_WORDS = frozenset("volt volts ampere amp second seconds sec % 1 - bar mbar hz khz dimensionless n/a".split())
+
+
+@dataclass(frozen=True)
+class Hints:
+    """What somebody has said of a text's layout, who need not say any of it."""
+
+    header_line: int | None = None  # from 1
+    encoding: str | None = None
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How a text is laid out.  Lines count from 1."""
+
+    encoding: str
+    has_mark: bool  # a byte-order mark begins it
+    header_line: int
+    units_line: int | None
+    data_line: int
+    cells: tuple[str, ...]  # of the header, as they stand
+    units: tuple[str, ...]  # of the row below; "" each where there is none
+    separator: str
+    decimal: str
+    thousands: str
+    head: frozenset[str]  # the lines above the numbers, which may be repeated further down
+
+    @property
+    def told(self) -> str:
+        """What is unusual in it: "header in line 4, units in line 5, Windows-1252"."""
+        parts = []
+        if self.header_line > 1:
+            parts.append(f"header in line {self.header_line}")
+        if self.units_line:
+            parts.append(f"units in line {self.units_line}")
+        if self.encoding != "utf-8":
+            parts.append(_ENCODINGS.get(self.encoding, self.encoding))
+        if self.thousands:
+            parts.append(f"thousands set off by {_SIGNS.get(self.thousands, 'blanks')}")
+        return ", ".join(parts)
+
+
+_SIGNS = {",": "commas", ".": "points", "'": "apostrophes"}
+
+
+def encoding_of(path: str, head: bytes, said: str | None = None) -> tuple[str, int]:
+    """The encoding, and the length of the mark that begins the text; InputError if it is no text in any."""
+    for mark, name in _BOMS:
+        if head.startswith(mark):
+            return name, len(mark)
+    if said:
+        return said, 0
+    pairs = len(head) // 2
+    for name, zeros in (("utf-16-le", head[1::2].count(0)), ("utf-16-be", head[0::2].count(0))):
+        if pairs > 8 and zeros > 0.7 * pairs:
+            return name, 0
+    try:
+        text = codecs.getincrementaldecoder("utf-8")().decode(head, final=len(head) < HEAD_BYTES)
+        name, strange = "utf-8", "\0" in text
+    except UnicodeDecodeError:
+        name, strange = "cp1252", bool(_CONTROL.search(head.decode("cp1252", "replace")))
+    if strange:
+        raise refusal(path, "is not text (neither UTF-8, UTF-16 nor Windows-1252); export it again as CSV")
+    return name, 0
+
+
+def known_encoding(text: str) -> str:
+    """The name that Python has for an encoding; ValueError for none, or one that is no encoding of text."""
+    try:
+        found = codecs.lookup(text)
+    except LookupError:
+        raise ValueError(text) from None
+    if not found._is_text_encoding:
+        raise ValueError(text)
+    return {"utf-8-sig": "utf-8", "utf-16": "utf-16-le"}.get(found.name, found.name)
+
+
+def lines_of(path: str, said: str | None = None) -> tuple[list[str], str, int, bool]:
+    """The first lines, the encoding, its mark's length, and whether the last line is cut."""
+    with open(path, "rb") as file:
+        head = file.read(HEAD_BYTES)
+    encoding, mark = encoding_of(path, head, said)
+    is_cut = len(head) == HEAD_BYTES
+    text = codecs.getincrementaldecoder(encoding)("replace").decode(head[mark:], final=not is_cut)
+    return re.split(r"\r\n|\r|\n", text), encoding, mark, is_cut
+
+
+def find_layout(path: str, hints: Hints) -> Layout | None:
+    """The layout of a text whose table begins with names; None if no table is seen in its first lines.
+
+    The header is the line of names with the most rows of numbers below it, the first of equals.  InputError for what
+    is no text, and for a said header that has no row of numbers below it.
+    """
+    lines, encoding, mark, is_cut = lines_of(path, hints.encoding)
+    if is_cut:
+        lines = lines[:-1]
+    best: tuple[float, int, int, str] | None = None
+    tables = {separator: [split(line, separator) for line in lines] for separator in SEPARATORS}
+    if hints.header_line is not None and not 0 < hints.header_line <= len(lines):
+        raise refusal(path, f"has no line {hints.header_line} among its first; correct --header-line")
+    for separator, rows in tables.items():
+        for at in range(len(rows)) if hints.header_line is None else [hints.header_line - 1]:
+            if hints.header_line is None and not _is_names(rows, at):
+                continue
+            first, score = _rows_below(rows, at)
+            if score > 0.0 and (best is None or score > best[0]):
+                best = score, at, first, separator
+    if best is None:
+        if hints.header_line is not None:
+            found = shown(lines[hints.header_line - 1], 60)
+            raise refusal(path, f"line {hints.header_line}: no table begins there ({found!r}); correct --header-line")
+        return None
+    _, at, first, separator = best
+    rows = tables[separator]
+    units_at = next((i for i in range(at + 1, first) if is_units(rows[i])), None)
+    width = max(len(rows[at]), len(rows[first]))
+    cells = [cell.strip() for cell in rows[at]]
+    cells[0] = cells[0].lstrip("#% ")
+    units = [cell.strip().strip("[]()") for cell in rows[units_at]] if units_at is not None else []
+    sample = [cell.strip() for row in rows[first : first + 300] for cell in row]
+    decimal, thousands = _signs(sample, separator)
+    return Layout(
+        encoding,
+        mark > 0,
+        at + 1,
+        None if units_at is None else units_at + 1,
+        first + 1,
+        tuple(cells + [""] * (width - len(cells)))[:width],
+        tuple((units + [""] * width)[:width]),
+        separator,
+        decimal,
+        thousands,
+        frozenset(line.strip() for line in lines[:first] if line.strip()),
+    )
+
+
+def split(line: str, separator: str) -> list[str]:
+    """A line's cells."""
+    if '"' not in line:
+        return line.split(separator)
+    try:
+        return next(csv.reader([line], delimiter=separator), [])
+    except csv.Error:
+        return line.split(separator)
+
+
+def is_number(cell: str) -> bool:
+    """Whether it is a number in any country's writing."""
+    return _NUMBER.fullmatch(cell.strip()) is not None
+
+
+def is_units(row: Sequence[str]) -> bool:
+    """Whether the cells of a row are units, as far as they are filled."""
+    cells = [cell.strip().strip("[]()") for cell in row if cell.strip()]
+    return bool(cells) and sum(map(_is_unit, cells)) > 0.5 * len(cells) and not all(cell in "1-" for cell in cells)
+
+
+def _is_unit(text: str) -> bool:
+    return text.lower() in _UNIT_WORDS or (len(text) <= 24 and any(find_unit(text, one) for one in UNITS))
+
+
+def _is_names(rows: Sequence[Sequence[str]], at: int) -> bool:
+    """Whether a line may hold the columns' names: no numbers, unless the next line holds their units."""
+    row = rows[at]
+    filled = [cell for cell in row if cell.strip()]
+    if len(row) < 2 or 2 * len(filled) < len(row):
+        return False
+    if is_units(row) and at > 0 and len(rows[at - 1]) == len(row) and not is_units(rows[at - 1]):
+        return False  # those of the names above it
+    if any(is_number(cell) or is_stamp(cell) for cell in filled):
+        below = rows[at + 1] if at + 1 < len(rows) else []
+        return not is_number(filled[0]) and len(below) == len(row) and is_units(below)
+    return True
+
+
+def _rows_below(rows: Sequence[Sequence[str]], at: int) -> tuple[int, float]:
+    """The first row of numbers below a header, and how much of a table follows: rows, by the share of numbers."""
+    width = len(rows[at])
+    first = next((i for i in range(at + 1, min(at + 2 + _MOST_BETWEEN, len(rows))) if _is_data(rows[i], width)), None)
+    if first is None:
+        return 0, 0.0
+    seen = filled = numbers = 0
+    for row in rows[first : first + _LOOKED_AT]:
+        if not any(cell.strip() for cell in row):
+            continue
+        if not _is_data(row, width):
+            break
+        seen += 1
+        filled += sum(bool(cell.strip()) for cell in row)
+        numbers += sum(is_number(cell) or is_stamp(cell) for cell in row)
+    return first, seen * numbers / filled if seen >= _FEWEST_ROWS else 0.0
+
+
+def _is_data(row: Sequence[str], width: int) -> bool:
+    extra = len(row) - width
+    if extra not in (0, 1) or (extra == 1 and row[-1].strip()):
+        return False
+    return any(is_number(cell) for cell in row)
+
+
+def _signs(cells: Sequence[str], separator: str) -> tuple[str, str]:
+    """The decimal sign, and what sets thousands off."""
+    numbers = [cell for cell in cells if _NUMBER.fullmatch(cell)]
+    blanks = next(
+        (sign for cell in numbers if _THOUSANDS.fullmatch(cell) for sign in cell if sign in "'\u00a0\u202f "), ""
+    )
+    with_comma = any("," in cell for cell in numbers)
+    both = next((cell for cell in numbers if "," in cell and "." in cell), "")
+    if both:
+        decimal = max(".,", key=both.rfind)
+        return decimal, "," if decimal == "." else "."
+    if any(cell.count(".") > 1 for cell in numbers):
+        return ",", "."
+    if any(cell.count(",") > 1 for cell in numbers):
+        return ".", ","
+    if separator == "," or not with_comma:
+        return ".", "," if with_comma else blanks
+    return ",", "." if any("." in cell for cell in numbers) else blanks

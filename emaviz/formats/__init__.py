@@ -1,0 +1,13 @@
+"""Formats of recordings that rerun reads, which the science must not know: a file each.
+
+They join the family of `ema_model.recordings.formats` when emaviz is imported, and do their work in the process that
+reads logs, so that rerun is loaded there alone.
+"""
+
+from __future__ import annotations
+
+from ema_model.recordings.formats import add_format
+from emaviz.formats import mcap, rrd
+
+for _one in (mcap, rrd):
+    add_format(_one.FORMAT)

@@ -1,0 +1,143 @@
+"""CSV as instruments and tools write it, each in the shape that its maker's manual or a public file shows."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ema_model.errors import InputError
+from ema_model.recordings import read_columns
+from ema_model.recordings.file import read_header, read_measurement
+from ema_model.recordings.formats.text_layout import Hints
+
+N = 240
+k = np.arange(N)
+TIME, ANGLE, CURRENT = k / 1e3, np.sin(k / 40.0), 1234.5 * np.cos(k / 40.0)
+
+
+def german(value, digits=6):
+    return f"{value:.{digits}f}".replace(".", ",")
+
+
+def grouped(value, thousands, decimal):
+    return f"{value:,.3f}".replace(",", "?").replace(".", decimal).replace("?", thousands)
+
+
+def rows(separator, *columns):
+    return [separator.join(cells) for cells in zip(*columns)]
+
+
+def text(value):
+    return f"{value:.6f}"
+
+
+PLAIN = [list(map(text, column)) for column in (TIME, ANGLE, CURRENT)]
+GERMAN = [list(map(german, column)) for column in (TIME, ANGLE, CURRENT)]
+STAMPS = [f"01.05.2024 23:59:{59 + i // 1000:02d},{i % 1000:03d}" for i in range(N)]
+
+# name: content, encoding, what is told, header
+FILES = {
+    # Tektronix 4 series programmer's manual, SAVe:WAVEform: model, labels, then TIME and channels
+    "tektronix": (
+        ["Model,MSO44", "Firmware Version,1.28.7", "", "Waveform Type,ANALOG", "Record Length,240",
+         "Sample Interval,1e-3", "", "", "TIME,CH1,CH2", *rows(",", *PLAIN)],
+        "utf-8", "header in line 9", ["TIME", "CH1", "CH2"],
+    ),
+    # Keysight InfiniiVision: "x-axis,1,2" and "second,Volt,Volt" above the numbers
+    "keysight": (
+        ["x-axis,1,2", "second,Volt,Volt", *rows(",", *PLAIN)],
+        "utf-8", "units in line 2", ["x-axis time [second]", "1 [Volt]", "2 [Volt]"],
+    ),
+    # LabVIEW .lvm: NI, "Specification for the LabVIEW Measurement File (.lvm)"
+    "labview": (
+        ["LabVIEW Measurement\t", "Writer_Version\t2", "Separator\tTab", "***End_of_Header***\t", "\t",
+         "Channels\t2\t\t", "Samples\t240\t240\t", "***End_of_Header***\t\t\t", "X_Value\tAngle\tCurrent\tComment",
+         *(line + "\t" for line in rows("\t", *PLAIN))],
+        "utf-8", "header in line 9", ["X_Value", "Angle", "Current", "Comment"],
+    ),
+    # TwinCAT 3 Scope View, CSV export: name and file, then names, then numbers; tabs, German Windows
+    "beckhoff": (
+        ["Name\tScope Project", "File\tC:\\Messung\\Prüfstand.svdx", "Starttime of export\t133", "",
+         "Zeit [ms]\tIstwinkel [°]\tStrom [mA]", *rows("\t", *GERMAN)],
+        "cp1252", "header in line 5, Windows-1252", ["Zeit [ms]", "Istwinkel [°]", "Strom [mA]"],
+    ),
+    # Excel, "Unicode text": UTF-16 with a mark, tabs
+    "excel": (["Zeit [s]\tWinkel [°]\tStrom [mA]", *rows("\t", *GERMAN)], "utf-16", "UTF-16",
+              ["Zeit [s]", "Winkel [°]", "Strom [mA]"]),
+    # DIAdem, ASCII export with name and unit in a row each; decimal comma
+    "diadem": (
+        ["Prüfer;Müller", "Datum;01.05.2024", "", "Zeit;Winkel;Strom", "s;°;mA", *rows(";", *GERMAN)],
+        "cp1252", "header in line 4, units in line 5, Windows-1252", ["Zeit [s]", "Winkel [°]", "Strom [mA]"],
+    ),
+    # Excel's "sep=" line, thousands set off by points
+    "thousands": (
+        ["sep=;", "t [s];Winkel [rad];Strom [mA]",
+         *rows(";", GERMAN[0], GERMAN[1], [grouped(value, ".", ",") for value in CURRENT])],
+        "utf-8", "header in line 2, thousands set off by points", ["t [s]", "Winkel [rad]", "Strom [mA]"],
+    ),
+    # WinCC / TIA data log (Siemens, "Structure of a *.csv file with data"): stamps of date and time
+    "siemens": (
+        ["Datum und Uhrzeit;Winkel;Strom", *rows(";", STAMPS, *GERMAN[1:])],
+        "utf-8", "", ["Datum und Uhrzeit [s]", "Winkel", "Strom"],
+    ),
+}  # fmt: skip
+
+
+def written(folder, lines, encoding, ending="\r\n"):
+    path = folder / "run.csv"
+    path.write_bytes((ending.join(lines) + ending).encode(encoding))
+    return path
+
+
+@pytest.mark.parametrize("kind", FILES)
+def test_found_and_told(kind, tmp_path):
+    lines, encoding, told, header = FILES[kind]
+    path = written(tmp_path, lines, encoding)
+    columns = read_columns(path)
+    assert read_header(str(path), 10_000_000) == header
+    names = [name for name in header if name != "Comment"]
+    assert list(columns) == names
+    for name, values in zip(names, (TIME, ANGLE, CURRENT)):
+        np.testing.assert_allclose(columns[name], values, atol=6e-4)
+    measurement = read_measurement(path, [f"time_s={names[0]}[s]", f"current_A={names[2]}[mA]"])
+    assert measurement.reading.layout == told
+
+
+def test_a_header_again_and_text_at_the_end(tmp_path):
+    lines = ["t [s];iq [A]", *rows(";", PLAIN[0][:100], PLAIN[1][:100])]
+    lines += ["t [s];iq [A]", *rows(";", PLAIN[0][100:], PLAIN[1][100:]), "", "Messung beendet", "Operator;Miller"]
+    measurement = read_measurement(written(tmp_path, lines, "utf-8"), ["time_s=t [s]", "current_A=iq [A]"])
+    np.testing.assert_allclose(measurement["current_A"], ANGLE, atol=1e-6)
+    assert "the header is repeated 1 times; those lines are left out" in measurement.notes
+    assert "2 lines of text below the numbers left out" in measurement.notes
+
+
+def test_what_is_wrong_amid_the_numbers_is_told_with_its_line(tmp_path):
+    lines = list(FILES["diadem"][0])
+    lines[60] = "0,055;abc;1,0"
+    with pytest.raises(InputError, match=r"line 61, column 'Winkel': a number is expected, found 'abc'"):
+        read_measurement(written(tmp_path, lines, "cp1252"), ["time_s=Zeit [s]", "command_rad=Winkel [°]"])
+    lines[60] = "0,055;1"
+    with pytest.raises(InputError, match=r"line 61: 2 cells where the header has 3"):
+        read_measurement(written(tmp_path, lines, "cp1252"), ["time_s=Zeit [s]", "command_rad=Winkel [°]"])
+
+
+def test_a_time_for_each_channel(tmp_path):
+    """As loggers with a buffer for each channel export: the slower one is shorter, its cells below are blank."""
+    slow = np.arange(N // 4) * 4e-3
+    cells = [[text(value) for value in column] + [""] * (N - len(column)) for column in (slow, np.sin(slow * 25.0))]
+    lines = ["t [s];angle [rad];t [s];current [A]", *rows(";", PLAIN[0], PLAIN[1], *cells)]
+    path = written(tmp_path, lines, "utf-8")
+    measurement = read_measurement(path, ["time_s=t [s]", "command_rad=angle [rad]", "current_A=current [A]"])
+    assert measurement.samples == N - 3
+    np.testing.assert_allclose(measurement["current_A"], np.sin(measurement.time_s * 25.0), atol=2e-3)
+    assert any("each with a time of its own, brought onto one linearly" in note for note in measurement.notes)
+
+
+def test_a_said_layout_goes_before_what_is_found(tmp_path):
+    lines = ["a;b", "1;2", "3;4", "5;6", "t;iq", *rows(";", *PLAIN[:2])]
+    path = written(tmp_path, lines, "cp1252")
+    assert read_header(str(path), 10_000_000) == ["t", "iq"]
+    assert read_header(str(path), 10_000_000, Hints(1)) == ["a", "b"]
+    with pytest.raises(InputError, match="line 244: no table begins there"):
+        read_header(str(path), 10_000_000, Hints(240 + 4))

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from ema_model.actuator import keys
 from ema_model.actuator.parameters import SECTIONS, numbers
 
-CONTROLLER_KINDS = ("cascade", "position", "unknown")
-INVERTER_KINDS = ("hysteresis", "current", "voltage")
+CONTROLLER_KINDS, INVERTER_KINDS = tuple(keys.KINDS["controller"]), tuple(keys.KINDS["inverter"])
 KINDS = {"controller": CONTROLLER_KINDS, "inverter": INVERTER_KINDS}
 USUAL = {"controller": "cascade", "inverter": "hysteresis"}
 

@@ -117,5 +117,6 @@ class Actuator:
         return self.with_values(values) if values else self
 
     def rules_for(self, name: str) -> tuple[Rule, ...]:
-        """The rules that hold for a recording of that name."""
-        return tuple(rule for rule in self.rules if fnmatchcase(name, rule.match))
+        """The rules that hold for a recording of that name, or for the file that it is a run of: NAME#3."""
+        names = (name, name.rpartition("#")[0])
+        return tuple(rule for rule in self.rules if any(one and fnmatchcase(one, rule.match) for one in names))

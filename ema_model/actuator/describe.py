@@ -12,7 +12,7 @@ from typing import Any
 
 from ema_model.actuator.actuator import Actuator
 from ema_model.actuator.file import actuator_of
-from ema_model.actuator.layout import layout
+from ema_model.actuator.layout import WITHOUT_DRIVE, layout
 from ema_model.actuator.naming import on_axes
 from ema_model.actuator.parameters import SECTIONS, default_of, facts_of
 from ema_model.actuator.unread import unread
@@ -57,7 +57,7 @@ def described(document: Mapping[str, Any], controller: str, drive: str, where: s
     """
     tables: dict[str, Any] = {name: dict(t) if isinstance(t, Mapping) else t for name, t in document.items()}
     tables.setdefault("controller", {})["kind"] = controller
-    if controller != "unknown":
+    if controller not in WITHOUT_DRIVE:
         tables.setdefault("inverter", {})["kind"] = drive
     axes = actuator_axes(tables)
     every = [f"{section}.{name}" for section in SECTIONS for name in SECTIONS[section].__annotations__]

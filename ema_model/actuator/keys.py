@@ -37,6 +37,7 @@ KINDS = {
     "controller": {
         "cascade": "position and speed loop",
         "position": "a position loop alone, as servos have it",
+        "open": "left out: the recorded current, torque or force is put in and the motion comes out",
         "unknown": "not described: the recorded motion is put in and the current that it needs comes out",
     },
     "inverter": {

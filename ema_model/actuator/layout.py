@@ -9,6 +9,8 @@ CONTROLLER_KINDS, INVERTER_KINDS = tuple(keys.KINDS["controller"]), tuple(keys.K
 KINDS = {"controller": CONTROLLER_KINDS, "inverter": INVERTER_KINDS}
 USUAL = {"controller": "cascade", "inverter": "hysteresis"}
 
+WITHOUT_DRIVE = ("open", "unknown")  # controllers whose file says no drive: the current is that of the recording
+
 _CASCADE = (
     *("position_gain_1_s", "speed_limit_rad_s", "speed_gain_Nms_rad", "integral_gain_Nm_rad"),
     *("derivative_gain_Nms2_rad", "integrator_window_rad", "torque_constant_Nm_A", "current_limit_A"),
@@ -32,11 +34,11 @@ def layout(section: str, kinds: dict[str, str]) -> tuple[tuple[str, ...], tuple[
     full = controller == "cascade" and inverter == "hysteresis"
     every = numbers(section)
     if section == "controller":
-        needed = {"cascade": _CASCADE, "position": ("gain_1_rad",), "unknown": ()}[controller]
+        needed = {"cascade": _CASCADE, "position": ("gain_1_rad",), "open": (), "unknown": ()}[controller]
         return needed, ("output_limit",) if controller == "position" else ()
     if section == "inverter":
         needed = _DRIVES[inverter]
-        return ((), needed) if controller == "unknown" else (needed, ())
+        return ((), needed) if controller in WITHOUT_DRIVE else (needed, ())
     if full:
         return every, ()
     needed = _MOTION if section == "motor" else ()

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from ema_model.actuator.actuator import Actuator
 from ema_model.actuator.describe import is_guess
-from ema_model.actuator.layout import layout
+from ema_model.actuator.layout import WITHOUT_DRIVE, layout
 from ema_model.actuator.naming import on_axes
 from ema_model.actuator.parameters import SECTIONS, default_of, facts_of
 from ema_model.actuator.unread import unread
@@ -96,7 +96,7 @@ def _contradictions(actuator: Actuator) -> Iterator[str]:
             _shown(actuator, f"motor.{name}") for name in ("static_friction_Nm", "dynamic_friction_Nm")
         )
         yield f"{both}: what stands is held by no less than what moves"
-    if controller.kind == "unknown":
+    if controller.kind in WITHOUT_DRIVE:
         return
     most = min(float(actuator.current_limit_A) * motor.torque_constant_Nm_A, motor.torque_limit_Nm)
     if inverter.kind == "voltage":

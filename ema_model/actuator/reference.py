@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import product
 
 from ema_model.actuator import keys
-from ema_model.actuator.layout import CONTROLLER_KINDS, INVERTER_KINDS, layout
+from ema_model.actuator.layout import CONTROLLER_KINDS, INVERTER_KINDS, WITHOUT_DRIVE, layout
 from ema_model.actuator.naming import on_axes
 from ema_model.actuator.parameters import SECTIONS, default_of, facts_of, numbers
 from ema_model.actuator.unread import unread
@@ -40,7 +40,7 @@ def kinds_of_actuators() -> tuple[tuple[str, str], ...]:
         (controller, drive)
         for controller, drive in product(CONTROLLER_KINDS, INVERTER_KINDS)
         if (controller, drive) not in (("position", "hysteresis"), ("cascade", "voltage"))
-        and (controller != "unknown" or drive == "current")
+        and (controller not in WITHOUT_DRIVE or drive == "current")
     )
 
 
@@ -72,7 +72,7 @@ def parameter_rows() -> Iterator[ParameterRow]:
 
 
 def _kind(controller: str, drive: str) -> str:
-    return controller if controller == "unknown" else f"{controller} + {drive}"
+    return controller if controller in WITHOUT_DRIVE else f"{controller} + {drive}"
 
 
 def _default(path: str, having: list[str], needing: list[str]) -> str:

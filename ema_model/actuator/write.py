@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from ema_model.actuator import keys
 from ema_model.actuator.actuator import Actuator
-from ema_model.actuator.layout import KINDS, layout
+from ema_model.actuator.layout import KINDS, WITHOUT_DRIVE, layout
 from ema_model.actuator.naming import on_axes
 from ema_model.actuator.parameters import SECTIONS, default_of, facts_of
 from ema_model.actuator.unread import unread
@@ -61,7 +61,7 @@ def as_toml(actuator: Actuator, *, with_comments: bool = False) -> str:
             lines.append(f"{entry:{_COMMENTS_AT}}  # {keys.TABLES[table][key]}" if with_comments else entry)
     for section in SECTIONS:
         lines += ["", f"[{section}]"]
-        if section in KINDS and not (section == "inverter" and kinds["controller"] == "unknown"):
+        if section in KINDS and not (section == "inverter" and kinds["controller"] in WITHOUT_DRIVE):
             entry = f"kind = {_text(kinds[section])}"
             meaning = keys.KINDS[section][kinds[section]]
             lines.append(f"{entry:{_COMMENTS_AT}}  # {meaning}" if with_comments else entry)

@@ -37,6 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME[=weight]",
         help="fit only these signals, with a weight (1 is what the noise says); repeat for more",
     )
+    options.add_open_loop(parser)
     options.add_seed(parser)
 
 

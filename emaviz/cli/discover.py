@@ -27,6 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     options.add_fit(parser, "the discovery")
     parser.add_argument("--signals", choices=("current", "all"), default="all", help="what is fitted")
     parser.add_argument("--max-effects", type=whole(0, 100), default=3, metavar="N", help="at most so many are added")
+    options.add_open_loop(parser)
     options.add_seed(parser)
 
 

@@ -17,7 +17,7 @@ from ema_model.effects.user.entries import kind_of, read_entries
 from ema_model.errors import InputError, quoted
 from ema_model.quantities.axes import Axes
 from ema_model.recordings import Measurement, read
-from ema_model.recordings.read import COMMAND_ALONE, Needs
+from ema_model.recordings.read import COMMAND_ALONE, INPUT_ALONE, Needs
 from ema_model.recordings.recording_set import files_of, held_out, is_pattern, runs_of
 from ema_model.simulation.run import Run
 from emaviz.cli import files
@@ -70,7 +70,12 @@ def read_set(
     named = [text for text in arguments.holdout if not is_pattern(text)]
     unseen = [file for text in named for file in files_of(text)]
     places = [Path(file).resolve() for file in unseen]
-    given = [file for text in arguments.files for file in files_of(text) if Path(file).resolve() not in places]
+    given = [
+        file
+        for text in arguments.files
+        for file in files_of(text)
+        if file == text or Path(file).resolve() not in places  # what is named itself is fitted all the same
+    ]
     if not given and arguments.files:
         raise InputError("--holdout takes out every recording; leave some to fit")
     fitted, held = (_read_files(names, arguments, actuator, progress) for names in (given, unseen))
@@ -200,9 +205,24 @@ def add_run(parser: argparse.ArgumentParser) -> None:
     add_seed(parser)
 
 
+def add_open_loop(parser: argparse.ArgumentParser) -> None:
+    """--open-loop"""
+    parser.add_argument(
+        "--open-loop",
+        action="store_true",
+        help="leave the controller out: the recorded current, torque or force goes in, and the motion is compared",
+    )
+
+
 def actuator_of(arguments: argparse.Namespace) -> Actuator:
-    """The actuator that --actuator names."""
-    return load_actuator(arguments.actuator)
+    """The actuator that --actuator names, without its controller where --open-loop asks for that."""
+    actuator = load_actuator(arguments.actuator)
+    return actuator.in_open_loop() if getattr(arguments, "open_loop", False) else actuator
+
+
+def input_of(arguments: argparse.Namespace, actuator: Actuator) -> Measurement:
+    """The recording of --input, whose current or torque is put in."""
+    return _read(arguments.input, arguments, actuator.in_open_loop(), needs=INPUT_ALONE)
 
 
 def faults_of(arguments: argparse.Namespace, known: Mapping[str, float] | None = None) -> Any:

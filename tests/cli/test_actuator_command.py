@@ -15,7 +15,7 @@ from worked_actuators import BALL_SCREW, WORKED
 
 from ema_model.actuator import load_actuator, save_actuator
 from ema_model.actuator.keys import ENTRY, HEAD, TABLES
-from ema_model.actuator.layout import layout
+from ema_model.actuator.layout import WITHOUT_DRIVE, layout
 from ema_model.actuator.naming import on_axes
 from ema_model.actuator.parameters import SECTIONS, Facts, facts_of, numbers
 from ema_model.actuator.reference import kinds_of_actuators, markdown, parameter_rows
@@ -207,7 +207,7 @@ def test_reference_is_what_is_shipped_and_has_every_key():
         assert isinstance(facts_of(path, Axes()), Facts) and row.meaning
         section, _, name = path.partition(".")
         for controller, drive in kinds_of_actuators():
-            shown = controller if controller == "unknown" else f"{controller} + {drive}"
+            shown = controller if controller in WITHOUT_DRIVE else f"{controller} + {drive}"
             read = name in sum(layout(section, {"controller": controller, "inverter": drive}), ())
             assert (shown in row.kinds) == (read and path not in unread(controller, drive)), (path, shown)
 

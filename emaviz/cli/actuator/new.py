@@ -85,7 +85,7 @@ def _kinds(arguments: argparse.Namespace) -> tuple[str, str]:
         return "cascade", "current" if drive == "unknown" else drive
     if arguments.controller == "position" and drive != "unknown":
         return "position", drive
-    return "unknown", "current"
+    return "open" if arguments.controller == "open" else "unknown", "current"
 
 
 def _document(arguments: argparse.Namespace) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from ema_model.quantities.axes import KINDS as AXES
 from ema_model.quantities.numbers import number
 
 # Drives that each controller may act through, the usual one first.
-_DRIVES = {"cascade": ("current", "hysteresis"), "position": ("voltage", "current"), "unknown": ()}
+_DRIVES = {"cascade": ("current", "hysteresis"), "position": ("voltage", "current"), "open": (), "unknown": ()}
 
 
 def ask(document: dict[str, Any], arguments: argparse.Namespace) -> None:

@@ -38,6 +38,7 @@ KEYS = {
         "values": "N·m at 2 to 24 knots at even distances; each a number, or a table with its tolerance",
     },
 }
+TITLES = {"user_torque": "Your own torque, as an expression", "torque_curve": "Your own torque, as a curve"}
 KINDS = tuple(KEYS)
 _NAME = re.compile(rf"({'|'.join(KINDS)})(_[A-Za-z0-9_]+)?")
 _CURVE = tuple(KEYS["torque_curve"])

@@ -122,6 +122,11 @@ def recordings() -> list[Measurement]:
 
 
 RECORDINGS = recordings()
+# For an open loop: currents that move the motor, to the limits and the end stops and back.
+PUSHED = [
+    one.with_signals(current_A=size * np.sin(2.0 * np.pi * rate * one.time_s))
+    for one, size, rate in zip(RECORDINGS, (4.0, 16.0), (15.0, 25.0))
+]
 
 
 def said(actuator, circuit: str) -> list[np.ndarray]:
@@ -129,7 +134,9 @@ def said(actuator, circuit: str) -> list[np.ndarray]:
     plant: Any = (  # each knows its own windows
         InverseDynamics(RECORDINGS, actuator)
         if actuator.controller.kind == "unknown"
-        else ClosedLoop(RECORDINGS, actuator, circuit=circuit or "reduced")
+        else ClosedLoop(
+            PUSHED if actuator.controller.kind == "open" else RECORDINGS, actuator, circuit=circuit or "reduced"
+        )
     )
     k = np.stack([HEALTHY, FAULTY])
     return [values for i in range(len(plant.windows)) for values in plant.signals(i, k=k).values()]

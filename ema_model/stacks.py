@@ -29,7 +29,7 @@ from ema_model.physics.rows import LANES, PARAMETER_ROWS
 
 CIRCUITS = ("thesis", "reduced")  # the drives that stand for the hysteresis current loop
 DRIVES = (*CIRCUITS, "current", "voltage")
-CONTROLLERS = ("cascade", "position")
+CONTROLLERS = ("cascade", "position", "open")
 
 
 @dataclass(frozen=True)

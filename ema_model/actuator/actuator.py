@@ -21,12 +21,15 @@ from ema_model.actuator.parameters import (
     Transmission,
     check_stops,
     check_value,
+    default_of,
     numbers,
 )
-from ema_model.actuator.unread import check_value_is_read
+from ema_model.actuator.unread import check_value_is_read, idle, unread
 from ema_model.errors import InputError, quoted
 from ema_model.faults import vector
 from ema_model.quantities.axes import Axes
+
+_OPEN_STEP_S = 5e-5  # what an actuator without chopping is simulated with
 
 
 @dataclass(frozen=True)
@@ -69,6 +72,38 @@ class Actuator:
     def current_limit_A(self) -> Any:
         """The most current, A, that controller and drive allow; (n,) where one of them is."""
         return np.minimum(self.controller.current_limit_A, self.inverter.current_limit_A)
+
+    def in_open_loop(self) -> Actuator:
+        """The same without controller and drive, and without what acts in them: a recorded current or torque is put in.
+
+        An actuator whose controller is not known has no play and end stops in its file, and so none here.
+        """
+        from ema_model.effects import find  # the catalogue need not be loaded for an actuator without effects
+
+        gone = set(unread("open", "current"))
+        neutral = {path: default_of(path) for path in gone if not path.startswith(("controller.", "inverter."))}
+        places = {name: {place.__name__ for place in find(name).places} for name in self.effects}
+        effects = {
+            name: given
+            for name, given in self.effects.items()
+            if not idle(places[name], bool(find(name).states), "open", "current")
+        }
+        kept = {
+            path: one
+            for path, one in self.tolerances.items()
+            if path not in gone and (not path.startswith("effects.") or path.split(".")[1] in effects)
+        }
+        return replace(
+            replace(self, controller=Controller(kind="open"), inverter=Inverter(kind="current")).varied(neutral),
+            tolerances=kept,
+            effects=effects,
+            rules=tuple(
+                replace(one, values={path: value for path, value in one.values.items() if path not in gone})
+                for one in self.rules
+            ),
+            step_s=max(self.step_s, _OPEN_STEP_S),
+            filter_s=Actuator.filter_s,
+        )
 
     def circuit(self, preferred: str = "reduced") -> str:
         """The Monitor Model's drive; `preferred` is the circuit for the hysteresis current loop."""
@@ -117,5 +152,6 @@ class Actuator:
         return self.with_values(values) if values else self
 
     def rules_for(self, name: str) -> tuple[Rule, ...]:
-        """The rules that hold for a recording of that name."""
-        return tuple(rule for rule in self.rules if fnmatchcase(name, rule.match))
+        """The rules that hold for a recording of that name, or for the file that it is a run of: NAME#3."""
+        names = (name, name.rpartition("#")[0])
+        return tuple(rule for rule in self.rules if any(one and fnmatchcase(one, rule.match) for one in names))

@@ -9,7 +9,8 @@ from typing import Any
 
 from ema_model.actuator.actuator import Actuator
 from ema_model.actuator.all_is_read import check_all_is_read
-from ema_model.actuator.layout import KINDS, USUAL, layout
+from ema_model.actuator.keys import ENTRY, HEAD, TABLES
+from ema_model.actuator.layout import KINDS, USUAL, WITHOUT_DRIVE, layout
 from ema_model.actuator.naming import on_axes
 from ema_model.actuator.parameters import SECTIONS, Rule, Tolerance, check_stops, check_value
 from ema_model.actuator.unread import unread
@@ -22,8 +23,7 @@ from ema_model.quantities.axes import KINDS as AXIS_KINDS
 from ema_model.quantities.axes import Axes
 from ema_model.quantities.numbers import as_number
 
-_OTHERS = ("schema", "name", "description", "axes", "model", "effects", "faults", "recordings")
-_MODEL = ("step_s", "filter_s", "torque_known")
+_OTHERS = (*HEAD, "axes", "model", "effects", "faults", "recordings")
 _RECORDING_KINDS = ("run", "map")
 _MOST_BYTES = 10_000_000
 
@@ -61,14 +61,15 @@ def parse_actuator(text: str, path: str | Path) -> Actuator:
     except ValueError as error:
         raise InputError(f"{where}: not valid TOML: {quoted(error)}") from None
     try:
-        return _actuator(document, where)
+        return actuator_of(document, where)
     except InputError:
         raise
     except ValueError:  # of a number with thousands of digits, read or shown
         raise InputError(f"{where}: holds a number with too many digits; correct it") from None
 
 
-def _actuator(document: dict[str, Any], where: str) -> Actuator:
+def actuator_of(document: dict[str, Any], where: str) -> Actuator:
+    """The actuator of a file's tables; InputError, which begins with `where`, tells what is wrong in them."""
     if document.get("schema", 1) != 1:
         raise InputError(f"{where}: schema {quoted(document['schema'], 40)} is not known; this version reads schema 1")
     unknown = set(document) - set(SECTIONS) - set(_OTHERS)
@@ -80,7 +81,7 @@ def _actuator(document: dict[str, Any], where: str) -> Actuator:
     kinds = {
         section: _choice(tables[section], "kind", USUAL[section], KINDS[section], section, where) for section in KINDS
     }
-    if kinds["controller"] == "unknown":
+    if kinds["controller"] in WITHOUT_DRIVE:
         kinds["inverter"] = "current"
     if kinds["controller"] == "position" and kinds["inverter"] == "hysteresis":
         raise InputError(f'{where}: [inverter] a position controller needs kind = "voltage" or "current"')
@@ -188,7 +189,7 @@ def _number_and_tolerance(section: str, shown: str, entry: Any, where: str) -> t
     tolerance = None
     value = entry
     if isinstance(entry, dict):
-        extra = set(entry) - {"value", "tolerance", "sigma", "free"}
+        extra = set(entry) - set(ENTRY)
         if extra or "value" not in entry:
             raise InputError(f"{where}: [{section}] {shown} takes value, tolerance or sigma, free")
         value = entry["value"]
@@ -213,6 +214,11 @@ def _table(document: dict[str, Any], name: str, where: str) -> dict[str, Any]:
     return table
 
 
+def _check_keys(table: dict[str, Any], name: str, shown: str, where: str) -> None:
+    for extra in set(table) - set(TABLES[name]):
+        raise InputError(f"{where}: {shown} has no {quoted(extra)!r}; it has {', '.join(TABLES[name])}")
+
+
 def _choice(table: dict[str, Any], key: str, usual: str, choices: tuple[str, ...], section: str, where: str) -> str:
     chosen = table.get(key, usual)
     if chosen not in choices:
@@ -221,8 +227,7 @@ def _choice(table: dict[str, Any], key: str, usual: str, choices: tuple[str, ...
 
 
 def _axes(table: dict[str, Any], where: str) -> Axes:
-    for extra in set(table) - {"motor", "user"}:
-        raise InputError(f"{where}: [axes] has no {quoted(extra)!r}; it has motor, user")
+    _check_keys(table, "axes", "[axes]", where)
     return Axes(*(_choice(table, key, "rotary", AXIS_KINDS, "axes", where) for key in ("motor", "user")))
 
 
@@ -233,8 +238,7 @@ def _usual_step(kinds: dict[str, str]) -> float:
 
 
 def _seconds(table: dict[str, Any], name: str, usual: float, where: str) -> float:
-    for extra in set(table) - set(_MODEL):
-        raise InputError(f"{where}: [model] has no {quoted(extra)!r}; it has {', '.join(_MODEL)}")
+    _check_keys(table, "model", "[model]", where)
     value = as_number(table.get(name, usual))
     if not 1e-7 <= value <= 1.0:
         raise InputError(f"{where}: [model] {name} must lie between 1e-7 and 1 s, not {quoted(table[name], 40)!r}")
@@ -249,8 +253,7 @@ def _flag(table: dict[str, Any], name: str, where: str) -> bool:
 
 
 def _mapping(table: dict[str, Any], where: str) -> tuple[str, ...]:
-    for extra in set(table) - {"mapping", "where"}:
-        raise InputError(f"{where}: [recordings] has no {quoted(extra)!r}; it has mapping, where")
+    _check_keys(table, "recordings", "[recordings]", where)
     mapping = table.get("mapping", [])
     if not isinstance(mapping, list) or not all(isinstance(text, str) for text in mapping):
         raise InputError(f'{where}: [recordings] mapping must be a list of texts such as "time_s=t[ms]"')
@@ -263,8 +266,7 @@ def _rules(table: dict[str, Any], axes: Axes, where: str) -> tuple[Rule, ...]:
         raise InputError(f"{where}: [[recordings.where]] must be tables")
     rules = []
     for rule in given:
-        for extra in set(rule) - {"match", "set", "kind"}:
-            raise InputError(f"{where}: [[recordings.where]] has no {quoted(extra)!r}; it has match, set, kind")
+        _check_keys(rule, "recordings.where", "[[recordings.where]]", where)
         if not isinstance(rule.get("match"), str):
             raise InputError(f'{where}: [[recordings.where]] needs match, a pattern of file names such as "*kp100*"')
         kind = _choice(rule, "kind", "run", _RECORDING_KINDS, "recordings.where", where)

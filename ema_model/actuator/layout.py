@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from ema_model.actuator import keys
 from ema_model.actuator.parameters import SECTIONS, numbers
 
-CONTROLLER_KINDS = ("cascade", "position", "unknown")
-INVERTER_KINDS = ("hysteresis", "current", "voltage")
+CONTROLLER_KINDS, INVERTER_KINDS = tuple(keys.KINDS["controller"]), tuple(keys.KINDS["inverter"])
 KINDS = {"controller": CONTROLLER_KINDS, "inverter": INVERTER_KINDS}
 USUAL = {"controller": "cascade", "inverter": "hysteresis"}
+
+WITHOUT_DRIVE = ("open", "unknown")  # controllers whose file says no drive: the current is that of the recording
 
 _CASCADE = (
     *("position_gain_1_s", "speed_limit_rad_s", "speed_gain_Nms_rad", "integral_gain_Nm_rad"),
@@ -32,11 +34,11 @@ def layout(section: str, kinds: dict[str, str]) -> tuple[tuple[str, ...], tuple[
     full = controller == "cascade" and inverter == "hysteresis"
     every = numbers(section)
     if section == "controller":
-        needed = {"cascade": _CASCADE, "position": ("gain_1_rad",), "unknown": ()}[controller]
+        needed = {"cascade": _CASCADE, "position": ("gain_1_rad",), "open": (), "unknown": ()}[controller]
         return needed, ("output_limit",) if controller == "position" else ()
     if section == "inverter":
         needed = _DRIVES[inverter]
-        return ((), needed) if controller == "unknown" else (needed, ())
+        return ((), needed) if controller in WITHOUT_DRIVE else (needed, ())
     if full:
         return every, ()
     needed = _MOTION if section == "motor" else ()

@@ -3,22 +3,55 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, fields
+from dataclasses import MISSING, dataclass, field, fields, replace
 from typing import Any
 
 from ema_model.errors import InputError, quoted
 from ema_model.quantities.axes import Axes
 from ema_model.quantities.numbers import as_number
-from ema_model.quantities.sides import MOTOR, USER
+from ema_model.quantities.sides import MOTOR, USER, Side
 
+Sits = dict[str, Side]
 _FAR = 1e9  # rad, where an end stop is out of reach
 
 
+@dataclass(frozen=True)
+class Facts:
+    """What a parameter means and how large it is, of a rotary axis; `on` has a linear one's.
+
+    The plausible range is of actuators from a watch's to a ship's: what lies outside was likely meant in other units.
+    """
+
+    meaning: str
+    low: float
+    high: float
+    guess: float  # where nobody knows it
+    tolerance: float = 0.0  # 1 σ of what data sheets leave open, relative to the value; 0 where it counts as known
+    sigma: float = 0.0  # the same as an absolute number, where the value is 0
+    linear: tuple[float, float, float] | None = None  # low, high and guess where its side is linear
+    follows: str = ""  # the parameter whose value it most likely has
+
+    def on(self, axes: Axes, side: Side | None, per: Side | None = None) -> Facts:
+        """The facts as these axes have them."""
+        is_linear = axes.is_linear(side) != (per is not None and axes.is_linear(per))
+        if self.linear is None or not is_linear:
+            return self
+        low, high, guess = self.linear
+        return replace(self, low=low, high=high, guess=guess)
+
+
 # Where a parameter sits: the side whose axis it is of, and for what is rad/rad, the side that it is counted by.
-_MOTOR = {"side": MOTOR}
-_USER = {"side": USER}
-_MOTOR_PER_USER = {"side": MOTOR, "per": USER}
-_USER_PER_MOTOR = {"side": USER, "per": MOTOR}
+_MOTOR: Sits = {"side": MOTOR}
+_USER: Sits = {"side": USER}
+_MOTOR_PER_USER: Sits = {"side": MOTOR, "per": USER}
+_USER_PER_MOTOR: Sits = {"side": USER, "per": MOTOR}
+_ANYWHERE: Sits = {}
+_KT = "motor.torque_constant_Nm_A"
+
+
+def _of(facts: Facts, sits: Sits, default: Any = MISSING) -> Any:
+    """A field with its facts."""
+    return field(default=default, metadata={**sits, "facts": facts})
 
 
 @dataclass(frozen=True)
@@ -31,16 +64,51 @@ class Controller:
     """
 
     kind: str = "cascade"
-    position_gain_1_s: float = field(default=0.0, metadata=_MOTOR_PER_USER)
-    speed_limit_rad_s: float = field(default=0.0, metadata=_MOTOR)
-    speed_gain_Nms_rad: float = field(default=0.0, metadata=_MOTOR)
-    integral_gain_Nm_rad: float = field(default=0.0, metadata=_MOTOR)
-    derivative_gain_Nms2_rad: float = field(default=0.0, metadata=_MOTOR)
-    integrator_window_rad: float = field(default=1.0, metadata=_USER)
-    torque_constant_Nm_A: float = field(default=1.0, metadata=_MOTOR)
-    current_limit_A: float = math.inf
-    gain_1_rad: float = field(default=0.0, metadata=_USER)
-    output_limit: float = 1.0
+    position_gain_1_s: float = _of(
+        Facts("motor speed asked for per position error at the user", 1e-2, 1e8, 100.0, 0.01, linear=(1e-2, 1e10, 1e2)),
+        _MOTOR_PER_USER,
+        0.0,
+    )
+    speed_limit_rad_s: float = _of(
+        Facts("the most motor speed that the position loop asks for", 0.05, 2e4, 300.0, linear=(1e-4, 50.0, 1.0)),
+        _MOTOR,
+        0.0,
+    )
+    speed_gain_Nms_rad: float = _of(
+        Facts("proportional gain of the speed loop", 1e-8, 1e4, 0.02, 0.01, linear=(1e-3, 1e8, 1e3)), _MOTOR, 0.0
+    )
+    integral_gain_Nm_rad: float = _of(
+        Facts("integral gain of the speed loop", 0.0, 1e6, 0.0, linear=(0.0, 1e10, 0.0)), _MOTOR, 0.0
+    )
+    derivative_gain_Nms2_rad: float = _of(
+        Facts("derivative gain of the speed loop", 0.0, 10.0, 0.0, linear=(0.0, 1e5, 0.0)), _MOTOR, 0.0
+    )
+    integrator_window_rad: float = _of(
+        Facts("position error at the user beyond which the integrator is frozen", 1e-9, 100.0, 1.0), _USER, 1.0
+    )
+    torque_constant_Nm_A: float = _of(
+        Facts(
+            "what the controller takes the motor's torque constant to be",
+            1e-5,
+            100.0,
+            0.05,
+            linear=(0.01, 1e4, 50),
+            follows=_KT,
+        ),
+        _MOTOR,
+        1.0,
+    )
+    current_limit_A: float = _of(
+        Facts("the most equivalent current that the controller asks for", 1e-3, 5e3, 10.0), _ANYWHERE, math.inf
+    )
+    gain_1_rad: float = _of(
+        Facts(
+            "share of the drive's full output per position error at the user", 1e-4, 1e7, 10.0, linear=(1e-2, 1e8, 1e3)
+        ),
+        _USER,
+        0.0,
+    )
+    output_limit: float = _of(Facts("the most of the drive's full output that is used", 0.01, 1.0, 1.0), _ANYWHERE, 1.0)
 
 
 @dataclass(frozen=True)
@@ -48,46 +116,98 @@ class Inverter:
     """Power electronics: a hysteresis current loop (T 3.2.5), an ideal current source, or PWM voltage."""
 
     kind: str = "hysteresis"
-    bus_voltage_V: float = 0.0
-    hysteresis_band_A: float = 0.0
-    current_limit_A: float = math.inf
+    bus_voltage_V: float = _of(
+        Facts("supply; a recording's own counts where it has one", 1.0, 2e3, 24.0, 0.02), _ANYWHERE, 0.0
+    )
+    hysteresis_band_A: float = _of(Facts("whole width of the current relays' band", 1e-3, 100.0, 0.4), _ANYWHERE, 0.0)
+    current_limit_A: float = _of(
+        Facts("the most current that the drive gives", 1e-3, 5e3, 10.0, follows="controller.current_limit_A"),
+        _ANYWHERE,
+        math.inf,
+    )
 
 
 @dataclass(frozen=True)
 class Motor:
     """Electric motor and rotor (T 3.2.5, Table 3.3)."""
 
-    torque_constant_Nm_A: float = field(metadata=_MOTOR)
-    inertia_kgm2: float = field(metadata=_MOTOR)
-    viscous_friction_Nms_rad: float = field(metadata=_MOTOR)
-    static_friction_Nm: float = field(metadata=_MOTOR)
-    dynamic_friction_Nm: float = field(metadata=_MOTOR)
-    resistance_Ohm: float = 1.0
-    inductance_H: float = 1e-6
-    emf_scale: float = 1.0
-    pole_pairs: float = 1.0
-    torque_limit_Nm: float = field(default=1e9, metadata=_MOTOR)
-    rotor_offset_rad: float = field(default=0.0, metadata=_MOTOR)
+    torque_constant_Nm_A: float = _of(
+        Facts("torque per ampere of the equivalent current", 1e-5, 100.0, 0.05, 0.01, linear=(0.01, 1e4, 50.0)), _MOTOR
+    )
+    inertia_kgm2: float = _of(
+        Facts("of all that moves, as the motor feels it", 1e-10, 100.0, 1e-4, 0.05, linear=(1e-4, 1e5, 5.0)), _MOTOR
+    )
+    viscous_friction_Nms_rad: float = _of(
+        Facts("friction that grows with speed, as the motor feels it", 0.0, 10.0, 1e-5, 0.15, linear=(0.0, 1e5, 10.0)),
+        _MOTOR,
+    )
+    static_friction_Nm: float = _of(
+        Facts(
+            *("holds the standing motor; no less than in motion", 0.0, 1e3, 0.01, 0.05),
+            linear=(0.0, 1e5, 5.0),
+            follows="motor.dynamic_friction_Nm",
+        ),
+        _MOTOR,
+    )
+    dynamic_friction_Nm: float = _of(
+        Facts("dry friction in motion, as the motor feels it", 0.0, 1e3, 0.01, 0.05, linear=(0.0, 1e5, 5.0)), _MOTOR
+    )
+    resistance_Ohm: float = _of(
+        Facts("of the winding, phase to phase; with a voltage drive, terminal to terminal", 1e-3, 1e3, 2.0, 0.05),
+        _ANYWHERE,
+        1.0,
+    )
+    inductance_H: float = _of(Facts("of the winding, phase to phase", 1e-7, 1.0, 1e-3, 0.1), _ANYWHERE, 1e-6)
+    emf_scale: float = _of(
+        Facts("of the three phases' back-EMF; 2 closes the energy balance", 0.5, 4.0, 2.0), _ANYWHERE, 1.0
+    )
+    pole_pairs: float = _of(Facts("of the rotor", 1.0, 100.0, 4.0), _ANYWHERE, 1.0)
+    torque_limit_Nm: float = _of(
+        Facts("at which the motor saturates; 1e9 is never", 1e-6, 1e5, 1e9, linear=(1e-3, 1e7, 1e9)), _MOTOR, 1e9
+    )
+    rotor_offset_rad: float = _of(
+        Facts("from the motor angle's zero to phase A", -6.3, 6.3, 0.0, sigma=0.02, linear=(-10.0, 10.0, 0.0)),
+        _MOTOR,
+        0.0,
+    )
 
 
 @dataclass(frozen=True)
 class Transmission:
     """Gear, screw and user (T 3.2.6)."""
 
-    gear_ratio: float = field(default=1.0, metadata=_USER_PER_MOTOR)
-    backlash_rad: float = field(default=0.0, metadata=_USER)
-    viscous_friction_Nms_rad: float = field(default=0.0, metadata=_MOTOR)
-    stop_low_rad: float = field(default=-_FAR, metadata=_USER)
-    stop_high_rad: float = field(default=_FAR, metadata=_USER)
+    gear_ratio: float = _of(
+        Facts(
+            "how far the user moves per motor angle: 1/500, or a screw's lead/2π",
+            1e-5,
+            2.0,
+            1.0,
+            linear=(1e-6, 0.1, 1.6e-3),
+        ),
+        _USER_PER_MOTOR,
+        1.0,
+    )
+    backlash_rad: float = _of(
+        Facts("whole width of the play, at the user", 0.0, 0.2, 0.0, 0.15, linear=(0.0, 5e-3, 0.0)), _USER, 0.0
+    )
+    viscous_friction_Nms_rad: float = _of(
+        Facts("of the user, as the motor feels it", 0.0, 10.0, 0.0, linear=(0.0, 1e5, 0.0)), _MOTOR, 0.0
+    )
+    stop_low_rad: float = _of(
+        Facts("lower end stop, at the user", -1e3, 1e3, -_FAR, linear=(-100.0, 100.0, -_FAR)), _USER, -_FAR
+    )
+    stop_high_rad: float = _of(
+        Facts("upper end stop, at the user", -1e3, 1e3, _FAR, linear=(-100.0, 100.0, _FAR)), _USER, _FAR
+    )
 
 
 @dataclass(frozen=True)
 class Sensors:
     """What the recording adds to the true signals."""
 
-    current_gain: float = 1.0
-    current_bias_A: float = 0.0
-    delay_s: float = 0.0
+    current_gain: float = _of(Facts("recorded current per true one", 0.5, 2.0, 1.0, 0.005), _ANYWHERE, 1.0)
+    current_bias_A: float = _of(Facts("added to the recorded current", -20.0, 20.0, 0.0, sigma=0.02), _ANYWHERE, 0.0)
+    delay_s: float = _of(Facts("by which recorded signals come late", -0.05, 0.05, 0.0, sigma=20e-6), _ANYWHERE, 0.0)
 
 
 @dataclass(frozen=True)
@@ -127,6 +247,19 @@ _ANY_SIGN = {"rotor_offset_rad", "current_bias_A", "stop_low_rad", "stop_high_ra
 def numbers(section: str) -> tuple[str, ...]:
     """Names of a section's numeric parameters."""
     return tuple(f.name for f in fields(SECTIONS[section]) if f.name != "kind")
+
+
+def facts_of(path: str, axes: Axes) -> Facts:
+    """What is known beforehand of "section.parameter" on these axes."""
+    section, _, name = path.partition(".")
+    about = next(one.metadata for one in fields(SECTIONS[section]) if one.name == name)
+    return about["facts"].on(axes, about.get("side"), about.get("per"))
+
+
+def default_of(path: str) -> float | None:
+    """What "section.parameter" is where a file leaves it out; None where none may."""
+    section, _, name = path.partition(".")
+    return getattr(SECTIONS[section], name, None)  # a dataclass keeps its defaults on the class
 
 
 def low_limit(path: str, controller: str = "") -> float:

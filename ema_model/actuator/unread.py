@@ -24,6 +24,9 @@ _CONTROLLERS = {
         "position_gain_1_s": "a position controller's gain is gain_1_rad",
         "current_limit_A": "a position controller's limit is output_limit",
     },
+    "open": {
+        " ".join(f.name for f in fields(SECTIONS["controller"])): "an open loop has no controller",
+    },
     "unknown": {
         " ".join(f.name for f in fields(SECTIONS["controller"])): "a controller that is not known has no parameters",
     },
@@ -46,6 +49,8 @@ _DRIVES = {
     },
 }
 INVERSE = "the controller is unknown, and inverse dynamics"
+_CURRENT_IN = "the recorded current or torque is put in as it is"
+_OPEN = {"sensors": {"current_gain current_bias_A": _CURRENT_IN}}
 # Instead of the drive's, where a measured motion is put in and the current that it needs comes out.
 _MOTION_IN = {
     "inverter": {"bus_voltage_V hysteresis_band_A current_limit_A": f"{INVERSE} has no drive"},
@@ -65,6 +70,8 @@ WINDING_PLACES = ("back_emf", "bus_voltage", "winding_resistance")
 # Those of the drive's controller that a position controller has not, and that a voltage drive has not.
 SPEED_LOOP_PLACES = ("speed_reading", "speed_sample", "speed_command", "speed_gain", "integral_gain")
 CURRENT_LOOP_PLACES = ("current_reference",)
+# All stages of a drive, and what the reading of a current changes, where the current is put in.
+CURRENT_IN_PLACES = (*SPEED_LOOP_PLACES, "position_error", "drive_output", *CURRENT_LOOP_PLACES, "current_reading")
 
 
 def idle(places: Collection[str], has_states: bool, controller: str, inverter: str) -> str:
@@ -72,6 +79,8 @@ def idle(places: Collection[str], has_states: bool, controller: str, inverter: s
     at = set(places)
     if controller == "unknown" and (has_states or not at & set(INVERSE_PLACES)):
         return f"{INVERSE} does not simulate what it acts on"
+    if controller == "open" and at <= set(CURRENT_IN_PLACES):
+        return f"in an open loop {_CURRENT_IN}"
     if inverter == "current" and at <= set(WINDING_PLACES):
         return f"{NO_WINDING} for it to act on"
     if controller == "position" and at <= set(SPEED_LOOP_PLACES):
@@ -84,7 +93,7 @@ def idle(places: Collection[str], has_states: bool, controller: str, inverter: s
 def unread(controller: str, inverter: str) -> dict[str, str]:
     """Why no model reads it, by "section.parameter", for an actuator of these kinds."""
     drive = _MOTION_IN if controller == "unknown" else _DRIVES[inverter]
-    by_section = {**drive, "controller": _CONTROLLERS[controller]}
+    by_section = {**drive, **(_OPEN if controller == "open" else {}), "controller": _CONTROLLERS[controller]}
     return {
         f"{section}.{name}": reason
         for section, reasons in by_section.items()

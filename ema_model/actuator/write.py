@@ -8,51 +8,74 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ema_model.actuator import keys
 from ema_model.actuator.actuator import Actuator
-from ema_model.actuator.layout import KINDS, layout
+from ema_model.actuator.layout import KINDS, WITHOUT_DRIVE, layout
 from ema_model.actuator.naming import on_axes
-from ema_model.actuator.parameters import SECTIONS
+from ema_model.actuator.parameters import SECTIONS, default_of, facts_of
 from ema_model.actuator.unread import unread
 from ema_model.errors import InputError, quoted
 from ema_model.files.whole_file import whole_file
+from ema_model.quantities.axes import Axes
 
 if TYPE_CHECKING:
     from ema_model.effects.user import UserEffect
 
 
-def save_actuator(actuator: Actuator, path: str | os.PathLike[str]) -> None:
+_COMMENTS_AT = 64  # characters from the left
+
+
+def save_actuator(actuator: Actuator, path: str | os.PathLike[str], *, with_comments: bool = False) -> None:
     """Writes all parameters, tolerances, effects and faults, whole or not at all.
 
-    Raises InputError if the file cannot be written.
+    with_comments: what each key means.  Raises InputError if the file cannot be written.
     """
     target = Path(path)
     if target.suffix != ".toml":
         raise InputError(f"{quoted(target)}: the name of an actuator file must end in .toml")
     try:
         with whole_file(target) as draft:
-            draft.write_text(as_toml(actuator), encoding="utf-8")
+            draft.write_text(commented(actuator) if with_comments else as_toml(actuator), encoding="utf-8")
     except OSError as error:
         raise InputError(f"{quoted(target)}: cannot be written ({error.strerror}); check the folder") from None
 
 
-def as_toml(actuator: Actuator) -> str:
+def commented(actuator: Actuator) -> str:
+    """The file's text with what each key means; what stands at its default is there to be taken, as a comment."""
+    text = as_toml(actuator, with_comments=True)
+    about = "\n".join(f"#   {key:10} {meaning}" for key, meaning in keys.ENTRY.items())
+    return f"# Each parameter is a number, or a table:\n{about}\n\n{text}"
+
+
+def as_toml(actuator: Actuator, *, with_comments: bool = False) -> str:
     """The file's text."""
     axes = actuator.axes
     kinds = {"controller": actuator.controller.kind, "inverter": actuator.inverter.kind}
     silent = unread(**kinds)
     lines = ["schema = 1", f"name = {_text(actuator.name)}", f"description = {_text(actuator.description)}"]
-    lines += ["", "[axes]", f"motor = {_text(axes.motor)}", f"user = {_text(axes.user)}"]
-    lines += ["", "[model]", f"step_s = {actuator.step_s!r}", f"filter_s = {actuator.filter_s!r}"]
-    lines += [f"torque_known = {str(actuator.torque_known).lower()}"]
+    model = {"step_s": actuator.step_s, "filter_s": actuator.filter_s, "torque_known": actuator.torque_known}
+    for table, values in (("axes", {"motor": axes.motor, "user": axes.user}), ("model", model)):
+        lines += ["", f"[{table}]"]
+        for key, value in values.items():
+            entry = f"{key} = {json.dumps(value)}"
+            lines.append(f"{entry:{_COMMENTS_AT}}  # {keys.TABLES[table][key]}" if with_comments else entry)
     for section in SECTIONS:
         lines += ["", f"[{section}]"]
-        if section in KINDS and not (section == "inverter" and kinds["controller"] == "unknown"):
-            lines.append(f"kind = {_text(kinds[section])}")
+        if section in KINDS and not (section == "inverter" and kinds["controller"] in WITHOUT_DRIVE):
+            entry = f"kind = {_text(kinds[section])}"
+            meaning = keys.KINDS[section][kinds[section]]
+            lines.append(f"{entry:{_COMMENTS_AT}}  # {meaning}" if with_comments else entry)
         needed, optional = layout(section, kinds)
         for name in (*needed, *optional):
             value = float(getattr(getattr(actuator, section), name))
-            if math.isfinite(value) and f"{section}.{name}" not in silent:
-                lines.append(_entry(actuator, f"{section}.{name}", on_axes(f"{section}.{name}", axes).name, value))
+            path = f"{section}.{name}"
+            if not math.isfinite(value) or path in silent:
+                continue
+            entry = _entry(actuator, path, on_axes(path, axes).name, value)
+            if with_comments:
+                is_idle = name in optional and path not in actuator.tolerances and value == default_of(path)
+                entry = f"{'# ' if is_idle else ''}{entry}".ljust(_COMMENTS_AT) + f"  # {about(path, axes)}"
+            lines.append(entry)
     lines += _effects(actuator)
     if actuator.faults:
         lines += ["", "[faults]", *(f"{name} = {float(value)!r}" for name, value in actuator.faults.items())]
@@ -66,6 +89,12 @@ def as_toml(actuator: Actuator) -> str:
             )
             lines.append(f"set = {{ {given} }}")
     return "\n".join([*lines, ""])
+
+
+def about(path: str, axes: Axes) -> str:
+    """'of all that moves, as the motor feels it [kg·m²]': what "section.parameter" means."""
+    unit = on_axes(path, axes).unit
+    return facts_of(path, axes).meaning + (f" [{unit}]" if unit else "")
 
 
 def _effects(actuator: Actuator) -> list[str]:

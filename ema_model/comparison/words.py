@@ -12,6 +12,8 @@ from ema_model.quantities.shown import of_residual, of_signal
 from ema_model.quantities.titles import in_sentence
 from ema_model.text import Document, Lines, Note, Table
 
+_MOST_TOLD = 6  # held-out recordings, each in a line of its own
+
 
 def held_out(one: Compared) -> str:
     """'chirp was not fitted: the equivalent current is off by 0.42 A (floor 0.31 A), …'."""
@@ -38,17 +40,28 @@ def _signals(result: Comparison) -> Table:
     return Table(("rms error", "initially", "floor", "mean |e|"), rows, "signal", units)
 
 
+def per_recording(result: Comparison) -> Table | None:
+    """The error of each recording, fitted or held out, in the primary signal; None where there is but one."""
+    every = [(one, "") for one in result.recordings] + [(one, "held out") for one in result.holdout]
+    largest = max((one.errors[result.primary].rmse for one, _ in every if result.primary in one.errors), default=0.0)
+    shown = of_signal(result.primary, result.actuator.axes).scaled(largest)
+    rows, remarks = [], []
+    for one, remark in every:
+        if result.primary in one.errors:
+            error = one.errors[result.primary]
+            over = number(error.rmse / error.noise_floor) if error.noise_floor > 0.0 else "–"
+            rows.append([one.name, *_scaled((error.rmse, error.noise_floor, error.mean_absolute), shown), over])
+            remarks.append(remark)
+    if len(rows) < 2:
+        return None
+    head = ("rms error", "floor", "mean |e|", "error / floor")
+    return Table(head, rows, "recording", remarks, f"{shown.unit}, of {result.primary}")
+
+
 def _recordings(result: Comparison) -> Iterator[Table | Lines]:
-    if len(result.recordings) > 1:
-        rows, units = [], []
-        for one in result.recordings:
-            if result.primary in one.errors:
-                error = one.errors[result.primary]
-                shown = error.quantity(of_signal(result.primary, result.actuator.axes))
-                rows.append([one.name, *_scaled((error.rmse, error.noise_floor, error.mean_absolute), shown)])
-                units.append(shown.unit)
-        yield Table(("rms error", "floor", "mean |e|"), rows, "recording", units, f"of {result.primary}")
-    if result.holdout:
+    if (table := per_recording(result)) is not None:
+        yield table
+    if 0 < len(result.holdout) <= _MOST_TOLD:
         yield Lines([held_out(one) for one in result.holdout])
 
 

@@ -157,17 +157,19 @@ def holdout_error(data: Data, found: Fit) -> float:
 
 
 @lru_cache(maxsize=8)  # a trial is judged by it, and its step of the ladder shows it
-def holdout_fit(data: Data, found: Fit) -> tuple[float, dict[str, float]]:
-    """`floor_ratio` of recordings that were not fitted, and `rms_by_signal`."""
+def holdout_fit(data: Data, found: Fit) -> tuple[float, dict[str, float], dict[str, float]]:
+    """`floor_ratio` of recordings that were not fitted, `rms_by_signal` and `ratio_by_recording`."""
     return resimulated(data, found.calibration.actuator)
 
 
-def resimulated(data: Data, actuator: Actuator) -> tuple[float, dict[str, float]]:
-    """`floor_ratio` and `rms_by_signal` of recordings of which only the starts are fitted."""
+def resimulated(data: Data, actuator: Actuator) -> tuple[float, dict[str, float], dict[str, float]]:
+    """`floor_ratio`, `rms_by_signal` and `ratio_by_recording` where only the recordings' starts are fitted."""
     plant = data.plant(actuator)
     calibration = calibrate(plant, data.floors, free=(), signals=data.signals, start={})
-    ratio = floor_ratio(data, plant, calibration.signals)
-    return ratio if math.isfinite(ratio) else math.inf, rms_by_signal(data, plant, calibration.signals)
+    shown = calibration.signals
+    ratio = floor_ratio(data, plant, shown)
+    ratio = ratio if math.isfinite(ratio) else math.inf
+    return ratio, rms_by_signal(data, plant, shown), ratio_by_recording(data, plant, shown)
 
 
 def rms_by_signal(data: Data, plant: Model, shown: Sequence[Mapping[str, Array]]) -> dict[str, float]:
@@ -180,16 +182,27 @@ def rms_by_signal(data: Data, plant: Model, shown: Sequence[Mapping[str, Array]]
     return {name: float(np.sqrt(np.mean(np.concatenate(part) ** 2))) for name, part in parts.items()}
 
 
-def floor_ratio(data: Data, plant: Model, shown: Sequence[Mapping[str, Array]]) -> float:
+def ratio_by_recording(data: Data, plant: Model, shown: Sequence[Mapping[str, Array]]) -> dict[str, float]:
+    """`floor_ratio` of each recording, by its name; of a name that stands twice, the second is NAME (2)."""
+    found: dict[str, float] = {}
+    for i, measurement in enumerate(data.measurements):
+        name = measurement.name or "recording"
+        name = f"{name} ({i + 1})" if name in found else name
+        if any(window.recording == i for window in plant.windows):
+            found[name] = floor_ratio(data, plant, shown, i)
+    return found
+
+
+def floor_ratio(data: Data, plant: Model, shown: Sequence[Mapping[str, Array]], recording: int | None = None) -> float:
     """rms of measurement − model in units of the floor, pooled over windows and signals: 1 is the floor.
 
-    A standstill counts as 25 ms of motion do.
+    A standstill counts as 25 ms of motion do.  recording: the one, from 0, whose windows count; all without it.
     """
     each = [
         (((signals[name] - window.measured[name]) / one.sigma(name)) ** 2, one.counts)
         for window, one, signals in zip(plant.windows, data.floors, shown)
         for name in data.signals
-        if name in window.measured
+        if name in window.measured and recording in (None, window.recording)
     ]
     squared, counts = (np.concatenate(parts) for parts in zip(*each))
     return float(np.sqrt(np.average(squared, weights=counts)))

@@ -28,6 +28,7 @@ from ema_model.discovery.model_fit import (
     floor_ratio,
     gather,
     holdout_fit,
+    ratio_by_recording,
     rms_by_signal,
     without_effect,
 )
@@ -305,8 +306,9 @@ def rung_of(label: str, found: Fit, data: Data, held: Data | None) -> Rung:
     """A fit's errors, with those of what was held out."""
     shown = found.calibration.signals
     ratio, rms = floor_ratio(data, found.plant, shown), rms_by_signal(data, found.plant, shown)
-    unseen, unseen_rms = (None, {}) if held is None else holdout_fit(held, found)
-    return Rung(label, ratio, unseen, rms, unseen_rms, shown)
+    each = ratio_by_recording(data, found.plant, shown)
+    unseen, unseen_rms, unseen_each = (None, {}, {}) if held is None else holdout_fit(held, found)
+    return Rung(label, ratio, unseen, rms, unseen_rms, shown, each, unseen_each)
 
 
 def with_drops(ranked: Sequence[Candidate], trials: Sequence[Trial]) -> list[Candidate]:

@@ -47,6 +47,8 @@ class Rung:
     signals: dict[str, float]  # rms by signal, in its unit
     holdout_signals: dict[str, float]  # the same of what was held out
     signals_per_window: Sequence[dict[str, Array]]  # the fitted model's, (blocks,) each
+    recordings: dict[str, float] = field(default_factory=dict)  # `rmse` of each recording by name
+    holdout_recordings: dict[str, float] = field(default_factory=dict)  # the same of what was held out
 
 
 @dataclass(frozen=True)

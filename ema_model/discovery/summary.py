@@ -77,6 +77,8 @@ def _rung(one: Rung) -> dict[str, Any]:
         "holdout_rmse": one.holdout_rmse,
         "signals": one.signals,
         "holdout_signals": one.holdout_signals,
+        "recordings": one.recordings,
+        "holdout_recordings": one.holdout_recordings,
     }
 
 

@@ -28,7 +28,7 @@ def verified(found: Discovery, path: str | os.PathLike[str]) -> Verified:
     Raises InputError for a file that cannot be read back.
     """
     actuator = load_actuator(os.fspath(path))
-    rmse, _ = resimulated(found.data, actuator)
+    rmse, *_ = resimulated(found.data, actuator)
     held = None if found.held is None else resimulated(found.held, actuator)[0]
     last: Rung = found.ladder[-1]
     pairs = [(rmse, last.rmse), (held, last.holdout_rmse)]

@@ -204,9 +204,24 @@ def _added(found: Discovery) -> Iterator[Lines]:
         yield Lines(list(faults(found).values()), "faults of the actuator")
 
 
+def per_recording(found: Discovery) -> Table | None:
+    """The error of each recording, fitted or held out, on the first and the last step; None where there is but one."""
+    first, last = found.ladder[0], found.ladder[-1]
+    rows = [[name, number(first.recordings[name]), number(error)] for name, error in last.recordings.items()]
+    held = [
+        [name, number(first.holdout_recordings[name]), number(error)] for name, error in last.holdout_recordings.items()
+    ]
+    if len(rows) + len(held) < 2:
+        return None
+    remarks = [*([""] * len(rows)), *(["held out"] * len(held))]
+    return Table(("calibrated", "last step"), [*rows, *held], "recording", remarks, "(error over the floor)")
+
+
 def _tables(found: Discovery) -> Iterator[Table]:
     rungs = [[one.label, _three(one.rmse), _three(one.holdout_rmse)] for one in found.ladder]
     yield Table(("fitted", "held out"), rungs, "error ladder", unit="(1 is the floor)")
+    if (table := per_recording(found)) is not None:
+        yield table
     if found.candidates:
         rows = [
             [one.name, f"{one.predicted_drop:.0f}", "" if one.refitted_drop is None else f"{one.refitted_drop:.0f}"]

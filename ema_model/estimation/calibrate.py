@@ -49,6 +49,7 @@ class Calibration:
     k: Array  # (8,)
     residual: Array  # (values,), model − measurement over the floor that weights the fit
     chi2_per_value: float  # of the signals over the floor they are weighted by
+    covariance_scale: float  # by which what the model misses widens all intervals' squares
     signals: list[dict[str, Array]]  # the fitted model's, per window, (blocks,) each
     before: list[dict[str, Array]]  # the file's own model's
     sensitivities: list[dict[str, Array]]  # per window and fitted signal: ∂signal/∂x, (blocks, unknowns)
@@ -101,9 +102,10 @@ def calibrate(
     x = fit.x
     chi2 = fit.chi2
     root = np.linalg.inv(np.linalg.qr(fit.jacobian, mode="r"))  # JᵀJ itself rounds the prior away beside a fine floor
-    covariance = root @ root.T * max(1.0, chi2)
+    scale = max(1.0, chi2)
     if chi2 > _MISFIT:  # errors of a wrong model last
-        covariance *= max(1.0, CORRELATED_S / min(one.block_s for one in floors))
+        scale *= max(1.0, CORRELATED_S / min(one.block_s for one in floors))
+    covariance = root @ root.T * scale
     fitted_k = problem.k(x)
     actuator = replace(model.actuator.varied(problem.parameters(x)), faults=named(fitted_k))
     found = calibrated(problem, x, covariance)
@@ -116,6 +118,7 @@ def calibrate(
         k=fitted_k,
         residual=fit.residual,
         chi2_per_value=chi2,
+        covariance_scale=scale,
         signals=_signals(problem, x),
         before=_signals(problem, np.zeros(len(x))),
         sensitivities=_split(problem, fit.jacobian, weighted=False),

@@ -54,6 +54,7 @@ def plain_demand(p, i, command, told, omega):
     error = command - told
     gain = p[POSITION_GAIN * LANES + i]
     return control(
+        command,
         error,
         speed_reference(error, gain, p[SPEED_LIMIT * LANES + i]) - omega,
         0.0,
@@ -96,7 +97,7 @@ def advance_drive(s, first, p, i, command, told, omega, supply, dt):
         most,
         dt,
     )
-    output = control(error, speed_error, remembered, position_gain, gain, current_per_torque, most)
+    output = control(command, error, speed_error, remembered, position_gain, gain, current_per_torque, most)
     put_out = drive_output(output, begins, dt, s, first, p, i)
     s[INTEGRAL * LANES + i] = integral if supply > 0.0 else 0.0
     s[SPEED_ERROR * LANES + i] = speed_error

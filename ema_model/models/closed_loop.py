@@ -1,4 +1,7 @@
-"""The actuator in its loop: command and load in, all signals out of the Monitor Model."""
+"""The actuator in its loop: command and load in, all signals out of the Monitor Model.
+
+In an open loop the recorded current, torque or force is what is put in, and the motion alone is compared.
+"""
 
 from __future__ import annotations
 
@@ -32,9 +35,10 @@ _CHUNK = 20_000  # blocks that are simulated at once
 
 
 class ClosedLoop:
-    """Recordings whose command and controller are known, cut into windows that start from their own first sample."""
+    """Recordings whose command and controller are known, or whose current is put in, cut into windows.
 
-    simulates_commands = True
+    Each starts from its own first sample.
+    """
 
     def __init__(
         self,
@@ -51,6 +55,7 @@ class ClosedLoop:
         if not measurements:
             raise InputError("one recording or more is needed")
         self.actuator = actuator
+        self.simulates_commands = actuator.controller.kind != "open"
         self.effects = {
             name: find(name, actuator.axes).settings(dict(given)) for name, given in (effects or {}).items()
         }
@@ -157,6 +162,8 @@ class ClosedLoop:
     ) -> Signals:
         actuator = (actuator or self.actuator).varied(window.values)
         k = np.atleast_2d(np.asarray(actuator.k if k is None else k, dtype=float))
+        if window.input == "motor_torque_Nm":  # which is put in as it is
+            actuator = actuator.varied({"motor.torque_constant_Nm_A": 1.0})
         rows = monitor_rows(actuator, k, self.stack, self.effects if effects is None else effects)
         tau = actuator.transmission.gear_ratio
         state = initial_state(

@@ -27,7 +27,8 @@ BLOCK_S = 0.5e-3  # means over it take the chopping ripple away, which no low-fi
 class LoopWindow(Window):
     """A window with its inputs, (steps,), and its start; measured are block means of `COMPARED`, as recorded."""
 
-    command: Array  # rad
+    command: Array  # rad; A or N·m in an open loop
+    input: str  # the signal that it is of, by its name inside
     load: Array  # N·m at the user
     supply: Array  # bus voltage over nominal; 0 where the drive is off
     steps_per_sample: int
@@ -67,9 +68,10 @@ def cut(
 
     block_s: 0 compares every sample.  Raises InputError if nothing can be compared.
     """
-    measurement.require("command_rad")
-    if not any(name in measurement for name in COMPARED):
-        wanted = ", ".join(measurement.shown(name) for name in COMPARED)
+    put_in = input_of(measurement, actuator)
+    known = [name for name in COMPARED if name != "current_A" or put_in == "command_rad"]
+    if not any(name in measurement for name in known):
+        wanted = ", ".join(measurement.shown(name) for name in known)
         raise InputError(f"{quoted(measurement.name)}: nothing to compare; one of {wanted} is needed")
     period = measurement.sample_period_s
     samples = max(1, round(block_s / period))
@@ -86,7 +88,7 @@ def cut(
         def means(name: str, compared: slice = compared, blocks: int = blocks) -> Array:
             return measurement[name][compared].reshape(blocks, samples).mean(axis=1)
 
-        inputs = _inputs(measurement, actuator, run, blocks * samples * steps, step_s)
+        inputs = _inputs(measurement, actuator, put_in, run, blocks * samples * steps, step_s)
         user, speed, play = _start(measurement, actuator, run.start)
         current = _current(measurement, actuator, run.start, speed)
         windows.append(
@@ -96,9 +98,10 @@ def cut(
                 first=run.start,
                 time_s=means("time_s"),
                 command=inputs[0],
+                input=put_in,
                 load=inputs[1],
                 supply=inputs[2],
-                measured={name: means(name) for name in COMPARED if name in measurement},
+                measured={name: means(name) for name in known if name in measurement},
                 context={name: means(name) for name in CONTEXT if name in measurement},
                 samples_per_block=samples,
                 block_s=samples * steps * step_s,
@@ -117,11 +120,28 @@ def cut(
     return windows
 
 
-def _inputs(measurement: Measurement, actuator: Actuator, run: slice, steps: int, step_s: float) -> tuple[Array, ...]:
+def input_of(measurement: Measurement, actuator: Actuator) -> str:
+    """The signal that is put in: the command, in an open loop the current or torque; InputError without one."""
+    if actuator.controller.kind != "open":
+        measurement.require("command_rad")
+        return "command_rad"
+    found = [name for name in ("current_A", "motor_torque_Nm") if name in measurement]
+    if not found:
+        measurement.require("current_A")
+    return found[0]
+
+
+def _inputs(
+    measurement: Measurement, actuator: Actuator, put_in: str, run: slice, steps: int, step_s: float
+) -> tuple[Array, ...]:
     """Command, load and supply at every step; linear between samples, but for jumps and the drive's switch."""
     time = measurement.time_s[run] - measurement.time_s[run.start]
     at = np.arange(steps) * step_s - actuator.sensors.delay_s
-    command: Array = between(at, time, measurement["command_rad"][run]).astype(float)
+    if put_in != "command_rad" and measurement.side.sampling != "instantaneous":  # of each period its own mean
+        held = np.clip(np.floor(at / measurement.sample_period_s + 1e-6).astype(int) + 1, 0, time.size - 1)
+        command: Array = measurement[put_in][run][held].astype(float)
+    else:
+        command = between(at, time, measurement[put_in][run]).astype(float)
     load = measurement.get("load_torque_Nm")
     loads = np.zeros(steps) if load is None else np.interp(at, time, load[run])
     bus = measurement.get("bus_voltage_V")
@@ -141,7 +161,8 @@ def _start(measurement: Measurement, actuator: Actuator, at: int) -> tuple[float
     user = measurement.get("user_position_rad")
     motor = measurement.get("motor_position_rad")
     speed = measurement.get("motor_speed_rad_s")
-    at_user = float(measurement["command_rad"][at] if user is None else user[at])
+    asked = measurement.get("command_rad") if user is None else user
+    at_user = 0.0 if asked is None else float(asked[at])
     if motor is None:
         return at_user, 0.0 if speed is None else float(speed[at]), 0.0
     # A rig's speed is often the encoder's difference, far too coarse for one sample.

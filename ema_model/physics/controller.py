@@ -17,7 +17,9 @@ def speed_reference(position_error, position_gain, speed_limit):
 
 
 @scalar
-def cascade_controller(position_error, speed_error, remembered, position_gain, speed_gain, current_per_torque, limit):
+def cascade_controller(
+    command, position_error, speed_error, remembered, position_gain, speed_gain, current_per_torque, limit
+):
     """PID speed loop (T 3.1) behind a position loop: the reference current, A.
 
     I_ref = sat(T_ref / k_t), T_ref = K_P e + K_I ∫e dt + K_D de/dt, e = ω_ref − ω; remembered: the last two, N·m.
@@ -26,9 +28,19 @@ def cascade_controller(position_error, speed_error, remembered, position_gain, s
 
 
 @scalar
-def position_controller(position_error, speed_error, remembered, position_gain, speed_gain, current_per_torque, limit):
+def position_controller(
+    command, position_error, speed_error, remembered, position_gain, speed_gain, current_per_torque, limit
+):
     """A position loop alone: limit·sat(gain·e), the share of the bus voltage, or a current, A."""
     return limit * clamp(position_gain * position_error, -1.0, 1.0)
+
+
+@scalar
+def open_controller(
+    command, position_error, speed_error, remembered, position_gain, speed_gain, current_per_torque, limit
+):
+    """No controller: what is put in is the current itself, A."""
+    return clamp(command, -limit, limit)
 
 
 @scalar

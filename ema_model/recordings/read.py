@@ -32,6 +32,7 @@ from ema_model.recordings.side_file.read import SideFile, find_side_file, read_s
 
 Needs = Sequence[Sequence[str]]  # of each group one signal, the first that there is; names inside
 COMMAND_ALONE: Needs = (("time_s",), ("command_rad",))
+INPUT_ALONE: Needs = (("time_s",), ("current_A", "motor_torque_Nm"))
 _MAKES_CURRENT = [*PHASES, "motor_position_rad"]
 _MOTION = ("motor_position_rad", "user_position_rad", "motor_speed_rad_s")
 
@@ -123,6 +124,8 @@ def needed(actuator: Actuator, *, is_map: bool = False) -> Needs:
         return (("motor_position_rad",), ("current_A", "motor_torque_Nm"))
     if actuator.controller.kind == "unknown":
         return (("time_s",), ("motor_position_rad",), ("current_A", "motor_torque_Nm"))
+    if actuator.controller.kind == "open":
+        return (*INPUT_ALONE, _MOTION)
     return (*COMMAND_ALONE, ("current_A", *_MOTION))
 
 

@@ -9,6 +9,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from ema_model.actuator import Actuator
+from ema_model.actuator.layout import WITHOUT_DRIVE
 from ema_model.errors import InputError, quoted
 from ema_model.recordings import Measurement
 from ema_model.simulation import precompile as ahead
@@ -21,7 +22,7 @@ FITNESSES = tuple(_RATE_HZ)
 
 def can_be_explored(actuator: Actuator) -> bool:
     """Whether any model can follow a command."""
-    return actuator.controller.kind != "unknown"
+    return actuator.controller.kind not in WITHOUT_DRIVE
 
 
 def note(actuator: Actuator) -> str:

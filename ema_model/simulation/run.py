@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ema_model.actuator import Actuator
+from ema_model.actuator.layout import WITHOUT_DRIVE
 from ema_model.commands import Command, command
 from ema_model.effects import find
 from ema_model.errors import InputError, quoted
@@ -151,7 +152,7 @@ def simulate_monitor(
 ) -> Measurement:
     """The Monitor Model's signals; raises as `simulate_reference`."""
     effects = {name: find(name, actuator.axes).settings(dict(given)) for name, given in (effects or {}).items()}
-    if actuator.controller.kind == "unknown":
+    if actuator.controller.kind in WITHOUT_DRIVE:
         raise InputError(f"{quoted(actuator.name)}: its controller is not known, so that no command can be simulated")
     stack = stack_at_hand(actuator, effects, circuit, "traces")
     period = _steps_per_sample(run, actuator.step_s)

@@ -11,7 +11,10 @@ from collections.abc import Sequence
 # Whatever takes time is imported where an interrupt ends the program as it should.
 from emaviz.cli.interrupt import EXIT_CODE, until_interrupted
 
-COMMANDS = ("gui", "simulate", "identify", "compare", "discover", "track", "effects", "view", "recover", "campaign")
+COMMANDS = (
+    *("gui", "simulate", "identify", "compare", "discover", "track"),
+    *("actuator", "effects", "view", "recover", "campaign"),
+)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

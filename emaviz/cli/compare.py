@@ -15,7 +15,11 @@ HELP = "show where the model fails beside recordings"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of INTERFACES, with the signals to fit."""
     parser.add_argument(
-        "files", nargs="+", type=files.RECORDING, metavar="FILE", help="recordings of one actuator, compared together"
+        "files",
+        nargs="+",
+        type=files.RECORDINGS,
+        metavar="FILE",
+        help="recordings of one actuator, compared together; folders and patterns too",
     )
     options.add_fit(parser, "the comparison")
     parser.add_argument(
@@ -33,6 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME[=weight]",
         help="fit only these signals, with a weight (1 is what the noise says); repeat for more",
     )
+    options.add_open_loop(parser)
     options.add_seed(parser)
 
 
@@ -43,9 +48,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise InputError("--save-actuator writes what the calibration found; leave --no-calibrate out")
     progress = output.Progress()
     try:
-        measurements, held = (
-            options.read_all(files, arguments, actuator, progress) for files in (arguments.files, arguments.holdout)
-        )
+        measurements, held = options.read_set(arguments, actuator, progress)
         result = compare(
             measurements,
             actuator,

@@ -18,11 +18,16 @@ _CURRENT_ONLY = ("current_A",)
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of INTERFACES."""
     parser.add_argument(
-        "files", nargs="+", type=files.RECORDING, metavar="FILE", help="recordings of one actuator, fitted together"
+        "files",
+        nargs="+",
+        type=files.RECORDINGS,
+        metavar="FILE",
+        help="recordings of one actuator, fitted together; folders and patterns too",
     )
     options.add_fit(parser, "the discovery")
     parser.add_argument("--signals", choices=("current", "all"), default="all", help="what is fitted")
     parser.add_argument("--max-effects", type=whole(0, 100), default=3, metavar="N", help="at most so many are added")
+    options.add_open_loop(parser)
     options.add_seed(parser)
 
 
@@ -31,9 +36,7 @@ def run(arguments: argparse.Namespace) -> int:
     actuator = options.actuator_of(arguments)
     progress = output.Progress()
     try:
-        fitted, held = (
-            options.read_all(named, arguments, actuator, progress) for named in (arguments.files, arguments.holdout)
-        )
+        fitted, held = options.read_set(arguments, actuator, progress)
         found = discover(
             fitted,
             actuator,

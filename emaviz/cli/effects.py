@@ -9,7 +9,9 @@ from typing import Any
 
 from ema_model.effects import CATALOGUE, Effect, Parameter, find
 from ema_model.effects.effect import FAMILIES
+from ema_model.effects.user.entries import KEYS, TITLES
 from ema_model.quantities.axes import Axes
+from emaviz.cli import files
 from emaviz.cli.options import add_json
 from emaviz.cli.output import configuration, write_json
 
@@ -17,22 +19,49 @@ HELP = "list the physical effects that can be added to the models, or explain on
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """NAME and --json."""
+    """NAME, --html and --json."""
     parser.add_argument("name", nargs="?", metavar="NAME", help="one effect; all without it")
+    parser.add_argument(
+        "--html", type=files.Folder(), metavar="DIR", help="write the library as pages, with typeset equations"
+    )
     add_json(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Prints the list or the explanation."""
+    """Prints the list or the explanation, or writes the pages."""
+    if arguments.name in KEYS:
+        print(explain_users(arguments.name))
+        write_json(arguments.json, {"effects": [_users_facts(arguments.name)]}, 0, configuration(arguments))
+        return 0
     chosen = [find(arguments.name)] if arguments.name else list(CATALOGUE.values())
-    if arguments.name:
+    if arguments.html:
+        from emaviz.report.effects import write_effects_reference
+
+        print(f"{arguments.html}: {len(write_effects_reference(arguments.html))} pages; begin with index.html")
+    elif arguments.name:
         print(explain(chosen[0]))
     else:
         width = max(len(effect.name) for effect in chosen)
         for effect in chosen:
             print(f"{effect.name:{width}}  {effect.family:9}  {effect.equation}")
-    write_json(arguments.json, {"effects": [_facts(effect) for effect in chosen]}, 0, configuration(arguments))
+        for name in KEYS:
+            print(f"{name:{width}}  {'yours':9}  {TITLES[name]}")
+    users = [] if arguments.name else [_users_facts(name) for name in KEYS]
+    write_json(
+        arguments.json, {"effects": [*(_facts(effect) for effect in chosen), *users]}, 0, configuration(arguments)
+    )
     return 0
+
+
+def explain_users(name: str) -> str:
+    """What an effect of the user's own is made of, for a terminal."""
+    width = max(map(len, KEYS[name]))
+    entries = [f"  {key:{width}}  {meaning}" for key, meaning in KEYS[name].items()]
+    return "\n".join([TITLES[name], "", f"The table [effects.{name}] of an actuator file", *entries])
+
+
+def _users_facts(name: str) -> dict[str, Any]:
+    return {"name": name, "title": TITLES[name], "keys": KEYS[name]}
 
 
 def explain(effect: Effect) -> str:

@@ -9,7 +9,7 @@ import argparse
 import os
 import unicodedata
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Generic, NamedTuple, TypeVar
 
@@ -19,6 +19,7 @@ from ema_model.files.user_file import check_user_file
 from ema_model.files.whole_file import remove_abandoned
 from ema_model.recordings import side_path
 from ema_model.recordings.formats import WRITTEN
+from ema_model.recordings.recording_set import files_of, is_pattern
 from ema_model.recordings.side_file.read import OF_A_FOLDER
 
 
@@ -29,6 +30,7 @@ class Input:
     expected: str  # as in "an actuator file (.toml)"
     has_side_file: bool = False
     is_file: Callable[[str], bool] = bool  # tells a file's name from what else the option takes
+    several: bool = False  # a folder or a pattern stands for the recordings in it
 
     def __call__(self, text: str) -> str:
         return text
@@ -59,6 +61,8 @@ class Folder:
 
 
 RECORDING = Input("the file of a measurement", has_side_file=True)
+RECORDINGS = replace(RECORDING, several=True)
+HELD_OUT = replace(RECORDINGS, is_file=lambda text: not is_pattern(text))
 ACTUATOR = Input("an actuator file (.toml)")
 JSON = Output((".json",), is_kept=False)
 REPORT = Output((".html", ".htm"), is_kept=False)
@@ -109,8 +113,13 @@ def _named(
             option = "".join(action.option_strings[:1])
             for text in value if isinstance(value, list) else [value]:
                 if text is not None:
-                    named.append(_Named(Path(text), option, action.type))
+                    named += [_Named(Path(one), option, action.type) for one in _files(text, action.type)]
     return named
+
+
+def _files(text: str, declared: Input | Output) -> list[str]:
+    is_set = isinstance(declared, Input) and declared.several and declared.is_file(text)
+    return files_of(text) if is_set else [text]
 
 
 def _taken(one: _Named[_Declared]) -> list[tuple[Path, str]]:

@@ -29,7 +29,11 @@ HELP = "find the faults k1 … k8 of recordings, or of a simulated actuator"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of INTERFACES, and those of the run that is simulated when no file is given."""
     parser.add_argument(
-        "files", nargs="*", type=files.RECORDING, metavar="FILE", help="recordings of one actuator, fitted together"
+        "files",
+        nargs="*",
+        type=files.RECORDINGS,
+        metavar="FILE",
+        help="recordings of one actuator, fitted together; folders and patterns too",
     )
     parser.add_argument(
         "--algorithm", choices=tuple(ALGORITHMS), default=ROBUST, help="robust, or one of the thesis's as published"
@@ -55,8 +59,7 @@ def run(arguments: argparse.Namespace) -> int:
     truth = options.faults_of(arguments) if arguments.fault or not arguments.files else None
     progress = output.Progress()
     try:
-        measurements = _recordings(arguments, actuator, truth, progress)
-        unseen = options.read_all(arguments.holdout, arguments, actuator, progress)
+        measurements, unseen = _recordings(arguments, actuator, truth, progress)
     finally:
         progress.done()
 
@@ -144,16 +147,18 @@ def result(answer: Identification, actuator: Actuator, holdout_rmse: float | Non
 
 def _recordings(
     arguments: argparse.Namespace, actuator: Actuator, truth: np.ndarray | None, progress: output.Progress
-) -> list[Measurement]:
-    if arguments.files:
-        return options.read_all(arguments.files, arguments, actuator, progress)
+) -> tuple[list[Measurement], list[Measurement]]:
+    """Those to fit, and those held out."""
+    fitted, held = options.read_set(arguments, actuator, progress)
+    if fitted:
+        return fitted, held
     assert truth is not None
     sensors = Sensors(arguments.noise_current, arguments.encoder_bits)
     try:
         clean = simulated(options.run_of(arguments, actuator), actuator, truth, arguments.fitness)
     except FloatingPointError as error:
         raise InputError(str(error)) from None
-    return [sensors.record(clean, arguments.seed)]
+    return [sensors.record(clean, arguments.seed)], held
 
 
 def _finite(value: float) -> float | None:

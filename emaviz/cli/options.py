@@ -18,7 +18,8 @@ from ema_model.errors import InputError, quoted
 from ema_model.quantities.axes import Axes
 from ema_model.recordings import Measurement, read
 from ema_model.recordings.formats.text_layout import Hints, known_encoding
-from ema_model.recordings.read import COMMAND_ALONE, Needs
+from ema_model.recordings.read import COMMAND_ALONE, INPUT_ALONE, Needs
+from ema_model.recordings.recording_set import files_of, held_out, is_pattern, runs_of
 from ema_model.simulation.run import Run
 from emaviz.cli import files
 from emaviz.cli.numbers import FINITE, SEED, whole
@@ -41,9 +42,15 @@ def add_fit(parser: argparse.ArgumentParser, what: str) -> None:
         "--holdout",
         action="append",
         default=[],
-        type=files.RECORDING,
-        metavar="FILE",
-        help="a recording that is not fitted, to judge the result by; repeat for more",
+        type=files.HELD_OUT,
+        metavar="FILE|RULE",
+        help="a recording that is not fitted, to judge the result by, or a rule that takes out those named so: "
+        "'kp200*'; repeat for more",
+    )
+    parser.add_argument(
+        "--runs",
+        metavar="COLUMN",
+        help="the column that numbers the runs of a file: each becomes a recording of its own, NAME#1, NAME#2 …",
     )
     parser.add_argument(
         "--save-actuator",
@@ -57,14 +64,37 @@ def add_fit(parser: argparse.ArgumentParser, what: str) -> None:
     files.add_force(parser)
 
 
-def read_all(
+def read_set(
+    arguments: argparse.Namespace, actuator: Actuator, progress: Progress
+) -> tuple[list[Measurement], list[Measurement]]:
+    """The recordings to fit and those held out, cut to --from and --to; says on stderr what was assumed of columns."""
+    named = [text for text in arguments.holdout if not is_pattern(text)]
+    unseen = [file for text in named for file in files_of(text)]
+    places = [Path(file).resolve() for file in unseen]
+    given = [
+        file
+        for text in arguments.files
+        for file in files_of(text)
+        if file == text or Path(file).resolve() not in places  # what is named itself is fitted all the same
+    ]
+    if not given and arguments.files:
+        raise InputError("--holdout takes out every recording; leave some to fit")
+    fitted, held = (_read_files(names, arguments, actuator, progress) for names in (given, unseen))
+    for rule in arguments.holdout:
+        if is_pattern(rule):
+            fitted, taken = held_out(fitted, rule)
+            held += taken
+    return fitted, held
+
+
+def _read_files(
     names: Sequence[str], arguments: argparse.Namespace, actuator: Actuator, progress: Progress
 ) -> list[Measurement]:
-    """The recordings, cut to --from and --to; says on stderr what was assumed of their columns."""
-    found = []
-    for name in names:
-        progress.show(f"reading {Path(name).name}")
-        found.append(_read(name, arguments, actuator, progress))
+    found: list[Measurement] = []
+    for i, name in enumerate(names):
+        progress.show(f"reading {Path(name).name} ({i + 1} of {len(names)})")
+        one = _read(name, arguments, actuator, progress)
+        found += runs_of(one) if arguments.runs else [one]
     if arguments.start_s is None and arguments.stop_s is None:
         return found
     start = -math.inf if arguments.start_s is None else arguments.start_s
@@ -79,8 +109,10 @@ def _read(
     progress: Progress | None = None,
     needs: Needs | None = None,
 ) -> Measurement:
+    runs = getattr(arguments, "runs", None)
+    by_run = [f"segment={runs}"] if runs and runs != "segment" else []
     hints = Hints(arguments.header_line, arguments.encoding)
-    measurement = read(file, actuator, arguments.mapping, needs=needs, hints=hints)
+    measurement = read(file, actuator, [*arguments.mapping, *by_run], needs=needs, hints=hints)
     if told := measurement.reading.told:
         if progress is not None:
             progress.done()
@@ -191,9 +223,24 @@ def add_run(parser: argparse.ArgumentParser) -> None:
     add_seed(parser)
 
 
+def add_open_loop(parser: argparse.ArgumentParser) -> None:
+    """--open-loop"""
+    parser.add_argument(
+        "--open-loop",
+        action="store_true",
+        help="leave the controller out: the recorded current, torque or force goes in, and the motion is compared",
+    )
+
+
 def actuator_of(arguments: argparse.Namespace) -> Actuator:
-    """The actuator that --actuator names."""
-    return load_actuator(arguments.actuator)
+    """The actuator that --actuator names, without its controller where --open-loop asks for that."""
+    actuator = load_actuator(arguments.actuator)
+    return actuator.in_open_loop() if getattr(arguments, "open_loop", False) else actuator
+
+
+def input_of(arguments: argparse.Namespace, actuator: Actuator) -> Measurement:
+    """The recording of --input, whose current or torque is put in."""
+    return _read(arguments.input, arguments, actuator.in_open_loop(), needs=INPUT_ALONE)
 
 
 def faults_of(arguments: argparse.Namespace, known: Mapping[str, float] | None = None) -> Any:

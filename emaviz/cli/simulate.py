@@ -7,8 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from ema_model.actuator import Actuator
 from ema_model.actuator.readings import readings
 from ema_model.errors import InputError
+from ema_model.models.open_loop import simulate_open_loop
 from ema_model.recordings import Measurement, write_measurement
 from ema_model.simulation.run import simulate_monitor, simulate_reference
 from ema_model.simulation.sensors import Sensors
@@ -22,6 +24,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of INTERFACES: model, actuator, command, faults, effects, sensors, files."""
     parser.add_argument("--model", choices=("rm", "mm"), default="rm", help="reference or monitor model")
     parser.add_argument("--circuit", choices=("reduced", "thesis"), default="reduced", help="of the monitor model")
+    parser.add_argument(
+        "--input",
+        type=files.RECORDING,
+        metavar="RUN.csv",
+        help="open loop: a recording whose current, torque or force is put in, in place of a command",
+    )
     options.add_actuator(parser)
     options.add_run(parser)
     options.add_mapping(parser)
@@ -40,13 +48,9 @@ def run(arguments: argparse.Namespace) -> int:
     """Simulates, records with the sensors' accuracy, writes."""
     actuator = options.actuator_of(arguments)
     k, effects = options.faults_of(arguments, actuator.faults), options.effects_of(arguments, actuator.axes)
-    asked = options.run_of(arguments, actuator, arguments.sample_rate)
     sensors = Sensors(arguments.noise_current, arguments.encoder_bits)
     try:
-        if arguments.model == "rm":
-            signals = simulate_reference(asked, actuator, k, effects)
-        else:
-            signals = simulate_monitor(asked, actuator, k, effects, arguments.circuit)
+        signals = _simulated(arguments, actuator, k, effects)
     except FloatingPointError as error:
         raise InputError(str(error)) from None
     signals = sensors.record(signals, arguments.seed)
@@ -63,14 +67,26 @@ def run(arguments: argparse.Namespace) -> int:
         "rms": {name: float(np.sqrt(np.mean(signals[name] ** 2))) for name in signals.signals if name != "time_s"},
     }
     output.write_json(arguments.json, summary, arguments.seed, output.configuration(arguments))
-    print(f"{arguments.out}: {signals.samples} samples, {signals.duration_s:g} s at {arguments.sample_rate:g} Hz")
+    rate = 1.0 / signals.sample_period_s
+    print(f"{arguments.out}: {signals.samples} samples, {signals.duration_s:g} s at {rate:g} Hz")
     return 0
+
+
+def _simulated(
+    arguments: argparse.Namespace, actuator: Actuator, k: np.ndarray, effects: dict[str, dict[str, float]]
+) -> Measurement:
+    if arguments.input:
+        return simulate_open_loop(options.input_of(arguments, actuator), actuator, k, effects)
+    asked = options.run_of(arguments, actuator, arguments.sample_rate)
+    if arguments.model == "rm":
+        return simulate_reference(asked, actuator, k, effects)
+    return simulate_monitor(asked, actuator, k, effects, arguments.circuit)
 
 
 def _record(arguments: argparse.Namespace, signals: Measurement, k: np.ndarray) -> None:
     from emaviz.recording import RecordingError, RecordingWriter  # rerun takes a second to import
 
-    group = "reference" if arguments.model == "rm" else "monitor"
+    group = "reference" if arguments.model == "rm" and not arguments.input else "monitor"
     try:
         with RecordingWriter(arguments.record) as writer:
             writer.signals(group, signals.time_s, {n: v for n, v in signals.signals.items() if n != "time_s"})

@@ -5,6 +5,8 @@ from __future__ import annotations
 import html
 from collections.abc import Iterable, Sequence
 
+from ema_model.text import Table
+
 
 def escape(text: object) -> str:
     """Text as HTML shows it, in an element or in a quoted attribute."""
@@ -37,6 +39,17 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[object]], *, text_column
     head = "".join(cell("th", i, title) for i, title in enumerate(heads))
     body = "".join("<tr>" + "".join(cell("td", i, v) for i, v in enumerate(row)) + "</tr>" for row in rows)
     return f'<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
+
+
+def document_table(told: Table | None, title: str) -> str:
+    """A table of a result's document, with what stands beside its rows as a last column; nothing for none."""
+    if told is None:
+        return ""
+    remarks = told.remarks or [""] * len(told.rows)
+    beside = any(remarks)
+    rows = [[*row, *([remark] if beside else [])] for row, remark in zip(told.rows, remarks)]
+    rows = table([told.title, *told.head, *([""] if beside else [])], rows)
+    return folded(f"{title} {told.unit}".rstrip(), rows)
 
 
 def link(anchor: str, text: object) -> str:

@@ -105,15 +105,16 @@ def test_a_recorded_command_is_an_input(capsys):
 
 
 def parsed(arguments):
-    parser = command_parser(arguments[0])
-    return parser, parser.parse_args([str(argument) for argument in arguments[1:]])
+    verbs = 2 if arguments[0] == "actuator" else 1
+    parser = command_parser(" ".join(arguments[:verbs]))
+    return parser, parser.parse_args([str(argument) for argument in arguments[verbs:]])
 
 
 @pytest.mark.parametrize("command, name, action", KEPT, ids=[f"{c} {n}" for c, n, _ in KEPT])
 def test_what_was_measured_is_replaced_with_force_only(command, name, action, tmp_path, capsys):
     old = tmp_path / f"old{action.type.suffixes[0]}"
     old.write_text("old")
-    arguments = [*needed(command, "in.csv", action), name, old]
+    arguments = [*needed(command, "in.csv", action), *flag(action, old)]
     assert "exists already; name another file, or replace it with --force" in refused(arguments, capsys)
     assert old.read_text() == "old"
     check_files(*parsed([*arguments, "--force"]))
@@ -141,9 +142,9 @@ def test_a_place_that_cannot_be_written_is_told(command, name, action, tmp_path,
         (f"folder{suffix}", "is a folder"),
         (f"pipe{suffix}", "is not a regular file"),
     ):
-        assert says in refused([*least, name, place], capsys)
+        assert says in refused([*least, *flag(action, place)], capsys)
     (tmp_path / f"dangling{suffix}").symlink_to(tmp_path / f"new{suffix}")
-    check_files(*parsed([*least, name, f"dangling{suffix}"]))
+    check_files(*parsed([*least, *flag(action, f"dangling{suffix}")]))
 
 
 def test_a_folder_without_permission_is_told(tmp_path, monkeypatch):

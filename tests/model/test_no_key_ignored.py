@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from ema_model.actuator import load_actuator, save_actuator
-from ema_model.actuator.layout import CONTROLLER_KINDS, INVERTER_KINDS, layout
+from ema_model.actuator.layout import CONTROLLER_KINDS, INVERTER_KINDS, WITHOUT_DRIVE, layout
 from ema_model.actuator.parameters import SECTIONS, numbers
 from ema_model.actuator.unread import INVERSE_PLACES, WINDING_PLACES, check_value_is_read, unread
 from ema_model.effects import CATALOGUE
@@ -69,7 +69,7 @@ KINDS = [
     (controller, inverter)
     for controller, inverter in product(CONTROLLER_KINDS, INVERTER_KINDS)
     if (controller, inverter) not in (("position", "hysteresis"), ("cascade", "voltage"))
-    and (controller != "unknown" or inverter == "current")
+    and (controller not in WITHOUT_DRIVE or inverter == "current")
 ]
 CIRCUITS = [(c, i, circuit) for c, i in KINDS for circuit in (("reduced", "thesis") if i == "hysteresis" else ("",))]
 WALK = [
@@ -88,7 +88,7 @@ def text(controller: str, inverter: str, values: dict[str, Any], extra: str = ""
     lines = []
     for section in SECTIONS:
         lines.append(f"[{section}]")
-        if section in kinds and not (section == "inverter" and controller == "unknown"):
+        if section in kinds and not (section == "inverter" and controller in WITHOUT_DRIVE):
             lines.append(f'kind = "{kinds[section]}"')
         for name in sum(layout(section, kinds), ()):
             path = f"{section}.{name}"
@@ -122,6 +122,11 @@ def recordings() -> list[Measurement]:
 
 
 RECORDINGS = recordings()
+# For an open loop: currents that move the motor, to the limits and the end stops and back.
+PUSHED = [
+    one.with_signals(current_A=size * np.sin(2.0 * np.pi * rate * one.time_s))
+    for one, size, rate in zip(RECORDINGS, (4.0, 16.0), (15.0, 25.0))
+]
 
 
 def said(actuator, circuit: str) -> list[np.ndarray]:
@@ -129,7 +134,9 @@ def said(actuator, circuit: str) -> list[np.ndarray]:
     plant: Any = (  # each knows its own windows
         InverseDynamics(RECORDINGS, actuator)
         if actuator.controller.kind == "unknown"
-        else ClosedLoop(RECORDINGS, actuator, circuit=circuit or "reduced")
+        else ClosedLoop(
+            PUSHED if actuator.controller.kind == "open" else RECORDINGS, actuator, circuit=circuit or "reduced"
+        )
     )
     k = np.stack([HEALTHY, FAULTY])
     return [values for i in range(len(plant.windows)) for values in plant.signals(i, k=k).values()]

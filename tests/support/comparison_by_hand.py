@@ -187,6 +187,7 @@ def _calibration(before: Actuator, after: Actuator, recordings: Sequence[Compare
         k=np.zeros(8),
         residual=np.zeros(0),
         chi2_per_value=1.3,
+        covariance_scale=1.3,
         signals=[one.model for one in recordings],
         before=[one.initial for one in recordings],
         sensitivities=[],

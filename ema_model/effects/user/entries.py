@@ -24,9 +24,24 @@ from ema_model.effects.user.user_effect import UserEffect
 from ema_model.errors import InputError, quoted
 from ema_model.quantities.numbers import as_number
 
-KINDS = ("user_torque", "torque_curve")
+# The keys of each kind, with what they mean.
+KEYS = {
+    "user_torque": {
+        "expression": 'a torque at the motor, N·m, of theta, omega, q, user, load: "c*omega + A*sin(7*theta)"',
+        "PARAMETER": "a value for each other name in the expression; in its table, low and high bound it",
+    },
+    "torque_curve": {
+        "variable": "theta, omega, q, user or load: what the torque depends on",
+        "modulator": "1, sign_speed or current: what the curve is multiplied by; 1 without it",
+        "low": "where the first knot stands, in the variable's unit",
+        "high": "where the last one stands; over a whole turn of theta, where the first comes again",
+        "values": "N·m at 2 to 24 knots at even distances; each a number, or a table with its tolerance",
+    },
+}
+TITLES = {"user_torque": "Your own torque, as an expression", "torque_curve": "Your own torque, as a curve"}
+KINDS = tuple(KEYS)
 _NAME = re.compile(rf"({'|'.join(KINDS)})(_[A-Za-z0-9_]+)?")
-_CURVE = ("variable", "modulator", "low", "high", "values")
+_CURVE = tuple(KEYS["torque_curve"])
 
 
 def kind_of(name: str) -> str | None:

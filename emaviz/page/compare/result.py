@@ -10,6 +10,7 @@ import numpy as np
 import viser
 
 from ema_model.comparison.result import Comparison, Region
+from ema_model.comparison.words import per_recording
 from ema_model.quantities.numbers import number
 from emaviz.figures import mapped_columns, quantity
 from emaviz.page.compare import WORKSPACE
@@ -19,7 +20,7 @@ from emaviz.page.kept import Cleared
 from emaviz.page.page import Page
 from emaviz.page.playback import PlaybackStrip
 from emaviz.session.opened import Opened
-from emaviz.text.html import Html, add_html, html, joined, unescaped
+from emaviz.text.html import Html, add_html, html, joined, table_of, unescaped
 
 _BOX = Html('style="padding:2px 12px 6px;font-size:13px;line-height:1.45"')
 _CARD = "height:auto!important;min-height:2em;padding:4px 8px;font-weight:400;font-size:13px;"
@@ -227,7 +228,7 @@ def headline(comparison: Comparison) -> Html:
         '<div {}><div style="{}">{}</div>'
         "{}{}"
         '<table style="width:100%;border-collapse:collapse;margin-top:6px;font-variant-numeric:tabular-nums">'
-        "<tr>{}</tr>{}</table></div>",
+        "<tr>{}</tr>{}</table>{}</div>",
         _BOX,
         large,
         first,
@@ -235,6 +236,7 @@ def headline(comparison: Comparison) -> Html:
         warnings,
         head,
         joined(rows),
+        table_of(per_recording(comparison), "Each recording"),
     )
 
 

@@ -10,7 +10,7 @@ import viser
 
 from ema_model.discovery.snapshot import AT_FLOOR, Look
 from ema_model.discovery.tracks import Track, tracks
-from ema_model.discovery.words import FLOOR_NOTE, headline, sentences
+from ema_model.discovery.words import FLOOR_NOTE, headline, per_recording, sentences
 from ema_model.effects import CATALOGUE
 from ema_model.quantities.numbers import number
 from ema_model.recordings import SIGNALS
@@ -25,7 +25,7 @@ from emaviz.page.kept import Cleared
 from emaviz.page.page import Page
 from emaviz.page.playback import PlaybackStrip
 from emaviz.session.discover.discovering import Discovering
-from emaviz.text.html import Html, add_html, html, joined
+from emaviz.text.html import Html, add_html, html, joined, table_of
 
 _RESTING = Html(
     "Choose recordings on the left, and press <b>Start</b>: the model is calibrated, and what it leaves is held "
@@ -183,11 +183,12 @@ def answer(look: Look) -> Html:
         '<div {}><div style="font-size:16px;font-weight:600;color:{};padding:2px 0">'
         "{}</div>{}{}"
         '<div style="opacity:.65;font-size:12px" title="{}">The floor is what noise and the model\'s own limits '
-        "leave: 1 on the ladder.</div></div>",
+        "leave: 1 on the ladder.</div>{}</div>",
         cards.BOX,
         colour,
         first,
         joined(html("<div>{}</div>", text) for text in others),
         warnings,
         FLOOR_NOTE,
+        table_of(per_recording(found), "Each recording"),
     )

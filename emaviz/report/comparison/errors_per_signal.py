@@ -29,9 +29,11 @@ class ErrorsPerSignal(Section[Comparison]):
             "purpose (the inverter's switching). An error over floor near 1 cannot be made smaller."
         )
         parts = [_table(subject, subject.signals, "Signal"), paragraph(note, "small")]
-        if len(subject.recordings) > 1:
+        if len(subject.recordings) + len(subject.holdout) > 1:
             for name in subject.signals:
                 errors = {f"{i + 1}. {one.name}": one.errors[name] for i, one in _with(subject, name)}
+                unseen = (one for one in subject.holdout if name in one.errors)
+                errors |= {f"not fitted: {one.name}": one.errors[name] for one in unseen}
                 title = quantity.of_signal(subject, name).title
                 rows = _table(subject, errors, "Recording", name)
                 title = f"{title}, by recording"

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from ema_model.discovery.words import FLOOR_NOTE, rung_title
+from ema_model.discovery.words import FLOOR_NOTE, per_recording, rung_title
 from ema_model.quantities.numbers import number
 from ema_model.quantities.shown import of_signal
 from emaviz.figures import error_ladder
 from emaviz.report.discovery.subject import Told
-from emaviz.report.markup import paragraph, table
+from emaviz.report.markup import document_table, paragraph, table
 from emaviz.report.section import Figures, Section
 
 
@@ -37,4 +37,5 @@ class Ladder(Section[Told]):
             figures.place(error_ladder.figure(found), 360, "error-ladder")
             + table(heads, rows)
             + paragraph(FLOOR_NOTE, "small")
+            + document_table(per_recording(found), "Each recording")
         )

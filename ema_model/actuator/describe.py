@@ -1,0 +1,121 @@
+"""An actuator from what somebody knows of it: the rest is guessed, with a wide tolerance, so that it can be calibrated.
+
+A description is what its file would hold, as tables of entries under the names that files have.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from ema_model.actuator.actuator import Actuator
+from ema_model.actuator.file import actuator_of
+from ema_model.actuator.layout import WITHOUT_DRIVE, layout
+from ema_model.actuator.naming import on_axes
+from ema_model.actuator.parameters import SECTIONS, default_of, facts_of
+from ema_model.actuator.unread import unread
+from ema_model.errors import InputError, quoted
+from ema_model.quantities.axes import Axes
+
+_GUESSED = 0.3  # tolerance of a guess, relative: 3 σ reach a tenth and twice of it
+_SIMULATED_ALONE = ("motor.static_friction_Nm",)  # inverse dynamics leaves out rest, and sees nothing of it
+_ENTRY = re.compile(r"\s*([^±,]*?)\s*(?:(?:±|\+-)\s*([^±,%]*?)\s*(%)?)?\s*(fixed)?\s*")
+
+
+def entry_of(text: str, where: str) -> dict[str, Any]:
+    """'1e-4 ± 5%', '0 +- 0.02', '3.5' or '3.5 fixed' as an entry of a file; InputError, which begins with `where`."""
+    found = _ENTRY.fullmatch(text)
+    try:
+        if found is None:
+            raise ValueError
+        value, sigma, percent, fixed = found.groups()
+        entry: dict[str, Any] = {"value": float(value)}
+        if sigma is not None:
+            entry |= {"tolerance": float(sigma) / 100.0} if percent else {"sigma": float(sigma)}
+        if fixed:
+            entry["free"] = False
+    except ValueError:
+        raise InputError(
+            f"{where}: write a number, or value±tolerance: 1e-4±5%, 0±0.02; not {quoted(text)!r}"
+        ) from None
+    return entry
+
+
+def needed(controller: str, drive: str) -> tuple[str, ...]:
+    """Every "section.parameter" that the file of an actuator of these kinds must say."""
+    kinds = {"controller": controller, "inverter": drive}
+    return tuple(f"{section}.{name}" for section in SECTIONS for name in layout(section, kinds)[0])
+
+
+def described(document: Mapping[str, Any], controller: str, drive: str, where: str) -> Actuator:
+    """The actuator of these tables, as `actuator_of` reads them, with a guess for what they leave out.
+
+    A value without a tolerance gets the usual one of its parameter, where it has one and a fit can learn of it.
+    Raises InputError, which begins with `where`, for what no such actuator can have.
+    """
+    tables: dict[str, Any] = {name: dict(t) if isinstance(t, Mapping) else t for name, t in document.items()}
+    tables.setdefault("controller", {})["kind"] = controller
+    if controller not in WITHOUT_DRIVE:
+        tables.setdefault("inverter", {})["kind"] = drive
+    axes = actuator_axes(tables)
+    every = [f"{section}.{name}" for section in SECTIONS for name in SECTIONS[section].__annotations__]
+    given = [path for path in every if on_axes(path, axes).name in tables.get(path.partition(".")[0], {})]
+    silent = unread(controller, drive)
+    for path in given:
+        entry = tables[path.partition(".")[0]][on_axes(path, axes).name]
+        if isinstance(entry, dict) and path not in silent and not {"sigma", "tolerance", "free"} & set(entry):
+            entry |= _usual_tolerance(path, axes, entry["value"])
+    for path in sorted(needed(controller, drive), key=lambda path: bool(facts_of(path, axes).follows)):
+        if path not in given:
+            _put(tables, path, axes, _guess(tables, path, axes))
+    if controller == "unknown":
+        for entry in (tables["motor"].get(on_axes(path, axes).name) for path in _SIMULATED_ALONE):
+            if isinstance(entry, dict):
+                entry.pop("tolerance", None)
+    return actuator_of(tables, where)
+
+
+def actuator_axes(tables: Mapping[str, Any]) -> Axes:
+    """The axes of a description whose other tables may still be wrong."""
+    given = tables.get("axes", {})
+    return Axes(str(given.get("motor", "rotary")), str(given.get("user", "rotary")))
+
+
+def is_guess(path: str, actuator: Actuator) -> bool:
+    """Whether a parameter still has the value, and the tolerance, that are written where nobody knows it."""
+    if path not in needed(actuator.controller.kind, actuator.inverter.kind) or facts_of(path, actuator.axes).follows:
+        return False
+    guess = _scaled_guess(path, actuator.axes, actuator.transmission.gear_ratio)
+    if guess == default_of(path) or actuator.value(path) != guess:
+        return False
+    tolerance = actuator.tolerances.get(path)
+    return tolerance is None or math.isclose(tolerance.sigma, _GUESSED * abs(guess))
+
+
+def _guess(tables: Mapping[str, Any], path: str, axes: Axes) -> dict[str, Any]:
+    facts = facts_of(path, axes)
+    section, _, name = facts.follows.partition(".")
+    leader = tables.get(section, {}).get(on_axes(facts.follows, axes).name) if name else None
+    if leader is not None:
+        return dict(leader) if "controller" not in path else {"value": leader["value"]}
+    gear = tables.get("transmission", {}).get("gear_ratio", {}).get("value", 1.0)
+    value = _scaled_guess(path, axes, gear)
+    return {"value": value, "tolerance": _GUESSED} if facts.tolerance and value else {"value": value}
+
+
+def _scaled_guess(path: str, axes: Axes, gear: float) -> float:
+    """A position gain is from the user's error to the motor's speed, and so counts the gear in."""
+    return facts_of(path, axes).guess / (gear if path == "controller.position_gain_1_s" else 1.0)
+
+
+def _put(tables: dict[str, Any], path: str, axes: Axes, entry: dict[str, Any]) -> None:
+    tables.setdefault(path.partition(".")[0], {})[on_axes(path, axes).name] = entry
+
+
+def _usual_tolerance(path: str, axes: Axes, value: float) -> dict[str, float]:
+    facts = facts_of(path, axes)
+    if facts.tolerance and value:
+        return {"tolerance": facts.tolerance}
+    return {"sigma": facts.sigma} if facts.sigma else {}

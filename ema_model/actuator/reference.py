@@ -1,0 +1,144 @@
+"""The reference of every key that an actuator file may have, made of what the reader itself goes by."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import product
+
+from ema_model.actuator import keys
+from ema_model.actuator.layout import CONTROLLER_KINDS, INVERTER_KINDS, WITHOUT_DRIVE, layout
+from ema_model.actuator.naming import on_axes
+from ema_model.actuator.parameters import SECTIONS, default_of, facts_of, numbers
+from ema_model.actuator.unread import unread
+from ema_model.effects import CATALOGUE
+from ema_model.effects.user.entries import KEYS as USERS
+from ema_model.quantities.axes import Axes
+from ema_model.quantities.numbers import number
+
+_LINES = Axes("linear", "linear")
+
+
+@dataclass(frozen=True)
+class ParameterRow:
+    """One parameter as the reference shows it."""
+
+    path: str  # "motor.inertia_kgm2"
+    linear: str  # the name where its axis is linear; the same where nothing changes
+    meaning: str
+    unit: str
+    default: str  # "needed" where a file must say it
+    tolerance: str  # the usual one
+    plausible: str
+    kinds: tuple[str, ...]  # of controller and drive, "cascade, current", that have it
+
+
+def kinds_of_actuators() -> tuple[tuple[str, str], ...]:
+    """Every pair of controller and drive that a file may have."""
+    return tuple(
+        (controller, drive)
+        for controller, drive in product(CONTROLLER_KINDS, INVERTER_KINDS)
+        if (controller, drive) not in (("position", "hysteresis"), ("cascade", "voltage"))
+        and (controller not in WITHOUT_DRIVE or drive == "current")
+    )
+
+
+def parameter_rows() -> Iterator[ParameterRow]:
+    """Every parameter of every kind, in the order of the sections."""
+    rotary = Axes()
+    for section in SECTIONS:
+        for name in numbers(section):
+            path = f"{section}.{name}"
+            facts, named = facts_of(path, rotary), on_axes(path, rotary)
+            having, needing = [], []
+            for controller, drive in kinds_of_actuators():
+                needed, optional = layout(section, {"controller": controller, "inverter": drive})
+                if name in (*needed, *optional) and path not in unread(controller, drive):
+                    having.append(_kind(controller, drive))
+                    if name in needed:
+                        needing.append(having[-1])
+            usual = f"{facts.tolerance:.1%}".replace(".0%", "%") if facts.tolerance else ""
+            yield ParameterRow(
+                path,
+                on_axes(path, _LINES).path,
+                facts.meaning,
+                named.unit,
+                _default(path, having, needing),
+                usual or (f"± {facts.sigma:g}" if facts.sigma else ""),
+                f"{number(facts.low)} … {number(facts.high)}",
+                tuple(having),
+            )
+
+
+def _kind(controller: str, drive: str) -> str:
+    return controller if controller in WITHOUT_DRIVE else f"{controller} + {drive}"
+
+
+def _default(path: str, having: list[str], needing: list[str]) -> str:
+    if having == needing:
+        return "needed"
+    value = default_of(path)
+    shown = "none" if value is None or not math.isfinite(value) or abs(value) >= 1e9 else f"{value:g}"
+    return f"{shown}; needed with {', '.join(needing)}" if needing else shown
+
+
+def markdown() -> str:
+    """The whole reference."""
+    lines = [
+        "# The keys of an actuator file",
+        "",
+        "Made by `emaviz actuator keys` from what the reader of these files goes by. `emaviz actuator new FILE.toml`",
+        "writes such a file with comments; `emaviz actuator check FILE.toml [RECORDING]` says what one lacks.",
+        "",
+        "Units are SI and end the names. On a linear axis a torque is a force, an inertia a mass and an angle",
+        "a length, and the names say so: `inertia_kgm2` becomes `mass_kg`.",
+        "",
+        *_table("Head", keys.HEAD),
+        *_table("A parameter: a number, or a table", keys.ENTRY),
+        *(line for name in ("axes", "model") for line in _table(f"[{name}]", keys.TABLES[name])),
+    ]
+    rows = list(parameter_rows())
+    for section in SECTIONS:
+        lines += [f"## [{section}]", ""]
+        if section in keys.KINDS:
+            choices = "; ".join(f"`{name}` {meaning}" for name, meaning in keys.KINDS[section].items())
+            lines += [f"`kind` is one of: {choices}.", ""]
+        lines += ["| key | on a linear axis | means | unit | default | usual 1 σ | plausible | of |", "|---" * 8 + "|"]
+        for row in rows:
+            if row.path.startswith(f"{section}."):
+                short, linear = (path.partition(".")[2] for path in (row.path, row.linear))
+                other = f"`{linear}`" if linear != short else ""
+                cells = (row.meaning, row.unit, row.default, row.tolerance, row.plausible, _of(row.kinds))
+                lines.append(f"| `{short}` | {other} | {' | '.join(cells)} |")
+        lines.append("")
+    lines += [
+        "## [effects.NAME]",
+        "",
+        "Effects that belong to the actuator's model, several of a kind as `NAME_2`.",
+        "",
+    ]
+    lines += ["| effect | key | on a linear axis | means | range | default |", "|---" * 6 + "|"]
+    for effect in CATALOGUE.values():
+        for parameter in effect.parameters:
+            there = parameter.on(_LINES).shown
+            other = f"`{there}`" if there != parameter.name else ""
+            cells = (parameter.meaning, f"{parameter.low:g} … {parameter.high:g}", f"{parameter.default:g}")
+            lines.append(f"| `{effect.name}` | `{parameter.name}` | {other} | {' | '.join(cells)} |")
+    lines.append("")
+    for name, about in USERS.items():
+        lines += _table(f"[effects.{name}]", about)
+    for name in ("faults", "recordings"):
+        lines += _table(f"[{name}]", keys.TABLES[name])
+    lines += _table("[[recordings.where]]", keys.TABLES["recordings.where"])
+    return "\n".join(lines)
+
+
+def _of(kinds: tuple[str, ...]) -> str:
+    every = [_kind(*pair) for pair in kinds_of_actuators()]
+    return "all" if list(kinds) == every else ", ".join(kinds)
+
+
+def _table(title: str, about: dict[str, str]) -> list[str]:
+    rows = [f"| `{key}` | {meaning.replace('|', '¦')} |" for key, meaning in about.items()]
+    return [f"## {title}", "", "| key | means |", "|---|---|", *rows, ""]

@@ -1,0 +1,79 @@
+"""Many recordings at once: the files of a folder or a pattern, the runs of one file, and which are held out by rule."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import replace
+from fnmatch import fnmatchcase
+from pathlib import Path
+
+import numpy as np
+
+from ema_model.errors import InputError
+from ema_model.files.refusal import listed, refusal, shown
+from ema_model.recordings.formats import FORMATS
+from ema_model.recordings.measurement import Measurement
+
+_MARKS = frozenset("*?[")
+RUN = "#"  # between a file's name and the number of one of its runs
+
+
+def is_pattern(text: str) -> bool:
+    """Whether it is a pattern, and not the name of a file that is there."""
+    return bool(_MARKS & set(text)) and not os.path.exists(text)
+
+
+def files_of(text: str) -> list[str]:
+    """The recordings that a folder holds, or a pattern names, in order of their names; of all else the text itself.
+
+    A folder's own folders are left out, as is what begins with a dot.  InputError where there are none.
+    """
+    path = Path(text)
+    if os.path.isdir(text):
+        found = sorted(str(one) for one in path.iterdir() if _is_recording(one))
+        if not found:
+            raise refusal(text, f"a folder without recordings; they end in {', '.join(FORMATS)}")
+        return found
+    if not is_pattern(text):
+        return [text]
+    anchor = Path(path.anchor) if path.is_absolute() else Path()
+    try:
+        found = sorted(str(one) for one in anchor.glob(str(path.relative_to(anchor))) if _is_recording(one))
+    except (ValueError, OSError, NotImplementedError):
+        found = []
+    if not found:
+        raise refusal(text, "no recording has such a name; check the pattern")
+    return found
+
+
+def _is_recording(path: Path) -> bool:
+    return path.is_file() and path.suffix.lower() in FORMATS and not path.name.startswith(".")
+
+
+def runs_of(measurement: Measurement) -> list[Measurement]:
+    """The runs of one file as recordings of their own, NAME#INDEX, by its `segment`, each with its own time.
+
+    InputError where the file has no such column.
+    """
+    measurement.require("segment")
+    found = []
+    for index in np.unique(measurement["segment"]):
+        keep = measurement["segment"] == index
+        signals = {name: values[keep] for name, values in measurement.signals.items() if name != "segment"}
+        found.append(replace(measurement, signals=signals, name=f"{measurement.name}{RUN}{index:g}"))
+    return found
+
+
+def held_out(measurements: Sequence[Measurement], rule: str) -> tuple[list[Measurement], list[Measurement]]:
+    """Those to fit, and those whose names the rule takes out; InputError where it takes none or all of them."""
+    taken = [fnmatchcase(one.name, rule) for one in measurements]
+    if not any(taken):
+        names = listed([one.name for one in measurements])
+        raise InputError(f"--holdout {shown(rule, 100)}: no recording has such a name (there are {names})")
+    if all(taken):
+        raise InputError(f"--holdout {shown(rule, 100)}: every recording has such a name; leave some to fit")
+    return (
+        [one for one, out in zip(measurements, taken) if not out],
+        [one for one, out in zip(measurements, taken) if out],
+    )

@@ -1,0 +1,89 @@
+"""`emaviz actuator check`: what an actuator file lacks, what is hard to believe, what a recording cannot tell."""
+
+from __future__ import annotations
+
+import argparse
+
+from ema_model.actuator import Actuator, load_actuator
+from ema_model.actuator.naming import on_axes
+from ema_model.actuator.plausible import implausible, missing
+from ema_model.comparison import compare
+from ema_model.estimation.identifiable import told
+from ema_model.quantities.titles import in_sentence
+from ema_model.recordings import read
+from ema_model.text import Document, Lines
+from emaviz.cli import files, options, output
+
+HELP = "say what an actuator file lacks, what is hard to believe, and what a recording cannot tell of it"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """FILE.toml, and a recording with its mapping."""
+    parser.add_argument("file", type=files.ACTUATOR, metavar="FILE.toml", help="the actuator file")
+    parser.add_argument("recording", nargs="?", type=files.RECORDING, metavar="RECORDING", help="of this actuator")
+    options.add_mapping(parser)
+    options.add_json(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Loads, checks, and calibrates where there is a recording."""
+    actuator = load_actuator(arguments.file)
+    found = {"missing": list(missing(actuator)), "implausible": list(implausible(actuator)), "unidentifiable": []}
+    if arguments.recording:
+        for kind, lines in _beside(actuator, arguments).items():
+            found[kind] += lines
+    print(_document(actuator, found, arguments).text)
+    output.write_json(arguments.json, {"name": actuator.name, **found}, 0, output.configuration(arguments))
+    return 0
+
+
+def _beside(actuator: Actuator, arguments: argparse.Namespace) -> dict[str, list[str]]:
+    """What the recording and a calibration by it say."""
+    progress = output.Progress()
+    try:
+        recording = read(arguments.recording, actuator, arguments.mapping)
+        result = compare([recording], actuator, on_progress=progress.show)
+    finally:
+        progress.done()
+    lacking, strange, unseen = [], [], []
+    with_values = [rule for rule in actuator.rules if rule.values]
+    if with_values and not actuator.rules_for(recording.name):
+        patterns = ", ".join(rule.match for rule in with_values)
+        lacking.append(f"no [[recordings.where]] is for {recording.name}; there are {patterns}")
+    calibration = result.calibration
+    if calibration is None:
+        return {}
+    if not calibration.converged:
+        strange.append("the calibration did not converge: the parameters begin too far off, or are too many")
+    for path in calibration.outside_tolerance:
+        one = calibration.parameters[path]
+        shown = on_axes(path, actuator.axes).path
+        strange.append(f"{shown} ends at the edge of its tolerance, at {one.value:g} {one.unit}".rstrip())
+    for one in told(calibration):
+        shown = on_axes(one.name, actuator.axes).path
+        if one.is_unseen:
+            unseen.append(f"{shown}: {recording.name} says nothing of it ({_left(one.left)}); the file's value counts")
+        elif one.is_confounded:
+            others = " and ".join(on_axes(name, actuator.axes).path for name in one.like[:2])
+            unseen.append(f"{shown}: {recording.name} does not tell it from {others} ({_left(one.left)})")
+    return {"missing": lacking, "implausible": strange, "unidentifiable": unseen}
+
+
+def _left(share: float) -> str:
+    return f"{share:.0%} of its tolerance is left"
+
+
+def _document(actuator: Actuator, found: dict[str, list[str]], arguments: argparse.Namespace) -> Document:
+    free = [path for path, tolerance in actuator.tolerances.items() if tolerance.free]
+    count = sum(map(len, found.values()))
+    state = "nothing to complain of" if not count else f"{count} thing{'s' if count > 1 else ''} to look at"
+    told_of = [f"{in_sentence(on_axes(path, actuator.axes).title)}" for path in free]
+    lines = [
+        f"{actuator.name}: {state}",
+        f"controller {actuator.controller.kind}"
+        + ("" if actuator.controller.kind == "unknown" else f", drive {actuator.inverter.kind}")
+        + f"; free to calibrate: {', '.join(told_of) or 'nothing'}",
+    ]
+    if not arguments.recording:
+        lines.append("which of them a recording can tell: emaviz actuator check FILE.toml RECORDING")
+    return Document([Lines(lines), *(Lines(said, title) for title, said in found.items() if said)])

@@ -1,0 +1,24 @@
+"""`emaviz actuator keys`: the reference of every key of an actuator file."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import asdict
+
+from ema_model.actuator.reference import markdown, parameter_rows
+from emaviz.cli import options, output
+
+HELP = "print the reference of every key of an actuator file, as Markdown"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """--json."""
+    options.add_json(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Prints it."""
+    print(markdown())
+    rows = [asdict(row) for row in parameter_rows()]
+    output.write_json(arguments.json, {"parameters": rows}, 0, output.configuration(arguments))
+    return 0

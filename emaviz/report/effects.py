@@ -1,0 +1,95 @@
+"""The library of effects as a small static reference: an index and a page an effect, without script or network."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from ema_model.effects import CATALOGUE, Effect
+from ema_model.effects.effect import FAMILIES
+from ema_model.effects.user.entries import KEYS, TITLES
+from ema_model.errors import InputError, quoted
+from ema_model.files.whole_file import whole_file
+from ema_model.quantities.axes import Axes
+from emaviz.report.markup import escape, paragraph, table
+from emaviz.text.mathml import mathml
+
+_STYLE = (
+    "body{font:16px/1.5 system-ui,sans-serif;max-width:52rem;margin:2rem auto;padding:0 1rem;color-scheme:light dark}"
+    "table{border-collapse:collapse}td,th{padding:2px 14px 2px 0;text-align:left;vertical-align:top}"
+    "math{font-size:1.25em;margin:1rem 0}h2{font-size:1.05em;margin-top:1.4em}"
+)
+_LINEAR = Axes("linear", "linear")
+
+
+def write_effects_reference(folder: str | Path) -> list[Path]:
+    """Writes index.html and a page for each effect and each kind of user's effect; InputError where it cannot."""
+    target = Path(folder)
+    if target.exists() and not target.is_dir():
+        raise InputError(f"--html {quoted(target)}: is a file; name a folder")
+    pages = {"index": _index()}
+    pages |= {name: _page(effect.title, _effect(effect)) for name, effect in CATALOGUE.items()}
+    pages |= {name: _page(TITLES[name], _users(name)) for name in KEYS}
+    written = []
+    try:
+        target.mkdir(parents=True, exist_ok=True)
+        for name, text in pages.items():
+            written.append(target / f"{name}.html")
+            with whole_file(written[-1]) as draft:
+                draft.write_text(text, encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise InputError(f"--html {quoted(target)}: cannot be written ({error.strerror}); check the folder") from None
+    return written
+
+
+def _page(title: str, body: str) -> str:
+    back = '<p><a href="index.html">All effects</a></p>' if title != "Effects" else ""
+    return (
+        '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
+        "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'\">"
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<title>{escape(title)}</title><style>{_STYLE}</style></head>\n"
+        f"<body>{back}<h1>{escape(title)}</h1>\n{body}\n</body></html>\n"
+    )
+
+
+def _index() -> str:
+    parts = []
+    for family, of_what in FAMILIES.items():
+        members = [effect for effect in CATALOGUE.values() if effect.family == family]
+        parts.append(f"<h2>Of {escape(of_what)}</h2>{_links([(e.name, e.title, e.shows) for e in members])}")
+    parts.append(f"<h2>Your own</h2>{_links([(name, TITLES[name], '') for name in KEYS])}")
+    return _page("Effects", "".join(parts))
+
+
+def _links(members: Sequence[tuple[str, str, str]]) -> str:
+    rows = (
+        f'<tr><td><a href="{escape(name)}.html">{escape(title)}</a></td><td>{escape(shows)}</td></tr>'
+        for name, title, shows in members
+    )
+    return f"<table>{''.join(rows)}</table>"
+
+
+def _effect(effect: Effect) -> str:
+    rows = []
+    for one in effect.parameters:
+        there = one.on(_LINEAR).shown
+        rows.append(
+            [one.name, one.meaning, f"{one.low:g} … {one.high:g}", f"{one.default:g}", there * (there != one.name)]
+        )
+    heads = ["Parameter", "means", "range", "default", "on a linear axis"]
+    facts = [["Shows", effect.shows], ["Mistaken for", effect.mistaken_for], ["Source", effect.source]]
+    if effect.duplicates:
+        facts.append(["Duplicates", f"{effect.duplicates}, which a calibration moves"])
+    usual = ", ".join(f"{value:g}" for value in effect.severities)
+    facts.append(["Slight, clear, strong", f"{effect.parameters[0].name} = {usual}"])
+    return (
+        f"{mathml(effect.equation)}{paragraph(effect.explanation)}"
+        f"{table(heads, rows, text_columns=5)}{table(['', ''], facts, text_columns=2)}"
+    )
+
+
+def _users(name: str) -> str:
+    rows = [[key, meaning] for key, meaning in KEYS[name].items()]
+    told = paragraph(f"In an actuator file, the table [effects.{name}]:")
+    return told + table(["Key", "means"], rows, text_columns=2)

@@ -1,0 +1,222 @@
+"""`emaviz actuator`: every shipped actuator described by options alone; what one lacks; the reference of all keys."""
+
+from __future__ import annotations
+
+import builtins
+import io
+import json
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from worked_actuators import BALL_SCREW, WORKED
+
+from ema_model.actuator import load_actuator, save_actuator
+from ema_model.actuator.keys import ENTRY, HEAD, TABLES
+from ema_model.actuator.layout import WITHOUT_DRIVE, layout
+from ema_model.actuator.naming import on_axes
+from ema_model.actuator.parameters import SECTIONS, Facts, facts_of, numbers
+from ema_model.actuator.reference import kinds_of_actuators, markdown, parameter_rows
+from ema_model.actuator.unread import unread
+from ema_model.commands import command
+from ema_model.effects.user.entries import KEYS as USERS
+from ema_model.quantities.axes import Axes
+from ema_model.recordings import Measurement, write_measurement
+from ema_model.simulation.run import Run, simulate_monitor
+from emaviz.cli import main
+
+SHIPPED = Path(__file__).parents[2] / "assets" / "actuators"
+
+
+def new(path, *options) -> int:
+    return main(["actuator", "new", str(path), *options])
+
+
+def check(path, *more, capsys) -> dict:
+    """The result of `actuator check` as JSON."""
+    out = Path(path).with_suffix(".json")
+    assert main(["actuator", "check", str(path), *map(str, more), "--json", str(out)]) == 0
+    capsys.readouterr()
+    return json.loads(out.read_text())
+
+
+@pytest.mark.parametrize("name", WORKED)
+def test_every_shipped_actuator_can_be_described_by_options_alone(name, tmp_path, capsys):
+    path = tmp_path / "mine.toml"
+    assert new(path, *WORKED[name]) == 0
+    assert load_actuator(path) == load_actuator(SHIPPED / f"{name}.toml")
+    assert sorted(WORKED) == sorted(file.stem for file in SHIPPED.glob("*.toml")), "a shipped one without its options"
+
+
+def test_described_axis_simulates_as_the_shipped_one(tmp_path, capsys):
+    path = tmp_path / "mine.toml"
+    new(path, *BALL_SCREW)
+    run = Run(command("sine", {"amplitude_rad": 0.02, "frequency_Hz": 2.0}), 0.5, 2000.0)
+    mine, shipped = (simulate_monitor(run, load_actuator(file)) for file in (path, SHIPPED / "ball_screw.toml"))
+    for name in shipped.signals:
+        np.testing.assert_array_equal(mine[name], shipped[name])
+    # 20 mm at 2 Hz: follows with the lag of Kv = 30 1/s, within its end stops
+    assert 0.015 < np.ptp(mine["user_position_rad"]) / 2.0 < 0.02
+    assert np.max(np.abs(mine["motor_position_rad"])) == pytest.approx(
+        np.max(np.abs(mine["user_position_rad"])) * 2 * np.pi / 0.01, rel=0.01
+    )
+
+
+def test_file_says_what_its_keys_mean_and_offers_the_rest(tmp_path, capsys):
+    path = tmp_path / "mine.toml"
+    assert new(path, "--controller=unknown", "--motor=linear", "--user=linear", "--set=motor.mass_kg=3±10%") == 0
+    text = path.read_text()
+    entry = next(line for line in text.splitlines() if line.startswith("mass_kg"))
+    assert facts_of("motor.inertia_kgm2", Axes("linear", "linear")).meaning in entry and "[kg]" in entry
+    assert any(line.startswith("# current_bias_A = 0.0") for line in text.splitlines())
+    idle = [line for line in text.splitlines() if line.startswith("# ") and " = " in line.partition("  #")[0]]
+    path.write_text("\n".join(line.removeprefix("# ") if line in idle else line for line in text.splitlines()))
+    load_actuator(path)  # each of them may be taken as it stands
+
+
+@pytest.mark.parametrize(("controller", "drive"), kinds_of_actuators())
+def test_kinds_alone_make_a_file_whose_guesses_are_told(controller, drive, tmp_path, capsys):
+    path = tmp_path / "mine.toml"
+    assert new(path, f"--controller={controller}", f"--drive={drive}") == 0
+    actuator = load_actuator(path)
+    assert actuator.controller.kind == controller
+    found = check(path, capsys=capsys)
+    assert any("motor.inertia_kgm2" in line and "guess" in line for line in found["missing"])
+    assert not found["implausible"]
+    save_actuator(actuator.with_values({"motor.inertia_kgm2": 2e-4}), path)
+    assert not any("inertia" in line for line in check(path, capsys=capsys)["missing"])
+
+
+def test_questions_on_a_terminal_make_the_same_file(tmp_path, capsys, monkeypatch):
+    answers = {
+        "Does the motor": "",
+        "Does what it moves": "linear",
+        "Which controller": "casc",
+        "Which drive": "current",
+        "Transmission gear ratio": f"{0.01 / (2 * np.pi)!r}",
+    }
+    for path, value in (one.removeprefix("--set=").split("=") for one in BALL_SCREW if one.startswith("--set=")):
+        inside = next(p for p in _paths() if on_axes(p, Axes("rotary", "linear")).path == path)
+        answers[on_axes(inside, Axes("rotary", "linear")).title] = value
+    asked = []
+
+    def answer(question: str) -> str:
+        asked.append(question)
+        matching = [name for name in answers if question.startswith(name)]
+        return answers[max(matching, key=len)] if matching else ""
+
+    monkeypatch.setattr(builtins, "input", answer)
+    monkeypatch.setattr(sys, "stdin", type("Terminal", (io.StringIO,), {"isatty": lambda self: True})())
+    asked_for, given = tmp_path / "asked.toml", tmp_path / "given.toml"
+    assert new(asked_for) == 0 and new(given, *BALL_SCREW) == 0
+    mine, other = load_actuator(asked_for), load_actuator(given)
+    assert len(asked) < 25
+    # what is not needed is not asked for: play, stops and sensors are in the file to be taken
+    rest = {"transmission": other.transmission, "sensors": other.sensors, "tolerances": other.tolerances}
+    assert mine.transmission.gear_ratio == other.transmission.gear_ratio
+    assert replace(mine, **rest, name="", description="") == replace(other, name="", description="")
+
+
+def _paths() -> list[str]:
+    return [f"{section}.{name}" for section in SECTIONS for name in numbers(section)]
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"motor.inertia_kgm2": 130.0}, "in g·cm² it would be 1.30·10⁻⁵ kg·m²"),
+        ({"controller.speed_limit_rad_s": 80000.0}, "in rpm it would be 8378 rad/s"),
+        ({"motor.inductance_H": 720.0}, "in µH it would be 0.000720 H"),
+        ({"motor.static_friction_Nm": 0.01}, "what stands is held by no less than what moves"),
+        ({"motor.static_friction_Nm": 2.0, "motor.dynamic_friction_Nm": 2.0}, "it cannot move"),
+        ({"controller.torque_constant_Nm_A": 0.15}, "the controller counts with another motor"),
+        ({"controller.speed_limit_rad_s": 2000.0}, "the motor's back-EMF takes the whole supply"),
+        ({"controller.speed_gain_Nms_rad": 5.0}, "too fast for steps of"),
+    ],
+)
+def test_what_is_hard_to_believe_is_told(change, says, tmp_path, capsys):
+    path = tmp_path / "mine.toml"
+    save_actuator(load_actuator().with_values(change), path)
+    assert any(says in line for line in check(path, capsys=capsys)["implausible"])
+
+
+def test_shipped_actuators_are_believed(capsys, tmp_path):
+    for file in SHIPPED.glob("*.toml"):
+        path = tmp_path / file.name
+        path.write_text(file.read_text())
+        assert not check(path, capsys=capsys)["implausible"], file.name
+
+
+def test_what_a_recording_cannot_tell_is_told(tmp_path, capsys):
+    """A free inverse-dynamics motor: torque constant, inertia and friction show by their ratios alone."""
+    rng = np.random.default_rng(3)
+    time = np.arange(0.0, 4.0, 2e-3)
+    position = 30.0 * np.sin(2.0 * np.pi * (0.5 * time + 0.3 * time**2))
+    speed = np.gradient(position, time)
+    torque = 2e-4 * np.gradient(speed, time) + 0.02 * np.sign(speed)
+    current = torque / 0.05 + 0.01 * rng.standard_normal(len(time))
+    signals = {"time_s": time, "motor_position_rad": position, "current_A": current}
+    write_measurement(Measurement(signals), tmp_path / "free.csv")
+    path = tmp_path / "mine.toml"
+    loose = [f"--set=motor.{name}±30%" for name in ("torque_constant_Nm_A=0.05", "inertia_kgm2=2e-4")]
+    more = ["--set=motor.dynamic_friction_Nm=0.02±30%", "--set=motor.viscous_friction_Nms_rad=0±1e-5"]
+    assert new(path, "--controller=unknown", *loose, *more) == 0
+    found = check(path, tmp_path / "free.csv", capsys=capsys)["unidentifiable"]
+    assert any("motor.torque_constant_Nm_A: free does not tell it from motor.inertia_kgm2" in line for line in found)
+    assert not any("viscous" in line.partition(":")[0] for line in found)
+    known = [one.replace("0.05±30%", "0.05 fixed") for one in loose]
+    assert new(path, "--force", "--controller=unknown", *known, *more) == 0
+    assert not check(path, tmp_path / "free.csv", capsys=capsys)["unidentifiable"]
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        ([], "say --controller"),
+        (["--controller=cascade", "--drive=voltage"], "a cascade needs kind"),
+        (["--controller=unknown", "--set=motor.inerta=3"], "[motor] has no parameter 'inerta'"),
+        (["--controller=unknown", "--set=motor.inertia_kgm2=3,5"], "write a number, or value±tolerance"),
+        (["--controller=unknown", "--set=motor.inertia_kgm2=-3"], "must be above 0"),
+        (["--controller=unknown", "--set=motor=3"], "write it as section.name=value"),
+        (["--controller=unknown", "--effect=nothing:a=1"], "no effect 'nothing'"),
+        (["--controller=unknown", "--effect=cogging_torque:a"], "write it as name=value"),
+        (["--controller=unknown", "--where=kp100"], "write it as PATTERN:"),
+        (["--controller=unknown", "--where=kp100:motor.x=1"], "no parameter 'motor.x'"),
+        (["--controller=unknown", "--gear=a/b"], "--gear"),
+        (["--controller=unknown", "--gear=0/1"], "--gear"),
+        (["--controller=unknown", "--gear=1", "--lead-mm=10"], "give one of them"),
+        (["--controller=unknown", "--set=model.step=1"], "[model] has no 'step'"),
+    ],
+)
+def test_a_mistake_is_one_line(options, says, tmp_path, capsys):
+    assert new(tmp_path / "mine.toml", *options) == 2
+    told = capsys.readouterr().err
+    assert says in told and told.count("\n") == 1 and not (tmp_path / "mine.toml").exists()
+
+
+def test_reference_is_what_is_shipped_and_has_every_key():
+    assert (SHIPPED / "KEYS.md").read_text(encoding="utf-8") == markdown() + "\n", "emaviz actuator keys > KEYS.md"
+    text = markdown()
+    rows = {row.path: row for row in parameter_rows()}
+    assert set(rows) == set(_paths())
+    for keys in (HEAD, ENTRY, *TABLES.values(), *USERS.values()):
+        assert all(f"`{key}`" in text for key in keys)
+    for path, row in rows.items():
+        assert isinstance(facts_of(path, Axes()), Facts) and row.meaning
+        section, _, name = path.partition(".")
+        for controller, drive in kinds_of_actuators():
+            shown = controller if controller in WITHOUT_DRIVE else f"{controller} + {drive}"
+            read = name in sum(layout(section, {"controller": controller, "inverter": drive}), ())
+            assert (shown in row.kinds) == (read and path not in unread(controller, drive)), (path, shown)
+
+
+@pytest.mark.parametrize("axes", [Axes(), Axes("rotary", "linear"), Axes("linear", "linear")], ids=str)
+def test_facts_agree_with_each_other(axes):
+    for path in _paths():
+        facts = facts_of(path, axes)
+        far = abs(facts.guess) >= 1e9
+        assert facts.low < facts.high and (far or facts.low <= facts.guess <= facts.high), path
+        assert not (facts.tolerance and facts.sigma), path
+        assert not facts.follows or facts.follows in _paths(), path

@@ -1,0 +1,56 @@
+"""`emaviz effects`: the user's own effects beside the library, and the library as pages."""
+
+from __future__ import annotations
+
+import json
+import re
+from xml.etree import ElementTree
+
+import pytest
+
+from ema_model.effects import CATALOGUE
+from ema_model.effects.user.entries import KEYS
+from emaviz.cli import main
+from emaviz.text.mathml import mathml
+
+
+def test_the_users_own_are_listed_and_explained(tmp_path, capsys):
+    out = tmp_path / "e.json"
+    assert main(["effects", "--json", str(out)]) == 0
+    listed = capsys.readouterr().out
+    names = [one["name"] for one in json.loads(out.read_text())["effects"]]
+    assert names == [*CATALOGUE, *KEYS] and all(name in listed for name in names)
+    for name, keys in KEYS.items():
+        assert main(["effects", name]) == 0
+        told = capsys.readouterr().out
+        assert all(key in told and meaning in told for key, meaning in keys.items())
+
+
+def test_pages_are_whole_and_lead_to_each_other(tmp_path, capsys):
+    folder = tmp_path / "pages"
+    assert main(["effects", "--html", str(folder)]) == 0
+    names = [*CATALOGUE, *KEYS]
+    assert sorted(page.stem for page in folder.iterdir()) == sorted([*names, "index"])
+    index = (folder / "index.html").read_text(encoding="utf-8")
+    assert sorted(re.findall(r'href="(\w+)\.html"', index)) == sorted(names)
+    for name, effect in CATALOGUE.items():
+        text = (folder / f"{name}.html").read_text(encoding="utf-8")
+        assert "<math" in text and "<script" not in text
+        assert all(parameter.name in text for parameter in effect.parameters)
+    (tmp_path / "file").write_text("")
+    assert main(["effects", "--html", str(tmp_path / "file")]) == 2
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_an_equation_is_well_formed_and_loses_no_letter(name):
+    equation = CATALOGUE[name].equation
+    root = ElementTree.fromstring(mathml(equation))
+    shown = "".join(root.itertext())
+    plain = re.sub(r"[\s_^{}/]", "", equation)
+    assert re.sub(r"[\s/]", "", shown) == plain
+
+
+def test_marks_are_set_below_above_and_over():
+    text = mathml("T_f = σ_0 z e^{−s T} (1 − s T/2)")
+    assert "<msub><mi>T</mi><mi>f</mi></msub>" in text and "<msub><mi>σ</mi><mn>0</mn></msub>" in text
+    assert "<msup><mi>e</mi><mrow>" in text and "<mfrac><mi>T</mi><mn>2</mn></mfrac>" in text

@@ -93,7 +93,7 @@ def _read_files(
     found: list[Measurement] = []
     for i, name in enumerate(names):
         progress.show(f"reading {Path(name).name} ({i + 1} of {len(names)})")
-        one = _read(name, arguments, actuator, progress)
+        one = read_one(name, arguments, actuator, progress)
         found += runs_of(one) if arguments.runs else [one]
     if arguments.start_s is None and arguments.stop_s is None:
         return found
@@ -102,7 +102,7 @@ def _read_files(
     return [measurement.selected((start, stop)) for measurement in found]
 
 
-def _read(
+def read_one(
     file: str,
     arguments: argparse.Namespace,
     actuator: Actuator,
@@ -240,7 +240,7 @@ def actuator_of(arguments: argparse.Namespace) -> Actuator:
 
 def input_of(arguments: argparse.Namespace, actuator: Actuator) -> Measurement:
     """The recording of --input, whose current or torque is put in."""
-    return _read(arguments.input, arguments, actuator.in_open_loop(), needs=INPUT_ALONE)
+    return read_one(arguments.input, arguments, actuator.in_open_loop(), needs=INPUT_ALONE)
 
 
 def faults_of(arguments: argparse.Namespace, known: Mapping[str, float] | None = None) -> Any:
@@ -322,7 +322,7 @@ def _command(arguments: argparse.Namespace, actuator: Actuator) -> tuple[Command
         return command(name, settings), 0.5
     if arguments.settings:
         raise InputError("--set changes a built-in command, not a recorded one")
-    recording = _read(name, arguments, actuator, needs=COMMAND_ALONE)
+    recording = read_one(name, arguments, actuator, needs=COMMAND_ALONE)
     recording.require("command_rad")
     return Recorded(recording.time_s, recording["command_rad"], str(name)), recording.duration_s
 

@@ -33,7 +33,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="k2=0.6",
         help="the value of a k at which the life ends; repeat for more",
     )
-    parser.set_defaults(start_s=None, stop_s=None)  # whole recordings are read
     options.add_actuator(parser)
     options.add_mapping(parser)
     options.add_record(parser, "k over the flights")
@@ -53,7 +52,7 @@ def run(arguments: argparse.Namespace) -> int:
         flights = list(
             identify_all(
                 paths,
-                lambda path: options.read_all([str(path)], arguments, actuator, progress)[0],
+                lambda path: options.read_one(str(path), arguments, actuator, progress),
                 actuator,
                 arguments.seed,
                 lambda number, name: progress.show(f"flight {number + 1} of {len(paths)}: {name}"),

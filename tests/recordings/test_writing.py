@@ -15,10 +15,10 @@ from ema_model.errors import InputError
 from ema_model.recordings import SIGNALS, Measurement, write_measurement
 from ema_model.recordings.checks import LARGEST
 from ema_model.recordings.file import read_measurement
-from ema_model.recordings.formats import FORMATS
+from ema_model.recordings.formats import WRITTEN
 
 N = 120
-each_format = pytest.mark.parametrize("suffix", sorted(FORMATS))
+each_format = pytest.mark.parametrize("suffix", sorted(WRITTEN))
 finite = st.floats(-LARGEST, LARGEST)
 
 

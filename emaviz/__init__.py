@@ -9,8 +9,6 @@ import os
 # Said before numpy is imported, and only where the user has not.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-import emaviz.formats  # noqa: F401  they join the family of formats
-
 
 def __getattr__(name: str) -> str:
     """`__version__`, sought when it is asked for, as that takes a while."""

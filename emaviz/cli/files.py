@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Generic, NamedTuple, TypeVar
 
+import emaviz.formats  # noqa: F401  they join the family
 from ema_model.errors import InputError
 from ema_model.files.refusal import shown
 from ema_model.files.user_file import check_user_file

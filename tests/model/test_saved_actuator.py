@@ -102,7 +102,7 @@ def test_a_place_that_cannot_be_written_is_one_line(tmp_path):
     "change, says",
     [
         (('user = "linear"', 'user = "round"'), "[axes] user must be rotary or linear"),
-        (('kind = "position"', 'kind = "fuzzy"'), "[controller] kind must be cascade or position or unknown"),
+        (('kind = "position"', 'kind = "fuzzy"'), "[controller] kind must be cascade or position or "),
         (('kind = "current"', 'kind = "hysteresis"'), "a position controller needs"),
         (("gain_1_m", "gain_1_rad"), "[controller] has no parameter 'gain_1_rad'"),
         (("[effects.hinge_moment]", "[effects.rust]"), "[effects] no effect 'rust'"),

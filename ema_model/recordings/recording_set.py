@@ -31,7 +31,7 @@ def files_of(text: str) -> list[str]:
     """
     path = Path(text)
     if os.path.isdir(text):
-        found = sorted(str(one) for one in path.iterdir() if _is_recording(one))
+        found = [str(one) for one in recordings_in(path)]
         if not found:
             raise refusal(text, f"a folder without recordings; they end in {', '.join(FORMATS)}")
         return found
@@ -45,6 +45,16 @@ def files_of(text: str) -> list[str]:
     if not found:
         raise refusal(text, "no recording has such a name; check the pattern")
     return found
+
+
+def recordings_in(folder: Path) -> list[Path]:
+    """The recordings of a folder in order of their names, without its own folders and what begins with a dot.
+
+    Files of a doubtful suffix count where there are no others: beside measurements, a text is a note.
+    """
+    found = sorted(path for path in folder.iterdir() if _is_recording(path))
+    sure = [path for path in found if path.suffix.lower() not in FORMATS[path.suffix.lower()].doubtful]
+    return sure or found
 
 
 def _is_recording(path: Path) -> bool:

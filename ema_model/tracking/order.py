@@ -10,17 +10,18 @@ from pathlib import Path
 from ema_model.errors import InputError, quoted
 from ema_model.recordings import find_side_file, read_side_file
 from ema_model.recordings.formats import FORMATS
+from ema_model.recordings.recording_set import recordings_in
 
 _NUMBER = re.compile(r"\d+")
 
 
 def flights_in(folder: Path) -> list[Path]:
     """The recordings of a folder in order; InputError where it is none, holds none, or tells no order."""
-    found = [path for path in sorted(folder.iterdir()) if _is_recording(path)]
+    found = recordings_in(folder)
     if not found:
         raise InputError(f"{quoted(folder)}: holds no recording ({', '.join(FORMATS)})")
     for inner in (path for path in sorted(folder.iterdir()) if path.is_dir()):
-        if any(map(_is_recording, inner.iterdir())):
+        if recordings_in(inner):
             told = f"{quoted(folder)}: there are recordings beside it in its folder {quoted(inner.name)}"
             raise InputError(f"{told}; a folder holds the flights of one unit, so move them or name the files")
     ordered = sorted(found, key=lambda path: _when(path))
@@ -53,10 +54,6 @@ def check_order(paths: Sequence[Path]) -> None:
                 f"{quoted(known[0])}; the flights are of one unit"
             )
         known = known or (actuator, path)
-
-
-def _is_recording(path: Path) -> bool:
-    return path.is_file() and path.suffix.lower() in FORMATS
 
 
 def _when(path: Path) -> tuple[int, ...]:

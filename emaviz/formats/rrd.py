@@ -27,4 +27,4 @@ def opened(path: str, most_bytes: int) -> Iterator[Log]:
     yield log
 
 
-FORMAT = log_format(__name__, "Rerun", ".rrd")
+FORMAT = log_format(__name__, "Rerun", ".rrd", doubtful=(".rrd",))

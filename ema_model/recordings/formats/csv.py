@@ -52,7 +52,7 @@ def hinted(hints: Hints) -> Format:
         unusual = _unusual(path, hints)
         return read_table(unusual, names, max_bytes, strict) if unusual else _read(path, names, max_bytes, strict)
 
-    return Format(".csv", "CSV", header, read, _write, (".txt", ".tsv", ".asc", ".lvm"), hinted)
+    return Format(".csv", "CSV", header, read, _write, (".txt", ".tsv", ".asc", ".lvm"), (".txt",), hinted)
 
 
 def _unusual(path: str, hints: Hints) -> TextTable | None:

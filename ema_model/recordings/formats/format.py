@@ -50,6 +50,7 @@ class Format:
     read: Callable[[str, Sequence[str], int, bool], Columns]  # path, names, max_bytes in memory, strict
     write: Callable[[Mapping[str, Array], str], None] | None = None
     others: tuple[str, ...] = ()  # further suffixes of the same kind of file
+    doubtful: tuple[str, ...] = ()  # suffixes that files of other things have as well: notes, settings, a run's record
     hinted: Callable[[Hints], Format] | None = None  # the same for a text of which somebody has said the layout
 
     @property

@@ -163,4 +163,4 @@ def _number(value: float) -> float:
         return float("inf")
 
 
-FORMAT = log_format(__name__, "JSON", ".json", ".jsonl", ".ndjson")
+FORMAT = log_format(__name__, "JSON", ".json", ".jsonl", ".ndjson", doubtful=(".json",))

@@ -27,7 +27,7 @@ _TIME = "time_s"  # what the common clock's column is called: it is in seconds
 INSTALL = "pip install 'emaviz[rigs]'"
 
 
-def log_format(module: str, title: str, *suffixes: str, needs: str = "") -> Format:
+def log_format(module: str, title: str, *suffixes: str, needs: str = "", doubtful: tuple[str, ...] = ()) -> Format:
     """A format whose file is `module`; `needs` is the library that reads it, if it is not always installed."""
 
     def ask(function: str, path: str, max_bytes: int, *more: Any, again: bool = True) -> apart.Answer:
@@ -52,7 +52,7 @@ def log_format(module: str, title: str, *suffixes: str, needs: str = "") -> Form
             check_lengths(path, columns)
         return Columns(columns, lambda row: f"sample {row + 1}", tuple(notes), title)
 
-    return Format(suffixes[0], title, header, read, others=suffixes[1:])
+    return Format(suffixes[0], title, header, read, others=suffixes[1:], doubtful=doubtful)
 
 
 _broken: dict[tuple[object, ...], str] = {}  # the file that broke its reader last, which is not asked of it again

@@ -15,7 +15,7 @@ from ema_model.actuator import Actuator, load_actuator
 from ema_model.comparison.explain import Explanation
 from ema_model.discovery.claims import against, still_against
 from ema_model.discovery.contradiction import contradictions
-from ema_model.discovery.criteria import LARGEST_GROUP, LEAST_BIC, SECOND, TIE
+from ema_model.discovery.criteria import HALF, LARGEST_GROUP, LEAST_BIC, SECOND, TIE
 from ema_model.discovery.evidence import evidence
 from ema_model.discovery.harmonics import Further, further_orders
 from ema_model.discovery.next_experiment import next_experiment
@@ -88,7 +88,7 @@ def walk(
     # Asked early, for a loop whose controller is another one is walked in vain; and again at its end, if it went on.
     opinion = second_opinion(story, tell)
     other = _other(opinion, tell, candidates, most_effects)
-    if opinion is not None and other is not None and opinion.settles(story):
+    if opinion is not None and other is not None and opinion.settles(story) and not _bends(story, tell):
         taken_over(story, opinion)
         walked = other
     else:
@@ -102,6 +102,14 @@ def walk(
             compared(story, opinion, tell)
     story.disagreements = contradictions(story, tell)
     return walked
+
+
+def _bends(story: Story, tell: Progress) -> bool:
+    """Whether a curve of the residual takes half of what the loop leaves, or all: a torque, no controller's."""
+    curve = story.curve(story.left().explanation, tell)
+    if curve is None:
+        return False
+    return at_floor(story.data, curve.fit) or curve.fit.error() < HALF * story.current.error()
 
 
 def _other(

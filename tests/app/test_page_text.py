@@ -102,6 +102,7 @@ def test_recordings_on_compare_and_what_is_said_of_them(app, name):
         wait_until(lambda kind=kind: f"uploads/{kind}{name}.csv" in app.comparing.opened)
         check(app, f"{kind}{name}.csv")
     check(app, f"{name} of a column")
+    wait_until(lambda: not app.comparing.running)  # whose end is said in the same place
     for listener in app.comparing.events.ended:
         listener(f"{name}.csv: line 1, column {name}: is wrong")
     check(app, f"{name}.csv: line 1, column {name}: is wrong")

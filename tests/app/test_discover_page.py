@@ -28,12 +28,6 @@ def signals_in_front(app):
 
 
 @pytest.fixture
-def page(shared_page):
-    """The module's one tab."""
-    return shared_page
-
-
-@pytest.fixture
 def discover(page, app):
     """The page on its Discover tab."""
     app.strip.play(False)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 from typing import Any
 
-from playwright.sync_api import TimeoutError
+from playwright.sync_api import Error
 
 from emaviz.page.app import App
 
@@ -42,28 +42,40 @@ class Tab:
 
     def as_new(self) -> Any:
         """The page with each group's first tab in front, folders as at first, nothing told, and its charts drawn."""
-        if self._page is None:
-            self._page = self._browser.new_page(viewport={"width": 1400, "height": 900})
-            if not self._scene:
-                self._page.add_init_script(UNDRAWN)
-            self._page.on("request", lambda request: self._asked.append(request.url))
-            self._page.goto(self._app.address)
-            self._page.get_by_role("tab", name="Explore").wait_for(timeout=60_000)
-            self._page.wait_for_function(CHARTS_DRAWN, timeout=60_000)
-            self._folders = self._page.evaluate(FOLDERS)
-            return self._page
+        if self._page is not None:
+            try:
+                self._take_back()
+                return self._page
+            except Error:  # on a loaded machine; a page that is loaded anew is as new, too
+                self._page.close()
+        self._load()
+        return self._page
+
+    def _load(self) -> None:
+        self._page = self._browser.new_page(viewport={"width": 1400, "height": 900})
+        if not self._scene:
+            self._page.add_init_script(UNDRAWN)
+        self._page.on("request", lambda request: self._asked.append(request.url))
+        self._page.goto(self._app.address)
+        self._page.get_by_role("tab", name="Explore").wait_for(timeout=60_000)
+        self._page.wait_for_function(CHARTS_DRAWN, timeout=60_000)
+        self._folders = self._page.evaluate(FOLDERS)
+
+    def _take_back(self) -> None:
         self._page.set_default_timeout(30_000)
         self._page.evaluate(TURN_BACK, self._folders)
-        while (tab := self._page.query_selector(BEHIND)) is not None:
-            with contextlib.suppress(TimeoutError):  # the app may put the tab's whole group away meanwhile
+        for _ in range(20):
+            tab = self._page.query_selector(BEHIND)
+            if tab is None:
+                break
+            with contextlib.suppress(Error):  # the app may put the tab's whole group away meanwhile
                 tab.click(timeout=2_000)
-                self._page.wait_for_function(IN_FRONT, arg=tab)
+                self._page.wait_for_function(IN_FRONT, arg=tab, timeout=2_000)
         while said := self._page.locator(SAID).count():
             self._page.evaluate(f"document.querySelectorAll('{SAID}').forEach(one => one.click())")
             self._page.wait_for_function(f"document.querySelectorAll('{SAID}').length < {said}")
-        self._page.wait_for_function(CHARTS_DRAWN, timeout=60_000)
+        self._page.wait_for_function(CHARTS_DRAWN)
         self._hear_out()
-        return self._page
 
     def _hear_out(self) -> None:
         """Returns when the tab has taken all that the app has said, which would undo what a test does meanwhile."""

@@ -27,6 +27,7 @@ from emaviz.server.door import Door
 from emaviz.server.gate import Gate
 from emaviz.server.messages import LARGEST_FRAME
 from emaviz.server.policy import protect
+from emaviz.server.viser_private import keep_icons
 
 _opening = threading.Lock()
 
@@ -42,6 +43,7 @@ def open_server(
     door = Door(host) if door is None else door
     _check_free(host, port)
     complain = Complaints()
+    keep_icons()
     opened: concurrent.futures.Future[viser.ViserServer] = concurrent.futures.Future()
     with _opening:  # viser takes no hook, so its `serve` is wrapped while this server starts
         plain = websockets.asyncio.server.serve

@@ -1,12 +1,29 @@
-"""The inside of viser 1.1 that guarding it needs, all of it here."""
+"""The inside of viser 1.1 that the app needs, all of it here."""
 
 from __future__ import annotations
 
+import zipfile
+from functools import cache
 from typing import Any
 
 import viser
-from viser import _messages
+from viser import _gui_api, _gui_handles, _icons, _messages
 from websockets.datastructures import Headers
+
+
+def keep_icons() -> None:
+    """Icons are read once: viser opens its archive of 5,000, most of a tenth of a second, for each of ours again."""
+    _gui_api.svg_from_icon = _gui_handles.svg_from_icon = _icon  # type: ignore[assignment]
+
+
+@cache
+def _icon(name: str) -> str:
+    return _archive().read(f"{name}.svg").decode()
+
+
+@cache
+def _archive() -> zipfile.ZipFile:
+    return zipfile.ZipFile(_icons.ICONS_DIR / "tabler-icons.zip")
 
 
 class Inside:

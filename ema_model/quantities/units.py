@@ -152,7 +152,16 @@ def find_unit(text: str, dimension: str) -> Unit | None:
     `counts/4096` is an encoder's counts of 4096 per turn, `counts/4096/s` its rate; without the number the
     unit is known but cannot be converted: its numerator is NaN.
     """
+    return _spelt(plain(text), dimension)
+
+
+def dimensions_of(text: str) -> list[str]:
+    """The dimensions in which the text names a unit."""
     spelling = plain(text)
+    return [dimension for dimension in UNITS if _spelt(spelling, dimension)]
+
+
+def _spelt(spelling: str, dimension: str) -> Unit | None:
     if spelling in UNITS.get(dimension, {}):
         return UNITS[dimension][spelling]
     counts = _COUNTS.fullmatch(spelling)
@@ -163,11 +172,6 @@ def find_unit(text: str, dimension: str) -> Unit | None:
             return Unit(f"counts{rate}", dimension, float("nan"))
         return Unit(f"counts/{per_turn}{rate}", dimension, 2.0 * pi, float(per_turn))
     return None
-
-
-def dimensions_of(text: str) -> list[str]:
-    """The dimensions in which the text names a unit."""
-    return [dimension for dimension in UNITS if find_unit(text, dimension)]
 
 
 def known_units(dimension: str) -> list[str]:

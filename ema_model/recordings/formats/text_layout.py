@@ -11,9 +11,10 @@ import csv
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 from ema_model.files.refusal import refusal, shown
-from ema_model.quantities.units import UNITS, find_unit
+from ema_model.quantities.units import dimensions_of
 from ema_model.recordings.formats.stamps import is_stamp
 
 HEAD_BYTES = 65_536
@@ -187,21 +188,22 @@ def is_units(row: Sequence[str]) -> bool:
     return bool(cells) and sum(map(_is_unit, cells)) > 0.5 * len(cells) and not all(cell in "1-" for cell in cells)
 
 
+@lru_cache(1000)
 def _is_unit(text: str) -> bool:
-    return text.lower() in _UNIT_WORDS or (len(text) <= 24 and any(find_unit(text, one) for one in UNITS))
+    return text.lower() in _UNIT_WORDS or (len(text) <= 24 and bool(dimensions_of(text)))
 
 
 def _is_names(rows: Sequence[Sequence[str]], at: int) -> bool:
     """Whether a line may hold the columns' names: no numbers, unless the next line holds their units."""
     row = rows[at]
     filled = [cell for cell in row if cell.strip()]
-    if len(row) < 2 or 2 * len(filled) < len(row):
+    if len(row) < 2 or 2 * len(filled) < len(row) or is_number(filled[0]):
         return False
     if is_units(row) and at > 0 and len(rows[at - 1]) == len(row) and not is_units(rows[at - 1]):
         return False  # those of the names above it
     if any(is_number(cell) or is_stamp(cell) for cell in filled):
         below = rows[at + 1] if at + 1 < len(rows) else []
-        return not is_number(filled[0]) and len(below) == len(row) and is_units(below)
+        return len(below) == len(row) and is_units(below)
     return True
 
 
@@ -233,9 +235,7 @@ def _is_data(row: Sequence[str], width: int) -> bool:
 def _signs(cells: Sequence[str], separator: str) -> tuple[str, str]:
     """The decimal sign, and what sets thousands off."""
     numbers = [cell for cell in cells if _NUMBER.fullmatch(cell)]
-    blanks = next(
-        (sign for cell in numbers if _THOUSANDS.fullmatch(cell) for sign in cell if sign in "'\u00a0\u202f "), ""
-    )
+    blanks = next((sign for cell in numbers if _THOUSANDS.fullmatch(cell) for sign in cell if sign in _BLANKS), "")
     with_comma = any("," in cell for cell in numbers)
     both = next((cell for cell in numbers if "," in cell and "." in cell), "")
     if both:

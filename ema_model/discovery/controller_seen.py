@@ -20,6 +20,7 @@ from ema_model.actuator import Actuator
 from ema_model.discovery.criteria import GAIN_APART, LATE_SAMPLES, LAW_APART, LAW_HOLDS
 from ema_model.models import Model
 from ema_model.models.motion import Motion, motion_of
+from ema_model.quantities.interval import HALF_90
 from ema_model.recordings import Measurement
 
 Array = NDArray[np.float64]
@@ -32,7 +33,6 @@ _LATEST_S = 6e-3  # that a drive may answer by, beyond the delay between the sig
 _DELAYS = 25  # tried
 _AT_LIMIT = 0.97  # of the current's limit, from which on it tells nothing of the gains
 _BLOCKS = 8  # of time, by whose scatter the gains' uncertainty is told
-_Z90 = 1.645
 _LEAST_ROWS = 60
 
 
@@ -210,5 +210,5 @@ def _scatter(runs: Sequence[_Run], delay_s: float, free: NDArray[np.bool_]) -> A
     without = [np.setdiff1d(np.arange(len(torque)), block, assume_unique=True) for block in blocks]
     gains = np.array([np.linalg.lstsq(columns[at] / scale, torque[at], rcond=None)[0] / scale for at in without])
     half = np.zeros(3)
-    half[free] = _Z90 * np.sqrt((_BLOCKS - 1.0) / _BLOCKS * np.sum((gains - gains.mean(axis=0)) ** 2, axis=0))
+    half[free] = HALF_90 * np.sqrt((_BLOCKS - 1.0) / _BLOCKS * np.sum((gains - gains.mean(axis=0)) ** 2, axis=0))
     return half

@@ -85,16 +85,18 @@ def walk(
     """
     own = _Walk(story, tell, candidates, most_effects)
     own.go()
-    # Asked early, for a loop whose controller is another one is walked in vain; and again at its end, if it went on.
-    opinion = second_opinion(story, tell)
-    other = _other(opinion, tell, candidates, most_effects)
+    opinion, other = None, None
+    if story.ladder[-1].rmse > HALF * story.ladder[0].rmse:  # a loop whose controller is another one is walked in vain
+        opinion = second_opinion(story, tell)
+        other = _other(opinion, tell, candidates, most_effects)
     if opinion is not None and other is not None and opinion.settles(story) and not _bends(story, tell):
         taken_over(story, opinion)
         walked = other
     else:
         walked = own.ended()
         opinion = second_opinion(story, tell, opinion)
-        other = other or _other(opinion, tell, candidates, most_effects)
+        blamed = opinion is not None and opinion.blames_controller
+        other = (other or _other(opinion, tell, candidates, most_effects)) if blamed else None
         if opinion is not None and other is not None and opinion.explains_better(story):
             taken_over(story, opinion)
             walked = other

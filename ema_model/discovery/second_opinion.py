@@ -13,7 +13,7 @@ from ema_model.actuator import Actuator, Tolerance
 from ema_model.actuator.unread import INVERSE_PLACES, unread
 from ema_model.comparison.criteria import BAND
 from ema_model.discovery.controller_seen import ControllerSeen, controller_seen
-from ema_model.discovery.criteria import APART, GONE, HALF, HEARD, LOOP_TOLD, MUCH_BETTER
+from ema_model.discovery.criteria import APART, GONE, HEARD, LOOP_TOLD, MUCH_BETTER
 from ema_model.discovery.path import Story, calibrated_story
 from ema_model.discovery.refit import pays
 from ema_model.discovery.remaining import at_floor
@@ -56,12 +56,11 @@ class Opinion:
         return left <= BAND or left <= (1.0 if sure else MUCH_BETTER) * closed.ladder[-1].rmse
 
     def settles(self, closed: Story) -> bool:
-        """Whether the loop need not be walked on: this explains what flowed to its floor, the first step hardly half.
+        """Whether the loop need not be walked on: this explains what flowed to its floor.
 
         A drive's own effect beside another one is left to the loop, which alone can tell the two.
         """
-        first, last = closed.ladder[0].rmse, closed.ladder[-1].rmse
-        return self.story.ladder[-1].rmse <= BAND and last > HALF * first and self.explains_better(closed)
+        return self.story.ladder[-1].rmse <= BAND and self.explains_better(closed)
 
 
 def second_opinion(story: Story, tell: Callable[[str], None], before: Opinion | None = None) -> Opinion | None:

@@ -20,12 +20,12 @@ from ema_model.discovery.remaining import Left
 from ema_model.discovery.result import Added
 from ema_model.discovery.tracks import primary
 from ema_model.effects import find
+from ema_model.quantities.interval import HALF_90
 
 Array = NDArray[np.float64]
 
 AT_FLOOR = BAND  # times the floor, up to which there is little left to find
 _RIVAL = 25.0  # of χ², below which an effect is too faint to be taken for another
-_TO_90 = 1.645  # σ, of a 90 % interval
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +103,7 @@ class Look:
         first = find(one.name, self.found.actuator.axes).parameters[0]
         if first.low > 0.0 or one.predicted_drop <= 0.0:
             return None
-        return _TO_90 * abs(one.settings[first.name]) / math.sqrt(one.predicted_drop)
+        return HALF_90 * abs(one.settings[first.name]) / math.sqrt(one.predicted_drop)
 
     @property
     def primary(self) -> str:

@@ -31,12 +31,12 @@ class Broken(Exception):
     """The process ended before it answered, or was ended; the text says how, for a person."""
 
 
-def ask(function: str, *arguments: Any, most_bytes: int, patience_s: float, more_to_come: bool = False) -> Answer:
+def ask(function: str, *arguments: Any, most_bytes: int, patience_s: float) -> Answer:
     """What `module:function` answers to arguments that JSON can carry: what JSON can carry, and arrays (n,) each.
 
     Raises the InputError that the function raises, and Broken if it crashes, takes more memory than its libraries
     and `most_bytes`, or more than `patience_s` of time.  One question is answered at a time.  A process that has grown
-    large is given up, unless there are `more_to_come` of the same file.
+    large is given up.
     """
     request = {"function": function, "arguments": arguments, "most_bytes": most_bytes + _GROUND}
     request["most_seconds"] = 2.0 * patience_s  # of computing on all cores, should nobody be left to end it
@@ -58,7 +58,7 @@ def ask(function: str, *arguments: Any, most_bytes: int, patience_s: float, more
         finally:
             was_late = not late.is_alive()
             late.cancel()
-        if not answer or (answer["bytes"] > _LARGE and not more_to_come):
+        if not answer or answer["bytes"] > _LARGE:
             _end()
     if not answer:
         how = f"takes over {patience_s:g} s to read" if was_late else "breaks the library that reads it"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
 from typing import Any
 
 import msgspec
@@ -20,17 +19,6 @@ _NAMES = "SeriesLines:names"
 _RAW = "McapMessage:data"
 _LEFT_OUT = ("McapChannel:", "McapSchema:", "McapStatistics:", "RecordingInfo:", "SeriesLines:", "CoordinateFrame:")
 _MOST_WIDE = 64  # numbers of one sample of an array
-
-
-@contextmanager
-def told() -> Iterator[None]:
-    """Around rerun's reading: whatever it raises becomes a NoLog, panics of its native code too."""
-    try:
-        yield
-    except (NoLog, MemoryError, GeneratorExit, KeyboardInterrupt):
-        raise
-    except BaseException as error:
-        raise NoLog(f"{type(error).__name__}: {error}") from None
 
 
 class Chunks:

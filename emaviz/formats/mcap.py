@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from ema_model.recordings.formats.channels import Log
+from ema_model.recordings.formats.channels import Log, broken_file
 from ema_model.recordings.formats.logs import log_format
 from emaviz.formats import mcap_chunks
 
@@ -19,11 +19,11 @@ def opened(path: str, most_bytes: int) -> Iterator[Log]:
     """The numbers of all topics; NoLog for what rerun cannot read."""
     from rerun.chunk import McapReader
 
-    from emaviz.formats.chunks import Chunks, told
+    from emaviz.formats.chunks import Chunks
 
     with open(path, "rb") as file:
         mcap_chunks.check(file, most_bytes)
-    with told():
+    with broken_file():
         info = McapReader(path).info()
         chunks = Chunks(_TIMELINES, most_bytes)
         decoders = [one for one in McapReader.available_decoders() if one not in ("raw", "schema", "stats", "urdf")]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from ema_model.recordings.formats.channels import Log
+from ema_model.recordings.formats.channels import Log, broken_file
 from ema_model.recordings.formats.logs import log_format
 
 _GROUPS = ("measurement", "reference", "monitor")  # of emaviz's own: the first that there is, is the recording
@@ -17,9 +17,9 @@ def opened(path: str, most_bytes: int) -> Iterator[Log]:
     """The numbers of all entities; NoLog for what rerun cannot read."""
     from rerun.chunk import RrdReader
 
-    from emaviz.formats.chunks import Chunks, told
+    from emaviz.formats.chunks import Chunks
 
-    with told():
+    with broken_file():
         chunks = Chunks(_TIMELINES, most_bytes)
         chunks.take(RrdReader(path).stream())
         root = next((group for group in _GROUPS if chunks.has(group)), "")

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ema_model.errors import InputError
 from ema_model.files.limits import COLUMNS
 from ema_model.files.refusal import shown
-from ema_model.quantities.units import UNITS, find_unit
+from ema_model.quantities.units import dimensions_of
 
 Array = NDArray[np.float64]
 MOST_COLUMNS = 64  # of a table without names: beyond, it is an image, or the table lies on its side
@@ -51,6 +52,20 @@ class NoLog(Exception):
     """The file breaks its format; the text says how, for a person."""
 
 
+@contextmanager
+def broken_file(what: str = "") -> Iterator[None]:
+    """Around a library that checks little: whatever it raises of a file's content is a NoLog, of `what` in it.
+
+    Native code raises panics that are no Exception.
+    """
+    try:
+        yield
+    except (NoLog, InputError, MemoryError, GeneratorExit, KeyboardInterrupt, SystemExit):
+        raise
+    except BaseException as error:
+        raise NoLog(f"{what}: {type(error).__name__}: {error}".removeprefix(": ")) from None
+
+
 def named(channels: Sequence[Channel]) -> dict[str, Channel]:
     """The channels by the names of their columns: their own, with the groups' as far as it takes, and the unit.
 
@@ -70,7 +85,7 @@ def named(channels: Sequence[Channel]) -> dict[str, Channel]:
 def with_unit(name: str, unit: str) -> str:
     """The name as people write it in a table: `speed [rpm]`; as it is where the unit is none that is known."""
     unit = unit.strip()
-    is_known = 0 < len(unit) <= _LONGEST_UNIT and any(find_unit(unit, dimension) for dimension in UNITS)
+    is_known = 0 < len(unit) <= _LONGEST_UNIT and bool(dimensions_of(unit))
     return f"{name} [{unit}]" if is_known and not name.endswith("]") and unit not in ("1", "-") else name
 
 

@@ -7,7 +7,6 @@ when that fails it is read again in blocks, and the one that fails is walked lin
 from __future__ import annotations
 
 import codecs
-import csv
 import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -22,7 +21,7 @@ from ema_model.errors import quoted
 from ema_model.files.limits import LINE_BYTES, megabytes
 from ema_model.files.refusal import listed, refusal, shown
 from ema_model.recordings.formats.format import Array, Columns, Format, check_size
-from ema_model.recordings.formats.text_layout import Hints, find_layout
+from ema_model.recordings.formats.text_layout import Hints, find_layout, split
 from ema_model.recordings.formats.text_table import TextTable, leaves_out, read_table, table_of
 
 _HEAD_BYTES = 65_536
@@ -159,7 +158,7 @@ def _dialect(path: str) -> _Dialect:
     if first == len(lines) - 1 and len(head) == _HEAD_BYTES:
         raise refusal(path, f"line {first + 1} is over 64 kB long; a header line with the columns' names is expected")
     separator = max(_SEPARATORS, key=lines[first].count)
-    names = [name.strip() for name in _cells(lines[first], separator)]
+    names = [name.strip() for name in split(lines[first], separator)]
     if any(_NUMBER.fullmatch(name) for name in names):
         found = f"names of columns are expected, found {listed(names)}"
         raise refusal(path, f"line {first + 1}: {found}; add a header line")
@@ -167,15 +166,6 @@ def _dialect(path: str) -> _Dialect:
     cells = (cell for line in lines[first + 1 : -1] for cell in line.split(separator))
     comma = separator != "," and any(re.fullmatch(r"\s*[+-]?[0-9]*,[0-9]+(e[+-]?[0-9]+)?\s*", c, re.I) for c in cells)
     return _Dialect(names, first + 1, separator, "," if comma else ".")
-
-
-def _cells(line: str, separator: str) -> list[str]:
-    if '"' not in line:
-        return line.split(separator)
-    try:
-        return next(csv.reader([line], delimiter=separator), [])
-    except csv.Error:
-        return line.split(separator)
 
 
 def _check_size(path: str, dialect: _Dialect, names: Sequence[str], max_bytes: int) -> None:
@@ -278,7 +268,7 @@ def _explain_block(
     for number, line in enumerate(block.decode(errors="replace").split("\n"), first):
         if not line:
             continue
-        cells = _cells(line, dialect.separator)
+        cells = split(line, dialect.separator)
         if len(cells) != width:
             hint = "write numbers with a decimal point" if len(cells) == 2 * width else "complete or remove the line"
             found = f"{len(cells)} cell{'s' * (len(cells) != 1)} where the header has {width}"

@@ -21,8 +21,7 @@ from ema_model.recordings.formats.channels import Channel, Log, NoLog, named, to
 from ema_model.recordings.formats.clocks import between, covered, main_clock, usable
 from ema_model.recordings.formats.format import Array, Columns, Format, check_size
 
-_PATIENCE_S = 20.0  # for one question, and as long again for each so many bytes; some libraries never end
-_PATIENCE_BYTES = 40_000_000
+_PATIENCE_S = 20.0  # for one question; some libraries never end
 _TIME = "time_s"  # what the common clock's column is called: it is in seconds
 INSTALL = "pip install 'emaviz[rigs]'"
 
@@ -30,7 +29,7 @@ INSTALL = "pip install 'emaviz[rigs]'"
 def log_format(module: str, title: str, *suffixes: str, needs: str = "", doubtful: tuple[str, ...] = ()) -> Format:
     """A format whose file is `module`; `needs` is the library that reads it, if it is not always installed."""
 
-    def ask(function: str, path: str, max_bytes: int, *more: Any, again: bool = True) -> apart.Answer:
+    def ask(function: str, path: str, max_bytes: int, *more: Any) -> apart.Answer:
         if needs and importlib.util.find_spec(needs) is None:
             raise refusal(path, f"{title} files are read with {needs}, which is not installed: {INSTALL}")
         with open(path, "rb"):
@@ -46,7 +45,7 @@ def log_format(module: str, title: str, *suffixes: str, needs: str = "", doubtfu
         return names
 
     def read(path: str, names: Sequence[str], max_bytes: int, strict: bool) -> Columns:
-        (found, notes, title), arrays = ask("columns_of", path, max_bytes, list(names), strict, again=not strict)
+        (found, notes, title), arrays = ask("columns_of", path, max_bytes, list(names), strict)
         columns = dict(zip(found, arrays))
         if strict:
             check_lengths(path, columns)
@@ -55,7 +54,6 @@ def log_format(module: str, title: str, *suffixes: str, needs: str = "", doubtfu
     return Format(suffixes[0], title, header, read, others=suffixes[1:], doubtful=doubtful)
 
 
-_broken: dict[tuple[object, ...], str] = {}  # the file that broke its reader last, which is not asked of it again
 _last: tuple[object, Log, ExitStack] | None = None  # the file that is looked at: it is asked about more than once
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ema_model.files.limits import ARRAYS
-from ema_model.recordings.formats.channels import Channel, Log, NoLog
+from ema_model.recordings.formats.channels import Channel, Log, NoLog, broken_file
 from ema_model.recordings.formats.logs import log_format
 
 _MASTERS = (2, 3)  # kinds of channels that are their group's time
@@ -20,19 +20,11 @@ def opened(path: str, most_bytes: int) -> Iterator[Log]:
     """The file's channels, by the physical values that its conversions say; NoLog for what cannot be opened."""
     from asammdf import MDF
 
-    try:
+    with broken_file():
         file = MDF(path)
-    except MemoryError:
-        raise
-    except Exception as error:  # the library checks little, and fails in any way
-        raise NoLog(f"{type(error).__name__}: {error}") from None
     with file:
-        try:
+        with broken_file():
             log = _log(file, most_bytes)
-        except (NoLog, MemoryError):
-            raise
-        except Exception as error:
-            raise NoLog(f"{type(error).__name__}: {error}") from None
         yield log
 
 
@@ -83,12 +75,8 @@ def _values(file: Any, group: int, index: int) -> Any:
 
 
 def _read(read: Any) -> Any:
-    try:
+    with broken_file():
         return np.asarray(read())
-    except MemoryError:
-        raise
-    except Exception as error:
-        raise NoLog(f"{type(error).__name__}: {error}") from None
 
 
 FORMAT = log_format(__name__, "MDF", ".mf4", ".mdf", ".mf3", needs="asammdf")

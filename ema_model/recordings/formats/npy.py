@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ema_model.files.refusal import refusal, shown
-from ema_model.recordings.formats.channels import Channel, Log, NoLog, is_table, table
+from ema_model.recordings.formats.channels import Channel, Log, NoLog, broken_file, is_table, table
 from ema_model.recordings.formats.format import check_size
 from ema_model.recordings.formats.logs import log_format
 
@@ -18,12 +18,8 @@ from ema_model.recordings.formats.logs import log_format
 @contextmanager
 def opened(path: str, most_bytes: int) -> Iterator[Log]:
     """The array's columns; NoLog for what is none."""
-    try:
+    with broken_file():  # the header is a Python expression, which fails in any way
         array = np.load(path, mmap_mode="r", allow_pickle=False)
-    except (MemoryError, OSError):
-        raise
-    except Exception as error:  # the header is a Python expression, which fails in any way
-        raise NoLog(f"{type(error).__name__}: {error}") from None
     if not isinstance(array, np.memmap):
         raise NoLog("it is no array of numbers")
     check_size(path, math.prod(array.shape) * array.dtype.itemsize / 8, most_bytes)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ema_model.files.limits import ARRAYS
-from ema_model.recordings.formats.channels import Array, Channel, Log, NoLog
+from ema_model.recordings.formats.channels import Array, Channel, Log, NoLog, broken_file
 from ema_model.recordings.formats.logs import log_format
 
 _INCREMENT, _START, _BEGINS = "wf_increment", "wf_start_offset", "wf_start_time"
@@ -22,19 +22,11 @@ def opened(path: str, most_bytes: int) -> Iterator[Log]:
     import nptdms
 
     del most_bytes  # what is read is counted before
-    try:
+    with broken_file():
         file = nptdms.TdmsFile.open(path)
-    except MemoryError:
-        raise
-    except Exception as error:  # the library checks little, and fails in any way
-        raise NoLog(f"{type(error).__name__}: {error}") from None
     with file:
-        try:
+        with broken_file():
             log = _log(file)
-        except (NoLog, MemoryError):
-            raise
-        except Exception as error:
-            raise NoLog(f"{type(error).__name__}: {error}") from None
         yield log
 
 
@@ -84,12 +76,8 @@ def _ramp(start: float, step: float, samples: int) -> Array:
 
 
 def _read(channel: Any) -> Any:
-    try:
+    with broken_file(repr(channel.name[:40])):
         return channel[:]
-    except MemoryError:
-        raise
-    except Exception as error:
-        raise NoLog(f"{channel.name[:40]!r}: {type(error).__name__}: {error}") from None
 
 
 def _seconds(stamps: Any) -> Array:

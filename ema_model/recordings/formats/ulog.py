@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from ema_model.files.limits import ARRAYS
-from ema_model.recordings.formats.channels import Channel, Log, NoLog
+from ema_model.recordings.formats.channels import Channel, Log, NoLog, broken_file
 from ema_model.recordings.formats.logs import log_format
 
 _STAMP = "timestamp"
@@ -20,13 +20,8 @@ def opened(path: str, most_bytes: int) -> Iterator[Log]:
     from pyulog import ULog
 
     del most_bytes  # the whole file is read, which is no larger than it may be
-    try:
-        file = ULog(path, disable_str_exceptions=True)
-        log = _log(file)
-    except (NoLog, MemoryError):
-        raise
-    except Exception as error:  # the library checks little, and fails in any way
-        raise NoLog(f"{type(error).__name__}: {error}") from None
+    with broken_file():
+        log = _log(ULog(path, disable_str_exceptions=True))
     yield log
 
 

@@ -58,6 +58,10 @@ class Problem:
         self._nominal, self._sigma = (np.array([getattr(u, one) for u in unknowns]) for one in ("nominal", "sigma"))
         self._faults = [(i, u.place) for i, u in enumerate(unknowns) if u.kind == "fault"]
         self._eccentricity = [i for i, place in self._faults if place in ECCENTRICITY]  # both parts, or none
+        self._acting = [
+            np.array([i for i, u in enumerate(unknowns) if places.get(u.kind, u.place) == u.place], dtype=int)
+            for places in map(self._places, range(len(model.windows)))
+        ]
         self._asked = signals or dict.fromkeys(SIGNALS, 1.0)
         self.reweighted(floors)
         if not self.values:
@@ -91,7 +95,7 @@ class Problem:
         residuals, slopes = [], np.zeros((n, self.count, self.values + self.count))
         first = 0
         for window in range(len(self.weights)):
-            acting = np.array([i for i, u in enumerate(self.unknowns) if self._acts(u, window)], dtype=int)
+            acting = self._acting[window]
             count = len(acting)
             points = np.repeat(x[:, None, :], 2 * count + 1, axis=1)
             points[:, 1 + np.arange(count), acting] = low[:, acting]
@@ -116,11 +120,9 @@ class Problem:
         ]
         return np.nan_to_num(np.concatenate([np.zeros((len(x), 0)), *parts], axis=1), nan=1e6, posinf=1e6, neginf=-1e6)
 
-    def _acts(self, unknown: Unknown, window: int) -> bool:
-        """Whether an unknown is anything to a window: a start is its own window's, a load its recording's."""
-        if unknown.kind in ("turned", "play"):
-            return unknown.place == window
-        return unknown.kind != "load" or unknown.place == self.model.windows[window].recording
+    def _places(self, window: int) -> dict[str, int]:
+        """Of the kinds that are not all windows' alike: where a window's own stands."""
+        return {"turned": window, "play": window, "load": self.model.windows[window].recording}
 
     def parts(self) -> list[tuple[int, str, slice]]:
         """Where the residuals of each window's signals stand: window, signal, rows."""
@@ -177,7 +179,7 @@ class Problem:
     def rig(self, x: Array, window: int) -> Rig:
         """What a window is simulated with at x (unknowns,), or for a population (n, unknowns)."""
         values = (self._nominal + self._sigma * x).T
-        places = {"turned": window, "play": window, "load": self.model.windows[window].recording}
+        places = self._places(window)
         own: dict[str, Any] = {u.kind: one for u, one in zip(self.unknowns, values) if places.get(u.kind) == u.place}
         effects: Effects = self.model.effects
         if "load" in own:

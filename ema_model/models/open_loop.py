@@ -30,8 +30,9 @@ def simulate_open_loop(
     the recording's time, or an even grid of its own period.  Faults are of k; a recording without a current raises
     InputError, FloatingPointError one with which the model diverges.
     """
-    still = {name: np.zeros(recorded.samples) for name in ("user_position_rad",) if not _has_motion(recorded)}
-    model = ClosedLoop([recorded.with_signals(**still)], actuator.in_open_loop(), effects=effects, block_s=0.0)
+    if not any(name in recorded for name in _MOTION):
+        recorded = recorded.with_signals(user_position_rad=np.zeros(recorded.samples))
+    model = ClosedLoop([recorded], actuator.in_open_loop(), effects=effects, block_s=0.0)
     source = model.measurements[0]
     parts: list[dict[str, Array]] = []
     for place, window in enumerate(model.windows):
@@ -51,7 +52,3 @@ def simulate_open_loop(
             at = signals["time_s"][int(np.argmin(np.isfinite(signals[name])))]
             raise FloatingPointError(f"the model diverged from {at:g} s on; check the settings")
     return replace(Measurement(signals), name="open loop")
-
-
-def _has_motion(recorded: Measurement) -> bool:
-    return any(name in recorded for name in _MOTION)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ from ema_model.actuator.unread import unread
 from ema_model.errors import InputError, quoted
 from ema_model.faults import vector
 from ema_model.files.limits import TEXT_BYTES
+from ema_model.files.shipped import shipped_folder
 from ema_model.files.toml_text import toml_of
 from ema_model.files.user_file import open_user_file
 from ema_model.quantities.axes import KINDS as AXIS_KINDS
@@ -47,10 +47,7 @@ def actuator_text(path: str | Path) -> str:
 
 def shipped(name: str) -> str:
     """Text of an actuator file that comes with the package (assets/actuators)."""
-    inside = resources.files("ema_model") / "assets" / "actuators" / name
-    if inside.is_file():
-        return inside.read_text(encoding="utf-8")
-    return (Path(__file__).parents[2] / "assets" / "actuators" / name).read_text(encoding="utf-8")
+    return (shipped_folder("actuators") / name).read_text(encoding="utf-8")
 
 
 def parse_actuator(text: str, path: str | Path) -> Actuator:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import tomllib
 from dataclasses import dataclass
-from importlib import resources
 from pathlib import Path
 
 from ema_model.errors import InputError, quoted
+from ema_model.files.shipped import shipped_folder
 
 _FILE = "challenge.toml"
 
@@ -28,8 +28,7 @@ class Challenge:
 
 def folder() -> Path:
     """Where the challenges that come with the package are."""
-    inside = Path(str(resources.files("ema_model") / "assets" / "challenges"))
-    return inside if inside.is_dir() else Path(__file__).parents[2] / "assets" / "challenges"
+    return shipped_folder("challenges")
 
 
 def challenges(where: Path | None = None) -> list[Challenge]:

@@ -15,10 +15,10 @@ from ema_model.estimation.problem import Problem
 from ema_model.estimation.unknowns import ECCENTRICITY, K_SIGMA, Unknown, polar, starts_of, unknowns_of
 from ema_model.faults import named
 from ema_model.models import Model
+from ema_model.quantities.interval import HALF_90
 
 Array = NDArray[np.float64]
 
-_Z90 = 1.645
 _OUTSIDE_Z = 2.99  # from which on a parameter stands at the edge of its tolerance
 _DRAWN = 192  # of the prior, from which further starts are taken
 _STARTS = 5
@@ -261,7 +261,7 @@ def calibrated(problem: Problem, x: Array, covariance: Array) -> dict[str, Calib
     found = {}
     for i, u in enumerate(problem.unknowns):
         value = float(u.nominal + u.sigma * x[i])
-        half = _Z90 * u.sigma * min(1.0, float(np.sqrt(covariance[i, i])))  # never less sure than the file itself
+        half = HALF_90 * u.sigma * min(1.0, float(np.sqrt(covariance[i, i])))  # never less sure than the file itself
         at_bound = bool(x[i] < u.low + 0.01 or x[i] > u.high - 0.01)
         unit = on_axes(u.name, axes).unit
         found[u.name] = Calibrated(value, u.nominal, (value - half, value + half), unit, float(x[i]), at_bound)
@@ -273,7 +273,7 @@ def _eccentricity(problem: Problem, x: Array, covariance: Array) -> dict[str, Ca
     along, across, size = polar(problem.vector(x)[list(ECCENTRICITY)], K_SIGMA**2 * covariance[np.ix_(at, at)])
     k, file = problem.k(x), problem.model.actuator.k
     turned = float((k[6] - file[6] + 0.5) % 1.0 - 0.5)
-    halves = _Z90 * min(K_SIGMA, along), min(0.5, _Z90 * across / max(2.0 * np.pi * size, 1e-9))
+    halves = HALF_90 * min(K_SIGMA, along), min(0.5, HALF_90 * across / max(2.0 * np.pi * size, 1e-9))
     scores = float(k[5] - file[5]) / K_SIGMA, 2.0 * np.pi * float(file[5]) * turned / K_SIGMA
     at_bounds = not 0.01 * K_SIGMA < k[5] < 1.0 - 0.01 * K_SIGMA, False
     return {

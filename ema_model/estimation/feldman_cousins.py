@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import i0e
 
+from ema_model.quantities.interval import HALF_90
+
 Array = NDArray[np.float64]
 
-_Z90 = 1.645
 _FAR = 6.0  # from here on the bound is not felt
 _STEP = 0.02
 
@@ -33,7 +34,7 @@ def length_of_vector(estimate: float) -> tuple[float, float]:
 
 def _interval(kind: str, estimate: float) -> tuple[float, float]:
     if estimate >= _FAR:
-        return estimate - _Z90, estimate + _Z90
+        return estimate - HALF_90, estimate + HALF_90
     truth, low, high = _belt(kind)
     at = max(estimate, float(low[0]) + 1e-9)
     # the truths that would have given this estimate among their likely ones

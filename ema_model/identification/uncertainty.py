@@ -21,10 +21,10 @@ from ema_model.identification.adequacy import Adequacy, adequacy
 from ema_model.identification.fit import FAULTS, Fitted
 from ema_model.identification.model_bias import TWINS
 from ema_model.identification.next_experiment import Suggestion, separating
+from ema_model.quantities.interval import HALF_90
 
 Array = NDArray[np.float64]
 
-_Z90 = 1.645
 _GAIN = 7  # place of the controller's among the faults
 _ALARM = 0.01 / 7  # of each of seven k, so that all together give a false one in 1 % of healthy actuators
 _ALARM_Z = 2.98  # one-sided, of a k that is healthy at 0
@@ -146,7 +146,7 @@ def _covariance(found: Fitted) -> Array:
         of_twins = (1.0 + 1.0 / TWINS) * scores.T @ scores / freedom
         covariance += of_twins
         share = np.diag(of_twins) / np.diag(covariance)
-        wider = stdtrit(freedom / np.maximum(share, 1e-6) ** 2, 0.95) / _Z90  # Welch and Satterthwaite's freedom
+        wider = stdtrit(freedom / np.maximum(share, 1e-6) ** 2, 0.95) / HALF_90  # Welch and Satterthwaite's freedom
         covariance *= np.outer(wider, wider)
     return 0.5 * (covariance + covariance.T)
 
@@ -211,13 +211,13 @@ def _intervals(free: Array, covariance: Array, k: Array) -> Array:
     for i in range(5):
         interval[i] = _bounded(free[i], sigma[i])
     gain = free[_GAIN]
-    interval[7] = gain - _Z90 * sigma[_GAIN], gain + _Z90 * sigma[_GAIN]
+    interval[7] = gain - HALF_90 * sigma[_GAIN], gain + HALF_90 * sigma[_GAIN]
     along, across, length = _polar(free, covariance)
     low, high = length_of_vector(length / along)
     interval[5] = low * along, high * along
     interval = np.clip(interval, 0.0, 1.0)
     interval[:, 0], interval[:, 1] = np.minimum(interval[:, 0], k), np.maximum(interval[:, 1], k)
-    half = _Z90 * across / max(length, 1e-9) / (2.0 * np.pi)
+    half = HALF_90 * across / max(length, 1e-9) / (2.0 * np.pi)
     interval[6] = (0.0, 1.0) if interval[5, 0] <= 0.0 or half >= 0.5 else (k[6] - half, k[6] + half)
     return interval
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 
 from ema_model import faults
 from ema_model.actuator import load_actuator
+from ema_model.files.shipped import shipped_folder
 from ema_model.identification.fit import refine, setting
 from ema_model.identification.objective import Objective
 from ema_model.identification.uncertainty import uncertainty
@@ -49,7 +49,7 @@ class Accuracy:
 @cache
 def accuracy() -> Accuracy:
     """As it was found."""
-    with np.load(_folder() / _FILE) as found:
+    with np.load(shipped_folder("lives") / _FILE) as found:
         return Accuracy(found["own"], found["common"])
 
 
@@ -71,11 +71,6 @@ def find() -> Accuracy:
 
 def write() -> Path:
     """Finds it and keeps it."""
-    found, path = find(), _folder() / _FILE
+    found, path = find(), shipped_folder("lives") / _FILE
     np.savez_compressed(path, own=found.own, common=found.common)
     return path
-
-
-def _folder() -> Path:
-    inside = Path(str(resources.files("ema_model") / "assets" / "lives"))
-    return inside if inside.is_dir() else Path(__file__).parents[2] / "assets" / "lives"

@@ -15,9 +15,9 @@ from ema_model.lives.life import Life
 from ema_model.lives.profiles import profiles_of
 from ema_model.lives.recorded import base_of
 from ema_model.tracking.flight import Flight
+from ema_model.tracking.identify import UNFIT
 
 _STATED = 0.2  # by which what an identification says of its own σ² varies about what it is, in natural logarithms
-_UNUSABLE = "the model does not fit this flight, whatever k"
 
 
 def drawn(life: Life) -> list[Flight]:
@@ -36,7 +36,7 @@ def drawn(life: Life) -> list[Flight]:
         stated = own * np.exp(_STATED * random.standard_normal())
         usable = bool(life.usable[i])
         seen = k + common @ u + error if usable else random.random(8)
-        flights.append(Flight(f"flight_{i + 1:04d}", seen, stated, common, "" if usable else _UNUSABLE))
+        flights.append(Flight(f"flight_{i + 1:04d}", seen, stated, common, "" if usable else UNFIT))
     return flights
 
 

@@ -16,7 +16,7 @@ _NUMBER = re.compile(r"\d+")
 
 
 def flights_in(folder: Path) -> list[Path]:
-    """The recordings of a folder in order; InputError where it is none, holds none, or tells no order."""
+    """The recordings of a folder in order; InputError where it is none, holds none, or a name tells no time."""
     found = recordings_in(folder)
     if not found:
         raise InputError(f"{quoted(folder)}: holds no recording ({', '.join(FORMATS)})")
@@ -24,9 +24,7 @@ def flights_in(folder: Path) -> list[Path]:
         if recordings_in(inner):
             told = f"{quoted(folder)}: there are recordings beside it in its folder {quoted(inner.name)}"
             raise InputError(f"{told}; a folder holds the flights of one unit, so move them or name the files")
-    ordered = sorted(found, key=lambda path: _when(path))
-    check_order(ordered)
-    return ordered
+    return sorted(found, key=_when)
 
 
 def check_order(paths: Sequence[Path]) -> None:

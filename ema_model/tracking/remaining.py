@@ -25,7 +25,11 @@ class Remaining:
     p50: float
     p95: float
     samples: Array  # sorted, of the distribution
-    crossing: tuple[tuple[int, float], ...]  # within so many flights, with which probability
+
+    @property
+    def crossing(self) -> tuple[tuple[int, float], ...]:
+        """Within so many flights, with which probability."""
+        return tuple((flights, self.within(flights)) for flights in AHEAD)
 
     def within(self, flights: float) -> float:
         """The probability of crossing within the next flights."""
@@ -75,8 +79,7 @@ def remaining(worn: Wear, threshold: float, unit: Array, bounded: bool, seed: in
     passage = np.where(distance > 0.0, random.wald(there, (there / uneven) ** 2) + 0.5 * (1.0 + uneven**2), 0.0)
     samples = np.sort(np.minimum(passage, LONGEST))
     p05, p50, p95 = np.quantile(samples, [0.05, 0.5, 0.95])
-    found = Remaining(float(p05), float(p50), float(p95), samples, ())
-    return Remaining(found.p05, found.p50, found.p95, samples, tuple((n, found.within(n)) for n in AHEAD))
+    return Remaining(float(p05), float(p50), float(p95), samples)
 
 
 def _truly_begun(begun: Array, variance: float, bounded: bool, random: np.random.Generator) -> Array:

@@ -10,19 +10,15 @@ from ema_model.tracking.words import answer
 
 def as_dict(result: Tracked) -> dict[str, Any]:
     """Plain values only."""
+    left_out = [{"flight": one.name, "reason": one.excluded} for one in result.flights if one.excluded]
     return {
         "answer": answer(result),
         "trusted": result.trusted,
         "warnings": list(result.warnings),
         "flights": [one.name for one in result.flights],
-        "excluded": {one.name: one.excluded for one in result.flights if one.excluded},
         "correlation": result.correlation.tolist(),
-        "faults": {name: _fault(one) | _excluded(result) for name, one in result.faults.items()},
+        "faults": {name: _fault(one) | {"excluded": left_out} for name, one in result.faults.items()},
     }
-
-
-def _excluded(result: Tracked) -> dict[str, Any]:
-    return {"excluded": [{"flight": one.name, "reason": one.excluded} for one in result.flights if one.excluded]}
 
 
 def _fault(one: FaultTrack) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ema_model import faults
 from ema_model.errors import InputError, quoted
 from ema_model.estimation.unknowns import ECCENTRICITY
+from ema_model.quantities.interval import HALF_90
 from ema_model.tracking.criteria import LEAST_FLIGHTS, LONGEST, MISFIT_SHARE, MISFIT_WINDOW
 from ema_model.tracking.flight import Flight
 from ema_model.tracking.remaining import remaining
@@ -25,7 +26,6 @@ COMPONENTS = len(faults.NAMES)
 _ONE_SIDED = 5  # k1 … k5 grow
 _GAIN = 7
 _RECENT = 10  # flights, over which the unit's share of k̂ is averaged
-_Z90 = 1.645
 
 
 def check_thresholds(thresholds: Mapping[str, float]) -> None:
@@ -126,7 +126,7 @@ class Tracker:
             level = healthy + sign * level
             drift, spread = _mixed(worn.weight, worn.rate, worn.covariance[:, 2])
             drift *= sign
-            drift90 = drift - _Z90 * spread, drift + _Z90 * spread
+            drift90 = drift - HALF_90 * spread, drift + HALF_90 * spread
             reason, left = self._left(name, worn, sign * ((threshold or healthy) - healthy), unit, drift, sign)
         else:
             recent = slice(max(begin, len(k) - _RECENT), None)
@@ -137,7 +137,7 @@ class Tracker:
         if not trusted:
             reason, left = "the model does not fit the last flights; remaining life not told", None
         sigma = float(np.sqrt(sigma**2 + unit[1, 1]))
-        low, high = (float(np.clip(level + z * sigma, 0.0, 1.0)) for z in (-_Z90, _Z90))
+        low, high = (float(np.clip(level + z * sigma, 0.0, 1.0)) for z in (-HALF_90, HALF_90))
         seen = known.trend_at[lead]
         since = "" if seen is None else self._usable[seen].name
         return FaultTrack(

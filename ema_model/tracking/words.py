@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
+from itertools import combinations
 
 from ema_model import faults
+from ema_model.estimation.unknowns import ECCENTRICITY
 from ema_model.quantities.numbers import number
 from ema_model.quantities.titles import in_sentence
 from ema_model.text import Document, Lines, Note, Table
+from ema_model.tracking.criteria import AHEAD
 from ema_model.tracking.result import FaultTrack, Tracked
 
 _MOST_NAMED = 5
@@ -65,12 +68,12 @@ def _table(result: Tracked) -> Table:
 
 
 def _ahead(result: Tracked) -> Table | None:
-    told = [one for one in result.faults.values() if one.remaining]
-    if not told:
-        return None
-    within = [n for n, _ in told[0].remaining.crossing] if told[0].remaining else []
-    rows = [[_called(one.name), *(_chance(p) for _, p in one.remaining.crossing)] for one in told if one.remaining]
-    return Table([str(n) for n in within], rows, "crosses within the next flights, probability")
+    rows = [
+        [_called(one.name), *(_chance(p) for _, p in one.remaining.crossing)]
+        for one in result.faults.values()
+        if one.remaining
+    ]
+    return Table([str(n) for n in AHEAD], rows, "crosses within the next flights, probability") if rows else None
 
 
 def _jumps(result: Tracked) -> list[str]:
@@ -84,12 +87,11 @@ def _jumps(result: Tracked) -> list[str]:
 
 def _trades(result: Tracked) -> list[str]:
     found = []
-    places = [i for i in range(len(faults.NAMES)) if i not in (5, 6)]  # the eccentricity's direction has no place
-    for i in places:
-        for j in places:
-            share = result.correlation[i, j]
-            if i < j and abs(share) > _TRADES:
-                found.append(f"{faults.NAMES[i]} and {faults.NAMES[j]} ({share:+.2f})")
+    places = [i for i in range(len(faults.NAMES)) if i not in ECCENTRICITY]  # its direction has no name of its own
+    for i, j in combinations(places, 2):
+        share = result.correlation[i, j]
+        if abs(share) > _TRADES:
+            found.append(f"{faults.NAMES[i]} and {faults.NAMES[j]} ({share:+.2f})")
     return [f"errors of one flight trade between {', '.join(found)}"] if found else []
 
 

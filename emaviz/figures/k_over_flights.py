@@ -5,11 +5,11 @@ from __future__ import annotations
 import plotly.graph_objects as go
 
 from ema_model.faults import BY_NAME
+from ema_model.quantities.interval import HALF_90
 from ema_model.tracking.result import FaultTrack, Tracked
 from emaviz.colours import DIFFERENCE, MONITOR, REFERENCE
 from emaviz.figures import theme
 
-_Z90 = 1.645
 _FAN = "rgba(224,49,49,0.18)"
 
 
@@ -19,7 +19,7 @@ def figure(result: Tracked, name: str, *, dark: bool = False) -> go.Figure:
     at = [i for i, flight in enumerate(result.flights, 1) if not flight.excluded]
     chart = theme.new(BY_NAME[name].label, "Flight", name, dark=dark)
     names = [theme.plain(flight.name) for flight in result.usable]
-    error = {"type": "data", "array": _Z90 * one.sigma, "thickness": 0.7, "width": 0}
+    error = {"type": "data", "array": HALF_90 * one.sigma, "thickness": 0.7, "width": 0}
     dots = {"size": 4, "color": REFERENCE}
     chart.add_trace(go.Scatter(x=at, y=one.k, error_y=error, mode="markers", marker=dots, text=names, name="measured"))
     now = len(result.flights)

@@ -12,6 +12,7 @@ import rerun.blueprint as rrb
 from numpy.typing import ArrayLike
 
 from ema_model.errors import InputError
+from ema_model.quantities.interval import HALF_90
 from ema_model.tracking.result import Tracked
 from ema_model.tracking.summary import as_dict
 from emaviz.recording import series
@@ -23,7 +24,6 @@ from emaviz.recording.writer import RecordingWriter
 
 FLIGHT = "flight"
 ROOT = "/track"
-_Z90 = 1.645
 _MOST_AHEAD = 400.0  # flights, to which the way to the threshold is drawn
 
 
@@ -63,7 +63,7 @@ class TrackingWriter(RecordingWriter):
         one, colours = self._result.faults[name], GROUP_COLOURS
         self._line(f"{name}/k", f"{name} measured", colours["reference"], self._at, one.k)
         for side, sign in (("low", -1.0), ("high", 1.0)):
-            band = one.k + sign * _Z90 * one.sigma
+            band = one.k + sign * HALF_90 * one.sigma
             self._line(f"{name}/{side}", f"{name} 90 % {side}", colours["floor_low"], self._at, band)
         now = len(self._result.flights)
         ahead = 0.0

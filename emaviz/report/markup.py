@@ -45,11 +45,15 @@ def document_table(told: Table | None, title: str) -> str:
     """A table of a result's document, with what stands beside its rows as a last column; nothing for none."""
     if told is None:
         return ""
+    return folded(f"{title} {told.unit}".rstrip(), with_remarks(told))
+
+
+def with_remarks(told: Table) -> str:
+    """A table of a result's document; what stands beside its rows is a last column."""
     remarks = told.remarks or [""] * len(told.rows)
     beside = any(remarks)
     rows = [[*row, *([remark] if beside else [])] for row, remark in zip(told.rows, remarks)]
-    rows = table([told.title, *told.head, *([""] if beside else [])], rows)
-    return folded(f"{title} {told.unit}".rstrip(), rows)
+    return table([told.title, *told.head, *([""] if beside else [])], rows)
 
 
 def link(anchor: str, text: object) -> str:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from importlib import resources
 from pathlib import Path
 
 from ema_model.actuator import Actuator, load_actuator
+from ema_model.files.shipped import shipped_folder
 from emaviz.session.data_folder import DataFolder
 
 UPLOADED = "uploaded: "  # before the names of those of the data folder
@@ -13,9 +13,7 @@ UPLOADED = "uploaded: "  # before the names of those of the data folder
 
 def shipped_actuators() -> dict[str, Path]:
     """The actuator files that come with the package, by the names in them."""
-    inside = resources.files("ema_model") / "assets" / "actuators"
-    folder = Path(str(inside)) if inside.is_dir() else Path(__file__).parents[2] / "assets" / "actuators"
-    return {load_actuator(path).name: path for path in sorted(folder.glob("*.toml"))}
+    return {load_actuator(path).name: path for path in sorted(shipped_folder("actuators").glob("*.toml"))}
 
 
 def names(folder: DataFolder) -> list[str]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
-from importlib import resources
 from pathlib import Path
 
 from ema_model.campaign.axes import MOST_TASKS
@@ -12,6 +11,7 @@ from ema_model.campaign.plan.document import check_names, document_of, plan_text
 from ema_model.campaign.plan.group import Group, excitation_of
 from ema_model.campaign.task import Task
 from ema_model.errors import InputError, quoted
+from ema_model.files.shipped import shipped_folder
 
 _ENTRIES = ("schema", "title", "about", "like", "runs", "groups")
 
@@ -69,6 +69,4 @@ def plan_path(path: str | os.PathLike[str]) -> Path:
 
 def shipped_plans() -> dict[str, Path]:
     """The plans that come with the package (assets/plans), by name."""
-    inside = Path(str(resources.files("ema_model") / "assets" / "plans"))
-    folder = inside if inside.is_dir() else Path(__file__).parents[3] / "assets" / "plans"
-    return {path.stem: path for path in sorted(folder.glob("*.toml"))}
+    return {path.stem: path for path in sorted(shipped_folder("plans").glob("*.toml"))}

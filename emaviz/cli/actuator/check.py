@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 
 from ema_model.actuator import Actuator, load_actuator
+from ema_model.actuator.layout import WITHOUT_DRIVE
 from ema_model.actuator.naming import on_axes
 from ema_model.actuator.plausible import implausible, missing
 from ema_model.comparison import compare
@@ -77,12 +78,11 @@ def _document(actuator: Actuator, found: dict[str, list[str]], arguments: argpar
     free = [path for path, tolerance in actuator.tolerances.items() if tolerance.free]
     count = sum(map(len, found.values()))
     state = "nothing to complain of" if not count else f"{count} thing{'s' if count > 1 else ''} to look at"
-    told_of = [f"{in_sentence(on_axes(path, actuator.axes).title)}" for path in free]
+    told_of = [in_sentence(on_axes(path, actuator.axes).title) for path in free]
+    drive = "" if actuator.controller.kind in WITHOUT_DRIVE else f", drive {actuator.inverter.kind}"
     lines = [
         f"{actuator.name}: {state}",
-        f"controller {actuator.controller.kind}"
-        + ("" if actuator.controller.kind == "unknown" else f", drive {actuator.inverter.kind}")
-        + f"; free to calibrate: {', '.join(told_of) or 'nothing'}",
+        f"controller {actuator.controller.kind}{drive}; free to calibrate: {', '.join(told_of) or 'nothing'}",
     ]
     if not arguments.recording:
         lines.append("which of them a recording can tell: emaviz actuator check FILE.toml RECORDING")

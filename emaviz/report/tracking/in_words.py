@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ema_model.text import Lines, Note, Table
 from ema_model.tracking.result import Tracked
-from emaviz.report.markup import bullets, paragraph, table
+from emaviz.report.markup import bullets, paragraph, with_remarks
 from emaviz.report.section import Figures, Section
 
 
@@ -23,7 +23,5 @@ class Answer(Section[Tracked]):
             elif isinstance(block, Note):
                 written.append(bullets([block.line], "warning"))
             elif isinstance(block, Table):
-                remarks = block.remarks or [""] * len(block.rows)
-                rows = [[*row, remark] for row, remark in zip(block.rows, remarks)]
-                written.append(table([block.title, *block.head, ""], rows))
+                written.append(with_remarks(block))
         return "".join(written)

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numba
+from numba.core import config
 from numba.core.codegen import get_host_cpu_features
 
 from ema_model.kernel_cache.kept import kept
@@ -25,9 +26,10 @@ def _take_whole_vectors() -> None:
 
     What somebody has said of the processor (NUMBA_CPU_FEATURES) stands.
     """
+    settings: Any = config
     features = get_host_cpu_features()
-    if numba.config.CPU_FEATURES is None and numba.config.CPU_NAME is None and "+avx512f" in features:
-        numba.config.CPU_FEATURES = f"{features},-prefer-256-bit"
+    if settings.CPU_FEATURES is None and settings.CPU_NAME is None and "+avx512f" in features:
+        settings.CPU_FEATURES = f"{features},-prefer-256-bit"
 
 
 _take_whole_vectors()

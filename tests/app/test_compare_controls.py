@@ -35,7 +35,7 @@ def page(browser, app):
     page = browser.new_page(viewport={"width": 1400, "height": 900})
     page.goto(app.address)
     page.get_by_role("tab", name="Compare", exact=True).click(timeout=60_000)
-    page.set_default_timeout(15_000)
+    page.set_default_timeout(60_000)
     yield page
     page.close()
 

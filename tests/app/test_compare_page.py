@@ -82,7 +82,7 @@ def compare(page, app):
     page.get_by_role("tab", name="Compare", exact=True).click()
     page.get_by_role("button", name="Upload a recording").wait_for()
     wait_until(lambda: not app.comparing.running)
-    page.set_default_timeout(15_000)
+    page.set_default_timeout(60_000)
     return page
 
 

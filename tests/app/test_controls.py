@@ -43,7 +43,7 @@ def tab(browser, app):
     page = browser.new_page(viewport={"width": 1400, "height": 900})
     page.goto(app.address)
     page.get_by_role("tab", name="Explore").wait_for(timeout=60_000)
-    page.set_default_timeout(15_000)
+    page.set_default_timeout(60_000)
     yield page
     page.close()
 

@@ -33,7 +33,7 @@ def discover(page, app):
     app.strip.play(False)
     page.get_by_role("tab", name="Discover", exact=True).click()
     page.get_by_label("Recordings", exact=True).wait_for()
-    page.set_default_timeout(20_000)
+    page.set_default_timeout(60_000)
     return page
 
 
@@ -101,18 +101,18 @@ def test_one_effect_with_the_guide(discover, app):
     page.get_by_text("Step 2 of 6").wait_for()
     page.get_by_text("Calibrating the model:").wait_for()  # what goes on, with its seconds
     page.get_by_text("Step 3 of 6").wait_for(timeout=240_000)
-    wait_until(lambda: drawn(page, "Error after each step") == 1, 20.0)
+    wait_until(lambda: drawn(page, "Error after each step") == 1)
     open_card(page, "Cogging torque")
     page.get_by_text("Step 4 of 6").wait_for()
-    wait_until(lambda: drawn(page, "beside what is left") > 20, 20.0)
+    wait_until(lambda: drawn(page, "beside what is left") > 20)
     page.get_by_text("The rotor's magnets pull toward the iron teeth").wait_for()
     page.get_by_role("button", name="Add it to the model").click()
     done(page, app)
     page.get_by_text("Step 5 of 6").wait_for()
     fitted, held = errors(app)
     assert fitted[0] > 1.3 and fitted[-1] < 1.1 and held[-1] < 1.1
-    wait_until(lambda: drawn(page, "Error after each step") == 2, 20.0)
-    wait_until(lambda: drawn(page, "What the residual depends on") > 2, 20.0)
+    wait_until(lambda: drawn(page, "Error after each step") == 2)
+    wait_until(lambda: drawn(page, "What the residual depends on") > 2)
     page.get_by_text("T = A sin(h θ + φ)").first.wait_for()
     assert revealed(page) == "Your answer agrees."
     page.get_by_text("Step 6 of 6").wait_for()
@@ -138,10 +138,10 @@ def test_two_effects_undo_and_a_wrong_answer(discover, app):
     measured = app.playback.motion
     page.get_by_label("3D actuator", exact=True).click()
     page.get_by_role("option", name="model with them").click()
-    wait_until(lambda: app.playback.motion is not measured, 20.0)
+    wait_until(lambda: app.playback.motion is not measured)
     page.get_by_label("3D actuator", exact=True).click()
     page.get_by_role("option", name="as measured").click()
-    wait_until(lambda: np.array_equal(app.playback.motion.motor_rad, measured.motor_rad), 20.0)
+    wait_until(lambda: np.array_equal(app.playback.motion.motor_rad, measured.motor_rad))
     page.get_by_text("Load-dependent friction had been masked").wait_for()
     page.get_by_text("Nothing of the library would take away more than chance does.").wait_for()
 
@@ -182,10 +182,10 @@ def test_an_expression_is_checked_as_it_is_typed_and_fitted(discover, app):
         before = shown.inner_text()
         value.fill(text)
         value.press("Enter")
-        wait_until(lambda before=before: shown.inner_text() != before, 20.0)
+        wait_until(lambda before=before: shown.inner_text() != before)
         errors_told.append(float(shown.inner_text().split("≈")[1].split()[0]))
     assert errors_told[0] < 1.1 < errors_told[1], "a slider shows at once what its value would do"
-    wait_until(lambda: drawn(page, "User's torque beside what is left") > 10, 20.0)
+    wait_until(lambda: drawn(page, "User's torque beside what is left") > 10)
     folder.click()
     done(page, app)
     (effect,) = app.discovering.look.added
@@ -261,7 +261,7 @@ def test_a_challenge_of_ones_own_is_sealed_sent_opened_and_revealed(discover, ap
     upload.set_input_files(broken)
     page.get_by_text("broken.challenge: is no challenge, or damaged").wait_for()
     upload.set_input_files(mine)
-    wait_until(lambda: "colleague" in app.discovering.source.chosen, 20.0)
+    wait_until(lambda: "colleague" in app.discovering.source.chosen)
     page.get_by_text("It hums when it turns.").wait_for()
     page.get_by_text("For <b>you</b>").first.wait_for()
     page.get_by_role("button", name="Start", exact=True).click()
@@ -295,7 +295,7 @@ def test_a_session_brings_the_ladder_back(discover, app):
     assert page.get_by_label("Recordings", exact=True).input_value().endswith("First bench run")
     again = errors(app)
     assert again[0] == pytest.approx(fitted, rel=0.01) and again[1] == pytest.approx(held, rel=0.01)
-    wait_until(lambda: drawn(page, "Error after each step") == 2, 20.0)
+    wait_until(lambda: drawn(page, "Error after each step") == 2)
     page.get_by_text("T = A sin(h θ + φ)").first.wait_for()
 
 

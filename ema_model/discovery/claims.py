@@ -45,7 +45,10 @@ def _against_settled(data: Data, before: Fit, after: Fit, keys: Sequence[str], s
     reason = next((reason for reason in known if reason), "")
     if not reason and not calm.calibration.converged:
         reason = "the fit with it did not converge"
-    return reason or ("" if calm is after else _idle(data, settled(before), calm))
+    if reason or calm is after:
+        return reason
+    first = settled(before)
+    return _idle(data, first, calm) or _little(data, first, calm)
 
 
 def still_against(data: Data, base: Fit, found: Fit, key: str) -> str:

@@ -181,14 +181,17 @@ class Story:
         )
 
     def settle(self, tell: Progress = lambda text: None) -> None:
-        """Fits the last model anew as what it leaves asks for, where that is no noise.
+        """Fits the models anew as what each leaves asks for, where what the last one leaves is no noise.
 
-        Counted in the sensors' noise, an error that the model cannot have outvotes every tolerance.
+        Counted in the sensors' noise, an error that the model cannot have outvotes every tolerance.  All of them, so
+        that the ladder's rungs are of one kind: a settled model may leave more than one that was bent.
         """
-        calm = self.settled(self.current, tell)
-        if calm is not self.current:
-            last = self.steps.pop()
-            self._append(calm, self._rung(last.rung.label, calm), last.added)
+        if self.settled(self.current, tell) is self.current:
+            return
+        before, self.steps = self.steps, []
+        for step in before:
+            calm = self.settled(step.fit, tell)
+            self._append(calm, self._rung(step.rung.label, calm), step.added)
 
     def settled(self, found: Fit, tell: Progress = lambda text: None) -> Fit:
         """A fit made anew as what it leaves asks for; itself where it is at the floor, or is so already."""

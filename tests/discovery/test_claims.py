@@ -111,3 +111,14 @@ def test_what_takes_nothing_away_within_the_tolerances_is_not_claimed(monkeypatc
     monkeypatch.setattr(claims, "at_floor", lambda *_: False)
     assert "does not fall" in claims._idle(DATA, 4.07, 4.06)
     assert not claims._idle(DATA, 4.07, 3.90)
+
+
+@pytest.mark.parametrize(("left", "said"), [(8.8, "it explains"), (4.0, "")])
+def test_the_share_that_counts_is_of_what_the_settled_models_leave(monkeypatch, left, said):
+    """A model that is bent to an error whose cause is not known tells more of it than it may."""
+    monkeypatch.setattr(claims, "ratio", lambda _, found: float(np.sqrt(np.mean(found.residual**2))))
+    monkeypatch.setattr(claims, "at_floor", lambda *_: False)
+    before, after = fitted([1.0, 1.0], noise=5.0), fitted([1.0, 1.0], noise=4.0)
+    settled = {before: fitted([1.0, 1.0], noise=9.1), after: fitted([1.0, 1.0], noise=left)}
+    found = claims._against_settled(DATA, before, after, [KEY], settled.__getitem__)
+    assert found.startswith(said) and bool(found) == bool(said)

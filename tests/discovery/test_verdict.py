@@ -15,6 +15,7 @@ from ema_model.comparison.residuals import Residuals
 from ema_model.comparison.result import SignalError
 from ema_model.comparison.verdict import judge
 from ema_model.discovery import as_dict, begun, result_of
+from ema_model.discovery.claims import ratio
 from ema_model.discovery.path import Step, rung_of
 from ema_model.discovery.result import VERDICTS
 from ema_model.discovery.words import VERDICTS as IN_WORDS
@@ -98,6 +99,14 @@ def test_what_is_not_claimed_is_told_with_the_reason(healthy):
     line = "Torsional compliance is not claimed: the fit with it did not converge."
     assert line in sentences(found) and line in str(found)
     assert as_dict(found)["not_claimed"] == {"torsional_compliance": "the fit with it did not converge"}
+
+
+def test_the_rungs_of_a_ladder_are_of_one_kind(lacking):
+    """A settled model may leave more than the bent one before it, which would read as an effect that does harm."""
+    story = sharper(lacking[1], 4.0)
+    story.settle()
+    assert story.added and all(story.settled(step.fit) is step.fit for step in story.steps)
+    assert all(step.rung.rmse == pytest.approx(ratio(story.data, step.fit)) for step in story.steps)
 
 
 def test_compare_is_bound_by_the_same_band():

@@ -66,6 +66,7 @@ class Step:
     fit: Fit
     rung: Rung
     added: tuple[Added, ...]
+    settled_from: Step | None = None
 
 
 @dataclass
@@ -188,10 +189,13 @@ class Story:
         """
         if self.settled(self.current, tell) is self.current:
             return
+        calms = [self.settled(step.fit, tell) for step in self.steps]  # tell may raise to stop: then all stay
         before, self.steps = self.steps, []
-        for step in before:
-            calm = self.settled(step.fit, tell)
-            self._append(calm, self._rung(step.rung.label, calm), step.added)
+        for step, calm in zip(before, calms):
+            if calm is step.fit:
+                self.steps.append(step)
+            else:
+                self._append(calm, self._rung(step.rung.label, calm), step.added, step)
 
     def settled(self, found: Fit, tell: Progress = lambda text: None) -> Fit:
         """A fit made anew as what it leaves asks for; itself where it is at the floor, or is so already."""
@@ -235,9 +239,9 @@ class Story:
             return f"{on_axes(path, self.current.actuator.axes).path} outside its tolerance"
         return f"+ {in_sentence(find(name).title)}" if name not in CATALOGUE else f"+ {name}"
 
-    def _append(self, found: Fit, rung: Rung, added: Sequence[Added]) -> None:
+    def _append(self, found: Fit, rung: Rung, added: Sequence[Added], settled_from: Step | None = None) -> None:
         # All with the last model's values: what is added later moves what was there.
-        self.steps.append(Step(found, rung, tuple(refreshed(one, found.calibration) for one in added)))
+        self.steps.append(Step(found, rung, tuple(refreshed(one, found.calibration) for one in added), settled_from))
 
     def _rung(self, label: str, found: Fit) -> Rung:
         return rung_of(label, found, self.data, self.held)

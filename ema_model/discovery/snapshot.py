@@ -15,7 +15,7 @@ from ema_model.comparison.explain import Explanation
 from ema_model.comparison.residuals import Residuals
 from ema_model.discovery import Candidate, Discovery, Story
 from ema_model.discovery.criteria import LEAST_BIC
-from ema_model.discovery.path import alike
+from ema_model.discovery.path import Step, alike
 from ema_model.discovery.remaining import Left
 from ema_model.discovery.result import Added
 from ema_model.discovery.tracks import primary
@@ -133,6 +133,14 @@ def assessed(story: Story) -> Assessment:
     signatures = story.signatures(worth)
     rivals = {one.name: signatures[one.name] for one in worth if one.predicted_drop > _RIVAL and one.name in signatures}
     return Assessment(left, ranked, signatures, alike(rivals))
+
+
+def known_of(step: Step, known: Mapping[Step, Assessment]) -> Assessment | None:
+    """What is known of a step, or of the one that it was settled from."""
+    at: Step | None = step
+    while at is not None and at not in known:
+        at = at.settled_from
+    return None if at is None else known[at]
 
 
 def look_at(story: Story, found: Discovery, assessment: Assessment | None, first: Assessment | None = None) -> Look:

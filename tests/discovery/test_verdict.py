@@ -18,6 +18,7 @@ from ema_model.discovery import as_dict, begun, result_of
 from ema_model.discovery.claims import ratio
 from ema_model.discovery.path import Step, rung_of
 from ema_model.discovery.result import VERDICTS
+from ema_model.discovery.snapshot import known_of
 from ema_model.discovery.words import VERDICTS as IN_WORDS
 from ema_model.discovery.words import headline, sentences
 
@@ -107,6 +108,24 @@ def test_the_rungs_of_a_ladder_are_of_one_kind(lacking):
     story.settle()
     assert story.added and all(story.settled(step.fit) is step.fit for step in story.steps)
     assert all(step.rung.rmse == pytest.approx(ratio(story.data, step.fit)) for step in story.steps)
+
+
+def test_a_stop_while_the_rungs_settle_leaves_the_ladder_as_it_was(lacking):
+    story = sharper(lacking[1], 4.0)
+    before, said = list(story.steps), []
+
+    def second_time(text):
+        said.append(text)
+        if len(said) > 1:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        story.settle(second_time)
+    assert story.steps == before
+    story.settle()
+    assert [one.settled_from for one in story.steps] == before
+    ended = {before[0]: "what was known of the calibrated model"}
+    assert known_of(story.steps[0], ended) == ended[before[0]] and known_of(story.steps[1], ended) is None
 
 
 def test_compare_is_bound_by_the_same_band():

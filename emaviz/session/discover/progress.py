@@ -11,7 +11,7 @@ from ema_model.discovery import Candidate, Story, result_of
 from ema_model.discovery.path import Step, with_drops
 from ema_model.discovery.refit import Trial, promising
 from ema_model.discovery.result import Experiment
-from ema_model.discovery.snapshot import Assessment, Look, assessed, look_at
+from ema_model.discovery.snapshot import Assessment, Look, assessed, known_of, look_at
 from ema_model.effects import CATALOGUE
 from emaviz.session.discover.record import experiment_saved, steps_of
 from emaviz.session.discover.refits import Trials
@@ -61,15 +61,15 @@ class Telling:
 
     def look(self) -> Look:
         """A picture of the story as it stands."""
-        story, known = self.story, self.known
+        story = self.story
         found = result_of(story, self.first, self._unknown(), self.experiment)
-        return look_at(story, found, known.get(story.steps[-1]), known.get(story.steps[0]))
+        return look_at(story, found, self.known.get(story.steps[-1]), known_of(story.steps[0], self.known))
 
     def _unknown(self) -> Explanation | None:
         """What is left by the last model; with a torque of no name in it, what that one stands in for."""
         steps = self.story.steps
         nameless = (i for i, step in enumerate(steps) if any(one.name not in CATALOGUE for one in step.added))
-        known = self.known.get(steps[next(nameless, len(steps)) - 1])
+        known = known_of(steps[next(nameless, len(steps)) - 1], self.known)
         return known.left.explanation if known is not None else None
 
     def saved(self) -> dict[str, Any]:

@@ -10,7 +10,7 @@ import numpy as np
 from ema_model.discovery import Candidate, Story
 from ema_model.discovery.path import Step
 from ema_model.discovery.refit import Trial
-from ema_model.discovery.snapshot import Assessment, Look
+from ema_model.discovery.snapshot import Assessment, Look, known_of
 from ema_model.effects import find
 from ema_model.errors import InputError
 from ema_model.quantities.titles import in_sentence
@@ -62,7 +62,7 @@ def check_value(trial: Trial) -> None:
 def undecided(story: Story, known: Mapping[Step, Assessment]) -> tuple[Story, list[Candidate]] | None:
     """The last step at which two candidates were worth a refit, as a story that ends there, and the best two."""
     for at in range(len(story.steps), 0, -1):
-        found = known.get(story.steps[at - 1])
+        found = known_of(story.steps[at - 1], known)
         worth = [one for one in found.candidates if Look.is_worth(one)] if found else []
         if len(worth) > 1:
             return Story(story.data, story.held, story.steps[:at]), worth[:2]

@@ -30,9 +30,9 @@ FLOORS = {
         ["face"],
     ],
     "emaviz": [
-        ["colours", "formats", "text"],
+        ["colours", "text"],
         ["recording"],
-        ["figures"],
+        ["figures", "formats"],
         ["report"],
         ["session"],
         ["server"],

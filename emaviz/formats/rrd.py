@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
 
-from ema_model.recordings.formats.channels import Log, broken_file
+from ema_model.recordings.formats.channels import Log, NoLog, broken_file
 from ema_model.recordings.formats.logs import log_format
 
 _GROUPS = ("measurement", "reference", "monitor")  # of emaviz's own: the first that there is, is the recording
@@ -15,16 +17,24 @@ _TIMELINES = ("sim_time", "sensor_time", "time", "timestamp", "log_time")
 @contextmanager
 def opened(path: str, most_bytes: int) -> Iterator[Log]:
     """The numbers of all entities; NoLog for what rerun cannot read."""
-    from rerun.chunk import RrdReader
-
     from emaviz.formats.chunks import Chunks
 
     with broken_file():
         chunks = Chunks(_TIMELINES, most_bytes)
-        chunks.take(RrdReader(path).stream())
+        chunks.take(_sound(path))
         root = next((group for group in _GROUPS if chunks.has(group)), "")
         log = chunks.log([f"the {root}'s signals of a recording by emaviz"] if root else [], root)
     yield log
+
+
+def _sound(path: str) -> Iterator[Any]:
+    from emaviz.recording.errors import RecordingError
+    from emaviz.recording.sound import sound_chunks
+
+    try:
+        return sound_chunks(Path(path))
+    except RecordingError as error:
+        raise NoLog(str(error)) from None
 
 
 FORMAT = log_format(__name__, "Rerun", ".rrd", doubtful=(".rrd",))

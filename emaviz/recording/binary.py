@@ -11,6 +11,7 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import IO
 
 from emaviz.recording.errors import RecordingError
 
@@ -26,8 +27,11 @@ def rerun_binary() -> Path:
 
 
 @contextmanager
-def started(*arguments: str) -> Iterator[subprocess.Popen[str]]:
-    """The program running, its messages on `stderr`; stopped at the end if it has not ended by itself."""
+def started(*arguments: str, output: IO[bytes] | None = None) -> Iterator[subprocess.Popen[str]]:
+    """The program running, its messages on `stderr`; stopped at the end if it has not ended by itself.
+
+    output: as of `run`.
+    """
     with tempfile.TemporaryDirectory(prefix="emaviz-") as folder:
         # Analytics are on unless a configuration says otherwise; this one is ours alone.
         settings = Path(folder, "rerun", "analytics.json")
@@ -37,7 +41,7 @@ def started(*arguments: str) -> Iterator[subprocess.Popen[str]]:
         process = subprocess.Popen(
             [str(rerun_binary()), *arguments],
             stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL if output is None else output,
             stderr=subprocess.PIPE,
             text=True,
             errors="replace",
@@ -50,9 +54,12 @@ def started(*arguments: str) -> Iterator[subprocess.Popen[str]]:
             process.communicate()
 
 
-def run(*arguments: str, timeout_s: float) -> None:
-    """Runs it to its end; RecordingError with its last message if it fails or takes longer."""
-    with started(*arguments) as process:
+def run(*arguments: str, timeout_s: float, output: IO[bytes] | None = None) -> None:
+    """Runs it to its end; RecordingError with its last message if it fails or takes longer.
+
+    output: a file for what it prints.
+    """
+    with started(*arguments, output=output) as process:
         try:
             _, messages = process.communicate(timeout=timeout_s)
         except subprocess.TimeoutExpired:

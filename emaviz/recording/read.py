@@ -17,6 +17,7 @@ from ema_model.errors import InputError
 from ema_model.files.user_file import open_user_file
 from emaviz.recording import binary
 from emaviz.recording.errors import RecordingError
+from emaviz.recording.sound import sound_chunks
 from emaviz.recording.style import GROUPS, ITERATION, K_NAMES, PROPERTIES, SIM_TIME
 
 Array = NDArray[np.float64]
@@ -86,14 +87,14 @@ def read(path: str | Path) -> Recording:
     """
     path = check(path)
     try:
-        return _verified(path).recording(path)
+        return _Chunks(path).recording(path)
     except Exception as error:  # the reader raises whatever its native part makes of the damage
         first = error
     with tempfile.TemporaryDirectory(prefix="emaviz-") as folder:
         copy = Path(folder, "repaired.rrd")
         try:
             repair(path, copy)
-            recording = _verified(copy).recording(path)
+            recording = _Chunks(copy).recording(path)
         except Exception:
             why = " ".join(str(first).split())
             raise RecordingError(f"{path}: is damaged and cannot be repaired: {why}") from first
@@ -106,9 +107,7 @@ def properties(path: str | Path) -> dict[str, Any]:
     path = check(path)
     found: dict[str, Any] = {}
     try:
-        from rerun.chunk import RrdReader
-
-        for chunk in RrdReader(path).stream().filter(content=f"/__properties/{PROPERTIES}"):
+        for chunk in sound_chunks(path, f"/__properties/{PROPERTIES}"):
             batch = chunk.to_record_batch()
             for name in batch.schema.names[1:]:
                 for value in filter(None, batch.column(name).to_pylist()):
@@ -131,25 +130,14 @@ def repair(source: Path, target: Path, layout: Path | None = None) -> None:
         raise RecordingError(f"{source}: nothing in it can be read")
 
 
-def _verified(path: Path) -> _Chunks:
-    """The file's chunks; its reader ends this whole process on some damage, so a program of its own goes first."""
-    try:
-        binary.run("rrd", "verify", str(path), timeout_s=_REPAIR_TIMEOUT_S)
-    except RecordingError:  # its last line is about itself, or advice for its makers
-        raise RecordingError("its contents cannot be decoded") from None
-    return _Chunks(path)
-
-
 class _Chunks:
     """All columns of a file by entity path, put together from its chunks."""
 
     def __init__(self, path: Path) -> None:
         self.static: dict[str, dict[str, list]] = defaultdict(dict)
         self._rows: dict[str, list[tuple[NDArray, NDArray[np.int64], Array]]] = defaultdict(list)
-        from rerun.chunk import RrdReader
-
         newest: dict[tuple[str, str], bytes] = {}
-        for chunk in RrdReader(path).stream():
+        for chunk in sound_chunks(path):
             batch = chunk.to_record_batch()
             if not chunk.is_static:
                 self._add(str(chunk.entity_path), batch)

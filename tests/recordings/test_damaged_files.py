@@ -20,7 +20,9 @@ ENDINGS = {name: ending.removeprefix(".") for name, (ending, _) in FILES.items()
     "actuator": "toml",
     "user effects": "toml",
     "session": "emaviz",
+    "listed rrd": "rrd",
 }
+BY_A_PROGRAM = "rrd", "listed rrd", "rerun"  # each is looked at by a program of its own first
 
 
 @pytest.fixture(scope="module")
@@ -56,21 +58,32 @@ def fuzzed(process, reader, count, folder):
     return kinds, bad, slowest, largest
 
 
-@pytest.mark.parametrize("reader", [reader for reader in READERS if reader != "rrd"])
+@pytest.mark.parametrize("reader", [reader for reader in READERS if reader not in BY_A_PROGRAM])
 def test_damaged_files(process, reader, tmp_path):
     kinds, bad, _, largest = fuzzed(process, reader, 100, tmp_path)
     assert not bad and largest < MOST_GROWN
     assert kinds["refused"] and (kinds["read"] or reader in ("packed mat", "gzip"))
 
 
-def test_damaged_recordings(process, tmp_path):
-    """Fewer, since each that cannot be read is first repaired by a program."""
-    _, bad, _, _ = fuzzed(process, "rrd", 8, tmp_path)
+@pytest.mark.parametrize("reader", BY_A_PROGRAM)
+def test_damaged_recordings(process, reader, tmp_path):
+    """Fewer, since a program that reads them first takes its time."""
+    _, bad, _, _ = fuzzed(process, reader, 8, tmp_path)
     assert not bad
+
+
+@pytest.mark.parametrize("reader", BY_A_PROGRAM)
+def test_a_name_with_a_nul_ends_no_process(process, reader, tmp_path):
+    """Rerun's program finds no fault with it, and its native reader aborts."""
+    [whole_one] = whole("rrd", tmp_path)
+    path = tmp_path / "a.rrd"
+    path.write_bytes(whole_one.replace(b"faults", b"fault\0"))
+    found = process.read(reader, path, MOST_BYTES)
+    assert found.kind == "refused" and "its contents cannot be decoded" in found.line
 
 
 @pytest.mark.study
 @pytest.mark.parametrize("reader", READERS)
 def test_ten_thousand_damaged_files(process, reader, tmp_path):
     _, bad, slowest, largest = fuzzed(process, reader, 10_000, tmp_path)
-    assert not bad and slowest < MOST_SECONDS and (largest < MOST_GROWN or reader == "rrd")
+    assert not bad and slowest < MOST_SECONDS and (largest < MOST_GROWN or reader in BY_A_PROGRAM)

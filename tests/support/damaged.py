@@ -134,7 +134,7 @@ def whole(reader: str, folder: Path) -> list[bytes]:
         return [shipped("thesis.toml").encode()]
     if reader == "user effects":
         return [(shipped("thesis.toml") + EFFECTS).encode()]
-    return [{"session": lambda _: session(), "challenge": challenge, "rrd": recording}[reader](folder)]
+    return [{"session": lambda _: session(), "challenge": challenge}.get(reader, recording)(folder)]
 
 
 def damage(reader: str, content: bytes, rng: random.Random, folder: Path) -> bytes:

@@ -139,6 +139,12 @@ def _recording(path: Path, _: int) -> None:
     read(path)
 
 
+def _listed(path: Path, _: int) -> None:
+    from emaviz.recording.read import properties
+
+    properties(path)
+
+
 READERS: dict[str, Callable[[Path, int], Any]] = {
     **dict.fromkeys(("csv", "parquet", "npz", "mat", "packed mat", *FILES), _measurement),
     "side file": _side_file,
@@ -147,6 +153,7 @@ READERS: dict[str, Callable[[Path, int], Any]] = {
     "session": _session,
     "challenge": _challenge,
     "rrd": _recording,
+    "listed rrd": _listed,
 }
 
 

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from ema_model.actuator import Actuator
 from ema_model.actuator.naming import on_axes
 from ema_model.estimation.floor import CORRELATED_S, Floor
+from ema_model.estimation.least_squares import descended
 from ema_model.estimation.problem import Problem
 from ema_model.estimation.unknowns import ECCENTRICITY, K_SIGMA, Unknown, polar, starts_of, unknowns_of
 from ema_model.faults import named
@@ -23,7 +24,6 @@ _OUTSIDE_Z = 2.99  # from which on a parameter stands at the edge of its toleran
 _DRAWN = 192  # of the prior, from which further starts are taken
 _STARTS = 5
 _MISFIT = 25.0  # χ² per value, from which on the model misses by far
-_LONGEST = 40  # evaluations of a start
 
 
 @dataclass(frozen=True)
@@ -162,20 +162,11 @@ class _Search:
         self.problem = problem
         self.on_progress = on_progress
         self.evaluations = 0
-        self._at, self._jacobian = np.zeros(0), np.zeros((0, 0))  # of the last evaluation
 
-    def residual(self, x: Array) -> Array:
-        """Also keeps the Jacobian there, which an accepted step asks for next."""
+    def _tell(self) -> None:
         self.evaluations += 1
         if self.on_progress is not None:
             self.on_progress(self.evaluations)
-        residuals, jacobians = self.problem.jacobians(x[None, :])
-        self._at, self._jacobian = x.copy(), jacobians[0]
-        return residuals[0]
-
-    def jacobian(self, x: Array) -> Array:
-        """∂residual/∂x."""
-        return self._jacobian if np.array_equal(x, self._at) else self.problem.jacobians(x[None, :])[1][0]
 
     def solve(self, start: Mapping[str, float] | None) -> _Found:
         """The best fit; where the model misses by far, one in which large errors count less."""
@@ -194,27 +185,11 @@ class _Search:
         return found
 
     def _from(self, starts: Sequence[Array], scale: float, loss: str) -> _Found:
-        from scipy.optimize import least_squares  # takes a third of a second to import
-
         least, greatest = self.problem.low, self.problem.high
-        # The singular values of the long Jacobian cost more than all else, but lsmr looks for its step in a plane.
-        solver = "exact" if len(least) == 1 else "lsmr"
         fits, agree = [], len(starts) == 1
         for start in starts:
-            fits.append(
-                least_squares(
-                    self.residual,
-                    np.clip(start, 0.98 * least, 0.98 * greatest),
-                    jac=self.jacobian,  # pyright: ignore[reportArgumentType]
-                    bounds=(least, greatest),
-                    max_nfev=_LONGEST,
-                    xtol=1e-4,
-                    ftol=5e-5,
-                    loss=loss,
-                    f_scale=scale,
-                    tr_solver=solver,
-                )
-            )
+            inside = np.clip(start, 0.98 * least, 0.98 * greatest)
+            fits.append(descended(self.problem, inside, scale, loss, self._tell))
             fits.sort(key=lambda fit: fit.cost)
             # "At most a hundredth apart": two minima of the same depth are one answer, and none is deeper than nothing.
             if fits[0].cost < 2.0 or (len(fits) > 1 and fits[1].cost < 1.01 * fits[0].cost + 2.0):
@@ -225,7 +200,7 @@ class _Search:
         residuals, jacobians = self.problem.jacobians(x[None, :])  # the fit's own are weighted by its loss
         fun, jacobian = residuals[0], jacobians[0]
         chi2 = float(fun @ fun - x @ x) / self.problem.values
-        return _Found(x, fun[: self.problem.values], jacobian, chi2, float(best.cost), bool(best.status > 0 and agree))
+        return _Found(x, fun[: self.problem.values], jacobian, chi2, best.cost, best.ended and agree)
 
 
 def _promising(problem: Problem) -> Array:

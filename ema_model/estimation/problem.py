@@ -15,6 +15,7 @@ from ema_model.estimation.unknowns import ECCENTRICITY, Unknown, to_k, to_vector
 from ema_model.models import Model
 from ema_model.models.closed_loop import LOAD
 from ema_model.models.model import Effects, Signals
+from ema_model.physics.rows import LANES
 
 Array = NDArray[np.float64]
 
@@ -58,8 +59,11 @@ class Problem:
         self._nominal, self._sigma = (np.array([getattr(u, one) for u in unknowns]) for one in ("nominal", "sigma"))
         self._faults = [(i, u.place) for i, u in enumerate(unknowns) if u.kind == "fault"]
         self._eccentricity = [i for i, place in self._faults if place in ECCENTRICITY]  # both parts, or none
+        bent_most = sorted(range(self.count), key=lambda i: (unknowns[i].kind == "turned", unknowns[i].is_base))
         self._acting = [
-            np.array([i for i, u in enumerate(unknowns) if places.get(u.kind, u.place) == u.place], dtype=int)
+            np.array(
+                [i for i in bent_most if places.get(unknowns[i].kind, unknowns[i].place) == unknowns[i].place], int
+            )
             for places in map(self._places, range(len(model.windows)))
         ]
         self._asked = signals or dict.fromkeys(SIGNALS, 1.0)
@@ -85,25 +89,31 @@ class Problem:
         errors = [self._errors(x, window) for window in range(len(self.weights))]
         return np.concatenate([*errors, x * self.prior], axis=1)
 
-    def jacobians(self, x: Array) -> tuple[Array, Array]:
+    def jacobians(self, x: Array, *, in_whole_blocks: bool = False) -> tuple[Array, Array]:
         """Residuals (n, m) and their derivatives (n, m, unknowns) by central differences.
 
         A window is simulated in one population, for the unknowns that act in it: not for where the others start.
+        in_whole_blocks: no block of lanes is begun for a part of it; the unknowns that bend the signals least then
+        have a difference to one side, which a step on the way may have.
         """
         n = len(x)
         low, high = np.maximum(x - self._step, self.low), np.minimum(x + self._step, self.high)
+        far = np.where(high - x >= x - low, high, low)
         residuals, slopes = [], np.zeros((n, self.count, self.values + self.count))
         first = 0
         for window in range(len(self.weights)):
             acting = self._acting[window]
-            count = len(acting)
-            points = np.repeat(x[:, None, :], 2 * count + 1, axis=1)
-            points[:, 1 + np.arange(count), acting] = low[:, acting]
-            points[:, 1 + count + np.arange(count), acting] = high[:, acting]
-            errors = self._errors(points.reshape(-1, self.count), window).reshape(n, 2 * count + 1, -1)
+            both = _room(n, len(acting)) if in_whole_blocks else len(acting)
+            sides, side = acting[:both], acting[both:]
+            lanes = 1 + 2 * len(sides) + len(side)
+            points = np.repeat(x[:, None, :], lanes, axis=1)
+            for at, moved, to in ((1, sides, low), (1 + both, sides, high), (1 + 2 * both, side, far)):
+                points[:, at + np.arange(len(moved)), moved] = to[:, moved]
+            errors = self._errors(points.reshape(-1, self.count), window).reshape(n, lanes, -1)
             rows = slice(first, first + errors.shape[2])
-            width = (high - low)[:, acting, None]
-            slopes[:, acting, rows] = (errors[:, 1 + count :] - errors[:, 1 : 1 + count]) / width
+            here, below, above, there = np.split(errors, [1, 1 + both, 1 + 2 * both], axis=1)
+            slopes[:, sides, rows] = (above - below) / (high - low)[:, sides, None]
+            slopes[:, side, rows] = (there - here) / (far - x)[:, side, None]
             residuals.append(errors[:, 0])
             first = rows.stop
         at = np.arange(self.count)
@@ -186,3 +196,9 @@ class Problem:
             effects = {**effects, LOAD: {"torque_Nm": own["load"]}}
         actuator = self.model.actuator.varied(self.parameters(x))
         return Rig(actuator, self.k(x), own.get("turned", 0.0), own.get("play", 0.0), effects)
+
+
+def _room(n: int, count: int) -> int:
+    """Of `count` unknowns, those that can be moved to both sides in the blocks of lanes that one side fills."""
+    blocks = -(-n * (1 + count) // LANES)
+    return min(count, blocks * LANES // n - (1 + count))

@@ -48,7 +48,8 @@ def _against_settled(data: Data, before: Fit, after: Fit, keys: Sequence[str], s
     if reason or calm is after:
         return reason
     first = settled(before)
-    return _idle(data, first, calm) or _little(data, first, calm)
+    # Near the floor a settled model, too, may lack a second cause that shares the error.
+    return _idle(data, first, calm) or ("" if ratio(data, after) < FAR else _little(data, first, calm))
 
 
 def still_against(data: Data, base: Fit, found: Fit, key: str) -> str:

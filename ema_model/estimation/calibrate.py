@@ -21,6 +21,7 @@ from ema_model.quantities.interval import HALF_90
 Array = NDArray[np.float64]
 
 _OUTSIDE_Z = 2.99  # from which on a parameter stands at the edge of its tolerance
+_AS_IN_THE_FILE = 0.05  # σ, up to which a parameter is where it was
 _DRAWN = 192  # of the prior, from which further starts are taken
 _STARTS = 5
 _MISFIT = 25.0  # χ² per value, from which on the model misses by far
@@ -237,7 +238,8 @@ def calibrated(problem: Problem, x: Array, covariance: Array) -> dict[str, Calib
     for i, u in enumerate(problem.unknowns):
         value = float(u.nominal + u.sigma * x[i])
         half = HALF_90 * u.sigma * min(1.0, float(np.sqrt(covariance[i, i])))  # never less sure than the file itself
-        at_bound = bool(x[i] < u.low + 0.01 or x[i] > u.high - 0.01)
+        # What the file gives the value of its bound, as a delay of 0, was driven nowhere by standing there.
+        at_bound = bool((x[i] < u.low + 0.01 or x[i] > u.high - 0.01) and abs(x[i]) > _AS_IN_THE_FILE)
         unit = on_axes(u.name, axes).unit
         found[u.name] = Calibrated(value, u.nominal, (value - half, value + half), unit, float(x[i]), at_bound)
     return {**found, **_eccentricity(problem, x, covariance)} if "k6" in found else found

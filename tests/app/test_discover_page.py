@@ -146,25 +146,12 @@ def test_two_effects_undo_and_a_wrong_answer(discover, app):
     page.get_by_text("Nothing of the library would take away more than chance does.").wait_for()
 
 
-def test_an_effect_outside_the_library_becomes_a_curve(discover, app):
+def test_an_effect_outside_the_library_becomes_an_expression_or_a_curve(discover, app):
     page = discover
     begin(page, app, "The prototype")
     page.get_by_text("goes with the motor's speed").first.wait_for()
     page.get_by_text("Your own effect").first.click()
-    page.get_by_role("button", name="From the curve").click()
-    done(page, app)
-    fitted, held = errors(app)
-    assert fitted[0] > 1.2 and fitted[-1] < 1.1 and held[-1] < 1.1
-    page.get_by_text("none of the known effects explains").first.wait_for()
-    assert revealed(page) == "Your answer agrees."
-
-
-def test_an_expression_is_checked_as_it_is_typed_and_fitted(discover, app):
-    page = discover
-    begin(page, app, "The prototype")
     folder = page.get_by_role("button", name="Fit it in the model")
-    if not folder.is_visible():
-        page.get_by_text("Your own effect").first.click()
     row = page.locator("label", has_text="T [N·m] =").locator("xpath=ancestor::div[contains(@class,'Flex-root')][1]")
     entry = row.locator("input")
     entry.fill("-c*sign(omega)*sqrt(abs(omega)")
@@ -191,9 +178,17 @@ def test_an_expression_is_checked_as_it_is_typed_and_fitted(discover, app):
     (effect,) = app.discovering.look.added
     assert effect.parameters["c"].value == pytest.approx(0.0025, rel=0.2)
     assert errors(app)[0][-1] < 1.1
+    page.get_by_role("button", name="Undo the last step").click()
+    wait_until(lambda: app.discovering.look.steps == 1)
+    page.get_by_role("button", name="From the curve").click()
+    done(page, app)
+    fitted, held = errors(app)
+    assert fitted[0] > 1.2 and fitted[-1] < 1.1 and held[-1] < 1.1
+    page.get_by_text("none of the known effects explains").first.wait_for()
+    assert revealed(page) == "Your answer agrees."
 
 
-def test_stop_works_and_the_page_stays_usable(discover, app):
+def test_stop_works_and_a_session_brings_the_ladder_back(discover, app):
     page = discover
     begin(page, app, "First bench run")
     before = app.discovering.look
@@ -207,6 +202,31 @@ def test_stop_works_and_the_page_stays_usable(discover, app):
     page.get_by_text("Stopped;").wait_for()
     assert app.discovering.look.steps == before.steps
     page.get_by_role("button", name="Start again").wait_for()
+
+    add(page, app, "Cogging torque")
+    fitted, held = errors(app)
+    page.get_by_role("tab", name="Recordings", exact=True).click()
+    box(page, "Session name").fill("ladder")
+    page.wait_for_timeout(300)
+    with page.expect_download():
+        page.get_by_role("button", name="Save session").click()
+    page.get_by_role("tab", name="Discover", exact=True).click()
+    page.get_by_role("button", name="Undo the last step").click()
+    wait_until(lambda: not app.discovering.look.added)
+    page.get_by_label("Recordings", exact=True).click()
+    page.get_by_role("option", name="Two suspects").click()
+    wait_until(lambda: "suspects" in app.discovering.source.chosen)
+    page.get_by_role("tab", name="Recordings", exact=True).click()
+    page.get_by_role("button", name="Load session").click()
+    page.get_by_role("tab", name="Discover", exact=True).click()
+    page.get_by_text("Taking the session's steps again").first.wait_for(timeout=60_000)
+    wait_until(lambda: not app.discovering.running)
+    page.get_by_role("button", name="Remove Cogging torque").wait_for()
+    assert page.get_by_label("Recordings", exact=True).input_value().endswith("First bench run")
+    again = errors(app)
+    assert again[0] == pytest.approx(fitted, rel=0.01) and again[1] == pytest.approx(held, rel=0.01)
+    wait_until(lambda: drawn(page, "Error after each step") == 2)
+    page.get_by_text("T = A sin(h θ + φ)").first.wait_for()
 
 
 def test_the_next_test_goes_to_explore_and_to_a_file(discover, app):
@@ -271,32 +291,6 @@ def test_a_challenge_of_ones_own_is_sealed_sent_opened_and_revealed(discover, ap
     assert fitted[0] > 1.1 > fitted[-1] and held[-1] < 1.1
     assert revealed(page) == "Your answer agrees."
     page.get_by_text("Hidden: cogging torque of order 12.").wait_for()
-
-
-def test_a_session_brings_the_ladder_back(discover, app):
-    page = discover
-    begin(page, app, "First bench run")
-    add(page, app, "Cogging torque")
-    fitted, held = errors(app)
-    page.get_by_role("tab", name="Recordings", exact=True).click()
-    box(page, "Session name").fill("ladder")
-    page.wait_for_timeout(300)
-    with page.expect_download():
-        page.get_by_role("button", name="Save session").click()
-    page.get_by_role("tab", name="Discover", exact=True).click()
-    begin(page, app, "Two suspects")
-    assert not app.discovering.look.added
-    page.get_by_role("tab", name="Recordings", exact=True).click()
-    page.get_by_role("button", name="Load session").click()
-    page.get_by_role("tab", name="Discover", exact=True).click()
-    page.get_by_text("Taking the session's steps again").first.wait_for(timeout=60_000)
-    wait_until(lambda: not app.discovering.running)
-    page.get_by_role("button", name="Remove Cogging torque").wait_for()
-    assert page.get_by_label("Recordings", exact=True).input_value().endswith("First bench run")
-    again = errors(app)
-    assert again[0] == pytest.approx(fitted, rel=0.01) and again[1] == pytest.approx(held, rel=0.01)
-    wait_until(lambda: drawn(page, "Error after each step") == 2)
-    page.get_by_text("T = A sin(h θ + φ)").first.wait_for()
 
 
 def test_the_library_is_searched_and_felt(page, app):

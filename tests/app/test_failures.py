@@ -126,7 +126,7 @@ def test_a_viewer_without_a_port_is_told_and_a_browser_that_leaves_ends_nothing(
         page.goto(app.address)
         page.get_by_text("The Rerun viewer cannot be shown").wait_for(timeout=60_000)
         app.session.settings.set_algorithm("hba")
-        app.session.settings.set_iterations(400)
+        app.session.settings.set_iterations(100)
         done = threading.Event()
         app.session.events.identified.append(lambda race: done.set())
         page.get_by_role("tab", name="Identify").click()

@@ -132,19 +132,19 @@ def test_what_fails_is_a_row_and_not_the_end(tmp_path):
 
 
 def test_a_task_that_ends_its_workers_is_an_error_in_the_end(tmp_path, expected):
-    """Killed as often as it is begun, it gives way, and the others are computed."""
-    plan = cheap(tmp_path, 2)
+    """Killed as often as it is begun, it gives way."""
+    plan = cheap(tmp_path, 1)
     out = tmp_path / "out"
     client = begun(plan, "--out", out, "--workers", "1", EMAVIZ_CACHE_DIR=str(tmp_path / "cold"))  # seconds to compile
     seen = set()
-    for _ in range(6):  # three deaths each
+    for _ in range(3):
         wait_for(lambda: (set(children_of(client.pid)) - seen and busy(client.pid)) or client.poll() is not None)
         for pid in children_of(client.pid):
             seen.add(pid)
             kill(pid)
-    assert "2 tasks, 2 computed now, 2 of them errors" in ended(client)
-    rows = Store(out).table("identify").to_pylist()
-    assert all("3 workers ended while they computed it" in row["error"] for row in rows)
+    assert "1 tasks, 1 computed now, 1 of them errors" in ended(client)
+    [row] = Store(out).table("identify").to_pylist()
+    assert "3 workers ended while they computed it" in row["error"]
 
 
 def busy(pid):

@@ -5,11 +5,13 @@ from __future__ import annotations
 import re
 import shutil
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from support.representative import first_of
 
 import ema_model
 from ema_model.actuator import load_actuator
@@ -28,10 +30,10 @@ NAMES = ("cogging_torque", "stribeck_friction", "hinge_moment", "dead_time")
 ALL = {one.name: one for one in challenges()}
 
 
-def solved(name: str):
+def solved(name: str, among: Sequence[str] | None = NAMES):
     one = ALL[name]
     training, held = ([read_measurement(path) for path in paths] for paths in (one.training, one.holdout))
-    return discover(training, holdout=held, candidates=NAMES)
+    return discover(training, holdout=held, candidates=among)
 
 
 def test_there_is_one_of_each_kind_and_they_are_small():
@@ -154,6 +156,18 @@ def test_the_easy_one_is_solved():
     assert settings["order"] == hidden["order"]
     assert settings["amplitude_Nm"] == pytest.approx(hidden["amplitude_Nm"], rel=0.2)
     assert found.ladder[-1].rmse < 1.1 and found.ladder[-1].holdout_rmse < 1.1
+
+
+@pytest.mark.parametrize("name", first_of(["after_the_overhaul", "two_suspects", "quiet_complaint", "prototype"]))
+def test_the_whole_library_solves_it(name):
+    """As somebody meets it who presses "Find all"."""
+    found, truth = solved(name, None), read_truth(folder() / "truth" / f"{name}.toml")
+    if truth.torque:
+        assert found.verdict == "unknown_effect" and found.unknown is not None
+        assert found.unknown.variable == "motor_speed"
+    else:
+        assert found.verdict == "effects_found" and {one.name for one in found.effects} == set(truth.effects)
+    assert found.ladder[-1].rmse < 1.1 < found.ladder[0].rmse
 
 
 def test_where_nothing_is_hidden_the_model_is_adequate():

@@ -10,13 +10,14 @@ import pytest
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
 from ema_model.estimation import calibrate, floor
-from ema_model.estimation.calibrate import problem_of
+from ema_model.estimation.calibrate import calibrated, problem_of
 from ema_model.estimation.descent import Descent
 from ema_model.estimation.unknowns import K_SIGMA, to_vector, unknowns_of
 from ema_model.faults import HEALTHY, NAMES, vector
 from ema_model.identification.fit import setting
 from ema_model.identification.objective import Objective
 from ema_model.models import model_for
+from ema_model.physics.rows import LANES
 from ema_model.simulation.plant import simulated
 from ema_model.simulation.run import Run, simulate_reference
 from ema_model.simulation.sensors import Sensors
@@ -104,3 +105,30 @@ def test_a_load_that_the_user_gives_stays(recording):
     )
     at = fits.at(HEALTHY[None, :])
     assert np.mean(fits.residuals(at) ** 2) < 0.2 * np.mean(misses.residuals(at) ** 2)
+
+
+def test_a_step_on_the_way_takes_no_block_of_lanes_more_than_one_side_needs(recording, monkeypatch):
+    model = model_for([recording], ACTUATOR)
+    problem = problem_of(model, [floor(model, 0)])
+    x = np.zeros((1, problem.count))
+    _, [exact] = problem.jacobians(x)
+    lanes, simulate = [], problem.simulate
+    monkeypatch.setattr(problem, "simulate", lambda x, window: lanes.append(len(x)) or simulate(x, window))
+    residual, [thrifty] = problem.jacobians(x, in_whole_blocks=True)
+    assert 1 + problem.count <= lanes[0] <= LANES < 1 + 2 * problem.count
+    np.testing.assert_array_equal(residual, problem.residuals(x))
+    both = lanes[0] - 1 - problem.count  # unknowns that are moved to both sides all the same
+    same = [np.array_equal(one, other) for one, other in zip(exact.T, thrifty.T)]
+    assert 0 < both <= sum(same) < problem.count
+    for one, other in zip(exact.T, thrifty.T):
+        np.testing.assert_allclose(other, one, atol=0.15 * np.abs(one).max())
+
+
+def test_a_parameter_that_stays_where_the_file_puts_its_bound_was_driven_nowhere(recording):
+    """A sensor's delay is 0 in the file, and less than 0 nowhere."""
+    problem = problem_for(recording, ACTUATOR, ["sensors.delay_s", "motor.inertia_kgm2"])
+    x = np.zeros(problem.count)
+    x[:2] = 0.005, -2.995
+    found = calibrated(problem, x, np.eye(problem.count))
+    delay, inertia = found["sensors.delay_s"], found["motor.inertia_kgm2"]
+    assert problem.low[0] == 0.0 == delay.initial and not delay.at_bound and inertia.at_bound

@@ -118,7 +118,7 @@ def test_what_takes_nothing_away_within_the_tolerances_is_not_claimed(monkeypatc
     [((5.0, 4.0), (9.1, 8.8), "it explains"), ((5.0, 4.0), (9.1, 4.0), ""), ((1.8, 1.3), (2.8, 2.5), "")],
 )
 def test_the_share_that_counts_is_of_what_the_settled_models_leave(monkeypatch, bent, calm, said):
-    """A model that is bent to an error of unknown cause tells more of it than it may; near the floor two may share it."""
+    """A model that is bent to an error of unknown cause tells more of it than it may; near the floor two share it."""
     monkeypatch.setattr(claims, "ratio", lambda _, found: float(np.sqrt(np.mean(found.residual**2))))
     monkeypatch.setattr(claims, "at_floor", lambda *_: False)
     before, after = (fitted([1.0, 1.0], noise=one) for one in bent)

@@ -10,16 +10,15 @@ from ema_model.quantities.variables import MODULATORS, VARIABLES, is_turn, of_va
 from ema_model.recordings import SIGNALS
 
 
-def goes_with(variable: str, modulator: str) -> str:
-    """'goes with the load, with the direction of motion'."""
-    return f"{VARIABLES[variable].phrase}{MODULATORS[modulator].phrase}"
+def cause_of(variable: str, modulator: str) -> str:
+    """'motor speed and direction'."""
+    return f"{VARIABLES[variable].noun}{MODULATORS[modulator].noun}"
 
 
 def explanation_sentence(signal: str, variable: str, modulator: str, r2: float) -> str:
     """One line on what explains a residual, and how much of it."""
-    title = in_sentence(SIGNALS[signal].title)
-    share = f"{100.0 * max(0.0, r2):.0f} % of what is left"
-    return f"The {title}'s error {goes_with(variable, modulator)} ({share})."
+    share = f"{100.0 * max(0.0, r2):.0f} % of the residual {in_sentence(SIGNALS[signal].title)} variance"
+    return f"{share} is explained by {cause_of(variable, modulator)} (cross-validated)."
 
 
 def order_sentence(order: int, amplitude: float, of: Quantity) -> str:

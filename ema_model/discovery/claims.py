@@ -75,7 +75,7 @@ def outdone(data: Data, before: Fit, after: Fit) -> str:
     enough = AS_MUCH * tells - TIE * scale
     if total - float(left @ left) >= enough or evidence(data, before, after) * scale >= enough:
         return ""
-    return f"a curve over the {curve.variable.replace('_', ' ')} tells more"
+    return f"a curve over the {curve.variable.replace('_', ' ')} explains more"
 
 
 def ratio(data: Data, found: Fit) -> float:

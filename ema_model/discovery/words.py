@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 from ema_model.actuator.naming import on_axes
 from ema_model.actuator.readings import sentences as phrases_of
-from ema_model.comparison.sentences import goes_with
+from ema_model.comparison.sentences import cause_of
 from ema_model.discovery.result import Added, Discovery, Rung
 from ema_model.discovery.verify import Verified
 from ema_model.effects import find
@@ -67,10 +67,10 @@ def _answer(found: Discovery) -> str:
 
 
 def remains(found: Discovery) -> str:
-    """'4.0 times the floor remains, cause unknown, goes with the load'."""
+    """'4.0 times the floor remains, cause unknown, varies with the load'."""
     if found.at_floor and found.unknown is None:
         return "what remains is as small as the floor, but lasts longer than noise"
-    goes = "" if found.unknown is None else f", {goes_with(found.unknown.variable, found.unknown.modulator)}"
+    goes = "" if found.unknown is None else f", varies with {cause_of(found.unknown.variable, found.unknown.modulator)}"
     return f"{number(found.ladder[-1].rmse, 2)} times the floor remains, cause unknown{goes}"
 
 
@@ -89,7 +89,7 @@ def sentences(found: Discovery) -> list[str]:
         held = "" if last.holdout_rmse is None else f" ({number(last.holdout_rmse)} times on what was not fitted)"
         told.append(f"The calibrated model's error is {number(last.rmse)} times the floor{held}.")
     if found.faults:
-        told.append(f"{'; '.join(faults(found).values())}. What is told of effects is told beside this.")
+        told.append(f"{'; '.join(faults(found).values())}. Effects and faults are estimated together.")
     for one in found.effects:
         if one.same_as:
             rivals = _listed([in_sentence(effect_title(name)) for name in one.same_as])

@@ -21,30 +21,28 @@ class Variable:
     title: str
     unit: str  # on rotary axes
     side: Side | None
-    phrase: str  # what an error does that it explains
+    noun: str  # in a sentence
     place: str = "at "  # before a value of it
     indirect: float = 0.0
 
 
 _ROWS = (
-    Variable("motor_angle", "Motor angle", "rad", MOTOR, "repeats with the motor's angle"),
-    Variable(
-        "user_position", "User position", "rad", USER, "goes with the user's position", "at a user position of ", 0.01
-    ),
-    Variable("motor_speed", "Motor speed", "rad/s", MOTOR, "goes with the motor's speed"),
+    Variable("motor_angle", "Motor angle", "rad", MOTOR, "motor angle"),
+    Variable("user_position", "User position", "rad", USER, "user position", "at a user position of ", 0.01),
+    Variable("motor_speed", "Motor speed", "rad/s", MOTOR, "motor speed"),
     Variable(
         "acceleration",
         "Motor acceleration",
         "rad/s²",
         MOTOR,
-        "goes with the acceleration",
+        "motor acceleration",
         "at an acceleration of ",
         0.03,
     ),
-    Variable("current", "Current", "A", None, "goes with the motor's current", indirect=0.005),
-    Variable("load", "Load", "N·m", USER, "goes with the load", "under a load of "),
-    Variable("time", "Time", "s", None, "drifts with time", indirect=0.15),
-    Variable("temperature", "Temperature", "°C", None, "goes with the temperature", indirect=0.05),
+    Variable("current", "Current", "A", None, "motor current", indirect=0.005),
+    Variable("load", "Load", "N·m", USER, "load", "under a load of "),
+    Variable("time", "Time", "s", None, "time", indirect=0.15),
+    Variable("temperature", "Temperature", "°C", None, "temperature", indirect=0.05),
 )
 VARIABLES: dict[str, Variable] = {row.name: row for row in _ROWS}
 
@@ -55,13 +53,13 @@ class Modulator:
 
     name: str
     title: str
-    phrase: str  # after a variable's
+    noun: str  # after a variable's
 
 
 _MODULATORS = (
     Modulator("1", "alone", ""),
-    Modulator("sign_speed", "× direction", ", with the direction of motion"),
-    Modulator("current", "× current", ", in proportion to the current"),
+    Modulator("sign_speed", "× direction", " and direction"),
+    Modulator("current", "× current", " in proportion to the current"),
 )
 MODULATORS: dict[str, Modulator] = {row.name: row for row in _MODULATORS}
 

@@ -33,6 +33,6 @@ class Page:
         try:
             change()
         except InputError as error:
-            self.notify("That does not work", str(error))
+            self.notify("Input refused", str(error))
             return False
         return True

@@ -99,7 +99,7 @@ class Gate:
         page = self._server.get_clients().get(-1 if client is None else client)
         if page is not None:
             text = f"{control.label}: {reason}; the value before it stays."
-            page.add_notification("That does not work", text, auto_close_seconds=8.0, color="red")
+            page.add_notification("Value refused", text, auto_close_seconds=8.0, color="red")
 
     def _forget(self) -> None:
         for waiting in self._waiting.values():

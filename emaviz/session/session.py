@@ -249,7 +249,7 @@ class Session:
 
     def _on_error(self, error: BaseException) -> None:
         if isinstance(error, InputError):
-            notify(self.events.told, "That does not work", str(error))
+            notify(self.events.told, "The run has failed", str(error))
             return
         traceback.print_exception(error)
         notify(self.events.told, "Something failed; the app goes on", f"{type(error).__name__}: {quoted(error)}")

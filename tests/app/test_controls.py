@@ -103,7 +103,7 @@ def test_what_the_plant_hides_is_set(page, app):
         ("Sensor noise", "Encoder [bit per turn]", 14, lambda s: s.sensors.encoder_bits),
         ("State at the start", "Angle off the command [mrad]", 2, lambda s: 1e3 * s.start_offset_rad),
         ("State at the start", "Motor speed [rad/s]", 20, lambda s: s.start_speed_rad_s),
-        ("State at the start", "Side of the play", 0.5, lambda s: s.start_side),
+        ("State at the start", "Position in the backlash", 0.5, lambda s: s.start_side),
     ):
         if folder:
             unfold(page, folder, label)
@@ -150,11 +150,11 @@ def test_the_charts_show_a_part_of_the_run_and_the_phases(page, app):
     phases = chart(page, "Phase currents")
     assert np.abs(phases[1:].sum(axis=0)).max() < 0.3 * np.abs(phases[1:]).max(), "they add up to about nothing"
     show(page, "Export")
-    choose(page, "Whose signals", "monitor")
+    choose(page, "Signals of", "monitor")
     with page.expect_download() as download:
         page.get_by_role("button", name="Data as CSV").click()
     assert download.value.suggested_filename == "emaviz-run-monitor.csv"
-    choose(page, "Whose signals", "plant")
+    choose(page, "Signals of", "plant")
     show(page, "Signals")
 
 
@@ -221,16 +221,16 @@ def test_the_search_is_looked_at_from_all_sides_and_its_landscape_drawn(page, ap
     show(page, "Identify")
     race = raced(app, page)
     show(page, "Search")
-    choose(page, "Swarm as", "points over two k")
+    choose(page, "Population view", "points over two k")
     choose(page, "Across", "k2 backlash")
     choose(page, "Upwards", "k8 proportional gain")
     page.locator("svg text", has_text="k8 proportional gain").first.wait_for()
 
     show(page, "Answer")
-    choose(page, "Whose", "Dandelion")
+    choose(page, "Algorithm shown", "Dandelion")
     found = f"{race.tracks['do'].k[0]:.3f}"
     page.locator("td", has_text=found).first.wait_for()
-    choose(page, "Whose", "the best")
+    choose(page, "Algorithm shown", "the best")
     page.get_by_text("Not healthy", exact=True).wait_for()
     page.get_by_text("k1 friction, k6 eccentricity").wait_for()
     page.get_by_text("90 % interval").wait_for()

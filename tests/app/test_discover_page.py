@@ -143,13 +143,13 @@ def test_two_effects_undo_and_a_wrong_answer(discover, app):
     page.get_by_role("option", name="as measured").click()
     wait_until(lambda: np.array_equal(app.playback.motion.motor_rad, measured.motor_rad))
     page.get_by_text("Load-dependent friction had been masked").wait_for()
-    page.get_by_text("Nothing of the library would take away more than chance does.").wait_for()
+    page.get_by_text("No effect in the library would reduce the error significantly.").wait_for()
 
 
 def test_an_effect_outside_the_library_becomes_an_expression_or_a_curve(discover, app):
     page = discover
     begin(page, app, "The prototype")
-    page.get_by_text("goes with the motor's speed").first.wait_for()
+    page.get_by_text("is explained by motor speed").first.wait_for()
     page.get_by_text("Your own effect").first.click()
     folder = page.get_by_role("button", name="Fit it in the model")
     row = page.locator("label", has_text="T [N·m] =").locator("xpath=ancestor::div[contains(@class,'Flex-root')][1]")

@@ -240,9 +240,9 @@ def test_an_effect_is_hidden_and_taken_out(page, app):
     page.get_by_role("option", name=title, exact=True).click()
     page.get_by_role("button", name="Hide it in the plant").click()
     wait_until(lambda: "viscous_friction" in app.session.settings.effects, 60.0)
-    page.get_by_role("button", name="Take it out").click()
+    page.get_by_role("button", name="Remove the effect").click()
     wait_until(lambda: not app.session.settings.effects, 60.0)
-    wait_until(lambda: page.get_by_role("button", name="Take it out").count() == 0)
+    wait_until(lambda: page.get_by_role("button", name="Remove the effect").count() == 0)
 
 
 @pytest.mark.browser

@@ -218,7 +218,7 @@ def test_a_race_is_watched_paused_and_looked_back_at(page, app):
     before = page.evaluate(CHART, "Convergence")
     page.wait_for_timeout(600)
     assert page.evaluate(CHART, "Convergence") == before, "it rests"
-    page.get_by_role("button", name="Go on").click()
+    page.get_by_role("button", name="Resume the search").click()
     page.get_by_role("link", name="in Rerun").wait_for(timeout=180_000)
     wait_until(lambda: np.array(page.evaluate(CHART, "Convergence")).shape == (4, 61))
     curves = np.array(page.evaluate(CHART, "Convergence"))
@@ -232,7 +232,7 @@ def test_a_race_is_watched_paused_and_looked_back_at(page, app):
     box.first.fill("0")
     box.first.press("Enter")
     wait_until(lambda: page.evaluate(pictures) != last)
-    page.get_by_label("Swarm as", exact=True).click()
+    page.get_by_label("Population view", exact=True).click()
     page.get_by_role("option", name="lines across all k").click()
     page.get_by_text("backlash", exact=True).first.wait_for()
 

@@ -42,7 +42,8 @@ def test_everything_is_written(rig, tmp_path, capsys):
     arguments = ["--json", str(out), "--report", str(report), "--record", str(record), "--seed", "7"]
     assert main(["compare", str(rig[0]), *arguments]) == 0
     printed = capsys.readouterr().out
-    assert printed.startswith("The equivalent current's error repeats with the motor's angle")
+    first = printed.splitlines()[0]
+    assert "of the residual equivalent current variance is explained by motor angle (cross-validated)" in first
     assert "12 times a turn" in printed and "calibration converged" in printed
     result = json.loads(out.read_text())
     assert result["schema"] == 1 and result["seed"] == 7 and result["adequate"] is False

@@ -101,7 +101,7 @@ class ComparePanel:
         self._page.screen.post("files", self.refresh_files)
 
     def _refused(self, line: str) -> None:
-        self._page.notify("That file does not work", line)
+        self._page.notify("The file cannot be read", line)
 
     def _add(self) -> None:
         name = str(self._choice.value)
@@ -163,7 +163,7 @@ class ComparePanel:
             started = self._comparing.compare()
         except InputError as error:
             if told:
-                self._page.notify("That does not work", str(error))
+                self._page.notify("The comparison cannot start", str(error))
             else:
                 self._say(str(error))
             return

@@ -53,10 +53,10 @@ def strength(look: Look, one: Candidate) -> str:
 
 
 def confidence(one: Candidate) -> str:
-    """How sure it is that something like this is missing, in a word."""
+    """How strong the evidence is that something like this is missing: 'strong evidence (Δχ² −405)'."""
     drop = one.predicted_drop
-    word = "plain" if drop > 200.0 else "clear" if drop > 50.0 else "faint"
-    return f"{word} (χ² −{drop:.0f})"
+    word = "strong" if drop > 200.0 else "moderate" if drop > 50.0 else "weak"
+    return f"{word} evidence (Δχ² −{drop:.0f})"
 
 
 def style(look: Look | None, shown: Sequence[tuple[str, Candidate | None]], opened: str | None) -> Html:

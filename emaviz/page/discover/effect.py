@@ -84,7 +84,7 @@ def head(look: Look, one: Candidate) -> Html:
         why = one.untestable_reason[:1].upper() + one.untestable_reason[1:]
         return html('<div {}><span style="color:#e8590c">▲ {}.</span></div>', cards.BOX, why)
     if not look.is_worth(one):
-        return html("<div {}>Nothing speaks for it: it would take away no more than chance does.</div>", cards.BOX)
+        return html("<div {}>No evidence for it: adding it would not reduce the error significantly.</div>", cards.BOX)
     lines: list[str] = [
         html(
             "The error would fall from <b>{}</b> to about <b>{} times the floor</b> ({:.0f} % of it).",

@@ -251,9 +251,9 @@ class DiscoverPanel:
         if look is None:
             return ""
         if look.assessment is None:
-            return "Looking at what is left, and scoring the library's effects …"
+            return "Analysing the residual and scoring the library's effects …"
         if look.promising:
-            return "The bar is the share of the error that it would take away. Click a card to see why, and to add it."
+            return "The bar is the share of the error that it would remove. Click a card to see why, and to add it."
         if look.assessment.left.explanation is not None and look.rmse > AT_FLOOR:
-            return "No effect of the library explains what is left: try its curve, or an expression of your own, below."
-        return "Nothing of the library would take away more than chance does."
+            return "No effect in the library explains the residual: try its curve, or an expression of your own, below."
+        return "No effect in the library would reduce the error significantly."

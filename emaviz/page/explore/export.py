@@ -34,7 +34,7 @@ class ExportControls:
         """Adds them here."""
         gui = self._page.server.gui
         gui.add_markdown("The run as it stands, in the format that *Compare* reads.")
-        self._whose = gui.add_dropdown("Whose signals", ("plant", "monitor"), initial_value="plant")
+        self._whose = gui.add_dropdown("Signals of", ("plant", "monitor"), initial_value="plant")
         self._button("Data as CSV", viser.Icon.FILE_SPREADSHEET, lambda client: self._send_data(client, ".csv"))
         self._button("Data as Parquet", viser.Icon.TABLE, lambda client: self._send_data(client, ".parquet"))
         gui.add_markdown("The charts, large; the camera above the figure saves it as **PNG**.")

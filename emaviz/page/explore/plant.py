@@ -52,7 +52,7 @@ class PlantControls:
                 lambda: settings.start_speed_rad_s,
             )
             self._listen(
-                gui.add_slider("Side of the play", -1.0, 1.0, 0.1, 0.0, hint="−1 and 1: at one of its walls"),
+                gui.add_slider("Position in the backlash", -1.0, 1.0, 0.1, 0.0, hint="−1 and 1: at one of its walls"),
                 settings.set_start_side,
                 lambda: settings.start_side,
             )
@@ -120,7 +120,7 @@ class PlantControls:
                         session.settings.set_effect(name, parameter, value)
 
                 self._listen(entry, setter)
-            remove = gui.add_button("Take it out", icon=viser.Icon.X, color="gray")
+            remove = gui.add_button("Remove the effect", icon=viser.Icon.X, color="gray")
         remove.on_click(lambda _: self._page.screen.post(f"take out {name}", lambda: self._remove(name)))
 
     def _remove(self, name: str) -> None:

@@ -47,7 +47,7 @@ class IdentifyResult:
             self._convergence = LiveConvergence(gui)
             self._swarm = SwarmView(page)
         with panel.add_tab("Answer", viser.Icon.TARGET_ARROW):
-            self._whose = gui.add_dropdown("Whose", (_BEST, *ALGORITHMS.values()))
+            self._whose = gui.add_dropdown("Algorithm shown", (_BEST, *ALGORITHMS.values()))
             self._bars = add_html(gui, fault_bars(HEALTHY, page.session.actuator))
             self._sure = add_html(gui)
             self._try = gui.add_button(

@@ -23,7 +23,7 @@ class SwarmView:
         self._race: Race | None = None
         self._chosen = False  # by hand, which two k
         gui = page.server.gui
-        self._kind = gui.add_dropdown("Swarm as", (_PLANE, _LINES))
+        self._kind = gui.add_dropdown("Population view", (_PLANE, _LINES))
         self._x = gui.add_dropdown("Across", _NAMES, initial_value=_NAMES[0])
         self._y = gui.add_dropdown("Upwards", _NAMES, initial_value=_NAMES[5])
         self._picture = add_html(gui, swarm.plane([], 0, 5))

@@ -163,7 +163,7 @@ class IdentifyPanel:
         self._result.draw()
 
     def _show_paused(self, paused: bool) -> None:
-        self._pause.label = "Go on" if paused else "Pause the search"
+        self._pause.label = "Resume the search" if paused else "Pause the search"
         self._pause.icon = viser.Icon.PLAYER_PLAY if paused else viser.Icon.PLAYER_PAUSE
 
     def free(self) -> None:

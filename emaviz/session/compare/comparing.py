@@ -297,7 +297,7 @@ class Comparing:
     def _on_error(self, error: BaseException) -> None:
         if isinstance(error, InputError):
             line = str(error).replace(f"{self.folder.folder}/", "")  # the page knows its files by their names there
-            notify(self.session.events.told, "That does not work", line)
+            notify(self.session.events.told, "The comparison has failed", line)
             return
         traceback.print_exception(error)
         notify(

@@ -116,7 +116,7 @@ def _summary(signal: Quantity, error: SignalError, adequate: bool) -> str:
     shown = error.quantity(signal)
     size, floor = f"{shown.text(error.rmse)} rms", shown.text(error.noise_floor)
     if adequate:
-        left = f"what is left of the {in_sentence(signal.title)}, {size}, is noise and the model's own floor ({floor})"
+        left = f"the residual {in_sentence(signal.title)}, {size}, is noise and the model's own floor ({floor})"
         return f"The model explains the recordings: {left}."
     return f"The {in_sentence(signal.title)} is off by {size}, where noise and the model's own floor are {floor}."
 

@@ -202,7 +202,7 @@ class Story:
         if found in self._calm.values() or at_floor(self.data, found):
             return found
         if found not in self._calm:
-            tell("calibrating within what is left")
+            tell("calibrating with the residual as the noise")
             self._calm[found] = settled(self.data, found, tell)
         return self._calm[found]
 

@@ -24,7 +24,7 @@ from ema_model.text import Document, Lines, Note, Table
 
 VERDICTS = {
     "effects_found": "effects are missing, and have been added",
-    "adequate": "nothing is missing: what is left is noise and the model's own floor",
+    "adequate": "nothing is missing: the residual is noise and the model's own floor",
     "partly_explained": "a part of what is missing has been found, and added; of the rest the cause is not known",
     "unknown_effect": "something is missing that none of the known effects explains",
     "not_converged": "the calibration has not converged; what looks like missing physics may be an unfinished fit",

@@ -56,7 +56,7 @@ def adequacy(found: Fitted) -> Adequacy:
         return Adequacy(False, 1.0, f"{', '.join(edge)} would have to be outside {whose} tolerance")
     shape, ratio = _worst_shape(found)
     if shape:
-        return Adequacy(False, ratio, f"what is left of the current {shape}")
+        return Adequacy(False, ratio, f"the residual current {shape}")
     return Adequacy(True, max(size for size, _ in sizes.values()), "")
 
 

@@ -30,7 +30,7 @@ _CLEAR = 0.25  # of the signature's square that a variable must tell, else it is
 
 def figure(look: Look, one: Candidate, *, dark: bool = False) -> go.Figure:
     """Means over the variable that the effect follows; where the two lines lie together, this is what is missing."""
-    title = f"{effect_title(one.name)} beside what is left"
+    title = f"{effect_title(one.name)} and the residual"
     signal = look.primary
     change = look.change(one, signal)
     if change is None or not np.any(change):

@@ -104,7 +104,7 @@ def test_one_effect_with_the_guide(discover, app):
     wait_until(lambda: drawn(page, "Error after each step") == 1)
     open_card(page, "Cogging torque")
     page.get_by_text("Step 4 of 6").wait_for()
-    wait_until(lambda: drawn(page, "beside what is left") > 20)
+    wait_until(lambda: drawn(page, "and the residual") > 20)
     page.get_by_text("The rotor's magnets pull toward the iron teeth").wait_for()
     page.get_by_role("button", name="Add it to the model").click()
     done(page, app)
@@ -172,7 +172,7 @@ def test_an_effect_outside_the_library_becomes_an_expression_or_a_curve(discover
         wait_until(lambda before=before: shown.inner_text() != before)
         errors_told.append(float(shown.inner_text().split("≈")[1].split()[0]))
     assert errors_told[0] < 1.1 < errors_told[1], "a slider shows at once what its value would do"
-    wait_until(lambda: drawn(page, "User's torque beside what is left") > 10)
+    wait_until(lambda: drawn(page, "User's torque and the residual") > 10)
     folder.click()
     done(page, app)
     (effect,) = app.discovering.look.added

@@ -92,7 +92,7 @@ def head(look: Look, one: Candidate) -> Html:
             number(look.predicted_rmse(one)),
             100.0 * look.share(one),
         ),
-        f"Suggested: {cards.strength(look, one)}; the refit finds it for good.",
+        f"Suggested: {cards.strength(look, one)} (estimated; adding it fits it).",
     ]
     same = look.assessment.alike.get(one.name, ()) if look.assessment else ()
     if same:

@@ -25,7 +25,7 @@ def step(look: Look | None, running: bool, opened: str | None, revealed: bool) -
     if look is None or look.assessment is None:
         return 2, Html(
             "The model's parameters move within their tolerances until it fits as well as it can; then every effect "
-            "of the library is held against what is left. This takes some seconds."
+            "of the library is compared with the residual. This takes some seconds."
         )
     if not look.added and opened is None:
         return 3, html(

@@ -66,7 +66,7 @@ def reveal(truth: Truth, found: Discovery, added: tuple[Added, ...]) -> Html:
     if truth.torque:
         own = next((one for one in added if one.name not in CATALOGUE), None)
         what = f"an effect outside the library: T = {truth.torque}"
-        how = f"found as {in_sentence(effect_title(own.name))}" if own else "not found: add the curve of what is left"
+        how = f"found as {in_sentence(effect_title(own.name))}" if own else "not found: add the residual's curve"
         rows.append(_row(own is not None, what, how))
     for one in added:
         if one.name in CATALOGUE and one.name not in truth.effects:

@@ -9,7 +9,7 @@ from emaviz.report.discovery.subject import Told
 from emaviz.report.markup import escape, folded, paragraph
 from emaviz.report.section import Figures, Section
 
-_NOTE = "Grey: what a perfect model would leave 95 of 100 times. Recordings that were held out are told in the ladder."
+_NOTE = "Grey: what a perfect model would leave 95 of 100 times. Held-out recordings: see the error ladder."
 
 
 class Residuals(Section[Told]):

@@ -150,7 +150,7 @@ class Discovering:
         told, look = self._seen()
         story, left = told.story, look.assessment.left.explanation if look.assessment else None
         if left is None:
-            raise InputError("no variable explains what is left, so that there is no curve to add")
+            raise InputError("no variable explains the residual, so that there is no curve to add")
 
         def job(tell: Tell) -> None:
             trial = curve_for(story.data, story.held, story.current, left, tell)
@@ -255,7 +255,7 @@ class Discovering:
         """Shows the model as it is now, then what may be missing from it."""
         self._show(told)
         if not told.is_assessed:
-            tell("looking at what is left; the library of effects is compiled on its first use")
+            tell("analysing the residual; the library of effects is compiled on its first use")
             told.assess()
             self._show(told)
 

@@ -58,7 +58,7 @@ class OwnPreview:
         Raises InputError where the torque has no value somewhere in these recordings, or settings out of range.
         """
         if look.assessment is None:
-            raise InputError("one moment: what is left is still being looked at")
+            raise InputError("one moment: the residual is still being analysed")
         full, step = effect.settings(dict(settings)), story.steps[-1]
         if self._room is None or self._room[0] is not step or self._room[1].name != effect.name:
             self._room = (step, room_for(story.data, story.current, effect.name, full))

@@ -14,9 +14,18 @@ from emaviz.figures.error_distribution import colour
 _LEAST_A = 1e-9  # a logarithmic axis has no zero
 
 
-def figure(histories: Mapping[str, Sequence[Sequence[float]]], *, dark: bool = False) -> go.Figure:
-    """histories: A, by algorithm or case, of each search by iteration; one that ended keeps its level."""
-    chart = theme.new("Best error of each iteration: median, and 5 to 95 %", "Iteration", "rmse [A]", dark=dark)
+def figure(
+    histories: Mapping[str, Sequence[Sequence[float]]],
+    *,
+    title: str = "Best error of each iteration",
+    names: Mapping[str, str] | None = None,
+    dark: bool = False,
+) -> go.Figure:
+    """histories: A, by algorithm or case, of each search by iteration; one that ended keeps its level.
+
+    names: what the legend calls them, where it is not as they are.
+    """
+    chart = theme.new(f"{title}: median, and 5 to 95 %", "Iteration", "rmse [A]", dark=dark)
     for i, (name, given) in enumerate(histories.items()):
         length = max(map(len, given))
         whole = np.array([[*one, *[one[-1]] * (length - len(one))] for one in given], dtype=float)
@@ -27,7 +36,9 @@ def figure(histories: Mapping[str, Sequence[Sequence[float]]], *, dark: bool = F
         chart.add_trace(go.Scatter(x=steps, y=high, **band))
         chart.add_trace(go.Scatter(x=steps, y=low, fill="tonexty", fillcolor=_faint(own), **band))
         line = {"color": own, "width": 2}
-        chart.add_trace(go.Scatter(x=steps, y=middle, mode="lines", name=theme.plain(name), line=line))
+        chart.add_trace(
+            go.Scatter(x=steps, y=middle, mode="lines", name=theme.plain((names or {}).get(name, name)), line=line)
+        )
     chart.update_layout(showlegend=len(histories) > 1)
     chart.update_yaxes(type="log")
     return chart

@@ -56,7 +56,7 @@ def run(arguments: argparse.Namespace) -> int:
         progress.done()
     output.write_json(arguments.json, dict(found.as_dict()), 0, output.configuration(arguments))
     print(aligned(*short_table(found)))
-    print(f"\n{answer(found)}")
+    print("", *answer(found), sep="\n")
     if status.errors:
         print(f"{status.errors} tasks ended in an error; the report lists them")
     print(f"{folder / REPORT}, {folder / RECORDING}")

@@ -44,6 +44,7 @@ def figure(
                     hovertemplate="%{y}: %{x:.3g} %",
                 )
             )
-    chart.update_xaxes(type="log")
+    ticks = [mantissa * 10.0**power for power in range(-3, 3) for mantissa in (1.0, 3.0)]
+    chart.update_xaxes(type="log", tickvals=ticks, ticktext=[f"{one:g}" for one in ticks])
     chart.update_yaxes(autorange="reversed", nticks=0)
     return chart

@@ -39,6 +39,7 @@ def figure(
         drawn = {"color": colour, "width": 1.3}
         chart.add_trace(go.Scatter(x=x, y=y, yaxis=axis, mode="lines", name=name, line=drawn, hovertemplate="%{y:.4g}"))
     chart.update_layout(
+        margin={"l": 62},
         yaxis={"domain": [_SPLIT + _GAP, 1.0]},
         yaxis2={"domain": [0.0, _SPLIT - _GAP], "title": {"text": f"difference [{finer.unit}]"}, "anchor": "x"},
         xaxis={"anchor": "y2"},

@@ -58,7 +58,7 @@ class ReproductionWriter(RecordingWriter):
     def tables(self, of: Evaluation) -> None:
         """The answer, and the thesis's numbers beside ours."""
         with self._file.lock:
-            text = f"{escaped(answer(of))}\n\n{_markdown(*row_table(of))}\n\n{_markdown(*coefficient_table(of))}\n"
+            text = f"{escaped(' '.join(answer(of)))}\n\n{_markdown(*row_table(of))}\n\n{_markdown(*coefficient_table(of))}\n"
             self._text(f"{ROOT}/tables", text)
 
     def convergence(self, of: Evaluation, case: str) -> None:

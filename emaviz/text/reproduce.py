@@ -27,11 +27,12 @@ def number(value: float | None, digits: int = 2, *, signed: bool = False) -> str
     """'−0.13', or a dash."""
     if value is None or not math.isfinite(value):
         return NONE
+    value = round(value, digits) + 0.0  # no −0.00
     return f"{value:{'+' if signed else ''}.{digits}f}".replace("-", "−")
 
 
-def answer(of: Evaluation) -> str:
-    """What comes first, in a sentence or two."""
+def answer(of: Evaluation) -> list[str]:
+    """What comes first, in sentences."""
     robust = of.mean_error(ROBUST)
     cases = sum(one.algorithm == ROBUST and one.error.count > 0 for one in of.scores)
     parts = []
@@ -46,7 +47,14 @@ def answer(of: Evaluation) -> str:
     told = [f"{name} {mean:.2f} (thesis {theirs:.2f})" for name, mean, theirs in ours if math.isfinite(mean)]
     if told:
         parts.append(f"The thesis's algorithms at its settings, mean Err %: {', '.join(told)}.")
-    return " ".join(parts) or "Nothing has been computed yet."
+    coefficients = [
+        f"{NAMES[one.algorithm]} {one.percent:.1f} (thesis {one.printed.coefficient_percent:.1f})"
+        for one in of.coefficients
+        if one.fault == SINGLE and one.printed is not None
+    ]
+    if coefficients:
+        parts.append(f"Performance coefficient %, mean of the five faults: {', '.join(coefficients)}.")
+    return parts or ["Nothing has been computed yet."]
 
 
 def short_table(of: Evaluation) -> tuple[list[str], list[list[str]]]:
@@ -86,12 +94,14 @@ def row_table(of: Evaluation) -> tuple[list[str], list[list[str]]]:
         "Thesis: time s",
         "Ours: time s",
     ]
-    lines = []
+    lines: list[list[str]] = []
+    before = ""
     for one in of.scores:
         digits = 2 if one.algorithm in ALGORITHMS else 3
+        title, before = "" if one.case.title == before else one.case.title, one.case.title
         lines.append(
             [
-                one.case.title,
+                title,
                 NAMES[one.algorithm],
                 spread(one.printed),
                 spread(one.error, digits),
@@ -110,12 +120,14 @@ def coefficient_table(of: Evaluation) -> tuple[list[str], list[list[str]]]:
     titles = {**TITLES, SINGLE: "The five, mean (T 5.42)", MULTIPLE: "Several at once (T 5.43)"}
     order = list(titles)
     order.append(order.pop(order.index(MULTIPLE)))
-    lines = []
+    lines: list[list[str]] = []
+    before = ""
     for one in sorted(of.coefficients, key=lambda one: order.index(one.fault)):
         printed = None if one.printed is None else one.printed.coefficient_percent
+        title, before = "" if one.fault == before else titles[one.fault], one.fault
         lines.append(
             [
-                titles[one.fault],
+                title,
                 NAMES[one.algorithm],
                 number(printed),
                 number(one.percent),

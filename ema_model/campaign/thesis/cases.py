@@ -25,7 +25,7 @@ TITLES = {
     "backlash": "Backlash",
     "short_circuit": "Short circuit",
     "eccentricity": "Eccentricity",
-    "gain": "Proportional gain",
+    "gain": "Gain",
     MULTIPLE: "Several at once",
 }
 

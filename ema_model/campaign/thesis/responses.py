@@ -14,7 +14,7 @@ from ema_model.recordings import Measurement
 from ema_model.simulation.plant import simulate
 from ema_model.simulation.run import Run, simulate_monitor
 
-RUNS = {"chirp": Run(command("chirp")), "step": Run(command("step"))}
+RUNS = {"chirp": Run(command("chirp")), "step": Run(command("step"), 1.0)}  # in 0.5 s, 1 rad is not reached
 SIGNALS = ("user_position_rad", "motor_speed_rad_s", "current_A")  # of which it shows severities
 
 

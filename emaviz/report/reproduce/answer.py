@@ -18,7 +18,8 @@ class Answer(Section[Reproduced]):
     def body(self, subject: Reproduced, figures: Figures) -> str:
         """Always there."""
         of = subject.evaluation
-        told = paragraph(answer(of), "answer")
+        first, *more = answer(of)
+        told = paragraph(first, "answer") + "".join(paragraph(one) for one in more)
         heads, lines = short_table(of)
         if not lines:
             return told

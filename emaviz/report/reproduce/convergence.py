@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ema_model.campaign.thesis.cases import ALGORITHMS, CASES, MULTIPLE, case_of
+from ema_model.campaign.thesis.cases import ALGORITHMS, CASES, MULTIPLE, Case, case_of
 from ema_model.campaign.thesis.result import AS_THE_THESIS
 from emaviz.figures import convergence_bands
 from emaviz.report.markup import folded, paragraph
@@ -19,30 +19,38 @@ class Convergence(Section[Reproduced]):
 
     def body(self, subject: Reproduced, figures: Figures) -> str:
         """Left out where nothing was searched."""
-        histories = {case.name: self._histories(subject, case.name) for case in CASES}
-        shown = [case for case in CASES if histories[case.name]]
+        shown = [case for case in CASES if self._histories(subject, case.name, "rmse_history_A")]
         if not shown:
             return ""
         first = next((case for case in shown if case.name == MULTIPLE), shown[0])
-        least = min(one[-1] for its in histories[first.name].values() for one in its)
+        ends = [one[-1] for its in self._histories(subject, first.name, "rmse_history_A").values() for one in its]
         told = (
-            f"{first.title}: RMSE of the best so far, with the thesis's fitness. The best of all searches ends at "
-            f"{least:.3g} A, which is what chopping leaves between the two models."
+            f"{first.title}: the best so far, with the thesis's fitness. The best of all searches ends at "
+            f"{min(ends):.3g} A, which is what chopping leaves between the two models: from there on the RMSE tells "
+            "hardly anything of the error."
         )
-        others = [
-            figures.place(convergence_bands.figure(histories[case.name], title=case.title, names=NAMES), 300)
-            for case in shown
-            if case is not first
-        ]
-        whole = figures.place(convergence_bands.figure(histories[first.name], title=first.title, names=NAMES), 360)
-        more = "".join(pair(*others[at : at + 2]) for at in range(0, len(others), 2))
-        return paragraph(told) + whole + (folded("The other actuators", more) if more else "")
+        others = "".join(self._drawn(subject, case, figures) for case in shown if case is not first)
+        return (
+            paragraph(told)
+            + self._drawn(subject, first, figures)
+            + (folded("The other actuators", others) if others else "")
+        )
 
-    def _histories(self, subject: Reproduced, case: str) -> dict[str, list[list[float]]]:
+    def _drawn(self, subject: Reproduced, case: Case, figures: Figures) -> str:
+        """RMSE, and the error that the thesis does not draw."""
+        rmse, error = (
+            self._histories(subject, case.name, what) for what in ("rmse_history_A", "error_history_percent")
+        )
+        return pair(
+            figures.place(convergence_bands.figure(rmse, title=case.title, names=NAMES), 340),
+            figures.place(convergence_bands.figure(error, title="Its error", y="Err [%]", names=NAMES), 340),
+        )
+
+    def _histories(self, subject: Reproduced, case: str, what: str) -> dict[str, list[list[float]]]:
         found: dict[str, list[list[float]]] = {}
         for name in ALGORITHMS:
             for row in subject.evaluation.of(AS_THE_THESIS):
                 known = case_of(row["k_true"])
                 if row["algorithm"] == name and known is not None and known.name == case:
-                    found.setdefault(name, []).append(row["rmse_history_A"])
+                    found.setdefault(name, []).append(row[what])
         return found

@@ -33,7 +33,9 @@ class Models(Section[Reproduced]):
                 whole = of_signal(name, axes)
                 rms = one.rms_difference(name)
                 told.append(f"{in_sentence(whole.title)} {whole.scaled(rms).text(rms)}")
-            parts.append(paragraph(f"{one.title}, on the chirp, rms of monitor − reference: {', '.join(told)}."))
+            parts.append(
+                paragraph(f"{one.title}, on the chirp, at 10 kHz; rms of monitor − reference: {', '.join(told)}.")
+            )
             drawn = [
                 figures.place(
                     model_pair.figure(

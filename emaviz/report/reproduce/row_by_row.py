@@ -18,7 +18,8 @@ class RowByRow(Section[Reproduced]):
         """Always there: the thesis's rows are."""
         told = (
             "Mean ± standard deviation over the runs. Err is T 5.2 as printed, which takes k7 as a number; beside it, "
-            "k7 is the angle that it is. The difference is ours − the thesis's. Times are of different computers."
+            "k7 is the angle that it is. The difference is ours − the thesis's. Times are by the clock, of different "
+            "computers; ours of one core a search, and longer where others used the machine."
         )
         heads, lines = row_table(subject.evaluation)
         return paragraph(told) + table(heads, lines, text_columns=2)

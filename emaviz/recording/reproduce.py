@@ -58,8 +58,8 @@ class ReproductionWriter(RecordingWriter):
     def tables(self, of: Evaluation) -> None:
         """The answer, and the thesis's numbers beside ours."""
         with self._file.lock:
-            text = f"{escaped(' '.join(answer(of)))}\n\n{_markdown(*row_table(of))}\n\n{_markdown(*coefficient_table(of))}\n"
-            self._text(f"{ROOT}/tables", text)
+            parts = [*map(escaped, answer(of)), _markdown(*row_table(of)), _markdown(*coefficient_table(of))]
+            self._text(f"{ROOT}/tables", "\n\n".join(parts))
 
     def convergence(self, of: Evaluation, case: str) -> None:
         """Median and band of the best RMSE over the iterations, A, by algorithm."""

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from ema_model.campaign.thesis import Evaluation
 from ema_model.campaign.thesis.cases import ALGORITHMS, MULTIPLE, TITLES
 from ema_model.campaign.thesis.result import TARGET_PERCENT
-from ema_model.campaign.thesis.scores import SINGLE, Spread
+from ema_model.campaign.thesis.scores import MISSED_PERCENT, SINGLE, Spread
 from ema_model.identification.run import ROBUST
 
 NONE = "–"
@@ -47,6 +47,14 @@ def answer(of: Evaluation) -> list[str]:
     told = [f"{name} {mean:.2f} (thesis {theirs:.2f})" for name, mean, theirs in ours if math.isfinite(mean)]
     if told:
         parts.append(f"The thesis's algorithms at its settings, mean Err %: {', '.join(told)}.")
+    others = [
+        f"{NAMES[one.algorithm]} {one.error_of_others:.2f}, {one.missed} of {one.count} left out "
+        f"(thesis {one.printed_error_of_others:.2f}, {one.printed_missed} of {one.printed_count})"
+        for one in of.missed
+        if one.printed_count and math.isfinite(one.error_of_others)
+    ]
+    if others:
+        parts.append(f"Without the runs that missed the fault (Err above {MISSED_PERCENT:g} %): {'; '.join(others)}.")
     coefficients = [
         f"{NAMES[one.algorithm]} {one.percent:.1f} (thesis {one.printed.coefficient_percent:.1f})"
         for one in of.coefficients

@@ -11,7 +11,7 @@ from ema_model.campaign import load_plan
 from ema_model.campaign.thesis import printed
 from ema_model.campaign.thesis.cases import ALGORITHMS, BY_NAME, CASES, EVERY, FAULTS, MULTIPLE, case_of
 from ema_model.campaign.thesis.responses import FAMILIES
-from ema_model.campaign.thesis.scores import SINGLE, Spread, coefficients, scores
+from ema_model.campaign.thesis.scores import SINGLE, Spread, coefficients, missed, scores
 from ema_model.campaign.thesis.trade_off import points, settled_at, stops
 from ema_model.faults import NAMES, error_percent, physical, vector
 from ema_model.identification.run import ROBUST
@@ -89,6 +89,15 @@ def test_spreads_and_scores_of_made_up_rows():
     robust = found["gain_high", ROBUST]
     assert robust.printed is None and robust.difference is None and robust.printed_time_s is None
     assert found["gain_low", "do"].difference is None  # the thesis has it, we have not
+
+
+def test_runs_that_missed_are_told_apart():
+    made = [row("gain_low", "hba", error=error) for error in (1.0, 2.0, 5.0, 20.0)]
+    (one,) = missed(made)
+    assert (one.count, one.missed) == (4, 1) and one.error_of_others == pytest.approx(8.0 / 3.0)
+    assert (one.printed_count, one.printed_missed) == (110, 1)  # of table 5.17
+    (ssa,) = missed([row("gain_low", "ssa")])
+    assert ssa.printed_missed == sum(one.error_percent > 5.0 for one in printed.rows() if one.algorithm == "ssa") >= 4
 
 
 def test_a_coefficient_needs_every_algorithm_on_low_and_high():

@@ -10,7 +10,7 @@ import numpy as np
 
 from ema_model.campaign.store import Store
 from ema_model.campaign.thesis.cases import ALGORITHMS
-from ema_model.campaign.thesis.scores import Coefficient, Score, coefficients, scores
+from ema_model.campaign.thesis.scores import Coefficient, Missed, Score, coefficients, missed, scores
 from ema_model.campaign.thesis.trade_off import Point, Stop, points, stops
 from ema_model.identification.run import ROBUST
 
@@ -38,6 +38,11 @@ class Evaluation:
     def scores(self) -> list[Score]:
         """The thesis's algorithms at its settings, and the robust identification."""
         return scores(self.of(AS_THE_THESIS) + self.of(ROBUST))
+
+    @cached_property
+    def missed(self) -> list[Missed]:
+        """How often each ended in a minimum that is not the fault's."""
+        return missed(self.of(AS_THE_THESIS) + self.of(ROBUST))
 
     @cached_property
     def filtered(self) -> list[Score]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ema_model.campaign.thesis.cases import ALGORITHMS, CASES
+from ema_model.campaign.thesis.scores import MISSED_PERCENT
 from emaviz.report.markup import paragraph, table
 from emaviz.report.reproduce.subject import Reproduced
 from emaviz.report.section import Figures, Section
@@ -38,7 +39,25 @@ class ModelBias(Section[Reproduced]):
             "Where three different searches agree on a wrong value, no search is to blame: that part of the error is "
             "the monitor model's and the fitness's, and more iterations do not take it away."
         )
-        return paragraph(told) + table(heads, lines) + self._filtered(subject)
+        return paragraph(told) + table(heads, lines) + self._missed(subject) + self._filtered(subject)
+
+    def _missed(self, subject: Reproduced) -> str:
+        heads = ["", "Thesis: missed", "Err % of the others", "Ours: missed", "Err % of the others"]
+        lines = [
+            [
+                NAMES[one.algorithm],
+                f"{one.printed_missed} of {one.printed_count}" if one.printed_count else NONE,
+                number(one.printed_error_of_others),
+                f"{one.missed} of {one.count}",
+                number(one.error_of_others, 2 if one.algorithm in ALGORITHMS else 3),
+            ]
+            for one in subject.evaluation.missed
+        ]
+        told = (
+            f"Runs whose Err is above {MISSED_PERCENT:g} % have ended in a minimum that is not the fault's; that part "
+            "is the search's, and few of them make the mean."
+        )
+        return paragraph(told) + table(heads, lines)
 
     def _filtered(self, subject: Reproduced) -> str:
         found = subject.evaluation.fitness_compared()

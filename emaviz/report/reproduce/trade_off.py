@@ -62,7 +62,8 @@ class TradeOff(Section[Reproduced]):
             title = points[0].case.title
             by_n = [one for one in points if one.iterations == usual_t]
             by_t = [one for one in points if one.population == usual_n]
-            parts.append(paragraph(f"{title}: median Err of {points[0].count} searches each, with 5 to 95 %."))
+            several = f"median Err of {points[0].count} searches each, with 5 to 95 %"
+            parts.append(paragraph(f"{title}: {several if points[0].count > 1 else 'Err of one search each'}."))
             parts.append(
                 pair(
                     _placed(figures, f"{usual_t} iterations", "Population", by_n, lambda one: one.population),

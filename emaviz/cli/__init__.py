@@ -13,7 +13,7 @@ from emaviz.cli.interrupt import EXIT_CODE, until_interrupted
 
 COMMANDS = (
     *("gui", "simulate", "identify", "compare", "discover", "track"),
-    *("actuator", "effects", "view", "recover", "campaign"),
+    *("actuator", "effects", "view", "recover", "campaign", "reproduce"),
 )
 
 

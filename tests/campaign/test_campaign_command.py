@@ -244,7 +244,7 @@ def test_parts_are_joined_and_nothing_is_lost(folder, monkeypatch, tmp_path):
 
 def test_the_table_says_nothing_of_how_it_came_about(folder):
     table = pq.read_table(folder / "identify.parquet")
-    assert not {"elapsed_s", "worker", "memory_MB", "finished_s"} & set(table.schema.names)
+    assert not {"elapsed_s", "answer_s", "worker", "memory_MB", "finished_s"} & set(table.schema.names)
     assert table["name"].to_pylist() == sorted(table["name"].to_pylist())
     row = table.to_pylist()[0]
     task = Store(folder).task(row)

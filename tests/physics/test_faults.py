@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +13,7 @@ from ema_model.actuator.readings import readings, sentences
 from ema_model.commands import command
 from ema_model.errors import InputError
 from ema_model.faults import FAULTS, HEALTHY, NAMES, error_percent, performance_coefficient, physical, vector
+from ema_model.files.shipped import shipped_folder
 from ema_model.simulation.run import Run, simulate_monitor, simulate_reference
 
 ACTUATOR = load_actuator()
@@ -29,7 +29,7 @@ SLEW = Run(command("ramp", {"slope_rad_s": 0.4}), 0.3)  # 200 rad/s at the motor
 
 def thesis_rows():
     """Tables 5.1–5.36: (table, k, truth, printed error with its digits)."""
-    with (Path(__file__).parent / "thesis_rows.csv").open(newline="", encoding="utf-8") as file:
+    with (shipped_folder("thesis") / "rows.csv").open(newline="", encoding="utf-8") as file:
         for row in csv.DictReader(file):
             k = [float(row[name]) for name in NAMES]
             truth = [float(row[f"{name}_true"]) for name in NAMES]

@@ -79,6 +79,10 @@ def _run(given: Given, settings: Settings, seed: int) -> dict[str, Any]:
         "ambiguous": ["+".join(group) for group in sure.ambiguous],
         "evaluations": int(answer.evaluations),
         "rmse_history_A": answer.rmse_history.tolist(),
+        "error_history_percent": None
+        if given.truth is None
+        else [faults.error_percent(k, given.truth) for k in answer.k_history],
+        "answer_s": answer.elapsed_s,
     }
 
 
@@ -144,6 +148,7 @@ KIND = Kind(
             ("ambiguous", TEXTS),
             ("evaluations", pa.int64()),
             ("rmse_history_A", NUMBERS),
+            ("error_history_percent", NUMBERS),  # as the thesis has it, of the best so far
         ]
     ),
     run=_run,

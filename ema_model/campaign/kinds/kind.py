@@ -27,7 +27,16 @@ COMMON = pa.schema(
     ]
 )
 HOW = pa.schema(  # how a row came about, which is another each time: in the parts, not in the tables
-    [("elapsed_s", NUMBER), ("worker", TEXT), ("memory_MB", NUMBER), ("finished_s", NUMBER)]
+    [
+        ("elapsed_s", NUMBER),
+        (
+            "answer_s",
+            NUMBER,
+        ),  # that an identification itself tells: without compilation, and without making its recordings
+        ("worker", TEXT),
+        ("memory_MB", NUMBER),
+        ("finished_s", NUMBER),
+    ]
 )
 
 
@@ -35,8 +44,8 @@ HOW = pa.schema(  # how a row came about, which is another each time: in the par
 class Kind:
     """A kind of task.
 
-    run(given, settings, seed) gives a value for each of `columns`, and raises InputError or FloatingPointError for
-    what cannot be computed; its answer depends on its arguments only.
+    run(given, settings, seed) gives a value for each of `columns`, which depends on its arguments only, and of `HOW`
+    what it knows; it raises InputError or FloatingPointError for what cannot be computed.
     """
 
     title: str

@@ -1,0 +1,63 @@
+"""`emaviz reproduce`: the thesis's evaluation beside ours, as a campaign, a report and a recording."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from ema_model.actuator import load_actuator
+from ema_model.campaign import Store, load_plan, run_plan, scheduler
+from ema_model.campaign.plan import plan_path
+from ema_model.campaign.thesis import Evaluation
+from ema_model.campaign.thesis.responses import drawn
+from ema_model.errors import InputError
+from emaviz.cli import files, options, output
+from emaviz.cli.numbers import whole
+from emaviz.text.reproduce import aligned, answer, short_table
+
+HELP = "compute the thesis's evaluation anew, and set its numbers beside ours"
+_PLAN = files.Input("a plan (.toml)", is_file=lambda name: bool(Path(name).suffix))
+REPORT, RECORDING = "reproduce.html", "reproduce.rrd"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """--out, --quick, --workers; --plan for a plan of one's own with the same groups."""
+    parser.add_argument(
+        "--out", required=True, type=files.Folder(), metavar="DIR", help="where the rows, the report and the .rrd go"
+    )
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument("--quick", action="store_true", help="two runs of each in place of ten: minutes, not an hour")
+    which.add_argument("--plan", type=_PLAN, metavar="PLAN.toml", help="another plan, with groups as `thesis` has them")
+    parser.add_argument("--workers", type=whole(1, 10_000), metavar="N", help="processes; all cores without it")
+    options.add_json(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Computes what the folder lacks, writes both files, prints the short table."""
+    plan = load_plan(plan_path(arguments.plan or ("thesis_quick" if arguments.quick else "thesis")))
+    if "identify" not in {task.kind for task in plan.tasks}:
+        raise InputError(f"{arguments.plan}: identifies nothing, so that nothing stands beside the thesis")
+    progress = output.Progress()
+    progress.show("beginning")
+    try:
+        workers = scheduler(None, arguments.workers)
+        status = run_plan(plan, arguments.out, workers, on_progress=lambda at: progress.show(at.text))
+        found = Evaluation(Store(arguments.out))
+        progress.show("simulating the responses")
+        responses = drawn(load_actuator())
+        progress.show("writing the report and the recording")
+        folder = Path(arguments.out)
+        from emaviz.recording.reproduce import write_reproduction  # rerun takes a second to import
+        from emaviz.report.reproduce import write_reproduction_report  # plotly takes a second to import
+
+        write_reproduction_report(found, responses, folder / REPORT)
+        write_reproduction(found, responses, folder / RECORDING)
+    finally:
+        progress.done()
+    output.write_json(arguments.json, dict(found.as_dict()), 0, output.configuration(arguments))
+    print(aligned(*short_table(found)))
+    print("", *answer(found), sep="\n")
+    if status.errors:
+        print(f"{status.errors} tasks ended in an error; the report lists them")
+    print(f"{folder / REPORT}, {folder / RECORDING}")
+    return 0

@@ -1,0 +1,149 @@
+"""The thesis's evaluation as a recording: tables, convergence on `iteration`, responses on `sim_time`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+from numpy.typing import ArrayLike
+
+from ema_model.campaign.thesis import Evaluation
+from ema_model.campaign.thesis.cases import ALGORITHMS, CASES, MULTIPLE, case_of
+from ema_model.campaign.thesis.responses import FAMILIES, SIGNALS, Drawn
+from ema_model.campaign.thesis.result import AS_THE_THESIS
+from ema_model.errors import InputError
+from emaviz.recording import series, style
+from emaviz.recording.blueprint import plot
+from emaviz.recording.errors import RecordingError
+from emaviz.recording.markdown import escaped
+from emaviz.recording.style import algorithm_colour, signal_title
+from emaviz.recording.writer import RecordingWriter
+from emaviz.text.reproduce import NAMES, answer, coefficient_table, row_table
+
+ROOT = "/reproduce"
+_PERCENTILES = (("p05", 5.0, 1.0), ("median", 50.0, 2.5), ("p95", 95.0, 1.0))  # with their lines' widths
+_SIGNALS = ("current_A", "user_position_rad", "motor_position_rad", "motor_speed_rad_s")
+_COLOURS = ((16, 152, 173, 255), (47, 111, 222, 255), (156, 54, 181, 255), (214, 51, 108, 255), (240, 140, 0, 255))
+
+
+def write_reproduction(evaluation: Evaluation, drawn: Drawn, path: str | Path) -> None:
+    """Writes a whole .rrd file; InputError in one line where that cannot be done."""
+    try:
+        with ReproductionWriter(path) as writer:
+            writer.properties({"reproduce": evaluation.as_dict()})
+            writer.tables(evaluation)
+            for case in CASES:
+                writer.convergence(evaluation, case.name)
+            writer.responses(drawn)
+    except RecordingError as error:
+        raise InputError(str(error)) from None
+    if writer.failed is not None:
+        raise InputError(writer.failed)
+
+
+class ReproductionWriter(RecordingWriter):
+    """A recording of the evaluation: what stands in the report, to be looked at closely."""
+
+    def __init__(self, path: str | Path) -> None:
+        super().__init__(path)
+        self._searched: list[str] = []  # cases
+
+    def __enter__(self) -> ReproductionWriter:
+        return self
+
+    def tables(self, of: Evaluation) -> None:
+        """The answer, and the thesis's numbers beside ours."""
+        with self._file.lock:
+            parts = [*map(escaped, answer(of)), _markdown(*row_table(of)), _markdown(*coefficient_table(of))]
+            self._text(f"{ROOT}/tables", "\n\n".join(parts))
+
+    def convergence(self, of: Evaluation, case: str) -> None:
+        """Median and band of the best RMSE over the iterations, A, by algorithm."""
+        for name in ALGORITHMS:
+            own = [
+                row["rmse_history_A"]
+                for row in of.of(AS_THE_THESIS)
+                if row["algorithm"] == name and (known := case_of(row["k_true"])) is not None and known.name == case
+            ]
+            if not own:
+                continue
+            length = max(map(len, own))
+            whole = np.array([[*one, *[one[-1]] * (length - len(one))] for one in own])
+            steps = np.arange(length)
+            for what, percentile, width in _PERCENTILES:
+                title = f"{NAMES[name]} {what} [A]"
+                drawn = series.line(title, algorithm_colour(name), width)
+                time = [rr.TimeColumn(style.ITERATION, sequence=steps)]
+                self._plotted(
+                    f"convergence/{case}/{name}/{what}", drawn, time, np.percentile(whole, percentile, axis=0)
+                )
+            if case not in self._searched:
+                self._searched.append(case)
+
+    def responses(self, drawn: Drawn) -> None:
+        """Both models, healthy and faulty; the actuator at five severities of each fault."""
+        for pair in drawn.pairs:
+            for group, run in (("reference", pair.reference), ("monitor", pair.monitor)):
+                for name in _SIGNALS:
+                    self._plotted(
+                        f"models/{pair.name}/{name}/{group}", series.signal_style(group, name), _time(run), run[name]
+                    )
+        for family in FAMILIES:
+            for command in ("chirp", "step"):
+                runs = drawn.families[family.name, command]
+                for at, (severity, run) in enumerate(runs.items()):
+                    for name in SIGNALS:
+                        line = series.line(f"{severity}, {signal_title(name)}", _COLOURS[at % len(_COLOURS)], 1.5)
+                        self._plotted(f"severities/{family.name}/{command}/{name}/s{at}", line, _time(run), run[name])
+
+    def _plotted(self, place: str, drawn: series.Style, time: list[rr.TimeColumn], values: ArrayLike) -> None:
+        self._send(f"{ROOT}/{place}", drawn, time, np.asarray(values, dtype=float))
+
+    def _layout(self) -> rrb.Blueprint:
+        tabs: list[Any] = [rrb.TextDocumentView(origin=f"{ROOT}/tables", name="Thesis beside ours")]
+        if self._searched:
+            first = sorted(self._searched, key=lambda case: case != MULTIPLE)
+            tabs.append(
+                rrb.Grid(*[plot(_title(case), [f"{ROOT}/convergence/{case}/**"]) for case in first], name="Convergence")
+            )
+        for pair in ("healthy", "faulty"):
+            tabs.append(_grid(f"RM and MM, {pair}", f"{ROOT}/models/{pair}", _SIGNALS))
+        for family in FAMILIES:
+            views = [
+                plot(f"{signal_title(name)}, {command}", [f"{ROOT}/severities/{family.name}/{command}/{name}/**"])
+                for command in ("chirp", "step")
+                for name in SIGNALS
+            ]
+            tabs.append(rrb.Grid(*views, grid_columns=3, name=family.title))
+        return rrb.Blueprint(
+            rrb.Tabs(*tabs),
+            rrb.BlueprintPanel(state="collapsed"),
+            rrb.SelectionPanel(state="collapsed"),
+            rrb.TimePanel(state="collapsed", timeline=style.SIM_TIME, play_state="Paused"),
+            auto_views=False,
+            auto_layout=False,
+        )
+
+
+def _grid(title: str, root: str, names: Sequence[str]) -> rrb.Grid:
+    return rrb.Grid(*[plot(signal_title(name), [f"{root}/{name}/**"]) for name in names], name=title)
+
+
+def _title(case: str) -> str:
+    return next(one.title for one in CASES if one.name == case)
+
+
+def _time(run: Any) -> list[rr.TimeColumn]:
+    nanoseconds = np.rint(np.asarray(run.time_s) * 1e9).astype("timedelta64[ns]")
+    return [rr.TimeColumn(style.SIM_TIME, duration=nanoseconds)]
+
+
+def _markdown(heads: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
+    rows = [heads, ["---"] * len(heads), *lines]
+    return "\n".join(
+        "| " + " | ".join(escaped(cell) if row is not rows[1] else cell for cell in row) + " |" for row in rows
+    )

@@ -10,14 +10,12 @@ import viser
 from numpy.typing import NDArray
 
 from emaviz.scene.drivetrain import Drivetrain
+from emaviz.scene.framing import FIELD_RAD, Frame, frame
 from emaviz.scene.motor import Motor
 
 _ROOT = "/actuator"
-_LOOK_AT = (0.63, 0.0, -0.06)
-_VIEW = (-0.62, -0.66, 0.44)  # direction from there to the camera
-_FIELD_RAD = 0.6
-_WIDTH, _HEIGHT = 2.15, 1.75  # of the actuator, as that view sees it
-_GROUND_Z, _GROUND_RADIUS, _GROUND_CELL = -0.37, 1.9, 0.27
+_FIRST_ASPECT = 0.7  # of the picture that a browser is taken to have until it tells
+_GROUND_MIDDLE, _GROUND_Z, _GROUND_RADIUS, _GROUND_CELL = (0.66, 0.12), -0.37, 1.55, 0.27
 _GRID = (156, 162, 174)  # seen on light and dark
 _LABELS = (
     ("housing", (0.12, -0.05, 0.31)),
@@ -60,7 +58,7 @@ class ActuatorScene:
             scene.add_label(f"/labels/{i}", text, position=place, visible=False, anchor="bottom-center")
             for i, (text, place) in enumerate(_LABELS)
         ]
-        self._frame_camera(server.initial_camera, 0.7)
+        _put(server.initial_camera, frame(_FIRST_ASPECT))
 
         @server.on_client_connect
         def _(client: viser.ClientHandle) -> None:
@@ -70,15 +68,14 @@ class ActuatorScene:
         """The whole actuator in a browser's picture, whatever its shape."""
         camera = client.camera
         if camera.image_height > 0:
-            self._frame_camera(camera, camera.image_width / camera.image_height)
+            _put(camera, frame(camera.image_width / camera.image_height))
 
     def _keep_framed(self, client: viser.ClientHandle) -> None:
         """Frames the actuator anew when the picture changes its shape, until the user moves the camera."""
         camera = client.camera
         aspects = [0.0]
-        placed: list[
-            Any
-        ] = []  # where it was put; the browser may tell of an earlier place when a later one is on its way
+        # where it was put: the browser may tell of an earlier place when a later one is on its way
+        placed: list[tuple[float, float, float]] = []
 
         @camera.on_update
         def _(_: Any) -> None:
@@ -87,9 +84,10 @@ class ActuatorScene:
             aspect = camera.image_width / camera.image_height
             untouched = not placed or any(np.allclose(camera.position, one, atol=0.02) for one in placed)
             if untouched and abs(aspect - aspects[-1]) > 0.01:
-                self._frame_camera(camera, aspect)
+                shown = frame(aspect)
+                _put(camera, shown)
                 aspects[:] = [aspect]
-                placed.append(self._place(aspect))
+                placed.append(shown.position)
                 del placed[:-_MOST_PLACED]
 
     def set_opacity(self, opacity: float) -> None:
@@ -121,17 +119,11 @@ class ActuatorScene:
             self._drivetrain.move(motor_rad, surface_rad, play)
             self._drivetrain.heat(heat)
 
-    def _frame_camera(self, camera: Any, aspect: float) -> None:
-        camera.fov = _FIELD_RAD
-        camera.position = self._place(aspect)
-        camera.look_at = _LOOK_AT
 
-    @staticmethod
-    def _place(aspect: float) -> tuple[float, ...]:
-        """Of a camera that sees the whole actuator; aspect is width over height of its picture."""
-        distance = 0.5 * max(_HEIGHT, _WIDTH / max(aspect, 0.2)) / np.tan(0.5 * _FIELD_RAD)
-        norm = sum(part**2 for part in _VIEW) ** 0.5
-        return tuple(float(at + distance * part / norm) for at, part in zip(_LOOK_AT, _VIEW))
+def _put(camera: Any, shown: Frame) -> None:
+    camera.fov = FIELD_RAD
+    camera.position = shown.position
+    camera.look_at = shown.look_at
 
 
 def _ground() -> NDArray[np.float32]:
@@ -140,5 +132,5 @@ def _ground() -> NDArray[np.float32]:
     half = np.sqrt(_GROUND_RADIUS**2 - across**2)
     one_way = np.stack([np.column_stack([across, end * half]) for end in (-1.0, 1.0)], axis=1)
     lines = np.concatenate([one_way, one_way[:, :, ::-1]])
-    middle = np.broadcast_to([_LOOK_AT[0], 0.0], lines.shape)
+    middle = np.broadcast_to(_GROUND_MIDDLE, lines.shape)
     return np.concatenate([lines + middle, np.full((*lines.shape[:2], 1), _GROUND_Z)], axis=2).astype(np.float32)

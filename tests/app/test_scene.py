@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from support.on_page import wait_until
 from support.one_tab import Tab
 
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
 from ema_model.faults import vector
 from ema_model.simulation.run import Run, simulate_reference
+from emaviz.page.docked import LEFT_PX, _width_px
+from emaviz.page.members import workspaces
+from emaviz.page.style import STRIP_HEIGHT_PX
 from emaviz.scene import drivetrain, motor, solids
+from emaviz.scene.framing import BOXES, frame
 from emaviz.scene.motion import enlargement, motion
 from emaviz.scene.playback import Playback
 from emaviz.session.session import Simulation
@@ -223,6 +229,29 @@ def test_coils_burn_from_the_first_shorted_turn_on():
     assert coils[0] is None, "all of phase A is burnt"
 
 
+WINDOWS = ((1400, 900), (1920, 1080), (1100, 700))
+
+
+def pictures():
+    """Sizes of the picture that the panels leave, in px."""
+    shares = {one.share for one in workspaces()}
+    return [(w - LEFT_PX - _width_px(w, share), h - STRIP_HEIGHT_PX) for w, h in WINDOWS for share in shares]
+
+
+@pytest.mark.parametrize("width, height", [*pictures(), (200, 900), (1800, 400)])
+def test_the_whole_machine_fills_the_picture(width, height):
+    corners = np.array([corner for box in BOXES for corner in itertools.product(*box)])
+    shown = frame(width / height)
+    seen = shown.seen(corners)
+    least, most = seen[:, :2].min(axis=0), seen[:, :2].max(axis=0)
+    assert np.all(least > -0.95) and np.all(most < 0.95) and np.all(seen[:, 2] > 0.0), "nothing is cut"
+    assert np.max((most - least) / 2.0) > 0.8, "as near as can be"
+    assert least == pytest.approx(-most, abs=0.1), "in the middle"
+    if (width, height) in pictures():
+        assert np.prod((most - least) / 2.0) > 0.5, "not half of the picture is empty"
+    assert shown.at(*seen[7]) == pytest.approx(corners[7])
+
+
 @pytest.fixture
 def drawn(browser, app):
     """A tab in which the scene is drawn."""
@@ -245,3 +274,29 @@ def test_the_rotor_in_the_browser_follows_the_run_at_a_pace(drawn, app):
     app.strip.play(True)
     drawn.wait_for_timeout(3000)
     assert drawn.evaluate("window.__poses.size") > 9
+
+
+@pytest.mark.browser
+def test_the_camera_frames_the_machine_between_the_panels_until_somebody_moves_it(drawn, app):
+    """In a window that becomes smaller, too; and again after Reset view."""
+    client = next(iter(app.server.get_clients().values()))
+
+    def framed():
+        camera = client.camera
+        return np.allclose(camera.position, frame(camera.image_width / camera.image_height).position, atol=0.03)
+
+    def picture():
+        box = drawn.locator("canvas").first.bounding_box()
+        left, right = (drawn.locator(f"[data-dock-region={side}]").bounding_box() for side in ("left", "right"))
+        return box["x"] >= left["x"] + left["width"] - 1 and box["x"] + box["width"] <= right["x"] + 1 and box["width"]
+
+    wait_until(lambda: framed() and 550 < picture() < 650, 30.0)
+    drawn.set_viewport_size({"width": 1100, "height": 700})
+    wait_until(lambda: framed() and 340 < picture() < 400, 30.0)
+    client.camera.position = (3.0, -2.0, 1.0)
+    wait_until(lambda: np.allclose(client.camera.position, (3.0, -2.0, 1.0), atol=0.03), 30.0)
+    drawn.set_viewport_size({"width": 1400, "height": 900})
+    wait_until(lambda: 550 < picture() < 650, 30.0)
+    assert not framed(), "the user's view is left alone"
+    drawn.get_by_role("button", name="Reset view").click()
+    wait_until(framed, 30.0)

@@ -14,7 +14,7 @@ BOXES = (
     ((-0.345, 0.345), (-0.31, 0.31), (-0.31, 0.31)),
     ((-0.42, -0.34), (-0.04, 0.04), (-0.04, 0.04)),
     ((-0.35, 1.63), (-0.17, 0.17), (-0.37, -0.34)),
-    ((1.30, 1.88), (-0.34, 0.34), (-0.02, 0.42)),
+    ((1.30, 1.88), (-0.34, 0.34), (-0.02, 0.44)),
     ((0.44, 0.86), (0.36, 0.60), (-0.37, 0.06)),
 )
 _CORNERS = np.array([corner for box in BOXES for corner in product(*box)])
@@ -66,9 +66,17 @@ def frame(aspect: float) -> Frame:
     left, low = (x + half_x * z).min(), (y + half_y * z).min()
     rightmost, top = (x - half_x * z).max(), (y - half_y * z).max()
     back = min((left - rightmost) / (2.0 * half_x), (low - top) / (2.0 * half_y))
-    camera = 0.5 * (left + rightmost) * right + 0.5 * (low + top) * up + back * away
+    across, over = 0.5 * (left + rightmost), 0.5 * (low + top)
+    for _ in range(4):  # to the middle of what is seen, where there is room to move
+        across += _middle((x - across) / (z - back)) * (z.mean() - back)
+        over += _middle((y - over) / (z - back)) * (z.mean() - back)
+    camera = across * right + over * up + back * away
     target = camera + (z.mean() - back) * away
     return Frame(_triple(camera), _triple(target), aspect)
+
+
+def _middle(values: NDArray[np.float64]) -> float:
+    return 0.5 * float(values.min() + values.max())
 
 
 def _axes(away: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:

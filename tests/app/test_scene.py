@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import time
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -18,10 +19,15 @@ from ema_model.simulation.run import Run, simulate_reference
 from emaviz.page.docked import LEFT_PX, _width_px
 from emaviz.page.members import workspaces
 from emaviz.page.style import STRIP_HEIGHT_PX
-from emaviz.scene import drivetrain, motor, solids
+from emaviz.scene import drive_box, drivetrain, motor, solids
+from emaviz.scene.actuator import _NAMES, ActuatorScene
+from emaviz.scene.drive_box import NAMED_AT
 from emaviz.scene.framing import BOXES, frame
+from emaviz.scene.labels import Label, lay_out
 from emaviz.scene.motion import enlargement, motion
+from emaviz.scene.palette import FAULT
 from emaviz.scene.playback import Playback
+from emaviz.server.safe_server import open_server
 from emaviz.session.session import Simulation
 
 SOLIDS = {
@@ -41,13 +47,16 @@ class Recorder:
     """A scene that remembers what it is told."""
 
     def __init__(self):
-        self.poses, self.damages = [], []
+        self.poses, self.damages, self.told = [], [], []
 
     def pose(self, *values):
         self.poses.append(values)
 
     def damage(self, *values):
         self.damages.append(values)
+
+    def tell(self, *values):
+        self.told.append(values)
 
 
 @pytest.fixture(scope="module")
@@ -138,10 +147,103 @@ def test_play_moves_the_nut_from_one_jaw_to_the_other(actuator):
     assert np.all(np.abs(loose.play) <= 0.5 * loose.room + 1e-12)
 
 
-def test_friction_heats_the_screw_and_nothing_else_does(actuator):
-    assert np.all(motion(*run_of(actuator, k2=0.5, k6=0.5), actuator).heat == 0.0)
-    hot = motion(*run_of(actuator, k1=1.0), actuator).heat
-    assert 0.3 < hot.min() and hot.max() == pytest.approx(1.0)
+@pytest.fixture(scope="module")
+def scene():
+    server = open_server("127.0.0.1", 0)
+    yield ActuatorScene(server)
+    server.stop()
+
+
+def drawn_nodes(scene, actuator, **faults):
+    """By name, what of each node is drawn: its colour, its text, its turn and place, its triangles."""
+    shown = motion(*run_of(actuator, **faults), actuator)
+    shown.damage(scene)
+    scene.pose(0.0, 0.0)
+    nodes = scene._server.scene._handle_from_node_name
+    drawn = {}
+    for name, node in nodes.items():
+        if node is not None and node.visible:
+            looks = [getattr(node, one, None) for one in ("color", "text")]
+            drawn[name] = (
+                *looks,
+                *np.round(node.wxyz, 3),
+                *np.round(node.position, 4),
+                len(getattr(node, "faces", ())),
+            )
+    return drawn
+
+
+@pytest.mark.parametrize(
+    "fault, text, place",
+    [
+        ("k1", "friction × 2.40", "motor/bearings"),
+        ("k2", "shown × 400", "drive/nut/jaw_low/block"),
+        ("k3", "phase A: 30% of turns", "motor/burnt"),
+        ("k4", "phase B: 30% of turns", "motor/burnt"),
+        ("k5", "phase C: 30% of turns", "motor/burnt"),
+        ("k6", "ζ = 0.70\nshown × 20", "motor/axis/rotor/thinnest_gap"),
+        ("k7", "+72°\n(no effect: ζ = 0)", "motor/axis/rotor/direction"),
+        ("k8", "gain × 1.20", "controller/front"),
+    ],
+)
+def test_each_fault_is_said_and_marked_at_its_place(scene, actuator, fault, text, place):
+    healthy = drawn_nodes(scene, actuator)
+    broken = drawn_nodes(scene, actuator, **{fault: 0.7})
+    assert FAULT not in {node[0] for node in healthy.values()}, "a healthy machine has nothing in the fault colour"
+    marked = {name for name, node in broken.items() if node[0] == FAULT}
+    assert f"/actuator/{place}" in marked and len({name.split("/")[2] for name in marked}) == 1, "one place alone"
+    assert text in broken[f"/labels/{fault}"][1]
+    assert not [name for name in healthy if name.startswith("/labels/k")]
+    again = drawn_nodes(scene, actuator)
+    assert again == healthy, "mended, it looks as it did"
+
+
+def test_the_eccentric_rotor_is_off_towards_its_mark(scene, actuator):
+    drawn_nodes(scene, actuator, k6=0.7, k7=0.7)
+    scene.pose(1.2, 0.0)
+    w, x, *_ = scene._motor._thinnest.wxyz
+    off = np.array(scene._motor._axis.position)
+    towards = 2.0 * np.arctan2(x, w) + 1.2
+    assert np.arctan2(off[2], off[1]) == pytest.approx(np.arctan2(np.sin(towards), np.cos(towards)))
+
+
+def test_the_load_is_an_arrow_on_the_surface(scene, actuator):
+    def shown(load):
+        """Which way its tail points, and its length; None without an arrow."""
+        run = simulate_reference(Run(load_torque_Nm=load), actuator)
+        motion(run, vector({}), actuator).pose(scene, 0.1)
+        w, _, y, _ = scene._load._frame.wxyz
+        return (-2.0 * w * y, scene._load._shaft.scale[0]) if scene._load._frame.visible else None
+
+    assert shown(0.0) is None
+    assert shown(20.0) == pytest.approx((1.0, 0.26)), "from above"
+    assert shown(-20.0) == pytest.approx((-1.0, 0.26))
+    assert shown(15.0) == pytest.approx((1.0, 0.75 * 0.26)), "where 20 is the longest"
+
+
+def test_the_drive_says_its_bus_and_its_delay(actuator):
+    assert drive_box.said(actuator) == "controller and inverter\n48 V bus"
+    late = replace(actuator, effects={"computation_delay": {"delay_s": 1e-4}})
+    assert drive_box.said(late) == "controller and inverter\n48 V bus, delay 0.100 ms"
+
+
+ALL = {f"k{i}": 0.7 for i in range(1, 9)}
+
+
+@pytest.mark.parametrize("faults", [{}, *({name: 0.7} for name in ALL), ALL])
+def test_labels_do_not_cover_each_other(scene, actuator, faults):
+    shown = motion(*run_of(actuator, **faults), actuator)
+    said = [Label(one.fault, one.text, one.place, callout=True) for one in shown.callouts]
+    said += [Label("drive", shown.drive_says, NAMED_AT), *_NAMES]
+    for picture in pictures():
+        placed = lay_out(said, frame(picture[0] / picture[1]), picture)
+        boxes = np.array([one.box() for one in placed])
+        apart = (boxes[:, None, :2] > boxes[None, :, 2:]).any(2) | (boxes[:, None, 2:] < boxes[None, :, :2]).any(2)
+        assert np.all(apart | np.eye(len(boxes), dtype=bool))
+        assert boxes[:, :2].min() >= 0.0 and np.all(boxes[:, 2:] <= picture)
+        told = {one.label.name for one in placed}
+        assert faults.keys() <= told or (faults == ALL and picture[0] < 400), "every fault is said"
+        assert len(placed) >= (len(said) if picture[0] > 550 and len(faults) < 2 else 0.6 * len(said))
 
 
 def test_playback_plays_pauses_and_seeks(actuator):

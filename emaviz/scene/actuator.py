@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Sequence
 from typing import Any
 
@@ -86,18 +87,21 @@ class ActuatorScene:
         camera = client.camera
         aspects = [0.0]
         # where it was put: the browser may tell of an earlier place when a later one is on its way
-        placed: list[tuple[float, float, float]] = []
+        placed = [frame(_FIRST_ASPECT).position]
+        framing = threading.Lock()
 
         @camera.on_update
         def _(_: Any) -> None:
-            if camera.image_height <= 0:
-                return
-            aspect = camera.image_width / camera.image_height
-            untouched = not placed or any(np.allclose(camera.position, one, atol=0.02) for one in placed)
-            if untouched and abs(aspect - aspects[-1]) > 0.01:
-                aspects[:] = [aspect]
-                placed.append(self._frame(camera).position)
-                del placed[:-_MOST_PLACED]
+            with framing:
+                if camera.image_height <= 0:
+                    return
+                aspect, at = camera.image_width / camera.image_height, camera.position
+                untouched = any(np.allclose(at, one, atol=0.02) for one in placed)
+                there = np.allclose(at, placed[-1], atol=0.02) and abs(aspect - aspects[-1]) <= 0.01
+                if untouched and not there:
+                    aspects[:] = [aspect]
+                    placed.append(self._frame(camera).position)
+                    del placed[:-_MOST_PLACED]
 
     def set_opacity(self, opacity: float) -> None:
         """Of the housing, 0 … 1."""

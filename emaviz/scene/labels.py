@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
 
@@ -25,7 +25,9 @@ _EDGE_PX, _APART_PX = 6.0, 3.0  # from the picture's edge, and between labels
 _AROUND = np.radians(np.arange(0.0, 360.0, 22.5))
 _AWAY_PX = (10.0, 26.0, 44.0, 64.0, 90.0, 120.0, 160.0, 210.0, 270.0)
 _COVERED_PX, _CROSSED_PX = 60.0, 90.0  # what covering the machine, and crossing another label, counts as way
-_LEADER_PX = 14.0  # from where on a line leads to the place
+_SCREW = ((0.42, 1.2), (-0.06, 0.06), (-0.24, -0.06))
+_SOLID = (BOXES[0], *BOXES[3:], _SCREW)  # what labels had better leave to be seen
+_LEADER_PX = 9.0  # from where on a line leads to the place
 _FIRST_PICTURE = (604, 832)  # px, until a browser tells
 _TOP_PX = 20.0  # where windows have their handles
 
@@ -99,7 +101,7 @@ def lay_out(labels: Sequence[Label], shown: Frame, picture: tuple[int, int]) -> 
 def _machine(shown: Frame, size: NDArray[np.float64]) -> list[NDArray[np.float64]]:
     """Boxes in the picture that the machine's parts fill, px (4,)."""
     boxes = []
-    for box in BOXES:
+    for box in _SOLID:
         corners = (shown.seen(list(product(*box)))[:, :2] * (1.0, -1.0) + 1.0) * 0.5 * size
         boxes.append(np.concatenate([corners.min(axis=0), corners.max(axis=0)]))
     return boxes
@@ -146,6 +148,7 @@ class Labels:
         self._frame = frame(_FIRST_PICTURE[0] / _FIRST_PICTURE[1])
         self._picture = _FIRST_PICTURE
         self._shown = True
+        self._laid_out: tuple[object, list[Placed]] = ((), [])
         self._arranging = threading.Lock()
         self._arrange()
 
@@ -169,7 +172,7 @@ class Labels:
     def _arrange(self) -> None:
         with self._arranging:
             labels = [*self._callouts, *self._told, *self._names] if self._shown else []
-            placed = lay_out(labels, self._frame, self._picture)
+            placed = self._lay_out(labels)
             for name in self._handles.keys() - {one.label.name for one in placed}:
                 self._put(name, "", (0.0, 0.0, 0.0), False, visible=False)
             for one in placed:
@@ -178,6 +181,15 @@ class Labels:
                 self._put(one.label.name, one.label.text, (right, back, up), one.label.callout, visible=True)
             for callout, colour, thickness in ((True, FAULT, 2.0), (False, SATIN, 1.0)):
                 self._lead([one for one in placed if one.label.callout == callout], colour, thickness)
+
+    def _lay_out(self, labels: list[Label]) -> list[Placed]:
+        """Only where their sizes have changed: a slider that is dragged mostly changes digits."""
+        sizes = tuple((one.name, one.place, tuple(one.size_px())) for one in labels)
+        asked = sizes, self._frame.position, self._picture
+        if asked != self._laid_out[0]:
+            self._laid_out = asked, lay_out(labels, self._frame, self._picture)
+        now = {one.name: one for one in labels}
+        return [replace(one, label=now[one.label.name]) for one in self._laid_out[1]]
 
     def _put(self, name: str, text: str, at: tuple[float, float, float], callout: bool, visible: bool) -> None:
         sent = (text, at) if visible else ()

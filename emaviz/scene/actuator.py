@@ -35,7 +35,7 @@ _NAMES = (
     Label("horn", "horn", (1.34, 0.0, -0.02)),
     Label("surface", "control surface", (1.70, -0.22, 0.13)),
 )
-_DRIVE_AT, _LOAD_AT = NAMED_AT, (1.68, 0.0, 0.28)
+_DRIVE_AT, _LOAD_AT = NAMED_AT, (1.68, 0.0, 0.13)
 _MOST_PLACED = 20  # places of a camera that are remembered
 
 

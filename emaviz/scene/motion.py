@@ -107,7 +107,7 @@ def motion(run: Measurement, k: ArrayLike, actuator: Actuator) -> Motion:
         currents = np.repeat(run["current_A"][:, None], 3, axis=1)
     full = _round_up(float(np.max(np.abs(currents))))
     load = run["load_torque_Nm"] if "load_torque_Nm" in run else None
-    heaviest = 0.0 if load is None else float(np.max(np.abs(load)))
+    heaviest = 0.0 if load is None else float(load[np.argmax(np.abs(load))])
     return Motion(
         run.time_s - run.time_s[0],
         motor,
@@ -124,8 +124,8 @@ def motion(run: Measurement, k: ArrayLike, actuator: Actuator) -> Motion:
         room,
         float(run.time_s[0]),
         callouts(k, actuator, enlarged * more, _GAP_ENLARGED),
-        None if load is None else load / _round_up(heaviest),
-        f"load {heaviest:.4g} {actuator.axes.unit('N·m', USER)}" if heaviest > 0.0 else "",
+        None if load is None else load / _round_up(abs(heaviest)),
+        f"load {heaviest:.4g} {actuator.axes.unit('N·m', USER)}".replace("-", "−") if heaviest else "",
         said(actuator),
     )
 

@@ -211,7 +211,9 @@ def test_the_load_is_an_arrow_on_the_surface(scene, actuator):
     def shown(load):
         """Which way its tail points, and its length; None without an arrow."""
         run = simulate_reference(Run(load_torque_Nm=load), actuator)
-        motion(run, vector({}), actuator).pose(scene, 0.1)
+        told = motion(run, vector({}), actuator)
+        told.pose(scene, 0.1)
+        assert told.load_says == (f"load {load:g} N·m".replace("-", "−") if load else "")
         w, _, y, _ = scene._load._frame.wxyz
         return (-2.0 * w * y, scene._load._shaft.scale[0]) if scene._load._frame.visible else None
 

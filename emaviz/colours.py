@@ -4,6 +4,7 @@ REFERENCE = "#2f6fde"
 MONITOR = "#f08c00"
 DIFFERENCE = "#e03131"
 COMMAND = "#868e96"
+FAULT = "#ff5a00"  # on the actuator: what is broken, and nothing else
 TRUTH = "#2b8a3e"
 GHOST = "#9c6ade"  # a frozen run
 PHASES = ("#ec403a", "#28be5a", "#3878ff")  # A, B, C, in the charts and in the windings

@@ -39,7 +39,7 @@ class PlaybackStrip:
             self._speed = gui.add_dropdown("Speed", tuple(SPEEDS), initial_value="1 : 10")
             self._moment = gui.add_slider("Moment [s]", *self._span_s, _SLOWEST_STEP_S, 0.0)
             self._opacity = gui.add_slider("Housing", 0.0, 1.0, 0.05, 0.35)
-            self._labels = gui.add_checkbox("Labels", False)
+            self._labels = gui.add_checkbox("Labels", True)
             self._dark = gui.add_checkbox("Dark", False)
             self._view = gui.add_button("Reset view", icon=viser.Icon.FOCUS_CENTERED, color="gray")
             self._figures = add_html(gui)

@@ -1,8 +1,8 @@
 """The workspaces: a window's tab, its panel on the right, its address and the actuator's run change together.
 
-Each window has its own: the server is told which tab is in front there by a button that nobody sees, and shows that
-window alone the panel that belongs to it.  The 3D scene is the server's, so the actuator plays for the window that
-was used last.
+Each window has its own: the server is told which tab is in front there, and how wide the window is, by buttons that
+nobody sees, and shows that window alone the panel that belongs to it.  The 3D scene is the server's, so the actuator
+plays for the window that was used last.
 """
 
 from __future__ import annotations
@@ -15,19 +15,20 @@ from typing import Any
 
 import viser
 
-from emaviz.page.docked import Docked
+from emaviz.page.docked import WINDOWS_PX, Docked
 from emaviz.page.style import unseen
 from emaviz.server.viser_private import Inside
 from emaviz.session.worker import Worker
 from emaviz.text.html import add_html
 
-# On the page: the tab in front goes into the address and to the server; `go` and a reload's address choose a tab.
+# On the page: the tab in front goes into the address and to the server, as does the window's width; `go` and a reload's
+# address choose a tab.
 _SCRIPT = """
 (() => {
-  const views = VIEWS, titles = Object.fromEntries(views.map(v => [v.title, v]));
+  const views = VIEWS, widths = WIDTHS, titles = Object.fromEntries(views.map(v => [v.title, v]));
   window.emavizViews?.end();
   const asked = new URLSearchParams(location.search).get('view');
-  let wanted = views.some(v => v.name === asked) ? asked : FIRST, told = null, pressed = 0;
+  let wanted = views.some(v => v.name === asked) ? asked : FIRST, told = null, pressed = 0, fitted = null;
   const tabs = () => [...document.querySelectorAll('[role=tab]')].filter(t => t.textContent.trim() in titles);
   const view = (tab) => titles[tab.textContent.trim()];
   const press = (tab) => {
@@ -54,9 +55,16 @@ _SCRIPT = """
     history.replaceState(history.state, '', address);
     button.click();
   };
+  const fit = () => {
+    const width = widths.filter(w => w.px <= innerWidth).pop() ?? widths[0];
+    const button = document.getElementById(width.button);
+    if (!button || width.px === fitted) return;
+    fitted = width.px;
+    button.click();
+  };
   const seen = new MutationObserver(look);
   seen.observe(document.body, { subtree: true, attributes: true, attributeFilter: ['aria-selected'] });
-  const timer = setInterval(() => { if (told === null || wanted !== null) look(); }, 100);
+  const timer = setInterval(() => { if (told === null || wanted !== null) look(); fit(); }, 100);
   window.emavizViews = {
     go: (name) => { wanted = name; look(); },
     end: () => { seen.disconnect(); clearInterval(timer); },
@@ -73,7 +81,7 @@ class Workspace:
     title: str
     icon: viser.IconName
     place: int
-    wider_px: int = 0  # than other panels on the right
+    share: float = 0.58  # of what the left panel leaves of a window, that its results have beside the actuator
 
 
 class Workspaces:
@@ -91,7 +99,7 @@ class Workspaces:
     def add(self, one: Workspace) -> viser.PanelHandle:
         """A workspace; returns its panel on the right."""
         self._members[one.name] = one
-        return self._docked.add(one.name, one.wider_px, in_front=one.name == self.first)
+        return self._docked.add(one.name, one.share, in_front=one.name == self.first)
 
     def connect(self) -> None:
         """Begins to follow the windows; to be called where the unseen buttons may stand, once all are added."""
@@ -100,12 +108,18 @@ class Workspaces:
         for name in self._members:
             buttons[name] = button = gui.add_button(f"view:{name}")
             button.on_click(lambda event, name=name: event.client and self._came(event.client, name))
-        add_html(gui, unseen([button._impl.uuid for button in buttons.values()]))
+        widths: dict[int, Any] = {}
+        for px in WINDOWS_PX:
+            widths[px] = button = gui.add_button(f"window:{px}")
+            button.on_click(lambda event, px=px: event.client and self._docked.fit(event.client.client_id, px))
+        add_html(gui, unseen([button._impl.uuid for button in (*buttons.values(), *widths.values())]))
         views = [
             {"name": name, "title": one.title, "button": buttons[name]._impl.uuid}
             for name, one in self._members.items()
         ]
-        self._inside.run(_SCRIPT.replace("VIEWS", json.dumps(views)).replace("FIRST", json.dumps(self.first)))
+        fits = [{"px": px, "button": button._impl.uuid} for px, button in widths.items()]
+        script = _SCRIPT.replace("VIEWS", json.dumps(views)).replace("WIDTHS", json.dumps(fits))
+        self._inside.run(script.replace("FIRST", json.dumps(self.first)))
 
     def go(self, name: str, client: viser.ClientHandle | None) -> None:
         """Takes one window there, as a click on the tab would; without a window, nothing happens."""

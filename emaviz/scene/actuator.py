@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Sequence
 from typing import Any
 
@@ -9,29 +10,32 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
+from emaviz.scene.callouts import Callout
+from emaviz.scene.drive_box import NAMED_AT, DriveBox
 from emaviz.scene.drivetrain import Drivetrain
+from emaviz.scene.framing import FIELD_RAD, Frame, frame
+from emaviz.scene.labels import Label, Labels
+from emaviz.scene.load_arrow import LoadArrow
 from emaviz.scene.motor import Motor
 
 _ROOT = "/actuator"
-_LOOK_AT = (0.63, 0.0, -0.06)
-_VIEW = (-0.62, -0.66, 0.44)  # direction from there to the camera
-_FIELD_RAD = 0.6
-_WIDTH, _HEIGHT = 2.15, 1.75  # of the actuator, as that view sees it
-_GROUND_Z, _GROUND_RADIUS, _GROUND_CELL = -0.37, 1.9, 0.27
+_FIRST_ASPECT = 0.7  # of the picture that a browser is taken to have until it tells
+_GROUND_MIDDLE, _GROUND_Z, _GROUND_RADIUS, _GROUND_CELL = (0.66, 0.12), -0.37, 1.55, 0.27
 _GRID = (156, 162, 174)  # seen on light and dark
-_LABELS = (
-    ("housing", (0.12, -0.05, 0.31)),
-    ("phase A", (-0.25, 0.0, 0.235)),
-    ("phase B", (-0.25, 0.21, -0.02)),
-    ("phase C", (-0.25, -0.21, -0.10)),
-    ("rotor", (-0.43, 0.0, 0.02)),
-    ("bearing", (0.33, 0.0, 0.15)),
-    ("gear", (0.46, -0.05, -0.34)),
-    ("ball screw", (0.66, 0.0, -0.29)),
-    ("nut, with play", (0.80, 0.0, 0.0)),
-    ("horn", (1.34, 0.0, -0.05)),
-    ("control surface (user)", (1.62, 0.0, 0.2)),
+_NAMES = (
+    Label("housing", "housing", (-0.28, 0.2, 0.225)),
+    Label("phase_a", "phase A", (-0.24, 0.09, 0.215)),
+    Label("phase_b", "phase B", (-0.25, 0.21, -0.06)),
+    Label("phase_c", "phase C", (-0.24, -0.21, -0.14)),
+    Label("rotor", "rotor", (0.0, -0.08, 0.09)),
+    Label("bearing", "bearing", (-0.335, -0.03, 0.07)),
+    Label("gear", "gear", (0.46, -0.05, -0.06)),
+    Label("ball_screw", "ball screw", (0.66, 0.0, -0.14)),
+    Label("nut", "nut", (0.80, -0.02, -0.12)),
+    Label("horn", "horn", (1.34, 0.0, -0.02)),
+    Label("surface", "control surface", (1.70, -0.22, 0.13)),
 )
+_DRIVE_AT, _LOAD_AT = NAMED_AT, (1.68, 0.0, 0.13)
 _MOST_PLACED = 20  # places of a camera that are remembered
 
 
@@ -56,11 +60,11 @@ class ActuatorScene:
         self._motor = Motor(scene, f"{_ROOT}/motor", pole_pairs)
         self._rotor = self._motor.rotor
         self._drivetrain = Drivetrain(scene, f"{_ROOT}/drive")
-        self._labels: list[Any] = [
-            scene.add_label(f"/labels/{i}", text, position=place, visible=False, anchor="bottom-center")
-            for i, (text, place) in enumerate(_LABELS)
-        ]
-        self._frame_camera(server.initial_camera, 0.7)
+        self._faults: frozenset[str] = frozenset()
+        self._drive = DriveBox(scene, f"{_ROOT}/controller")
+        self._load = LoadArrow(scene, f"{_ROOT}/drive/surface")
+        self._labels = Labels(scene, "/labels", _NAMES)
+        _put(server.initial_camera, frame(_FIRST_ASPECT))
 
         @server.on_client_connect
         def _(client: viser.ClientHandle) -> None:
@@ -68,38 +72,56 @@ class ActuatorScene:
 
     def reset_view(self, client: viser.ClientHandle) -> None:
         """The whole actuator in a browser's picture, whatever its shape."""
-        camera = client.camera
-        if camera.image_height > 0:
-            self._frame_camera(camera, camera.image_width / camera.image_height)
+        if client.camera.image_height > 0:
+            self._frame(client.camera)
+
+    def _frame(self, camera: viser.CameraHandle) -> Frame:
+        picture = camera.image_width, camera.image_height
+        shown = frame(picture[0] / picture[1])
+        _put(camera, shown)
+        self._labels.fit(shown, picture)
+        return shown
 
     def _keep_framed(self, client: viser.ClientHandle) -> None:
         """Frames the actuator anew when the picture changes its shape, until the user moves the camera."""
         camera = client.camera
         aspects = [0.0]
-        placed: list[
-            Any
-        ] = []  # where it was put; the browser may tell of an earlier place when a later one is on its way
+        # where it was put: the browser may tell of an earlier place when a later one is on its way
+        placed = [frame(_FIRST_ASPECT).position]
+        framing = threading.Lock()
 
         @camera.on_update
         def _(_: Any) -> None:
-            if camera.image_height <= 0:
-                return
-            aspect = camera.image_width / camera.image_height
-            untouched = not placed or any(np.allclose(camera.position, one, atol=0.02) for one in placed)
-            if untouched and abs(aspect - aspects[-1]) > 0.01:
-                self._frame_camera(camera, aspect)
-                aspects[:] = [aspect]
-                placed.append(self._place(aspect))
-                del placed[:-_MOST_PLACED]
+            with framing:
+                if camera.image_height <= 0:
+                    return
+                aspect, at = camera.image_width / camera.image_height, camera.position
+                untouched = any(np.allclose(at, one, atol=0.02) for one in placed)
+                there = np.allclose(at, placed[-1], atol=0.02) and abs(aspect - aspects[-1]) <= 0.01
+                if untouched and not there:
+                    aspects[:] = [aspect]
+                    placed.append(self._frame(camera).position)
+                    del placed[:-_MOST_PLACED]
 
     def set_opacity(self, opacity: float) -> None:
         """Of the housing, 0 … 1."""
         self._motor.set_opacity(opacity)
 
     def show_labels(self, shown: bool) -> None:
-        """Names of the parts."""
-        for label in self._labels:
-            label.visible = shown
+        """Names of the parts, and what is said of them."""
+        self._labels.show(shown)
+
+    def tell(self, callouts: Sequence[Callout], drive: str = "", load: str = "") -> None:
+        """Marks the places of faults, and says what they are; what is set in the drive; the load."""
+        faults = frozenset(one.fault for one in callouts)
+        told = [Label("drive", drive or "controller and inverter", _DRIVE_AT)]
+        told += [Label("load", load, _LOAD_AT)] if load else []
+        with self._server.atomic():
+            if faults != self._faults:
+                self._faults = faults
+                for part in (self._motor, self._drivetrain, self._drive):
+                    part.mark(faults)
+            self._labels.tell([Label(one.fault, one.text, one.place, callout=True) for one in callouts], told)
 
     def damage(self, turns: Sequence[float], eccentricity: float, phase_rad: float, play: float) -> None:
         """What a fault changes for good: live shares of the turns, the rotor's offset, the pin's room in the nut."""
@@ -113,25 +135,24 @@ class ActuatorScene:
         play: float = 0.0,
         glow: Sequence[float] = (0.0, 0.0, 0.0),
         heat: float = 0.0,
+        load: float = 0.0,
     ) -> None:
-        """Rotor and surface, the nut before the pin (a length), brightness of the phases, heat of the screw 0 … 1."""
+        """Rotor and surface, the nut before the pin (a length), brightness of the phases, heat of the screw, the load.
+
+        Heat is a share 0 … 1, the load a share −1 … 1 of the longest arrow, positive where it opposes a positive turn.
+        """
         with self._server.atomic():
             self._motor.turn(motor_rad)
             self._motor.glow(glow)
             self._drivetrain.move(motor_rad, surface_rad, play)
             self._drivetrain.heat(heat)
+            self._load.show(load)
 
-    def _frame_camera(self, camera: Any, aspect: float) -> None:
-        camera.fov = _FIELD_RAD
-        camera.position = self._place(aspect)
-        camera.look_at = _LOOK_AT
 
-    @staticmethod
-    def _place(aspect: float) -> tuple[float, ...]:
-        """Of a camera that sees the whole actuator; aspect is width over height of its picture."""
-        distance = 0.5 * max(_HEIGHT, _WIDTH / max(aspect, 0.2)) / np.tan(0.5 * _FIELD_RAD)
-        norm = sum(part**2 for part in _VIEW) ** 0.5
-        return tuple(float(at + distance * part / norm) for at, part in zip(_LOOK_AT, _VIEW))
+def _put(camera: Any, shown: Frame) -> None:
+    camera.fov = FIELD_RAD
+    camera.position = shown.position
+    camera.look_at = shown.look_at
 
 
 def _ground() -> NDArray[np.float32]:
@@ -140,5 +161,5 @@ def _ground() -> NDArray[np.float32]:
     half = np.sqrt(_GROUND_RADIUS**2 - across**2)
     one_way = np.stack([np.column_stack([across, end * half]) for end in (-1.0, 1.0)], axis=1)
     lines = np.concatenate([one_way, one_way[:, :, ::-1]])
-    middle = np.broadcast_to([_LOOK_AT[0], 0.0], lines.shape)
+    middle = np.broadcast_to(_GROUND_MIDDLE, lines.shape)
     return np.concatenate([lines + middle, np.full((*lines.shape[:2], 1), _GROUND_Z)], axis=2).astype(np.float32)

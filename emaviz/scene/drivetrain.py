@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Set
 from typing import Any
 
 import numpy as np
 import viser
 
-from emaviz.colours import REFERENCE
+from emaviz.scene.palette import DARK, FAULT, IRON, LIGHT, SATIN, STEEL, Colour, between
 from emaviz.scene.solids import Solid, about_x, about_y, ball, block, extruded, gear_wheel, joined, thread, tube
-
-Colour = tuple[int, int, int]
 
 ARM = 0.2  # of the horn: what the nut's travel is to the surface's turn
 _SCREW_Z = -0.165
@@ -18,10 +17,6 @@ _NUT_X = 0.80
 _PIN_Z = 0.075  # the rod's pin above the screw's axis
 _HINGE = np.array([1.34, 0.0, 0.11])
 _PINION, _WHEEL = 14, 28
-_COLD, _HOT = np.array([178.0, 184.0, 194.0]), np.array([255.0, 84.0, 20.0])
-_STEEL: Colour = (168, 174, 184)
-_DARK: Colour = (78, 84, 96)
-_BRASS: Colour = (205, 160, 84)
 
 
 class Drivetrain:
@@ -43,19 +38,21 @@ class Drivetrain:
             return scene.add_frame(f"{root}/{name}", show_axes=False, position=position)
 
         self._pinion = frame("pinion")
-        add("pinion/wheel", gear_wheel(_PINION, 0.055, 0.42, 0.50), _BRASS, flat=True)
+        add("pinion/wheel", gear_wheel(_PINION, 0.055, 0.42, 0.50), SATIN, flat=True)
         self._screw = frame("screw", (0.0, 0.0, _SCREW_Z))
-        add("screw/wheel", gear_wheel(_WHEEL, 0.110, 0.42, 0.50), _DARK, flat=True)
+        add("screw/wheel", gear_wheel(_WHEEL, 0.110, 0.42, 0.50), IRON, flat=True)
         self._rod_of_screw = add(
-            "screw/thread", joined(tube(0.40, 1.16, 0.0, 0.026), thread(0.54, 1.12, 0.026, 0.029, 0.012)), _STEEL
+            "screw/thread", joined(tube(0.40, 1.16, 0.0, 0.026), thread(0.54, 1.12, 0.026, 0.029, 0.012)), STEEL
         )
-        add("rails", _rails(), _DARK)
+        add("rails", _rails(), DARK)
         self._nut = frame("nut", (_NUT_X, 0.0, _SCREW_Z))
-        add("nut/body", joined(tube(-0.055, 0.055, 0.03, 0.055), tube(-0.02, 0.02, 0.055, 0.068)), _BRASS)
+        add("nut/body", joined(tube(-0.055, 0.055, 0.03, 0.055), tube(-0.02, 0.02, 0.055, 0.068)), SATIN)
         self._jaws = [frame(f"nut/jaw_{side}") for side in ("low", "high")]
+        self._blocks: list[Any] = []
         for side, jaw in zip(("low", "high"), self._jaws):
             sign = -1.0 if side == "low" else 1.0
-            add(f"nut/jaw_{side}/block", block(0.02, 0.07, 0.06).moved(x=sign * 0.03, z=_PIN_Z), _BRASS, flat=True)
+            one = block(0.02, 0.07, 0.06).moved(x=sign * 0.03, z=_PIN_Z)
+            self._blocks.append(add(f"nut/jaw_{side}/block", one, SATIN, flat=True))
             jaw.position = (0.0, 0.0, 0.0)
         self._rod = frame("rod")
         self._length = 0.0
@@ -66,11 +63,11 @@ class Drivetrain:
             tube(-0.03, 0.03, 0.0, 0.019).across(),
             tube(-0.03, 0.03, 0.0, 0.019).across().moved(x=self._length),
         )
-        add("rod/shaft", shaft, _STEEL)
-        add("bracket", _bracket(), _DARK)
+        add("rod/shaft", shaft, STEEL)
+        add("bracket", _bracket(), DARK)
         self._surface = frame("surface", (float(_HINGE[0]), 0.0, float(_HINGE[2])))
-        add("surface/horn", _horn(), _STEEL, flat=True)
-        add("surface/flap", _flap(), _rgb(REFERENCE), flat=True)
+        add("surface/horn", _horn(), STEEL, flat=True)
+        add("surface/flap", _flap(), LIGHT, flat=True)
         self._heat = -1.0
 
     def move(self, motor_rad: float, surface_rad: float, play: float) -> None:
@@ -89,13 +86,17 @@ class Drivetrain:
         for sign, jaw in zip((-1.0, 1.0), self._jaws):
             jaw.position = (0.5 * sign * width, 0.0, 0.0)
 
+    def mark(self, faults: Set[str]) -> None:
+        """Shows the place of backlash (k2), where the nut meets the pin, in the fault colour."""
+        for one in self._blocks:
+            one.color = FAULT if "k2" in faults else SATIN
+
     def heat(self, share: float) -> None:
         """Colour of the screw, from cold 0 to glowing 1."""
         share = round(min(max(share, 0.0), 1.0), 2)
         if share != self._heat:
             self._heat = share
-            red, green, blue = _COLD + (_HOT - _COLD) * share
-            self._rod_of_screw.color = (int(red), int(green), int(blue))
+            self._rod_of_screw.color = between(STEEL, FAULT, share)
 
 
 def _rod_of(surface_rad: float) -> tuple[np.ndarray, np.ndarray]:
@@ -138,7 +139,3 @@ def _flap() -> Solid:
     for y0, y1 in ((-0.33, -0.03), (0.03, 0.33)):  # with room for the horn
         halves.append(extruded([(-x - 0.03, z) for x, z in outline], y0, y1).across())
     return joined(*halves, block(0.40, 0.06, 0.02).moved(x=0.31))
-
-
-def _rgb(colour: str) -> Colour:
-    return int(colour[1:3], 16), int(colour[3:5], 16), int(colour[5:7], 16)

@@ -9,8 +9,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.faults import physical
+from ema_model.quantities.sides import USER
 from ema_model.recordings import Measurement
 from emaviz.scene.actuator import ActuatorScene
+from emaviz.scene.callouts import Callout, callouts
+from emaviz.scene.drive_box import said
 from emaviz.scene.drivetrain import ARM
 
 _LARGEST_TURN_RAD = 0.6  # to which the surface's motion is enlarged
@@ -40,7 +43,7 @@ class Motion:
     surface_rad: NDArray[np.float64]  # as drawn
     play: NDArray[np.float64]  # as drawn, the nut before the pin, a length
     glow: NDArray[np.float64]  # (n, 3), shares of the brightest
-    heat: NDArray[np.float64]
+    heat: NDArray[np.float64]  # of the screw, which glows where a model fails
     enlarged: float
     play_enlarged: float
     full_A: float
@@ -49,6 +52,10 @@ class Motion:
     phase_rad: float
     room: float  # of the pin between the jaws, as drawn
     start_s: float = 0.0  # of the recording's own time, which time 0 here is
+    callouts: tuple[Callout, ...] = ()
+    load: NDArray[np.float64] | None = None  # shares of the longest arrow
+    load_says: str = ""
+    drive_says: str = ""
     says: str = ""  # what its glow means, beyond `sentence`
 
     @property
@@ -59,6 +66,7 @@ class Motion:
     def damage(self, scene: ActuatorScene) -> None:
         """Shows what its faults change for good."""
         scene.damage(self.turns, self.eccentricity, self.phase_rad, self.room)
+        scene.tell(self.callouts, self.drive_says, self.load_says)
 
     def pose(self, scene: ActuatorScene, time_s: float) -> None:
         """Shows a moment, s from the run's start."""
@@ -69,6 +77,7 @@ class Motion:
             float(self.play[at]),
             tuple(float(share) for share in self.glow[at]),
             float(self.heat[at]),
+            0.0 if self.load is None else float(self.load[at]),
         )
 
     def sentence(self) -> str:
@@ -97,16 +106,15 @@ def motion(run: Measurement, k: ArrayLike, actuator: Actuator) -> Motion:
     else:
         currents = np.repeat(run["current_A"][:, None], 3, axis=1)
     full = _round_up(float(np.max(np.abs(currents))))
-    speed = np.abs(run["motor_speed_rad_s"])
-    friction = (float(faults.friction_factor) - 1.0) / 2.0
-    heat = friction * (0.35 + 0.65 * speed / max(float(np.max(speed)), 1e-9))
+    load = run["load_torque_Nm"] if "load_torque_Nm" in run else None
+    heaviest = 0.0 if load is None else float(load[np.argmax(np.abs(load))])
     return Motion(
         run.time_s - run.time_s[0],
         motor,
         enlarged * user,
         play,
         currents / full,
-        heat,
+        np.zeros(len(motor)),
         enlarged,
         enlarged * more,
         full,
@@ -115,6 +123,10 @@ def motion(run: Measurement, k: ArrayLike, actuator: Actuator) -> Motion:
         float(faults.phase_rad),
         room,
         float(run.time_s[0]),
+        callouts(k, actuator, enlarged * more, _GAP_ENLARGED),
+        None if load is None else load / _round_up(abs(heaviest)),
+        f"load {heaviest:.4g} {actuator.axes.unit('N·m', USER)}".replace("-", "−") if heaviest else "",
+        said(actuator),
     )
 
 

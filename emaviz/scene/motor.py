@@ -6,47 +6,46 @@ so the drawn gap under a phase is thin when the model's factor 1 + ζ cos(θ_m �
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from typing import Any
 
 import numpy as np
 import viser
-from numpy.typing import NDArray
 
-from emaviz.colours import PHASES
+from emaviz.scene.palette import AT_REST, FAULT, GLASS, IRON, LIGHT, PHASES, SATIN, STEEL, WHITE, Colour, between
 from emaviz.scene.solids import TURN, Solid, about_x, ball, block, joined, revolved, tube
 
-Colour = tuple[int, int, int]
-
-_PHASES: tuple[Colour, ...] = tuple((int(c[1:3], 16), int(c[3:5], 16), int(c[5:7], 16)) for c in PHASES)
 AIR_GAP = 0.025  # as drawn, where the rotor's radius is 0.125
 _BORE = 0.15
 _FIRST_AZIMUTH = 0.5 * np.pi  # of phase A: on top
 _LAYERS = 8  # turns drawn of each coil
 _OPEN_FROM, _OPEN_TO = np.radians(75.0), np.radians(215.0)  # the sector cut out of the housing
-_STEEL: Colour = (168, 174, 184)
-_IRON: Colour = (96, 102, 114)
-_BURNT: Colour = (18, 14, 12)
+_DIRECTION_RAD, _THINNEST_RAD = np.radians((4.0, 26.0))  # half widths of the marks in the air gap
 
 
 class Motor:
     """Built once; afterwards only frames move and colours change."""
 
     def __init__(self, scene: viser.SceneApi, root: str, pole_pairs: int) -> None:
-        self._housing = _add(scene, f"{root}/housing", _housing(), (96, 130, 176), opacity=0.35)
-        _add(scene, f"{root}/stator", _stator(), _IRON)
+        self._housing = _add(scene, f"{root}/housing", _housing(), GLASS, opacity=0.35)
+        _add(scene, f"{root}/stator", _stator(), IRON)
         self._scene, self._root = scene, root
         self._coils: list[Any] = [None] * 3
         self._burnt: Any = None
         self._layers: list[int] = [0] * 3
         self._axis = scene.add_frame(f"{root}/axis", show_axes=False)
         self.rotor = scene.add_frame(f"{root}/axis/rotor", show_axes=False)
-        _add(scene, f"{root}/axis/rotor/core", _rotor_core(), _STEEL)
+        _add(scene, f"{root}/axis/rotor/core", _rotor_core(), STEEL)
         magnets = 2 * min(max(pole_pairs, 1), 6)
-        for pole, colour in enumerate(((206, 62, 72), (226, 230, 236))):
+        for pole, colour in enumerate((SATIN, LIGHT)):
             _add(scene, f"{root}/axis/rotor/magnets_{pole}", _magnets(magnets, pole), colour)
         self._cage = scene.add_frame(f"{root}/cage", show_axes=False)
-        _add(scene, f"{root}/bearings", joined(*(_bearing(x) for x in (-0.31, 0.31))), _STEEL)
+        # on the rotor, so that they turn with it: where the gap is thinnest, or without eccentricity would be
+        self._thinnest, self._direction = (
+            _add(scene, f"{root}/axis/rotor/{name}", _gap(half), FAULT)
+            for name, half in (("thinnest_gap", _THINNEST_RAD), ("direction", _DIRECTION_RAD))
+        )
+        self._bearings = _add(scene, f"{root}/bearings", joined(*(_bearing(x) for x in (-0.31, 0.31))), STEEL)
         balls = [(x, 0.062, TURN * i / 8) for x in (-0.31, 0.31) for i in range(8)]
         sphere = ball(0.0125)
         scene.add_batched_meshes_simple(
@@ -62,6 +61,13 @@ class Motor:
         )
         self._eccentricity, self._phase_rad = 0.0, 0.0
         self._wind([_LAYERS] * 3)
+        self.mark(frozenset())
+
+    def mark(self, faults: Set[str]) -> None:
+        """Shows the places of friction (k1) and eccentricity (k6; k7 alone is a direction) in the fault colour."""
+        self._bearings.color = FAULT if "k1" in faults else STEEL
+        self._thinnest.visible = "k6" in faults
+        self._direction.visible = "k7" in faults and "k6" not in faults
 
     def set_opacity(self, opacity: float) -> None:
         """Of the housing, 0 … 1."""
@@ -75,6 +81,7 @@ class Motor:
         healthy = np.where((healthy == _LAYERS) & (np.asarray(turns) < 0.995), _LAYERS - 1, healthy)
         self._wind([int(layers) for layers in healthy])
         self._eccentricity, self._phase_rad = eccentricity, phase_rad
+        self._thinnest.wxyz = self._direction.wxyz = about_x(_FIRST_AZIMUTH - phase_rad)
 
     def turn(self, motor_rad: float) -> None:
         """Turns the rotor on its axis, which itself runs around where it is off centre."""
@@ -86,8 +93,8 @@ class Motor:
 
     def glow(self, currents: Sequence[float]) -> None:
         """Brightness of the phases by their currents, each as a share −1 … 1 of the brightest."""
-        for coil, own, current in zip(self._coils, _PHASES, currents):
-            colour = tuple(int(part) for part in _lit(own, abs(current)))
+        for phase, (coil, current) in enumerate(zip(self._coils, currents)):
+            colour = _lit(phase, abs(current))
             if coil is not None and coil.color != colour:
                 coil.color = colour
 
@@ -98,9 +105,9 @@ class Motor:
         for phase, healthy in enumerate(layers):
             if healthy != self._layers[phase]:
                 loops = _loops(phase, range(healthy))
-                self._coils[phase] = self._mesh(self._coils[phase], f"coil_{'abc'[phase]}", loops, _PHASES[phase])
+                self._coils[phase] = self._mesh(self._coils[phase], f"coil_{'abc'[phase]}", loops, AT_REST[phase])
         burnt = [loop for phase, healthy in enumerate(layers) for loop in _loops(phase, range(healthy, _LAYERS))]
-        self._burnt = self._mesh(self._burnt, "burnt", burnt, _BURNT)
+        self._burnt = self._mesh(self._burnt, "burnt", burnt, FAULT)
         self._layers = layers
 
     def _mesh(self, old: Any, name: str, loops: list[Solid], colour: Colour) -> Any:
@@ -110,13 +117,12 @@ class Motor:
         return _add(self._scene, f"{self._root}/{name}", joined(*loops), colour) if loops else None
 
 
-def _lit(colour: Colour, share: float) -> NDArray[np.float64]:
-    """From dull at rest, over the phase's own colour, towards white at the most."""
+def _lit(phase: int, share: float) -> Colour:
+    """From subdued at rest, over the phase's own colour, towards white at the most."""
     share = min(max(share, 0.0), 1.0)
-    own = np.array(colour, dtype=float)
     if share < 0.6:
-        return own * (0.3 + 0.7 * share / 0.6)
-    return own + (255.0 - own) * 0.75 * (share - 0.6) / 0.4
+        return between(AT_REST[phase], PHASES[phase], share / 0.6)
+    return between(PHASES[phase], WHITE, 0.75 * (share - 0.6) / 0.4)
 
 
 def _add(scene: viser.SceneApi, name: str, solid: Solid, colour: Colour, opacity: float | None = None) -> Any:
@@ -189,6 +195,14 @@ def _magnets(count: int, pole: int) -> Solid:
             tube(-0.21, 0.21, 0.095, _BORE - AIR_GAP, TURN * i / count - half, TURN * i / count + half)
             for i in range(pole, count, 2)
         )
+    )
+
+
+def _gap(half_rad: float) -> Solid:
+    """A strip along the air gap about azimuth 0, and its end before the rotor, where it is seen from outside."""
+    return joined(
+        tube(-0.225, 0.225, _BORE - AIR_GAP + 0.001, _BORE - 0.012, -half_rad, half_rad),
+        tube(-0.262, -0.225, 0.098, _BORE - 0.002, -half_rad, half_rad),
     )
 
 

@@ -2,20 +2,32 @@
 
 from __future__ import annotations
 
+import itertools
 import time
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from support.on_page import wait_until
 from support.one_tab import Tab
 
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
 from ema_model.faults import vector
 from ema_model.simulation.run import Run, simulate_reference
-from emaviz.scene import drivetrain, motor, solids
+from emaviz.page.docked import LEFT_PX, _width_px
+from emaviz.page.members import workspaces
+from emaviz.page.style import STRIP_HEIGHT_PX
+from emaviz.scene import drive_box, drivetrain, motor, solids
+from emaviz.scene.actuator import _NAMES, ActuatorScene
+from emaviz.scene.drive_box import NAMED_AT
+from emaviz.scene.framing import BOXES, frame
+from emaviz.scene.labels import Label, lay_out
 from emaviz.scene.motion import enlargement, motion
+from emaviz.scene.palette import FAULT
 from emaviz.scene.playback import Playback
+from emaviz.server.safe_server import open_server
 from emaviz.session.session import Simulation
 
 SOLIDS = {
@@ -35,13 +47,16 @@ class Recorder:
     """A scene that remembers what it is told."""
 
     def __init__(self):
-        self.poses, self.damages = [], []
+        self.poses, self.damages, self.told = [], [], []
 
     def pose(self, *values):
         self.poses.append(values)
 
     def damage(self, *values):
         self.damages.append(values)
+
+    def tell(self, *values):
+        self.told.append(values)
 
 
 @pytest.fixture(scope="module")
@@ -132,10 +147,105 @@ def test_play_moves_the_nut_from_one_jaw_to_the_other(actuator):
     assert np.all(np.abs(loose.play) <= 0.5 * loose.room + 1e-12)
 
 
-def test_friction_heats_the_screw_and_nothing_else_does(actuator):
-    assert np.all(motion(*run_of(actuator, k2=0.5, k6=0.5), actuator).heat == 0.0)
-    hot = motion(*run_of(actuator, k1=1.0), actuator).heat
-    assert 0.3 < hot.min() and hot.max() == pytest.approx(1.0)
+@pytest.fixture(scope="module")
+def scene():
+    server = open_server("127.0.0.1", 0)
+    yield ActuatorScene(server)
+    server.stop()
+
+
+def drawn_nodes(scene, actuator, **faults):
+    """By name, what of each node is drawn: its colour, its text, its turn and place, its triangles."""
+    shown = motion(*run_of(actuator, **faults), actuator)
+    shown.damage(scene)
+    scene.pose(0.0, 0.0)
+    nodes = scene._server.scene._handle_from_node_name
+    drawn = {}
+    for name, node in nodes.items():
+        if node is not None and node.visible:
+            looks = [getattr(node, one, None) for one in ("color", "text")]
+            drawn[name] = (
+                *looks,
+                *np.round(node.wxyz, 3),
+                *np.round(node.position, 4),
+                len(getattr(node, "faces", ())),
+            )
+    return drawn
+
+
+@pytest.mark.parametrize(
+    "fault, text, place",
+    [
+        ("k1", "friction × 2.40", "motor/bearings"),
+        ("k2", "shown × 400", "drive/nut/jaw_low/block"),
+        ("k3", "phase A: 30% of turns", "motor/burnt"),
+        ("k4", "phase B: 30% of turns", "motor/burnt"),
+        ("k5", "phase C: 30% of turns", "motor/burnt"),
+        ("k6", "ζ = 0.70\nshown × 20", "motor/axis/rotor/thinnest_gap"),
+        ("k7", "+72°\n(no effect: ζ = 0)", "motor/axis/rotor/direction"),
+        ("k8", "gain × 1.20", "controller/front"),
+    ],
+)
+def test_each_fault_is_said_and_marked_at_its_place(scene, actuator, fault, text, place):
+    healthy = drawn_nodes(scene, actuator)
+    broken = drawn_nodes(scene, actuator, **{fault: 0.7})
+    assert FAULT not in {node[0] for node in healthy.values()}, "a healthy machine has nothing in the fault colour"
+    marked = {name for name, node in broken.items() if node[0] == FAULT}
+    assert f"/actuator/{place}" in marked and len({name.split("/")[2] for name in marked}) == 1, "one place alone"
+    assert text in broken[f"/labels/{fault}"][1]
+    assert not [name for name in healthy if name.startswith("/labels/k")]
+    again = drawn_nodes(scene, actuator)
+    assert again == healthy, "mended, it looks as it did"
+
+
+def test_the_eccentric_rotor_is_off_towards_its_mark(scene, actuator):
+    drawn_nodes(scene, actuator, k6=0.7, k7=0.7)
+    scene.pose(1.2, 0.0)
+    w, x, *_ = scene._motor._thinnest.wxyz
+    off = np.array(scene._motor._axis.position)
+    towards = 2.0 * np.arctan2(x, w) + 1.2
+    assert np.arctan2(off[2], off[1]) == pytest.approx(np.arctan2(np.sin(towards), np.cos(towards)))
+
+
+def test_the_load_is_an_arrow_on_the_surface(scene, actuator):
+    def shown(load):
+        """Which way its tail points, and its length; None without an arrow."""
+        run = simulate_reference(Run(load_torque_Nm=load), actuator)
+        told = motion(run, vector({}), actuator)
+        told.pose(scene, 0.1)
+        assert told.load_says == (f"load {load:g} N·m".replace("-", "−") if load else "")
+        w, _, y, _ = scene._load._frame.wxyz
+        return (-2.0 * w * y, scene._load._shaft.scale[0]) if scene._load._frame.visible else None
+
+    assert shown(0.0) is None
+    assert shown(20.0) == pytest.approx((1.0, 0.26)), "from above"
+    assert shown(-20.0) == pytest.approx((-1.0, 0.26))
+    assert shown(15.0) == pytest.approx((1.0, 0.75 * 0.26)), "where 20 is the longest"
+
+
+def test_the_drive_says_its_bus_and_its_delay(actuator):
+    assert drive_box.said(actuator) == "controller and inverter\n48 V bus"
+    late = replace(actuator, effects={"computation_delay": {"delay_s": 1e-4}})
+    assert drive_box.said(late) == "controller and inverter\n48 V bus, delay 0.100 ms"
+
+
+ALL = {f"k{i}": 0.7 for i in range(1, 9)}
+
+
+@pytest.mark.parametrize("faults", [{}, *({name: 0.7} for name in ALL), ALL])
+def test_labels_do_not_cover_each_other(scene, actuator, faults):
+    shown = motion(*run_of(actuator, **faults), actuator)
+    said = [Label(one.fault, one.text, one.place, callout=True) for one in shown.callouts]
+    said += [Label("drive", shown.drive_says, NAMED_AT), *_NAMES]
+    for picture in pictures():
+        placed = lay_out(said, frame(picture[0] / picture[1]), picture)
+        boxes = np.array([one.box() for one in placed])
+        apart = (boxes[:, None, :2] > boxes[None, :, 2:]).any(2) | (boxes[:, None, 2:] < boxes[None, :, :2]).any(2)
+        assert np.all(apart | np.eye(len(boxes), dtype=bool))
+        assert boxes[:, :2].min() >= 0.0 and np.all(boxes[:, 2:] <= picture)
+        told = {one.label.name for one in placed}
+        assert faults.keys() <= told or (faults == ALL and picture[0] < 400), "every fault is said"
+        assert len(placed) >= (len(said) if picture[0] > 550 and len(faults) < 2 else 0.6 * len(said))
 
 
 def test_playback_plays_pauses_and_seeks(actuator):
@@ -223,6 +333,29 @@ def test_coils_burn_from_the_first_shorted_turn_on():
     assert coils[0] is None, "all of phase A is burnt"
 
 
+WINDOWS = ((1400, 900), (1920, 1080), (1100, 700))
+
+
+def pictures():
+    """Sizes of the picture that the panels leave, in px."""
+    shares = {one.share for one in workspaces()}
+    return [(w - LEFT_PX - _width_px(w, share), h - STRIP_HEIGHT_PX) for w, h in WINDOWS for share in shares]
+
+
+@pytest.mark.parametrize("width, height", [*pictures(), (200, 900), (1800, 400)])
+def test_the_whole_machine_fills_the_picture(width, height):
+    corners = np.array([corner for box in BOXES for corner in itertools.product(*box)])
+    shown = frame(width / height)
+    seen = shown.seen(corners)
+    least, most = seen[:, :2].min(axis=0), seen[:, :2].max(axis=0)
+    assert np.all(least > -0.95) and np.all(most < 0.95) and np.all(seen[:, 2] > 0.0), "nothing is cut"
+    assert np.max((most - least) / 2.0) > 0.8, "as near as can be"
+    assert least == pytest.approx(-most, abs=0.1), "in the middle"
+    if (width, height) in pictures():
+        assert np.prod((most - least) / 2.0) > 0.5, "not half of the picture is empty"
+    assert shown.at(*seen[7]) == pytest.approx(corners[7])
+
+
 @pytest.fixture
 def drawn(browser, app):
     """A tab in which the scene is drawn."""
@@ -245,3 +378,29 @@ def test_the_rotor_in_the_browser_follows_the_run_at_a_pace(drawn, app):
     app.strip.play(True)
     drawn.wait_for_timeout(3000)
     assert drawn.evaluate("window.__poses.size") > 9
+
+
+@pytest.mark.browser
+def test_the_camera_frames_the_machine_between_the_panels_until_somebody_moves_it(drawn, app):
+    """In a window that becomes smaller, too; and again after Reset view."""
+    client = next(iter(app.server.get_clients().values()))
+
+    def framed():
+        camera = client.camera
+        return np.allclose(camera.position, frame(camera.image_width / camera.image_height).position, atol=0.03)
+
+    def picture():
+        box = drawn.locator("canvas").first.bounding_box()
+        left, right = (drawn.locator(f"[data-dock-region={side}]").bounding_box() for side in ("left", "right"))
+        return box["x"] >= left["x"] + left["width"] - 1 and box["x"] + box["width"] <= right["x"] + 1 and box["width"]
+
+    wait_until(lambda: framed() and 550 < picture() < 650, 30.0)
+    drawn.set_viewport_size({"width": 1100, "height": 700})
+    wait_until(lambda: framed() and 340 < picture() < 400, 30.0)
+    client.camera.position = (3.0, -2.0, 1.0)
+    wait_until(lambda: np.allclose(client.camera.position, (3.0, -2.0, 1.0), atol=0.03), 30.0)
+    drawn.set_viewport_size({"width": 1400, "height": 900})
+    wait_until(lambda: 550 < picture() < 650, 30.0)
+    assert not framed(), "the user's view is left alone"
+    drawn.get_by_role("button", name="Reset view").click()
+    wait_until(framed, 30.0)

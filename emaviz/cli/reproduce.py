@@ -26,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--out", required=True, type=files.Folder(), metavar="DIR", help="where the rows, the report and the .rrd go"
     )
     which = parser.add_mutually_exclusive_group()
-    which.add_argument("--quick", action="store_true", help="two runs of each in place of ten: minutes, not an hour")
+    which.add_argument("--quick", action="store_true", help="one run of each in place of ten: minutes, not an hour")
     which.add_argument("--plan", type=_PLAN, metavar="PLAN.toml", help="another plan, with groups as `thesis` has them")
     parser.add_argument("--workers", type=whole(1, 10_000), metavar="N", help="processes; all cores without it")
     options.add_json(parser)

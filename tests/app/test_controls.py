@@ -172,9 +172,9 @@ def test_the_strip_plays_scrubs_and_changes_the_look(page, app):
     wait_until(lambda: abs(app.playback.time_s - 0.1) < 1e-3)
     fill(page, "Housing", 0.8)
     wait_until(lambda: app.scene._motor._housing.opacity == pytest.approx(0.8))
-    for shown in (True, False):
+    for shown in (False, True):
         page.get_by_label("Labels", exact=True).click()
-        wait_until(lambda: all(label.visible == shown for label in app.scene._labels))  # noqa: B023
+        wait_until(lambda: any(one.visible for one in app.scene._labels._handles.values()) == shown)  # noqa: B023
     page.get_by_label("Dark", exact=True).click()
     wait_until(lambda: page.evaluate("document.documentElement.dataset.mantineColorScheme") == "dark")
     page.get_by_label("Dark", exact=True).click()

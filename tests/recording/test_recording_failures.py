@@ -11,6 +11,7 @@ from collections import namedtuple
 import numpy as np
 import psutil
 import pytest
+from rerun import chunk
 
 from emaviz.recording import RecordingError, RecordingWriter, binary, paths
 from emaviz.recording.file import RrdFile
@@ -176,14 +177,20 @@ def test_what_the_program_cannot_verify_never_reaches_the_reader(tmp_path, signa
     program = binary.run
     asked = []
 
-    def run(*arguments, timeout_s):
+    def run(*arguments, **options):
         asked.append(arguments[1])
         if arguments[1] == "verify":
             raise RecordingError("rerun rrd verify failed: exit code 102")
-        program(*arguments, timeout_s=timeout_s)
+        program(*arguments, **options)
+
+    native = chunk.RrdReader
+
+    def reader(path):
+        assert path.name == "repaired.rrd", "it is read"
+        return native(path)
 
     monkeypatch.setattr(binary, "run", run)
-    monkeypatch.setattr(sys.modules[read.__module__], "_Chunks", lambda path: pytest.fail("it is read"))
+    monkeypatch.setattr(chunk, "RrdReader", reader)
     with pytest.raises(RecordingError, match="is damaged and cannot be repaired: its contents cannot be decoded"):
         read(tmp_path / "a.rrd")
     assert asked == ["verify", "optimize", "verify"]

@@ -86,8 +86,9 @@ def sentences(found: Discovery) -> list[str]:
     if found.effects:
         told.append(f"With {'it' if len(found.effects) == 1 else 'them'} the error falls from {_times(first, last)}.")
     else:
-        held = "" if last.holdout_rmse is None else f" ({number(last.holdout_rmse)} times on what was not fitted)"
-        told.append(f"The calibrated model's error is {number(last.rmse)} times the floor{held}.")
+        bare = found.ladder[-2] if found.curve is not None else last  # a curve is no part of the calibrated model
+        held = "" if bare.holdout_rmse is None else f" ({number(bare.holdout_rmse)} times on what was not fitted)"
+        told.append(f"The calibrated model's error is {number(bare.rmse)} times the floor{held}.")
     if found.faults:
         told.append(f"{'; '.join(faults(found).values())}. Effects and faults are estimated together.")
     for one in found.effects:

@@ -9,6 +9,7 @@ from rerun.chunk import RrdReader
 from support.discovered import with_cogging, with_unknown
 
 from ema_model.errors import InputError
+from ema_model.quantities.numbers import number
 from emaviz.recording import read
 from emaviz.recording.discovery.write import write_discovery
 
@@ -98,7 +99,8 @@ def test_nothing_held_out_and_only_a_curve_added(tmp_path):
     assert len(rows) == 2
     assert_allclose(_columns(tmp_path / "d.rrd", "/discovery/ladder", "Scalars:scalars"), rows)
     [verdict] = _columns(tmp_path / "d.rrd", "/discovery/verdict", "TextDocument:text")
-    assert "none of the known effects explains" in verdict[0] and "motor's angle" in verdict[0]
+    assert "none of the known effects explains" in verdict[0] and "motor angle" in verdict[0]
+    assert f"The calibrated model's error is {number(found.ladder[0].rmse)} times the floor" in verdict[0]
     assert "curve stands in for it" in verdict[0]
 
 

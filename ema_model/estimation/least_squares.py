@@ -74,22 +74,26 @@ class _Way:
     def residual(self, x: Array) -> Array:
         """(values + unknowns,).  Raises _Ended where the last evaluations changed nothing that counts."""
         self._tell()
-        residuals, jacobians = self._problem.jacobians(x[None, :], in_whole_blocks=True)
-        self._at, self._jacobian = x.copy(), jacobians[0]
-        cost = self._counted(residuals[0])
+        residual = self._simulated(x)
+        cost = self._counted(residual)
         idle = abs(self.cost - cost) < _IDLE + _IDLE_SHARE * cost
         if cost < self.cost:
             self.x, self.cost = self._at, cost
         self._idle = self._idle + 1 if idle else 0
         if self._idle == _MOST_IDLE:
             raise _Ended
-        return residuals[0]
+        return residual
 
     def jacobian(self, x: Array) -> Array:
         """(values + unknowns, unknowns)."""
         if not np.array_equal(x, self._at):
-            self._at, self._jacobian = x.copy(), self._problem.jacobians(x[None, :], in_whole_blocks=True)[1][0]
+            self._simulated(x)
         return self._jacobian
+
+    def _simulated(self, x: Array) -> Array:
+        residuals, jacobians = self._problem.jacobians(x[None, :], in_whole_blocks=True)
+        self._at, self._jacobian = x.copy(), jacobians[0]
+        return residuals[0]
 
     def _counted(self, residual: Array) -> float:
         if self._loss == "linear":

@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike
 
 from ema_model.actuator import Actuator
 from ema_model.quantities.numbers import amount
-from emaviz.scene.palette import DARK, FAULT, IRON, LIGHT, SATIN, Colour
+from emaviz.scene.mesh import add_mesh
+from emaviz.scene.palette import DARK, FAULT, IRON, LIGHT, SATIN
 from emaviz.scene.solids import TURN, Solid, block, joined
 
 _MIDDLE = (0.65, 0.48, -0.165)
@@ -30,21 +31,10 @@ class DriveBox:
     """Static, but for the front, which is in the fault colour where the gain (k8) is not healthy."""
 
     def __init__(self, scene: viser.SceneApi, root: str) -> None:
-        def add(name: str, solid: Solid, colour: Colour) -> viser.MeshHandle:
-            return scene.add_mesh_simple(
-                f"{root}/{name}",
-                solid.vertices,
-                solid.faces,
-                color=colour,
-                flat_shading=True,
-                cast_shadow=False,
-                receive_shadow=False,
-            )
-
-        add("case", _case(), IRON)
-        add("cable", _tube(_CABLE, _CABLE_RADIUS), DARK)
-        add("sockets", _sockets(), SATIN)
-        self._front = add("front", _front(), LIGHT)
+        add_mesh(scene, f"{root}/case", _case(), IRON, flat=True)
+        add_mesh(scene, f"{root}/cable", _tube(_CABLE, _CABLE_RADIUS), DARK, flat=True)
+        add_mesh(scene, f"{root}/sockets", _sockets(), SATIN, flat=True)
+        self._front = add_mesh(scene, f"{root}/front", _front(), LIGHT, flat=True)
 
     def mark(self, faults: Set[str]) -> None:
         """Shows the place of the gain (k8) in the fault colour."""

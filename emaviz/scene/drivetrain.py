@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import viser
 
+from emaviz.scene.mesh import add_mesh
 from emaviz.scene.palette import DARK, FAULT, IRON, LIGHT, SATIN, STEEL, Colour, between
 from emaviz.scene.solids import Solid, about_x, about_y, ball, block, extruded, gear_wheel, joined, thread, tube
 
@@ -24,15 +25,7 @@ class Drivetrain:
 
     def __init__(self, scene: viser.SceneApi, root: str) -> None:
         def add(name: str, solid: Solid, colour: Colour, flat: bool = False) -> Any:
-            return scene.add_mesh_simple(
-                f"{root}/{name}",
-                solid.vertices,
-                solid.faces,
-                color=colour,
-                flat_shading=flat,
-                cast_shadow=False,
-                receive_shadow=False,
-            )
+            return add_mesh(scene, f"{root}/{name}", solid, colour, flat=flat)
 
         def frame(name: str, position: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Any:
             return scene.add_frame(f"{root}/{name}", show_axes=False, position=position)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import viser
 
+from emaviz.scene.mesh import add_mesh
 from emaviz.scene.palette import DARK
 from emaviz.scene.solids import revolved
 
@@ -20,18 +21,8 @@ class LoadArrow:
         head = revolved([(0.0, 0.0), (_HEAD, 0.0), (_HEAD, _HEAD_RADIUS)], segments=16)
         shaft = revolved([(0.0, 0.0), (1.0, 0.0), (1.0, _SHAFT_RADIUS), (0.0, _SHAFT_RADIUS)], segments=12)
         self._frame = scene.add_frame(f"{root}/load", show_axes=False, position=_AT, visible=False)
-        scene.add_mesh_simple(
-            f"{root}/load/head", head.vertices, head.faces, color=DARK, cast_shadow=False, receive_shadow=False
-        )
-        self._shaft = scene.add_mesh_simple(
-            f"{root}/load/shaft",
-            shaft.vertices,
-            shaft.faces,
-            color=DARK,
-            position=(_HEAD, 0.0, 0.0),
-            cast_shadow=False,
-            receive_shadow=False,
-        )
+        add_mesh(scene, f"{root}/load/head", head, DARK)
+        self._shaft = add_mesh(scene, f"{root}/load/shaft", shaft, DARK, position=(_HEAD, 0.0, 0.0))
         self._share = 0.0
 
     def show(self, share: float) -> None:

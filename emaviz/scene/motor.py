@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import viser
 
+from emaviz.scene.mesh import add_mesh
 from emaviz.scene.palette import AT_REST, FAULT, GLASS, IRON, LIGHT, PHASES, SATIN, STEEL, WHITE, Colour, between
 from emaviz.scene.solids import TURN, Solid, about_x, ball, block, joined, revolved, tube
 
@@ -27,25 +28,25 @@ class Motor:
     """Built once; afterwards only frames move and colours change."""
 
     def __init__(self, scene: viser.SceneApi, root: str, pole_pairs: int) -> None:
-        self._housing = _add(scene, f"{root}/housing", _housing(), GLASS, opacity=0.35)
-        _add(scene, f"{root}/stator", _stator(), IRON)
+        self._housing = add_mesh(scene, f"{root}/housing", _housing(), GLASS, opacity=0.35)
+        add_mesh(scene, f"{root}/stator", _stator(), IRON)
         self._scene, self._root = scene, root
         self._coils: list[Any] = [None] * 3
         self._burnt: Any = None
         self._layers: list[int] = [0] * 3
         self._axis = scene.add_frame(f"{root}/axis", show_axes=False)
         self.rotor = scene.add_frame(f"{root}/axis/rotor", show_axes=False)
-        _add(scene, f"{root}/axis/rotor/core", _rotor_core(), STEEL)
+        add_mesh(scene, f"{root}/axis/rotor/core", _rotor_core(), STEEL)
         magnets = 2 * min(max(pole_pairs, 1), 6)
         for pole, colour in enumerate((SATIN, LIGHT)):
-            _add(scene, f"{root}/axis/rotor/magnets_{pole}", _magnets(magnets, pole), colour)
+            add_mesh(scene, f"{root}/axis/rotor/magnets_{pole}", _magnets(magnets, pole), colour)
         self._cage = scene.add_frame(f"{root}/cage", show_axes=False)
         # on the rotor, so that they turn with it: where the gap is thinnest, or without eccentricity would be
         self._thinnest, self._direction = (
-            _add(scene, f"{root}/axis/rotor/{name}", _gap(half), FAULT)
+            add_mesh(scene, f"{root}/axis/rotor/{name}", _gap(half), FAULT)
             for name, half in (("thinnest_gap", _THINNEST_RAD), ("direction", _DIRECTION_RAD))
         )
-        self._bearings = _add(scene, f"{root}/bearings", joined(*(_bearing(x) for x in (-0.31, 0.31))), STEEL)
+        self._bearings = add_mesh(scene, f"{root}/bearings", joined(*(_bearing(x) for x in (-0.31, 0.31))), STEEL)
         balls = [(x, 0.062, TURN * i / 8) for x in (-0.31, 0.31) for i in range(8)]
         sphere = ball(0.0125)
         scene.add_batched_meshes_simple(
@@ -114,7 +115,7 @@ class Motor:
         """Of these loops instead of the old ones; None without any."""
         if old is not None:
             old.remove()
-        return _add(self._scene, f"{self._root}/{name}", joined(*loops), colour) if loops else None
+        return add_mesh(self._scene, f"{self._root}/{name}", joined(*loops), colour) if loops else None
 
 
 def _lit(phase: int, share: float) -> Colour:
@@ -123,18 +124,6 @@ def _lit(phase: int, share: float) -> Colour:
     if share < 0.6:
         return between(AT_REST[phase], PHASES[phase], share / 0.6)
     return between(PHASES[phase], WHITE, 0.75 * (share - 0.6) / 0.4)
-
-
-def _add(scene: viser.SceneApi, name: str, solid: Solid, colour: Colour, opacity: float | None = None) -> Any:
-    return scene.add_mesh_simple(
-        name,
-        solid.vertices,
-        solid.faces,
-        color=colour,
-        opacity=opacity,
-        cast_shadow=False,
-        receive_shadow=False,
-    )
 
 
 def _housing() -> Solid:

@@ -29,10 +29,7 @@ COMMON = pa.schema(
 HOW = pa.schema(  # how a row came about, which is another each time: in the parts, not in the tables
     [
         ("elapsed_s", NUMBER),
-        (
-            "answer_s",
-            NUMBER,
-        ),  # that an identification itself tells: without compilation, and without making its recordings
+        ("answer_s", NUMBER),  # of an identification itself, without compiling and without making its recordings
         ("worker", TEXT),
         ("memory_MB", NUMBER),
         ("finished_s", NUMBER),

@@ -9,3 +9,9 @@ TRUTH = "#2b8a3e"
 GHOST = "#9c6ade"  # a frozen run
 PHASES = ("#ec403a", "#28be5a", "#3878ff")  # A, B, C, in the charts and in the windings
 ALGORITHMS = {"robust": "#d6336c", "ssa": "#9c36b5", "hba": "#f08c00", "do": "#1098ad"}
+
+
+def rgb(colour: str) -> tuple[int, int, int]:
+    """Of "#rrggbb", 0 … 255 each."""
+    red, green, blue = bytes.fromhex(colour.removeprefix("#"))
+    return red, green, blue

@@ -21,28 +21,24 @@ class Variable:
     title: str
     unit: str  # on rotary axes
     side: Side | None
-    noun: str  # in a sentence
     place: str = "at "  # before a value of it
     indirect: float = 0.0
 
+    @property
+    def noun(self) -> str:
+        """In a sentence."""
+        return self.title.lower()
+
 
 _ROWS = (
-    Variable("motor_angle", "Motor angle", "rad", MOTOR, "motor angle"),
-    Variable("user_position", "User position", "rad", USER, "user position", "at a user position of ", 0.01),
-    Variable("motor_speed", "Motor speed", "rad/s", MOTOR, "motor speed"),
-    Variable(
-        "acceleration",
-        "Motor acceleration",
-        "rad/s²",
-        MOTOR,
-        "motor acceleration",
-        "at an acceleration of ",
-        0.03,
-    ),
-    Variable("current", "Current", "A", None, "motor current", indirect=0.005),
-    Variable("load", "Load", "N·m", USER, "load", "under a load of "),
-    Variable("time", "Time", "s", None, "time", indirect=0.15),
-    Variable("temperature", "Temperature", "°C", None, "temperature", indirect=0.05),
+    Variable("motor_angle", "Motor angle", "rad", MOTOR),
+    Variable("user_position", "User position", "rad", USER, "at a user position of ", 0.01),
+    Variable("motor_speed", "Motor speed", "rad/s", MOTOR),
+    Variable("acceleration", "Motor acceleration", "rad/s²", MOTOR, "at an acceleration of ", 0.03),
+    Variable("current", "Motor current", "A", None, indirect=0.005),
+    Variable("load", "Load", "N·m", USER, "under a load of "),
+    Variable("time", "Time", "s", None, indirect=0.15),
+    Variable("temperature", "Temperature", "°C", None, indirect=0.05),
 )
 VARIABLES: dict[str, Variable] = {row.name: row for row in _ROWS}
 

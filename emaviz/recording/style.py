@@ -14,8 +14,7 @@ Colour = tuple[int, int, int, int]
 
 
 def _rgba(hexadecimal: str, alpha: int = 255) -> Colour:
-    red, green, blue = bytes.fromhex(hexadecimal.removeprefix("#"))
-    return red, green, blue, alpha
+    return *colours.rgb(hexadecimal), alpha
 
 
 APPLICATION = "emaviz"

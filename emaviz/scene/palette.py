@@ -7,11 +7,6 @@ from emaviz import colours
 Colour = tuple[int, int, int]
 
 
-def rgb(colour: str) -> Colour:
-    """Of "#rrggbb"."""
-    return int(colour[1:3], 16), int(colour[3:5], 16), int(colour[5:7], 16)
-
-
 def between(one: Colour, other: Colour, share: float) -> Colour:
     """From one colour at share 0 to the other at 1."""
     red, green, blue = (round(a + (b - a) * share) for a, b in zip(one, other))
@@ -25,6 +20,6 @@ SATIN: Colour = (140, 146, 156)
 IRON: Colour = (104, 109, 119)
 DARK: Colour = (76, 81, 91)
 WHITE: Colour = (255, 255, 255)
-FAULT = rgb(colours.FAULT)
-PHASES = tuple(rgb(one) for one in colours.PHASES)
+FAULT = colours.rgb(colours.FAULT)
+PHASES = tuple(colours.rgb(one) for one in colours.PHASES)
 AT_REST = tuple(between(between(one, IRON, 0.5), DARK, 0.35) for one in PHASES)  # a phase without current

@@ -5,11 +5,10 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Iterator
-from typing import Any
 
 import pytest
 from hypothesis import settings
-from support.browser import SOFTWARE_GL
+from support.browser import SOFTWARE_GL, Browser
 
 # As `emaviz` says it, before any test imports numpy: two processes' threads would wait for each other.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -23,13 +22,13 @@ settings.load_profile("any time")
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
     """The whole suite takes two processes or more; chosen tests, a study, or `-s` run here."""
     whole = config.args_source == pytest.Config.ArgsSource.TESTPATHS
-    if not whole or config.option.capture == "no" or config.option.markexpr != "not study":
+    if not whole or config.option.capture == "no" or "not study" not in config.option.markexpr:
         return 0
     return min(4, os.cpu_count() or 1)
 
 
 @pytest.fixture(scope="session")
-def browser() -> Iterator[Any]:
+def browser() -> Iterator[Browser]:
     """Headless Chromium with software GL; without one the test is skipped, in CI it fails."""
     path = os.environ.get("EMAVIZ_CHROMIUM") or shutil.which("chromium") or shutil.which("chromium-browser")
     if path is None:
@@ -40,6 +39,6 @@ def browser() -> Iterator[Any]:
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=path, args=SOFTWARE_GL, headless=True)
+        chromium = Browser(playwright.chromium.launch(executable_path=path, args=SOFTWARE_GL, headless=True))
         yield chromium
         chromium.close()

@@ -119,6 +119,7 @@ def test_what_the_list_says_of_a_row(data):
     assert "A worn one" in shown and "<td>worn</td>" in shown and "Comparison" in shown
 
 
+@pytest.mark.long
 @pytest.mark.browser
 def test_a_row_is_chosen_and_opened_on_the_page(watched, app, tmp_path):
     page = watched

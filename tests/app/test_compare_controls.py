@@ -48,6 +48,7 @@ def figure(page, words):
     return next((one for one in page.evaluate(FIGURES) if words in one["title"]), None)
 
 
+@pytest.mark.long
 def test_files_are_added_shown_and_removed(page, app):
     for name in ("slow", "quick"):
         choose(page, "Data folder", f"uploads/{name}.csv")
@@ -67,6 +68,7 @@ def test_files_are_added_shown_and_removed(page, app):
     wait_until(lambda: list(app.comparing.opened) == ["uploads/quick.csv"])
 
 
+@pytest.mark.long
 def test_what_is_asked_is_set(page, app):
     comparing = app.comparing
     resting(app)
@@ -109,6 +111,7 @@ def test_an_actuators_file_is_uploaded(page, app, tmp_path):
     wait_until(lambda: app.comparing.actuator is app.session.actuator)
 
 
+@pytest.mark.long
 def test_the_comparison_is_looked_at_and_kept(page, app):
     comparing = app.comparing
     comparing.add("uploads/slow.csv")  # its columns' side file says mA

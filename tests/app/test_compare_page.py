@@ -141,6 +141,7 @@ def test_from_a_file_to_the_region_where_the_model_fails(compare, app, rig_file)
         wait_until(lambda title=title: any(title in drawn for drawn, _ in figures(page)))
 
 
+@pytest.mark.long
 def test_a_column_is_corrected_by_hand(compare, app, rig_file, tmp_path):
     page = compare
     upload(page, shutil.copy(rig_file, tmp_path / "another.csv"))  # a browser tells no change where it is the same
@@ -219,6 +220,7 @@ def test_the_panel_on_the_right_follows_what_is_done(compare, app, rig_file):
     assert page.get_by_role("tab", name="Comparison").count() == 0
 
 
+@pytest.mark.long
 def test_files_of_the_command_line_open_on_compare(browser, recording, tmp_path):
     path = tmp_path / "given.csv"
     write_measurement(recording, path)

@@ -40,6 +40,7 @@ def worn(rig):
     return rig.discovering
 
 
+@pytest.mark.long
 def test_start_takes_the_fault_into_the_model(worn):
     look = worn.look
     assert list(look.found.faults) == ["k2"] and not look.added
@@ -74,6 +75,7 @@ def test_reveal_holds_the_faults_against_the_truth(worn):
     assert not agrees(shorted, worn.look.found, ()) and "not found" in reveal(shorted, worn.look.found, ())
 
 
+@pytest.mark.long
 def test_a_session_keeps_the_fault_and_undo_takes_it_back(rig, worn):
     saved = json.loads(json.dumps(worn.saved()))
     assert saved["steps"][0]["faults"] == ["k2"]

@@ -120,6 +120,7 @@ def test_one_effect_with_the_guide(discover, app):
     page.get_by_text("Step 6 of 6").wait_for(state="hidden")
 
 
+@pytest.mark.long
 def test_two_effects_undo_and_a_wrong_answer(discover, app):
     page = discover
     begin(page, app, "After the overhaul")
@@ -146,6 +147,7 @@ def test_two_effects_undo_and_a_wrong_answer(discover, app):
     page.get_by_text("No effect in the library would reduce the error significantly.").wait_for()
 
 
+@pytest.mark.long
 def test_an_effect_outside_the_library_becomes_an_expression_or_a_curve(discover, app):
     page = discover
     begin(page, app, "The prototype")
@@ -188,6 +190,7 @@ def test_an_effect_outside_the_library_becomes_an_expression_or_a_curve(discover
     assert revealed(page) == "Your answer agrees."
 
 
+@pytest.mark.long
 def test_stop_works_and_a_session_brings_the_ladder_back(discover, app):
     page = discover
     begin(page, app, "First bench run")
@@ -230,6 +233,7 @@ def test_stop_works_and_a_session_brings_the_ladder_back(discover, app):
     page.get_by_text("T = A sin(h θ + φ)").first.wait_for()
 
 
+@pytest.mark.long
 def test_the_next_test_goes_to_explore_and_to_a_file(discover, app):
     page = discover
     begin(page, app, "Two suspects")
@@ -250,6 +254,7 @@ def test_the_next_test_goes_to_explore_and_to_a_file(discover, app):
     assert float(shown.input_value()) == pytest.approx(wanted.duration_s)
 
 
+@pytest.mark.long
 def test_a_challenge_of_ones_own_is_sealed_sent_opened_and_revealed(discover, app, tmp_path):
     page = discover
     settings = app.session.settings
@@ -294,6 +299,7 @@ def test_a_challenge_of_ones_own_is_sealed_sent_opened_and_revealed(discover, ap
     page.get_by_text("Hidden: cogging torque of order 12.").wait_for()
 
 
+@pytest.mark.long
 def test_the_library_is_searched_and_felt(page, app):
     page.get_by_role("tab", name="Library", exact=True).click()
     page.locator("label", has_text="Search").locator(

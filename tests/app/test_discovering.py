@@ -125,6 +125,7 @@ def test_an_effect_is_removed_as_a_step_of_its_own(fresh):
     assert fresh.look.rmse == pytest.approx(calibrated, rel=0.02)
 
 
+@pytest.mark.long
 def test_an_expression_of_the_user_is_fitted(fresh):
     effect = user_torque("A*sin(14*theta) + B*cos(14*theta)")
     assert fresh.add_own(effect, {"A": 1e-3, "B": 1e-3})
@@ -194,6 +195,7 @@ WITHOUT_VALUE = [
 ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("text", WITHOUT_VALUE)
 def test_a_torque_without_value_fails_as_a_candidate_and_nothing_else(fresh, text):
     before, said = fresh.look, []
@@ -223,6 +225,7 @@ def test_what_is_kept_opens_again(fresh):
     assert fresh.folder.name_of(model) in fresh.folder.actuator_files()
 
 
+@pytest.mark.long
 def test_the_next_test_is_between_the_two_best(fresh):
     before = fresh.look.promising[:2]
     assert fresh.suggest()

@@ -62,6 +62,7 @@ def ladder(rig):
     return [(one.label, one.rmse, one.holdout_rmse) for one in rig.discovering.look.found.ladder]
 
 
+@pytest.mark.long
 def test_what_was_sealed_in_explore_is_found_and_revealed(solved):
     found, added = solved.discovering.look.found, solved.discovering.look.added
     truth = solved.discovering.source.reveal()
@@ -74,6 +75,7 @@ def test_what_was_sealed_in_explore_is_found_and_revealed(solved):
     assert amplitude == pytest.approx(0.02, rel=0.1)
 
 
+@pytest.mark.long
 def test_a_session_keeps_the_ladder(rigs, solved):
     there = rigs[1]
     solved.discovering._told.experiment = Experiment(
@@ -112,6 +114,7 @@ def test_a_session_keeps_the_ladder(rigs, solved):
     there.done()  # the cards of that step are new here
 
 
+@pytest.mark.long
 def test_recordings_of_compare_are_taken_again_with_what_was_asked(rigs, tmp_path):
     here, there = rigs
     files = here.discovering.source.challenges[EASY]
@@ -177,6 +180,7 @@ def test_damaged_parts_are_told_in_one_line_and_change_nothing(rigs, solved):
     assert there.discovering.look is before and not there.discovering.running
 
 
+@pytest.mark.long
 def test_a_step_whose_model_is_damaged_leaves_the_steps_before_it(rigs):
     there = rigs[1]
     saved = {"recipe": {"challenge": EASY}, "steps": [{"model": "evil", "starts": {}}], "experiment": None}

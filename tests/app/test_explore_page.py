@@ -259,6 +259,7 @@ def test_saved_data_are_the_run(page, app, tmp_path, suffix):
     assert read["phase_b_current_A"] == pytest.approx(shown["phase_b_current_A"], abs=1e-9)
 
 
+@pytest.mark.long
 @pytest.mark.browser
 def test_the_plot_is_saved_as_a_picture(page, app, tmp_path):
     page.get_by_role("tab", name="Export").click()
@@ -275,6 +276,7 @@ def test_the_plot_is_saved_as_a_picture(page, app, tmp_path):
     dialog.wait_for(state="detached")
 
 
+@pytest.mark.long
 @pytest.mark.browser
 def test_the_scene_is_saved_and_opens_alone(page, app, browser, tmp_path):
     page.get_by_role("tab", name="Export").click()
@@ -293,6 +295,7 @@ def test_the_scene_is_saved_and_opens_alone(page, app, browser, tmp_path):
     alone.close()
 
 
+@pytest.mark.long
 @pytest.mark.browser
 def test_the_first_visit_is_greeted_once(app, browser):
     context = browser.new_context(viewport={"width": 1400, "height": 900})

@@ -69,6 +69,7 @@ def test_the_app_is_imported_without_rerun():
     assert done.stdout.strip() == "fine", done.stderr
 
 
+@pytest.mark.long
 def test_a_disk_that_fills_while_recording_is_told_and_the_answer_stays(session, monkeypatch, tmp_path):
     begun = threading.Event()
 
@@ -115,6 +116,7 @@ def no_port(*_, **__):
     raise RecordingError("port 0 cannot be used: address already in use; choose another, or 0 for a free one")
 
 
+@pytest.mark.long
 @pytest.mark.browser
 def test_a_viewer_without_a_port_is_told_and_a_browser_that_leaves_ends_nothing(browser, tmp_path, monkeypatch):
     monkeypatch.setattr("emaviz.page.app.ViewerHost", no_port)

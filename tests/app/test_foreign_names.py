@@ -6,6 +6,7 @@ import pytest
 from support import hostile
 from support.hostile import FRAME, IMAGE, MARKDOWN
 from support.on_page import choose, wait_until
+from support.representative import first_of
 
 from emaviz.page.app import App
 from emaviz.page.identify.tab import PLANT
@@ -43,6 +44,7 @@ def tab(page, name):
     page.get_by_role("tab", name=name, exact=True).click()
 
 
+@pytest.mark.long
 def test_explore(page, app):
     def told(line):
         """Again where the session says something of its own in between."""
@@ -55,7 +57,7 @@ def test_explore(page, app):
         seen(page, f"Recovered: {name}.rrd")
 
 
-@pytest.mark.parametrize("name", hostile.NAMES)
+@pytest.mark.parametrize("name", first_of(hostile.NAMES))
 def test_compare(page, app, name):
     tab(page, "Compare")
     choose(page, "Data folder", f"uploads/broken {name}.csv")
@@ -73,6 +75,7 @@ def test_compare(page, app, name):
     seen(page, f"{name}.csv: has no current")
 
 
+@pytest.mark.long
 def test_a_comparison(page, app):
     tab(page, "Compare")
     for name in hostile.NAMES[:2]:
@@ -85,6 +88,7 @@ def test_a_comparison(page, app):
     seen(page)
 
 
+@pytest.mark.long
 def test_identify(page, app):
     tab(page, "Identify")
     choose(page, "Identify", f"uploads/broken {IMAGE}.csv")
@@ -95,6 +99,7 @@ def test_identify(page, app):
     wait_until(lambda: not app.session.settings.source)
 
 
+@pytest.mark.long
 def test_discover(page, app):
     tab(page, "Discover")
     choose(page, "Recordings", f"Sealed: {IMAGE}.challenge")
@@ -107,6 +112,7 @@ def test_discover(page, app):
     seen(page, f"{FRAME}.csv: cannot be used")
 
 
+@pytest.mark.long
 def test_recordings_and_sessions(page, app):
     tab(page, "Recordings")
     page.get_by_role("button", name="Read the folder again", exact=True).click()

@@ -243,6 +243,7 @@ def test_ten_thousand_random_messages_from_five_pages_and_as_many_handshakes(app
 # --- in a browser -----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 @pytest.mark.browser
 def test_a_long_number_is_typed_and_the_page_lives(page, app, controls):
     seed = next(one for one in controls.values() if getattr(one, "label", "") == "Seed")

@@ -62,6 +62,7 @@ def raced(session, algorithms, seconds=120.0):
 # --- without a browser ------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_a_race_gives_each_optimiser_the_answer_that_it_finds_alone(session):
     session.settings.restore(Settings().saved())
     session.settings.set_fault(0, 0.3)
@@ -194,6 +195,7 @@ pictures = """() => Array.from(document.querySelectorAll('svg'))
   .filter(s => s.textContent.includes('friction') || s.textContent.includes('k1')).map(s => s.outerHTML)"""
 
 
+@pytest.mark.long
 @pytest.mark.browser
 def test_a_race_is_watched_paused_and_looked_back_at(page, app):
     settings = app.session.settings

@@ -53,6 +53,7 @@ def test_a_drive_without_a_controller_is_refused_in_one_line():
         assert "\n" not in str(told.value)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", [SERVO, DRIVE])
 def test_a_session_of_either_starts_and_tells_no_failure(name, tmp_path):
     session = Session(actuator(name), tmp_path)
@@ -81,6 +82,7 @@ def test_a_session_of_either_starts_and_tells_no_failure(name, tmp_path):
         session.close()
 
 
+@pytest.mark.long
 @pytest.mark.browser
 @pytest.mark.parametrize("name", [SERVO, DRIVE])
 def test_the_page_says_what_it_cannot_show(browser, tmp_path, name, capfd):

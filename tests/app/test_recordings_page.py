@@ -190,6 +190,7 @@ def test_closing_the_host_ends_what_follows_a_recording(tmp_path):
 # --- in the browser ---------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 @pytest.mark.browser
 def test_recordings_are_opened_compared_renamed_and_deleted(watched, app):
     page, session = watched, app.session

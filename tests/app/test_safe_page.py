@@ -51,6 +51,7 @@ def elsewhere():
     server.server_close()
 
 
+@pytest.mark.long
 def test_the_page_works_under_its_policy_and_reaches_no_other_port(browser, app, elsewhere):
     port, asked = elsewhere
     app.session.refresh()

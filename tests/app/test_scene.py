@@ -367,6 +367,7 @@ def drawn(browser, app):
     tab.close()
 
 
+@pytest.mark.long
 @pytest.mark.browser
 def test_the_rotor_in_the_browser_follows_the_run_at_a_pace(drawn, app):
     """Poses that reach the browser; drawing them all at 25/s needs two free cores and is measured in benchmarks."""
@@ -380,6 +381,7 @@ def test_the_rotor_in_the_browser_follows_the_run_at_a_pace(drawn, app):
     assert drawn.evaluate("window.__poses.size") > 9
 
 
+@pytest.mark.long
 @pytest.mark.browser
 def test_the_camera_frames_the_machine_between_the_panels_until_somebody_moves_it(drawn, app):
     """In a window that becomes smaller, too; and again after Reset view."""

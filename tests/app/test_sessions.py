@@ -177,6 +177,7 @@ def slider(page, label):
     return row.locator("input:not([type=hidden])").first
 
 
+@pytest.mark.long
 @pytest.mark.browser
 def test_two_tabs_stay_in_step_and_a_reload_keeps_the_state(page, app, browser):
     other = browser.new_page(viewport={"width": 1400, "height": 900})

@@ -83,6 +83,7 @@ def soak(browser, folder, capfd, rounds, iterations, seconds):
     assert not faults and "Traceback" not in logged and "ERROR" not in logged, (faults, logged[-2000:])
 
 
+@pytest.mark.long
 def test_work_piles_up_nothing(browser, tmp_path, capfd):
     soak(browser, tmp_path, capfd, rounds=12, iterations=3, seconds=25.0)
 

@@ -75,6 +75,7 @@ def test_the_right_side_and_the_address_follow_the_tab(tab, app):
         wait_until(lambda name=name: app.playback.on == name.lower(), 10.0)
 
 
+@pytest.mark.long
 def test_a_verdict_comes_back_after_a_visit_to_explore(tab, app, compared):
     tab.get_by_text(compared.sentences[0]).first.wait_for()
     go(tab, "Explore")
@@ -87,6 +88,7 @@ def test_a_verdict_comes_back_after_a_visit_to_explore(tab, app, compared):
     assert app.comparing.comparison is compared, "nothing was computed again"
 
 
+@pytest.mark.long
 def test_each_workspace_has_its_own_clock_and_there_is_one_slider(tab, app, compared):
     go(tab, "Explore")
     wait_until(lambda: app.playback.on == "explore", 10.0)
@@ -109,6 +111,7 @@ def test_each_workspace_has_its_own_clock_and_there_is_one_slider(tab, app, comp
     wait_until(lambda: not app.playback.playing, 10.0)
 
 
+@pytest.mark.long
 def test_another_window_keeps_its_own_workspace_and_a_reload_its_place(tab, app, browser):
     go(tab, "Compare")
     other = browser.new_page(viewport={"width": 1400, "height": 900})
@@ -135,6 +138,7 @@ def test_compare_leads_on_to_identify_and_discover(tab, app, compared):
     assert tab.url.endswith("?view=discover")
 
 
+@pytest.mark.long
 def test_a_discovery_is_gone_back_to_without_computing_and_is_used_in_explore(tab, app, compared):
     go(tab, "Discover")
     discovering = app.discovering
@@ -161,6 +165,7 @@ def test_a_discovery_is_gone_back_to_without_computing_and_is_used_in_explore(ta
     wait_until(lambda: app.session.simulation.plant == app.session.plant)
 
 
+@pytest.mark.long
 def test_explore_says_its_model_and_keeps_it(tab, app):
     go(tab, "Explore")
     tab.get_by_text("model: healthy").wait_for()

@@ -78,6 +78,7 @@ def test_a_dry_run_computes_nothing(tmp_path, capsys):
     assert json.loads((tmp_path / "d.json").read_text())["tasks"] == 3
 
 
+@pytest.mark.long
 def test_a_dry_run_knows_what_is_there_and_how_long_it_took(made, folder, capsys):
     assert main(["campaign", str(made[0]), "--out", str(folder), "--dry-run"]) == 0
     assert "0 of 3" in (shown := capsys.readouterr().out) and "measured" in shown

@@ -81,6 +81,7 @@ def figures_of(html):
     return json.loads(re.search(r'id="figures">(.*?)</script>', html, re.S).group(1))["figures"]
 
 
+@pytest.mark.long
 def test_the_result_follows_from_the_rows(made):
     told = json.loads((made.parent / "r.json").read_text())
     rows = {(one["case"], one["algorithm"]): one for one in told["rows"]}

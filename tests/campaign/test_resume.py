@@ -28,6 +28,7 @@ def rows_by_name(folder):
     return {row["name"]: row for row in Store(folder).table("identify", how=True).to_pylist()}
 
 
+@pytest.mark.long
 def test_a_worker_and_then_the_client_are_killed(tmp_path, expected):
     plan, table = expected
     out = tmp_path / "out"
@@ -70,6 +71,7 @@ def test_an_interrupt_keeps_the_rows_and_leaves_no_worker(tmp_path):
     assert 1 <= rows_of(out) < 200
 
 
+@pytest.mark.long
 def test_on_dask_a_worker_the_client_and_the_scheduler_are_killed(tmp_path, expected):
     pytest.importorskip("distributed")
     plan, table = expected
@@ -113,6 +115,7 @@ def callbacks_of(address):
     return list(found.values())
 
 
+@pytest.mark.long
 def test_what_fails_is_a_row_and_not_the_end(tmp_path):
     broken = "[groups.broken]\nCHEAP\nload_torque_Nm = [0.0, 1e7]\n"
     out = tmp_path / "out"
@@ -131,6 +134,7 @@ def test_what_fails_is_a_row_and_not_the_end(tmp_path):
     assert json.loads((tmp_path / "s.json").read_text())["groups"]["broken"]["errors"] == 1
 
 
+@pytest.mark.long
 def test_a_task_that_ends_its_workers_is_an_error_in_the_end(tmp_path, expected):
     """Killed as often as it is begun, it gives way."""
     plan = cheap(tmp_path, 1)

@@ -43,6 +43,7 @@ print("threads", numba.get_num_threads(), "sum", float(found["current_A"].sum())
 """
 
 
+@pytest.mark.long
 def test_one_process_compiles_and_the_others_take_it(tmp_path):
     started = [
         subprocess.Popen(

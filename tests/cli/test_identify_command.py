@@ -41,6 +41,7 @@ def test_polish_is_told_beside_what_the_search_found(tmp_path):
     assert result["searched_k"] != result["k"]
 
 
+@pytest.mark.long
 def test_missing_physics_blames_no_part_until_it_is_added(cogging, tmp_path, capsys):
     out = tmp_path / "result.json"
     assert main(["identify", str(cogging), "--json", str(out)]) == 0

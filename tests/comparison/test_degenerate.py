@@ -66,6 +66,7 @@ def test_a_noiseless_recording_of_a_perfect_model_is_searched_for_effects():
     assert found.verdict == "adequate" and found.ladder[-1].rmse < 1.0
 
 
+@pytest.mark.long
 def test_a_current_at_its_limit_throughout_has_an_answer():
     limit = np.full(noiseless().samples, ACTUATOR.controller.current_limit_A)
     saturated = noiseless().with_signals(current_A=limit)

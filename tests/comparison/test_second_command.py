@@ -20,6 +20,7 @@ def _ahead(seed: int, commands) -> float:
     return r2["user_position"] - r2["acceleration"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [61002, 61003])
 def test_second_frequency_tells_a_hinge_moment_from_an_acceleration(seed):
     assert _ahead(seed, [SINE, FASTER]) > _APART

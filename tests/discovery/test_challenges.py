@@ -93,6 +93,7 @@ def test_plants_are_off_but_within_their_tolerances():
         assert 0.5 < np.max(np.abs(off)) <= 2.0 + 1e-9
 
 
+@pytest.mark.long
 def test_making_twice_gives_the_same_bytes(tmp_path):
     truth = read_truth(folder() / "truth" / "prototype.toml")
     made = []

@@ -50,6 +50,7 @@ OUTSIDE_THE_LIBRARY = [
 ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("text", "settings", "variable", "truth"), OUTSIDE_THE_LIBRARY, ids=["speed", "angle"])
 def test_curve_of_a_hidden_torque_brings_the_held_out_error_to_the_floor(text, settings, variable, truth, tmp_path):
     effects = {user_torque(text).name: settings}

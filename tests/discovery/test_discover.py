@@ -47,6 +47,7 @@ def test_hidden_effect_is_found_and_the_error_falls_to_the_floor(name):
     assert found.ladder[-1].rmse < found.ladder[0].rmse
 
 
+@pytest.mark.long
 def test_cogging_with_its_order_and_phase(cogged):
     assert [one.name for one in cogged.effects] == ["cogging_torque"]
     settings = settings_of(cogged)["cogging_torque"]
@@ -66,6 +67,7 @@ def test_nothing_hidden_is_adequate():
     assert found.verdict == "adequate" and not found.effects and len(found.ladder) == 1
 
 
+@pytest.mark.long
 def test_two_effects_one_after_the_other():
     found = found_in({name: CASES[name] for name in ("cogging_torque", "load_dependent_friction")})
     assert {one.name for one in found.effects} == {"cogging_torque", "load_dependent_friction"}
@@ -73,6 +75,7 @@ def test_two_effects_one_after_the_other():
     assert rungs == sorted(rungs, reverse=True) and found.ladder[-1].holdout_rmse < 1.1
 
 
+@pytest.mark.long
 def test_what_is_not_among_the_candidates_is_unknown():
     found = found_in({"hinge_moment": CASES["hinge_moment"]}, names=("stribeck_friction",))
     assert found.verdict == "unknown_effect" and found.unknown is not None
@@ -112,6 +115,7 @@ def test_mixed_maps_and_runs_are_refused():
     assert np.isfinite(run["current_A"]).all()
 
 
+@pytest.mark.long
 def test_parameter_outside_its_tolerance_is_no_missing_physics():
     extra = {"motor.viscous_friction_Nms_rad": 1.5e-4}
     recordings, unseen = (recorded(31, commands=commands, extra=extra) for commands in (COMMANDS, UNSEEN))

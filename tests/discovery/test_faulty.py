@@ -47,6 +47,7 @@ def test_a_fault_is_named_and_no_physics_beside_it(fault):
     assert last.rmse < 1.1 and last.holdout_rmse is not None and last.holdout_rmse < 1.1 < found.ladder[0].rmse
 
 
+@pytest.mark.long
 def test_missing_physics_is_found_beside_two_faults():
     found = found_in({"k1": 0.3, "k2": 0.2}, {"stribeck_friction": {"speed_rad_s": 10.0}})
     assert [one.name for one in found.effects] == ["stribeck_friction"] and set(found.faults) == {"k1", "k2"}
@@ -55,11 +56,13 @@ def test_missing_physics_is_found_beside_two_faults():
     assert found.ladder[-1].rmse < 1.1 and found.ladder[-1].holdout_rmse < 1.1
 
 
+@pytest.mark.long
 def test_an_effect_stays_one_where_a_fault_tells_less():
     found = found_in({}, {"cogging_torque": {"amplitude_Nm": 0.012, "order": 12.0}})
     assert [one.name for one in found.effects] == ["cogging_torque"] and not found.faults
 
 
+@pytest.mark.long
 def test_an_eccentric_rotor_comes_before_a_ripple_of_few_periods_which_is_said():
     found = found_in({"k6": 0.3, "k7": 0.7})
     assert set(found.faults) == {"k6", "k7"} and not found.effects
@@ -70,6 +73,7 @@ def test_an_eccentric_rotor_comes_before_a_ripple_of_few_periods_which_is_said()
     assert [one.name for one in found.effects] == ["torque_ripple"] and not found.faults
 
 
+@pytest.mark.long
 def test_a_fault_stays_in_the_model_that_is_judged_shown_and_taken_back():
     recordings = [recorded(run, {"k2": 0.2}, seed=seed) for seed, run in enumerate((CHIRP, SINE))]
     story = begun(recordings, ACTUATOR, [recorded(UNSEEN, {"k2": 0.2}, seed=9)])

@@ -55,6 +55,7 @@ def test_a_loop_that_reaches_its_band_is_not_asked_again(healthy):
     assert second_opinion(begun(healthy, ACTUATOR), quiet) is None
 
 
+@pytest.mark.long
 def test_inverse_dynamics_names_what_the_wrong_loop_cannot(cogging):
     found = discover(cogging, OTHER, candidates=FEW)
     assert found.controller_seen is not None
@@ -94,6 +95,7 @@ def _spoilt(one, how):
     return one
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("how", ["right", "sign", "unit"])
 def test_a_held_out_recording_at_odds_is_told_with_the_reason(how, healthy):
     held = [replace(_spoilt(one, how), name="unseen") for one in recorded(11, commands=[MOTION], plant_seed=11)]
@@ -108,6 +110,7 @@ def test_a_held_out_recording_at_odds_is_told_with_the_reason(how, healthy):
     assert one.after < 0.4 * one.before and "unseen contradicts the fitted recordings" in one.sentence
 
 
+@pytest.mark.long
 def test_a_held_out_recording_of_another_actuator_is_told(healthy):
     heavier = {"motor.inertia_kgm2": 0.8 * ACTUATOR.value("motor.inertia_kgm2")}
     held = [replace(one, name="other") for one in recorded(11, commands=[MOTION], extra=heavier)]

@@ -39,6 +39,7 @@ def toothed():
     return data, fit(data, ACTUATOR)
 
 
+@pytest.mark.long
 def test_an_effect_may_be_there_twice(toothed):
     found = discover(
         recorded(41, effects=ORDERS),
@@ -94,6 +95,7 @@ def test_floor_is_the_greater_of_two():
         assert np.all(values >= data.floors[1].model[name]) and np.all(values >= other.model[name])
 
 
+@pytest.mark.long
 def test_a_loop_that_chatters_in_its_play_is_not_repeatable():
     """What the motion needed is compared then, and the effect is still found."""
     chattering = ACTUATOR.with_values({"transmission.backlash_rad": 1e-3, "controller.position_gain_1_s": 5e6})
@@ -117,6 +119,7 @@ def test_a_loop_that_is_not_repeatable_and_has_no_current_is_said_to_be():
     assert found.verdict == "not_repeatable" and not found.effects
 
 
+@pytest.mark.long
 def test_next_experiment_tells_rivals_apart():
     """In a slow sine a hinge moment and a heavier rotor look alike; a faster or wider one tells them apart."""
     hinge = {"hinge_moment": {"stiffness_Nm_rad": 500.0}}

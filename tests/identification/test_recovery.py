@@ -43,6 +43,7 @@ def best_of_two(fault: tuple, noise: float = 0.0) -> Identification:
     return min(found, key=lambda answer: answer.rmse)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("fault", first_of(CASES), ids=case_id)
 def test_fault_is_recovered(fault):
     answer = best_of_two(tuple(fault.items()))
@@ -80,6 +81,7 @@ def test_intervals_contain_the_truth_for_most():
     assert np.median(widths) < 0.15, "an interval that says nothing contains everything"
 
 
+@pytest.mark.long
 def test_healthy_actuator_is_called_healthy():
     answer = best_of_two(())
     assert answer.error_percent is not None and answer.error_percent <= 0.6
@@ -87,6 +89,7 @@ def test_healthy_actuator_is_called_healthy():
     assert answer.uncertainty.alarms == ()
 
 
+@pytest.mark.long
 def test_tolerances_widen_the_intervals():
     answer = best_of_two((("k1", 0.25),))
     objective = Objective([recorded((("k1", 0.25),))], ACTUATOR)
@@ -98,6 +101,7 @@ def test_tolerances_widen_the_intervals():
     assert open_[0, 0] <= 0.25 <= open_[0, 1]
 
 
+@pytest.mark.long
 def test_two_recordings_together():
     fault = {"k1": 0.25, "k3": 0.25}
     truth = vector(fault)
@@ -145,6 +149,7 @@ def test_stopped_run_returns_its_best():
     assert np.all(np.isfinite(answer.uncertainty.interval90))
 
 
+@pytest.mark.long
 def test_run_to_the_end_is_not_stopped_and_repeats():
     objective = Objective([recorded((("k1", 0.25),))], ACTUATOR)
     runs = [identify(objective, "ssa", population=10, iterations=5, seed=seed) for seed in (4, 4, 5)]

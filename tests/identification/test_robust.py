@@ -43,6 +43,7 @@ def test_noise_free_faults_are_found_from_every_start(fault):
         assert answer.polished and answer.algorithm == "robust" and answer.uncertainty.adequate
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "given"), [("step", {"final_rad": 0.01}), ("step", {"final_rad": 0.03}), ("sine", {}), ("staircase", {})]
 )
@@ -56,6 +57,7 @@ def test_every_command_that_tells_the_faults_gives_them(name, given):
     assert answer.error_percent is not None and answer.error_percent <= 0.5, answer.k
 
 
+@pytest.mark.long
 def test_what_hardly_tells_anything_is_not_sure_of_anything():
     """A crawl of half a millirad: other basins fit as well, and the intervals reach over them."""
     truth = faults.vector({"k3": 0.25})
@@ -65,6 +67,7 @@ def test_what_hardly_tells_anything_is_not_sure_of_anything():
     assert "k3" not in answer.uncertainty.alarms
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("sensors", [None, NOISY])
 def test_a_step_that_saturates_tells_what_it_can(sensors):
     """One radian in half a second: all at full speed, where the gain does nothing, and that is said."""
@@ -104,6 +107,7 @@ def test_polish_repairs_a_short_search():
     assert (polished.error_percent or 0.0) < 0.5 < (plain.error_percent or 0.0)
 
 
+@pytest.mark.long
 def test_hidden_effect_raises_no_alarm_and_is_identified_once_added():
     effect = {"cogging_torque": {"amplitude_Nm": 0.012, "order": 12.0, "phase_rad": 0.0}}
     truth = faults.vector({"k2": 0.2})

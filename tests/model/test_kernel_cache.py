@@ -262,6 +262,7 @@ print(sum_of_thrice(3.0))
 """
 
 
+@pytest.mark.long
 def test_two_processes_may_heal_the_same_kernel_at_once(root):
     env = {**os.environ, "PYTHONPATH": str(PARENT)}
     folder = cache_folder()

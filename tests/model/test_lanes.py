@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.representative import first_of
 
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
@@ -23,13 +24,13 @@ from ema_model.stacks import CIRCUITS, exclusive, find_stack
 
 ACTUATOR = load_actuator()
 RUN = Run(command("chirp"), 0.1, load_torque_Nm=5.0)
-STACKS = (
+STACKS = [
+    {"cogging_torque": {"amplitude_Nm": 0.02}, "stribeck_friction": {"speed_rad_s": 12.0}},
     {},
     {"cogging_torque": {"amplitude_Nm": 0.02, "order": 7.0, "phase_rad": 0.4}},
-    {"cogging_torque": {"amplitude_Nm": 0.02}, "stribeck_friction": {"speed_rad_s": 12.0}},
-)
+]
 each_circuit = pytest.mark.parametrize("circuit", CIRCUITS)
-each_stack = pytest.mark.parametrize("effects", STACKS, ids=["0", "1", "2"])
+each_stack = pytest.mark.parametrize("effects", first_of(STACKS), ids=["two effects", "none", "cogging"])
 
 
 def population(n: int, seed: int = 0):

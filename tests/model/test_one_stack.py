@@ -133,6 +133,7 @@ def test_the_library_at_rest_needs_the_bare_models_current():
 OWN = ("torsional_compliance", "stribeck_friction+torque_ripple")  # with states, and with two places
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["chirp", "step"])
 @pytest.mark.parametrize("names", OWN)
 def test_a_models_own_stack_gives_the_librarys_signals(names, name):

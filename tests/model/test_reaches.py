@@ -77,6 +77,7 @@ def test_lists_name_existing_parameters():
     assert all(name.partition(".")[0] in CATALOGUE for name, _ in EFFECTS_IN_ONE)
 
 
+@pytest.mark.long
 def test_emf_scale_sets_the_reduced_circuit_only():
     """The thesis's circuit has the thesis's own constants."""
     changed = ACTUATOR.with_values({"motor.emf_scale": 2.0})

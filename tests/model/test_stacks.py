@@ -69,6 +69,7 @@ def test_stribeck_friction_of_a_vanishing_speed_is_nearly_no_effect():
     assert 0.0 < moved[0] < moved[1] < moved[2] and moved[0] < 0.1 * moved[2]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("circuit", CIRCUITS)
 def test_order_and_repetition_of_effects_do_not_matter(circuit):
     a, b = "cogging_torque", "stribeck_friction"
@@ -212,6 +213,7 @@ def copy(tmp_path) -> Path:
     return tmp_path
 
 
+@pytest.mark.long
 def test_edited_effect_is_never_served_from_the_cache(copy):
     cache = copy / "cache"
     program, env = PROGRAM.format(effect=True), environment(copy, cache)
@@ -240,6 +242,7 @@ def test_edited_effect_is_never_served_from_the_cache(copy):
     assert kernels_in(cache) == after, "an unchanged run compiled again"
 
 
+@pytest.mark.long
 def test_edited_physics_is_never_served_from_the_cache(copy):
     """Friction's softened sign is inlined from another file than the kernel's: numba alone would not notice."""
     cache = copy / "cache"
@@ -253,6 +256,7 @@ def test_edited_physics_is_never_served_from_the_cache(copy):
     assert abs(result(start(program, copy, env)) - first) > 1e-6 * first
 
 
+@pytest.mark.long
 def test_two_processes_may_build_the_same_stack_at_once(tmp_path):
     env = environment(PACKAGE.parent, tmp_path / "cache")
     both = [start(PROGRAM.format(effect=False), tmp_path, env) for _ in range(2)]

@@ -85,6 +85,7 @@ def test_file_written_and_read_again_is_the_same_actuator(own, tmp_path):
     assert (tmp_path / "third.toml").read_text(encoding="utf-8") == text
 
 
+@pytest.mark.long
 def test_effects_of_a_file_act_as_those_given_to_a_run(own):
     actuator, bare = load_actuator(own), load_actuator()
     run = Run(command("chirp"), 0.05)
@@ -187,6 +188,7 @@ def simulated(tmp_path, *effects: str) -> np.ndarray:
     return read_measurement(out)["current_A"]
 
 
+@pytest.mark.long
 def test_expression_and_curve_on_the_command_line(tmp_path):
     run = Run(command("chirp"), 0.05)
     own = user_torque("min(c*omega, 0) - A*sign(omega)")
@@ -199,12 +201,14 @@ def test_expression_and_curve_on_the_command_line(tmp_path):
     np.testing.assert_allclose(simulated(tmp_path, text), expected, atol=1e-6)
 
 
+@pytest.mark.long
 def test_several_own_torques_add_up(tmp_path):
     both = simulated(tmp_path, "user_torque:expression=-c*omega,c=1e-4", "user_torque:expression=-d*sign(omega),d=0.02")
     one = simulated(tmp_path, "user_torque:expression=-c*omega - d*sign(omega),c=1e-4,d=0.02")
     np.testing.assert_allclose(both, one, atol=1e-6)
 
 
+@pytest.mark.long
 def test_compare_takes_an_own_torque(tmp_path, capsys):
     recording, result = tmp_path / "run.csv", tmp_path / "result.json"
     effect = "user_torque:expression=-d*sign(omega),d=0.02"

@@ -169,6 +169,7 @@ def currents(effects: dict, simulate: Callable[..., Measurement] = simulate_moni
     return simulate(RUN, ACTUATOR, effects=effects)["current_A"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("simulate", [simulate_monitor, simulate_reference])
 def test_expression_of_cogging_is_the_effect_of_the_library(simulate):
     effect = user_torque("A*sin(h*theta + f)")
@@ -179,6 +180,7 @@ def test_expression_of_cogging_is_the_effect_of_the_library(simulate):
     np.testing.assert_allclose(own, expected, rtol=0.0, atol=1e-6)
 
 
+@pytest.mark.long
 def test_the_same_formula_with_other_names_is_an_effect_of_its_own():
     one, other = user_torque("-c*omega"), user_torque("-d*omega")
     assert one.name != other.name
@@ -187,6 +189,7 @@ def test_the_same_formula_with_other_names_is_an_effect_of_its_own():
     np.testing.assert_allclose(both, currents({one.name: {"c": 3e-4}}), atol=1e-6)
 
 
+@pytest.mark.long
 def test_time_counts_from_the_start_of_the_run():
     late = user_torque("level*clamp((t - 0.06)*1e4, 0, 1)")
     assert late.states == ("time_s",)
@@ -196,6 +199,7 @@ def test_time_counts_from_the_start_of_the_run():
     assert np.abs(difference[~before]).max() > 0.1
 
 
+@pytest.mark.long
 def test_curve_of_many_knots_acts_in_the_model_as_its_formula_does():
     knots = 0.02 * np.sin(TURN * np.arange(24) / 24)
     curve = torque_curve(knots, 0.0, TURN)
@@ -217,6 +221,7 @@ def test_no_value_at_run_time_is_a_failed_candidate_and_no_crash(wrong):
         simulate_monitor(RUN, ACTUATOR, effects={effect.name: wrong})
 
 
+@pytest.mark.long
 def test_a_failed_lane_leaves_the_others_untouched():
     effect = user_torque("1e-3*(sqrt(a)/b + exp(c))*theta")
     plant = ClosedLoop([simulated(RUN, ACTUATOR, HEALTHY)], ACTUATOR, effects={effect.name: {}})
@@ -241,6 +246,7 @@ def test_a_failed_lane_leaves_the_others_untouched():
 DRIVES = [("position", "voltage"), ("position", "current"), ("cascade", "current")]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("controller", "drive"), DRIVES)
 def test_no_drive_hides_a_torque_without_value(controller, drive):
     actuator = replace(

@@ -117,6 +117,7 @@ def test_an_integral_gain_never_turns_round():
 # --- in the loop ----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["computation_delay", "sampled_control", "speed_filter", "current_loop_lag"])
 def test_the_shorter_the_less(name):
     """In proportion: what is twice as late moves the motor about twice as far."""
@@ -169,6 +170,7 @@ def test_a_bias_in_the_current_loop_is_a_constant_load():
         assert apart(by_bias, by_load, name) < 1e-6 * apart(by_bias, simulated(CHIRP), name), name
 
 
+@pytest.mark.long
 def test_a_bias_of_a_current_that_nothing_controls_is_seen_in_the_reading_alone():
     servo = replace(
         IDEAL,

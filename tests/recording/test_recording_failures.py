@@ -102,6 +102,7 @@ print(writer.failed)
 """
 
 
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a limit on file sizes")
 def test_a_file_that_cannot_grow_neither_raises_nor_hangs(tmp_path):
     done = subprocess.run(

@@ -137,6 +137,7 @@ def test_what_cannot_be_recovered_stays_as_it_is(name, content, says, tmp_path, 
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("killed", [True, False], ids=["killed", "being written"])
 def test_view_shows_a_part(tmp_path, running, killed):
     if killed:

@@ -165,12 +165,13 @@ def test_view_tells_a_name_that_would_not_be_served(tmp_path):
         view(tmp_path / "a.RRD", open_browser=False)
 
 
+@pytest.mark.long
 @pytest.mark.browser
 def test_a_browser_draws_the_recording(tmp_path, write, browser):
     with RecordingWriter(tmp_path / "a.rrd") as writer:
         write(writer)
     with ViewerHost(tmp_path) as host:
-        page = browser.new_page(viewport={"width": 1000, "height": 650}, color_scheme="dark")
+        page = browser.new_page(viewport={"width": 1000, "height": 650}, color_scheme="dark", drawn=True)
         abroad, fetched = [], []
         page.on("requestfinished", lambda r: (fetched if r.url.startswith(host.address) else abroad).append(r.url))
         page.goto(host.url_of("a.rrd"))

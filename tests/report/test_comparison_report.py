@@ -173,6 +173,7 @@ def _nothing_is_covered(tab: Any) -> None:
     assert tab.evaluate("document.documentElement.scrollWidth <= innerWidth + 1")  # nothing sticks out
 
 
+@pytest.mark.long
 @pytest.mark.browser
 def test_legends_and_titles_cover_nothing_on_a_telephone(report, tab):
     tab.set_viewport_size({"width": 420, "height": 900})
@@ -190,6 +191,7 @@ def _until(tab: Any, condition: str) -> None:
     pytest.fail(f"still not: {condition}")
 
 
+@pytest.mark.long
 @pytest.mark.browser
 def test_it_follows_light_and_dark_and_prints_whole(report, tab):
     ink = "getComputedStyle(document.querySelector('[data-figure] .gtitle')).fill"
@@ -204,6 +206,7 @@ def test_it_follows_light_and_dark_and_prints_whole(report, tab):
     assert tab.evaluate("document.querySelectorAll('[data-figure]:not(.js-plotly-plot)').length") == 0
 
 
+@pytest.mark.long
 @pytest.mark.browser
 def test_hostile_names_do_nothing_in_a_browser(comparison, tab, tmp_path):
     write_report(_hostile(comparison), tmp_path / "r.html")

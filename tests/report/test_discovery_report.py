@@ -96,6 +96,7 @@ def test_next_experiment_and_warnings_are_in_plain_words(found, tmp_path):
     assert "Look here." in _section(tmp_path / "r.html", "verdict")
 
 
+@pytest.mark.long
 def test_unknown_effect_is_shown_as_a_curve(unknown):
     assert "none of the known effects explains" in _section(unknown, "verdict")
     assert 'id="missing-curve"' in _section(unknown, "missing")
@@ -141,6 +142,7 @@ def tab(browser: Any) -> Iterator[Any]:
     context.close()
 
 
+@pytest.mark.long
 @pytest.mark.browser
 @pytest.mark.parametrize("which", ["report", "unknown"])
 def test_all_figures_are_drawn_without_network_and_every_axis_has_its_unit(which, tab, request):

@@ -12,11 +12,6 @@ from emaviz.page.app import App
 CHARTS_DRAWN = "Object.keys(window.__viserTestpoints?.uplots ?? {}).length >= 4"
 BEHIND = "[role=tablist] > [role=tab]:first-child[aria-selected=false]:visible"  # first tabs that are not in front
 IN_FRONT = "tab => tab.ariaSelected === 'true' || !tab.isConnected"
-# Software GL draws the scene again and again, with a third of a core for nothing that these tests look at; what moves
-# there is asked of its poses.
-UNDRAWN = """for (const gl of [WebGL2RenderingContext.prototype, WebGLRenderingContext.prototype])
-  for (const draw of ['drawElements', 'drawArrays', 'drawElementsInstanced', 'drawArraysInstanced'])
-    gl[draw] = () => {};"""
 MARKED = "window.__viserMutable.nodePoseData['/said_so_far']"
 SAID = ".mantine-Notification-closeButton"
 # Whether each folder is open, by its title; and what turns those that a test has left otherwise.
@@ -52,9 +47,7 @@ class Tab:
         return self._page
 
     def _load(self) -> None:
-        self._page = self._browser.new_page(viewport={"width": 1400, "height": 900})
-        if not self._scene:
-            self._page.add_init_script(UNDRAWN)
+        self._page = self._browser.new_page(viewport={"width": 1400, "height": 900}, drawn=self._scene)
         self._page.on("request", lambda request: self._asked.append(request.url))
         self._page.goto(self._app.address)
         self._page.get_by_role("tab", name="Explore").wait_for(timeout=60_000)

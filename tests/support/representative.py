@@ -1,4 +1,4 @@
-"""Cases of one kind: the first belongs to every run, the rest to the studies."""
+"""Cases of one kind: the first belongs to every run, the rest to the long ones."""
 
 from __future__ import annotations
 
@@ -10,4 +10,4 @@ import pytest
 
 def first_of(cases: Sequence[Any]) -> list[Any]:
     """For `parametrize`: what stands first is quick, and as telling as any other."""
-    return [cases[0], *(pytest.param(one, marks=pytest.mark.study) for one in cases[1:])]
+    return [cases[0], *(pytest.param(one, marks=pytest.mark.long) for one in cases[1:])]

@@ -15,7 +15,7 @@ from ema_model.simulation.run import Run, simulate_reference
 from ema_model.simulation.sensors import Sensors
 from emaviz.recording import read
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.long]
 
 FIGURES = """() => Array.from(document.querySelectorAll('.js-plotly-plot'), plot => ({
   title: plot.layout?.title?.text ?? '', y: plot.layout?.yaxis?.title?.text ?? '',
@@ -48,7 +48,6 @@ def figure(page, words):
     return next((one for one in page.evaluate(FIGURES) if words in one["title"]), None)
 
 
-@pytest.mark.long
 def test_files_are_added_shown_and_removed(page, app):
     for name in ("slow", "quick"):
         choose(page, "Data folder", f"uploads/{name}.csv")
@@ -68,7 +67,6 @@ def test_files_are_added_shown_and_removed(page, app):
     wait_until(lambda: list(app.comparing.opened) == ["uploads/quick.csv"])
 
 
-@pytest.mark.long
 def test_what_is_asked_is_set(page, app):
     comparing = app.comparing
     resting(app)
@@ -111,7 +109,6 @@ def test_an_actuators_file_is_uploaded(page, app, tmp_path):
     wait_until(lambda: app.comparing.actuator is app.session.actuator)
 
 
-@pytest.mark.long
 def test_the_comparison_is_looked_at_and_kept(page, app):
     comparing = app.comparing
     comparing.add("uploads/slow.csv")  # its columns' side file says mA

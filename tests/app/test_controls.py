@@ -16,7 +16,7 @@ from ema_model.identification.next_experiment import Suggestion
 from emaviz.recording import read
 from emaviz.session.settings import Settings
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.long]
 
 CHART = """(title) => {
   const charts = Object.values(window.__viserTestpoints.uplots).map(u => u.chart);
@@ -94,7 +94,6 @@ def raced(app, page, seconds=60.0):
 # --- Explore ----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.long
 def test_what_the_plant_hides_is_set(page, app):
     show(page, "Explore")
     for folder, label, value, read_back in (
@@ -133,7 +132,6 @@ def test_each_command_has_its_settings(page, app, title, name, label, value, set
     wait_until(lambda: app.session.simulation.command == name or app.session.simulation is not drawn)
 
 
-@pytest.mark.long
 def test_the_charts_show_a_part_of_the_run_and_the_phases(page, app):
     app.explore.set_faults(HEALTHY)
     wait_until(lambda: app.signals_panel.visible)
@@ -163,7 +161,6 @@ def test_the_charts_show_a_part_of_the_run_and_the_phases(page, app):
 # --- playback ---------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.long
 def test_the_strip_plays_scrubs_and_changes_the_look(page, app):
     page.get_by_role("button", name="Play", exact=True).click()
     wait_until(lambda: app.playback.playing)
@@ -191,7 +188,6 @@ def test_the_strip_plays_scrubs_and_changes_the_look(page, app):
 # --- Identify ---------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.long
 def test_stop_ends_several_searches_at_once_even_while_they_rest(page, app):
     app.session.settings.set_algorithms(["do", "hba", "ssa"])
     app.session.settings.set_iterations(5000)
@@ -215,7 +211,6 @@ def test_stop_ends_several_searches_at_once_even_while_they_rest(page, app):
     page.get_by_role("button", name="Identify", exact=True).click(trial=True)  # enabled again
 
 
-@pytest.mark.long
 def test_the_search_is_looked_at_from_all_sides_and_its_landscape_drawn(page, app):
     app.session.settings.set_algorithms(["robust", "do"])
     app.session.settings.set_population(20)
@@ -277,7 +272,6 @@ def test_a_landscape_is_stopped(page, app, monkeypatch):
     wait_until(lambda: not app.session.worker.busy)
 
 
-@pytest.mark.long
 def test_what_does_not_fit_is_taken_to_discover(page, app):
     settings = app.session.settings
     settings.set_effect("cogging_torque", "amplitude_Nm", 0.02)
@@ -323,7 +317,6 @@ def test_a_separating_command_is_set_in_explore(page, app):
 # --- Recordings and sessions ------------------------------------------------------------------------------------------
 
 
-@pytest.mark.long
 def test_a_recording_is_chosen_and_watched_while_it_grows(page, app):
     session = app.session
     names = [path.name for path in sorted(session.folder.glob("*.rrd"), key=lambda path: path.stat().st_mtime_ns)]
@@ -361,7 +354,6 @@ def test_a_recording_is_chosen_and_watched_while_it_grows(page, app):
     page.get_by_role("button", name="Watch it in Rerun, here").wait_for(state="hidden")
 
 
-@pytest.mark.long
 def test_a_session_is_dropped_on_the_page(page, app, tmp_path):
     show(page, "Recordings")
     app.session.settings.set_fault(3, 0.45)

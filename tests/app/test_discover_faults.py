@@ -53,6 +53,7 @@ def test_start_takes_the_fault_into_the_model(worn):
     assert "#2b8a3e" in answer(look), "at the floor"
 
 
+@pytest.mark.long
 def test_the_improved_model_is_kept_with_its_fault_and_verified(worn):
     told = []
     worn.events.verified.append(lambda path, text: told.append((path, text)))
@@ -63,6 +64,7 @@ def test_the_improved_model_is_kept_with_its_fault_and_verified(worn):
     assert text.startswith("verified: ") and "× the floor" in text and "worse" not in text
 
 
+@pytest.mark.long
 def test_reveal_holds_the_faults_against_the_truth(worn):
     truth = worn.source.reveal()
     assert truth.faults == {"k2": 0.2}

@@ -151,6 +151,7 @@ def test_recordings_of_compare_are_taken_again_with_what_was_asked(rigs, tmp_pat
     assert max(window.time_s[-1] for window in look.found.plant.windows) < 0.31
 
 
+@pytest.mark.long
 def test_damaged_parts_are_told_in_one_line_and_change_nothing(rigs, solved):
     there = rigs[1]
     good = json.loads(json.dumps(solved.discovering.saved()))

@@ -199,6 +199,7 @@ def test_two_tabs_stay_in_step_and_a_reload_keeps_the_state(page, app, browser):
     assert app.session.settings.load_torque_Nm == 7.0
 
 
+@pytest.mark.long
 @pytest.mark.browser
 def test_a_session_is_saved_and_loaded_with_all_that_is_on_the_page(page, app, tmp_path):
     run = simulate_reference(Run(command("chirp", {}), 0.2), load_actuator(), HEALTHY)

@@ -186,6 +186,7 @@ def test_explore_says_its_model_and_keeps_it(tab, app):
     tab.get_by_text(f"model: identified {session.identified_at:%H:%M}").wait_for()
 
 
+@pytest.mark.long
 def test_identify_answers_in_physical_units(tab, app):
     go(tab, "Identify")
     tab.get_by_role("tab", name="Answer", exact=True).click()
@@ -234,6 +235,7 @@ def test_the_guide_belongs_to_its_challenge(tab, app):
     tab.get_by_text("Step 1 of 6").wait_for(state="hidden")
 
 
+@pytest.mark.long
 def test_several_discoveries_are_saved_and_brought(app):
     saved = app.discovering.saved()
     assert saved is not None and saved["recipe"]

@@ -56,6 +56,7 @@ def test_cogging_with_its_order_and_phase(cogged):
     assert settings["phase_rad"] == pytest.approx(0.7, abs=0.25)
 
 
+@pytest.mark.long
 def test_score_predicts_what_the_refit_gives(cogged):
     best = cogged.candidates[0]
     assert best.name == "cogging_torque" and best.refitted_drop is not None

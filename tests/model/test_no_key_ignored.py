@@ -156,7 +156,11 @@ def sensible_step(path: str) -> float:
     return (0.5 if "limit" in path else 1.3) * BASE[path]
 
 
-@pytest.mark.parametrize(("controller", "inverter", "circuit", "path"), WALK, ids=["-".join(w) for w in WALK])
+@pytest.mark.parametrize(
+    ("controller", "inverter", "circuit", "path"),
+    [pytest.param(*one, marks=pytest.mark.long if "thesis" in one else ()) for one in WALK],
+    ids=["-".join(one) for one in WALK],
+)
 def test_key_changes_the_fitted_model_or_is_refused(load, controller, inverter, circuit, path):
     value = sensible_step(path)
     reason = unread(controller, inverter).get(path)

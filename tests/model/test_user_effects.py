@@ -210,6 +210,7 @@ def test_curve_of_many_knots_acts_in_the_model_as_its_formula_does():
     assert np.abs(currents({curve.name: {}}) - expected).max() < 0.05 * change
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("wrong", [{"b": 0.0}, {"c": -1.0}, {"d": 1000.0}, {"a": 0.0, "b": 0.0}, {"e": 0.0}])
 def test_no_value_at_run_time_is_a_failed_candidate_and_no_crash(wrong):
     effect = user_torque("1e-9*(a/b + sqrt(c) + exp(d) + e**-3 + theta)")
@@ -282,6 +283,7 @@ print("RESULT", effect.name, repr(float((s["current_A"] ** 2).mean())))
 """
 
 
+@pytest.mark.long
 def test_another_process_finds_the_compiled_kernel_again(tmp_path):
     parent = Path(ema_model.__file__).parents[1]
     env = {**os.environ, "PYTHONPATH": str(parent), "EMAVIZ_CACHE_DIR": str(tmp_path)}

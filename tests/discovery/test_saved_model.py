@@ -48,6 +48,7 @@ def saved(tmp_path):
     return tmp_path / "better.toml"
 
 
+@pytest.mark.long
 def test_the_saved_model_reaches_the_last_rung_of_the_ladder(saved):
     found, again = improved(), load_actuator(saved)
     low, high = found.faults["k1"].interval90

@@ -73,6 +73,7 @@ def answers(healthy, lacking):
     yield from (with_cogging(), with_unknown())
 
 
+@pytest.mark.long
 def test_verdict_and_ladder_never_contradict(healthy, lacking):
     seen = set()
     for found in answers(healthy, lacking):

@@ -6,6 +6,8 @@ import os
 import subprocess
 import sys
 
+import pytest
+
 HERE = """
 import sys, time
 from ema_model.actuator import load_actuator
@@ -26,6 +28,7 @@ assert not running, "what the cache holds is not compiled again"
 """
 
 
+@pytest.mark.long
 def test_a_kernel_compiled_ahead_is_not_compiled_here(tmp_path):
     found = subprocess.run(
         [sys.executable, "-c", HERE],

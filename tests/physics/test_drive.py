@@ -127,6 +127,7 @@ def test_the_shorter_the_less(name):
     assert moved[1] / moved[0] == pytest.approx(2.0, rel=0.35) and moved[2] / moved[1] == pytest.approx(2.0, rel=0.35)
 
 
+@pytest.mark.long
 def test_a_rate_beyond_the_model_s_steps_is_continuous():
     plain, fast = simulated(CHIRP), simulated(CHIRP, sampled_control=DT)
     for name in SIGNALS:

@@ -399,8 +399,13 @@ def test_the_camera_frames_the_machine_between_the_panels_until_somebody_moves_i
     wait_until(lambda: framed() and 550 < picture() < 650, 30.0)
     drawn.set_viewport_size({"width": 1100, "height": 700})
     wait_until(lambda: framed() and 340 < picture() < 400, 30.0)
-    client.camera.position = (3.0, -2.0, 1.0)
-    wait_until(lambda: np.allclose(client.camera.position, (3.0, -2.0, 1.0), atol=0.03), 30.0)
+    box = drawn.locator("canvas").first.bounding_box()
+    x, y = box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]
+    drawn.mouse.move(x, y)
+    drawn.mouse.down()
+    drawn.mouse.move(x - 80, y - 40, steps=4)
+    drawn.mouse.up()
+    wait_until(lambda: not framed(), 30.0)
     drawn.set_viewport_size({"width": 1400, "height": 900})
     wait_until(lambda: 550 < picture() < 650, 30.0)
     assert not framed(), "the user's view is left alone"

@@ -36,9 +36,13 @@ class Gate:
         self._server, self._inside, self._connection, self._complain = server, Inside(server), connection, complain
         self._plain: Callable[[], Awaitable[str | bytes]] = connection.recv
         self._waiting: dict[str, asyncio.TimerHandle] = {}  # values that are still being typed, by their control
+        self._passed: Any = None  # the control whose new value was let through last
 
     async def recv(self) -> bytes:
         """The next message that may pass, written anew, so that what is heard is what was checked."""
+        if self._passed is not None:  # viser takes it after this, in a task of its own
+            asyncio.get_running_loop().call_soon(self._keep_whole, self._passed)
+            self._passed = None
         while True:
             try:
                 frame = await self._plain()
@@ -87,7 +91,13 @@ class Gate:
             else:
                 self._inside.send_value(client, control)
             return False
+        self._passed = control
         return True
+
+    def _keep_whole(self, control: Any) -> None:
+        """A choice that was taken away between the check and viser's taking it becomes the first that there is."""
+        if isinstance(control, viser.GuiDropdownHandle) and control.value not in control.options:
+            asyncio.get_running_loop().run_in_executor(None, setattr, control, "value", control.options[0])
 
     def _refuse(self, client: int | None, uuid: str, reason: str) -> None:
         """Nothing more was typed: the field shows what counts, and the user is told why."""

@@ -13,8 +13,10 @@ import viser
 from support.on_page import field, wait_until
 from support.raw_page import CAMERA, RawPage
 
+from emaviz.server import gate
 from emaviz.server.gate import TYPING_S
 from emaviz.server.messages import MOST_INT
+from emaviz.server.values import checked
 
 NUMBERS = (viser.GuiNumberHandle, viser.GuiSliderHandle)
 PUSHED = (viser.GuiButtonHandle, viser.GuiButtonGroupHandle, viser.GuiUploadButtonHandle)
@@ -148,6 +150,23 @@ def random_value(draw, control):
         case viser.GuiMultiSliderHandle():
             return sorted(draw.uniform(control.min, control.max) for _ in control.value)
     return control.value if isinstance(control, viser.GuiTextHandle) else None
+
+
+def test_a_choice_that_is_taken_away_while_a_page_makes_it_is_not_kept(app, raw, marker, monkeypatch):
+    """As when the folder's list is read again on another thread."""
+    choice = app.server.gui.add_dropdown("taken away", ("a", "b"))
+
+    def late(control, value):
+        taken = checked(control, value)
+        if control._impl is choice._impl:
+            choice.options = ("c", "d")
+        return taken
+
+    monkeypatch.setattr(gate, "checked", late)
+    raw.update(choice._impl.uuid, "b")
+    heard(raw, marker)
+    wait_until(lambda: choice.value == "c", 20.0)
+    choice.remove()
 
 
 def random_message(draw, controls):

@@ -188,21 +188,21 @@ def _claimed(story: Story, accepted: Sequence[Trial], tell: Progress) -> tuple[T
     while left:
         best, others = _chosen(story, left)
         further = _further(story, best, tell)
-        # Without a controller there is no twin, whose floor would tell a further order from what is left.
-        more, reason = None if further is None or story.data.guarded else further.trial, ""
+        more, reason = None if further is None else further.trial, ""
         apart = _of_other_parts(best, others)
         if len(apart) >= LARGEST_GROUP:
             reason = f"{len(apart)} others tell as much"
         elif further is not None and not further.stands_out:
             reason = f"its order {best.candidate.settings['order']:g} tells no more than its neighbours"
-        for whole in (more, best):
-            if whole is not None and not reason:
-                keys = [*best.effects, *(whole.effects if whole is more else ())]
-                reason = against(story.data, story.current, whole.fit, keys, lambda found: story.settled(found, tell))
-                if not reason:
-                    return best, others, more if whole is more else None
-                if whole is more:
-                    reason = ""
+        # Without a controller there is no twin, whose floor would tell a further order from what is left.
+        for whole in () if reason else (best, more) if story.data.guarded else (more, best):
+            if whole is None:
+                continue
+            keys = [*best.effects, *(whole.effects if whole is more else ())]
+            spoken = against(story.data, story.current, whole.fit, keys, lambda found: story.settled(found, tell))
+            if not spoken:
+                return best, others, more if whole is more else None
+            reason = spoken if whole is best else reason
         story.refused[best.candidate.name] = reason
         left = [trial for trial in left if trial is not best]
     return None

@@ -154,6 +154,12 @@ def test_constant_signals_are_named():
     assert constant is not None and constant.signal == "bus_voltage_V" and "48.0 V" in constant.sentence
 
 
+def test_numbers_too_small_to_be_told_apart_are_constant():
+    found = card(made(motor_position_rad=np.where(times() < 1.0, 0.0, 2e-317)))
+    constant = found.of("constant")
+    assert constant is not None and constant.signal == "motor_position_rad"
+
+
 @pytest.mark.parametrize("limit", [0.5, 0.8, 0.9])
 def test_saturation(limit):
     current = np.sin(7.0 * times())

@@ -62,14 +62,14 @@ def sensors(measurement: Measurement) -> Iterator[Finding]:
         if signal is None or signal.kind in ("time", "state") or name.startswith("command"):
             continue
         values = measurement[name]
-        if np.all(values == values[0]):
+        spread = float(np.std(values))
+        if np.all(values == values[0]) or spread == 0.0:  # of numbers so small that their squares vanish
             yield Finding(
                 "constant", "note", f"{signal.title} is constant, {amount(values[0], signal.unit)}.", {}, name
             )
             continue
         blocks = estimates.sample_blocks(values, measurement.runs)
         step = estimates.quantisation_step(blocks)
-        spread = float(np.std(values))
         if step:
             coarse = step > 0.05 * spread
             sentence = f"{signal.title} comes in steps of {amount(step, signal.unit)}."

@@ -186,7 +186,7 @@ def document_of(found: Discovery) -> Document:
     """All that the terminal and a notebook show: the verdict, the effects, the ladder, the candidates."""
     notes = [Note(warning) for warning in found.warnings]
     # "Nothing is missing" is no word for a drive that is not the file's.
-    said = VERDICTS[found.verdict] if found.controller_seen is None else headline(found)
+    said = headline(found)
     head = Lines([f"{found.verdict}: {said}"])
     return Document([head, *notes, *_added(found), *_tables(found), *_rest(found)])
 

@@ -22,7 +22,7 @@ from ema_model.files.limits import LINE_BYTES, megabytes
 from ema_model.files.refusal import listed, refusal, shown
 from ema_model.recordings.formats.format import Array, Columns, Format, check_size
 from ema_model.recordings.formats.text_layout import Hints, find_layout, split
-from ema_model.recordings.formats.text_table import TextTable, leaves_out, read_table, table_of
+from ema_model.recordings.formats.text_table import TextTable, read_leaving_out, read_table, table_of
 
 _HEAD_BYTES = 65_536
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)(e[+-]?[0-9]+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE)
@@ -71,8 +71,8 @@ def _read(path: str, names: Sequence[str], max_bytes: int, strict: bool) -> Colu
     dialect = _dialect(path)
     _check_size(path, dialect, names, max_bytes)
     table = _table(path, dialect, names)
-    if table is None and strict and (again := find_layout(path, Hints())) and _goes_on(path, dialect, names):
-        return read_table(table_of(path, again), names, max_bytes, strict)
+    if table is None and strict and (found := _left_out(path, dialect, names, max_bytes)):
+        return found
     if table is None:
         if strict:
             _explain(path, dialect, names)
@@ -93,13 +93,13 @@ def _read(path: str, names: Sequence[str], max_bytes: int, strict: bool) -> Colu
     return Columns(arrays, lambda row: _place(path, dialect, row), tuple(notes))
 
 
-def _goes_on(path: str, dialect: _Dialect, names: Sequence[str]) -> bool:
-    """Whether all that is wrong in a table is its header again, or text at its end."""
+def _left_out(path: str, dialect: _Dialect, names: Sequence[str], max_bytes: int) -> Columns | None:
+    """The columns, if all that is wrong in a table is its header again, or text at its end."""
     layout = find_layout(path, Hints())
     if layout is None or layout.header_line != dialect.header_lines:
-        return False
+        return None
     _check_lines(path, dialect)
-    return leaves_out(table_of(path, layout), names)
+    return read_leaving_out(table_of(path, layout), names, max_bytes)
 
 
 def _check_lines(path: str, dialect: _Dialect) -> None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import codecs
 import io
+import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -30,6 +31,7 @@ from ema_model.recordings.formats.text_layout import SEPARATORS, Layout, is_numb
 
 pc: Any = pyarrow.compute  # its functions are made when it is imported
 _TIME = QUANTITIES["time"]
+_MOST_TEXT = 0.25  # of a file's limit, up to which cells are understood one by one
 _MOST_AT_THE_END = 200  # lines of text below the numbers
 _NUMBER = r"^\s*[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\s*$|^\s*[+-]?(?i:nan|inf|infinity)\s*$"
 
@@ -105,6 +107,7 @@ def read_table(table: TextTable, names: Sequence[str], max_bytes: int, strict: b
     kept: np.ndarray | None = None
     notes = _notes(table.layout)
     if found is None:
+        _check_text(table, max_bytes)
         found, kept, done = _understood(table, needed, strict)
         notes += done
     for i in () if strict else places:
@@ -123,13 +126,13 @@ def read_table(table: TextTable, names: Sequence[str], max_bytes: int, strict: b
     )
 
 
-def leaves_out(table: TextTable, names: Sequence[str]) -> bool:
-    """Whether the table can be read, and lines are left out for it."""
+def read_leaving_out(table: TextTable, names: Sequence[str], max_bytes: int) -> Columns | None:
+    """The columns, for which lines are left out; None where that does not make them numbers."""
     try:
-        _, _, notes = _understood(table, sorted(table.places[name] for name in names), True)
+        found = read_table(table, names, max_bytes, True)
     except InputError:
-        return False
-    return bool(notes)
+        return None
+    return found if len(found.notes) > len(_notes(table.layout)) else None
 
 
 def _notes(layout: Layout) -> list[str]:
@@ -168,6 +171,16 @@ def _parsed(
                 decimal_point=table.layout.decimal,
             ),
         )
+
+
+def _check_text(table: TextTable, max_bytes: int) -> None:
+    """Cells that are looked at one by one take four times their file's size, and time."""
+    if os.path.getsize(table.path) > _MOST_TEXT * max_bytes:
+        most = megabytes(int(_MOST_TEXT * max_bytes))
+        problem = (
+            f"is over {most} large, and more than one header line and plain numbers; cut it, or export plain numbers"
+        )
+        raise refusal(table.path, problem)
 
 
 def _understood(

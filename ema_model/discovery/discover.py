@@ -175,7 +175,7 @@ class _Walk:
             self._rivals = [best, *others]
         story.add(best, ties=[trial.candidate.name for trial in others])
         if more:
-            story.add(more, f"+ {best.candidate.name} of orders {', '.join(f'{order:g}' for order in orders)}")
+            story.add(more)
         return True
 
 

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
-from ema_model.actuator.naming import on_axes
 from ema_model.actuator.unread import idle
 from ema_model.comparison.compare import weights_of
 from ema_model.comparison.explain import Explanation
@@ -35,16 +34,14 @@ from ema_model.discovery.model_fit import (
 from ema_model.discovery.refit import Trial, promising, tried
 from ema_model.discovery.remaining import Left, at_floor, left_by
 from ema_model.discovery.repeatability import by_inverse_dynamics, is_lost, with_divergence
-from ema_model.discovery.result import Added, Candidate, Contradiction, Rung, StoodIn
+from ema_model.discovery.result import Added, Candidate, Change, Contradiction, Rung, StoodIn
 from ema_model.discovery.score import scored, signatures
 from ema_model.discovery.sentences import NOT_REPEATABLE
 from ema_model.discovery.uncertainty import settled
 from ema_model.discovery.unknown import curve_for
 from ema_model.effects import CATALOGUE, catalogue_name, find
 from ema_model.estimation import Calibration
-from ema_model.faults import BY_NAME
 from ema_model.models.stretches import fit_stretches
-from ema_model.quantities.titles import in_sentence
 from ema_model.recordings import Measurement
 from ema_model.recordings.prepared import prepared
 from ema_model.recordings.read import check_same_actuator
@@ -160,10 +157,10 @@ class Story:
         """The residual's own curve as a torque, refitted, if the data pay for it."""
         return curve_for(self.data, self.held, self.current, explanation, tell)
 
-    def add(self, trial: Trial, label: str = "", ties: Sequence[str] = ()) -> None:
+    def add(self, trial: Trial, ties: Sequence[str] = ()) -> None:
         """Takes a trial for the next model."""
         before, moved = self.steps[-1].rung, _stood_in(self.current, trial.fit)
-        rung = self._rung(label or self.label(trial), trial.fit)
+        rung = self._rung(_change(trial), trial.fit)
         errors = before.rmse, rung.rmse, before.holdout_rmse, rung.holdout_rmse
         new = [Added(catalogue_name(key), {}, *errors, tuple(ties), key, {}, moved) for key in trial.effects]
         self._append(trial.fit, rung, (*self.added, *new))
@@ -173,7 +170,8 @@ class Story:
         """Takes an effect out again, as a step of its own; found: the fit without it, if it is known."""
         smaller = found or self.without(key)
         name = next(one.name for one in self.added if one.key == key)
-        self._append(smaller, self._rung(f"− {name}", smaller), tuple(one for one in self.added if one.key != key))
+        rung = self._rung(Change("removed", (name,)), smaller)
+        self._append(smaller, rung, tuple(one for one in self.added if one.key != key))
 
     def without(self, key: str, tell: Progress = lambda text: None) -> Fit:
         """The last model without one of its effects, refitted."""
@@ -195,7 +193,7 @@ class Story:
             if calm is step.fit:
                 self.steps.append(step)
             else:
-                self._append(calm, self._rung(step.rung.label, calm), step.added, step)
+                self._append(calm, self._rung(step.rung.change, calm), step.added, step)
 
     def settled(self, found: Fit, tell: Progress = lambda text: None) -> Fit:
         """A fit made anew as what it leaves asks for; itself where it is at the floor, or is so already."""
@@ -229,22 +227,23 @@ class Story:
         """Takes all effects back."""
         del self.steps[self.bare :]
 
-    def label(self, trial: Trial) -> str:
-        """What a step that adds this is called."""
-        name = trial.candidate.name
-        if trial.faults:
-            return f"fault {BY_NAME[name].label}"
-        path = find(name).duplicates
-        if path:
-            return f"{on_axes(path, self.current.actuator.axes).path} outside its tolerance"
-        return f"+ {in_sentence(find(name).title)}" if name not in CATALOGUE else f"+ {name}"
-
     def _append(self, found: Fit, rung: Rung, added: Sequence[Added], settled_from: Step | None = None) -> None:
         # All with the last model's values: what is added later moves what was there.
         self.steps.append(Step(found, rung, tuple(refreshed(one, found.calibration) for one in added), settled_from))
 
-    def _rung(self, label: str, found: Fit) -> Rung:
-        return rung_of(label, found, self.data, self.held)
+    def _rung(self, change: Change, found: Fit) -> Rung:
+        return rung_of(change, found, self.data, self.held)
+
+
+def _change(trial: Trial) -> Change:
+    """What a step that adds this changes."""
+    if trial.faults:
+        return Change("fault", trial.faults)
+    name = trial.candidate.name
+    if path := find(name).duplicates:
+        return Change("parameter", (path,))
+    orders = tuple(values["order"] for key, values in trial.effects.items() if key != name and "order" in values)
+    return Change("effect", (name,), orders)
 
 
 def _may_act(name: str, actuator: Actuator) -> bool:
@@ -297,7 +296,7 @@ def calibrated_story(
     held = None if held is None else held.beside(base)
     if not data.weighs_as(bare):
         base = fit(data, actuator, base.starts, tell)
-    return Story(data, held, [Step(base, rung_of("calibrated", base, data, held), ())], not is_lost(lost))
+    return Story(data, held, [Step(base, rung_of(Change(), base, data, held), ())], not is_lost(lost))
 
 
 def _data(
@@ -309,13 +308,13 @@ def _data(
     return gather(inside, actuator, weights_of(signals, actuator), fit_stretches(inside, actuator), guarded)
 
 
-def rung_of(label: str, found: Fit, data: Data, held: Data | None) -> Rung:
+def rung_of(change: Change, found: Fit, data: Data, held: Data | None) -> Rung:
     """A fit's errors, with those of what was held out."""
     shown = found.calibration.signals
     ratio, rms = floor_ratio(data, found.plant, shown), rms_by_signal(data, found.plant, shown)
     each = ratio_by_recording(data, found.plant, shown)
     unseen, unseen_rms, unseen_each = (None, {}, {}) if held is None else holdout_fit(held, found)
-    return Rung(label, ratio, unseen, rms, unseen_rms, shown, each, unseen_each)
+    return Rung(change, ratio, unseen, rms, unseen_rms, shown, each, unseen_each)
 
 
 def with_drops(ranked: Sequence[Candidate], trials: Sequence[Trial]) -> list[Candidate]:

@@ -38,10 +38,23 @@ class Candidate:
 
 
 @dataclass(frozen=True)
+class Change:
+    """What a rung's model has beyond the one before.
+
+    kind: "calibrated", "without_controller", "fault" (k1 … k8), "effect", "parameter" (its path: freed beyond its
+    tolerance), or "removed"; orders: of a periodic effect that was there already, at others.
+    """
+
+    kind: str = "calibrated"
+    names: tuple[str, ...] = ()
+    orders: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
 class Rung:
     """One step of the error ladder, in units of the floor: 1 is the floor."""
 
-    label: str
+    change: Change
     rmse: float
     holdout_rmse: float | None
     signals: dict[str, float]  # rms by signal, in its unit

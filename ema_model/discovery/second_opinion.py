@@ -18,7 +18,7 @@ from ema_model.discovery.path import Story, calibrated_story
 from ema_model.discovery.refit import pays
 from ema_model.discovery.remaining import at_floor
 from ema_model.discovery.repeatability import by_inverse_dynamics
-from ema_model.discovery.result import Added, Candidate
+from ema_model.discovery.result import Added, Candidate, Change
 from ema_model.discovery.uncertainty import with_intervals
 from ema_model.effects import CATALOGUE, find
 from ema_model.errors import InputError
@@ -27,7 +27,6 @@ from ema_model.estimation import Calibrated
 CLOSED_LOOP, INVERSE_DYNAMICS = "closed_loop", "inverse_dynamics"
 _DELAY = "sensors.delay_s"
 _DELAY_SIGMA_S = 1e-3  # between two channels of a usual logger
-_CALIBRATED = "calibrated, without the controller"
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +101,7 @@ def taken_over(story: Story, opinion: Opinion) -> None:
     story.refused |= dict.fromkeys(alone, reason)
     story.take_over(opinion.story)
     first = story.steps[0]
-    story.steps[0] = replace(first, rung=replace(first.rung, label=_CALIBRATED))
+    story.steps[0] = replace(first, rung=replace(first.rung, change=Change("without_controller")))
     story.controller_seen = opinion.seen
 
 

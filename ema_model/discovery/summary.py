@@ -9,7 +9,9 @@ import numpy as np
 from ema_model.actuator.naming import on_axes
 from ema_model.comparison.summary import calibration_dict, parameter_dict, plain
 from ema_model.discovery.controller_seen import ControllerSeen
+from ema_model.discovery.repeated import repeated
 from ema_model.discovery.result import Added, Discovery, Experiment, Rung
+from ema_model.discovery.words import rung_label
 from ema_model.effects import find
 from ema_model.quantities.axes import Axes
 
@@ -18,12 +20,14 @@ def as_dict(found: Discovery) -> dict[str, Any]:
     """Everything but the series, in numbers and texts that JSON can hold; unknown numbers are None."""
     axes = found.actuator.axes
     unknown = found.unknown
+    twice = repeated(found)
+    is_believable = twice is None or twice.floor_believable
     return plain(
         {
             "verdict": found.verdict,
             "calibration": calibration_dict(found.calibration, axes),
             "effects": [_added(one, axes) for one in found.effects],
-            "ladder": [_rung(rung) for rung in found.ladder],
+            "ladder": [_rung(rung, axes, is_believable) for rung in found.ladder],
             "candidates": [
                 {
                     "name": one.name,
@@ -49,7 +53,15 @@ def as_dict(found: Discovery) -> dict[str, Any]:
                 "curve": np.column_stack([unknown.centres, unknown.curve, unknown.error]).tolist(),
                 "added": None if found.curve is None else _added(found.curve, axes),
             },
-            "remaining": {"rmse": found.ladder[-1].rmse, "at_floor": found.at_floor},
+            "floor_believable": is_believable,
+            "repeatability": None
+            if twice is None
+            else {
+                "recordings": list(twice.recordings),
+                "over_floor": twice.apart,
+                "signals": {axes.signal(name): value for name, value in twice.signals.items()},
+            },
+            "remaining": {"rmse": found.ladder[-1].rmse if is_believable else None, "at_floor": found.at_floor},
             "not_claimed": dict(found.not_claimed),
             "next_experiment": _experiment(found.next_experiment),
             "controller_mismatch": found.controller_seen is not None,
@@ -70,11 +82,16 @@ def as_dict(found: Discovery) -> dict[str, Any]:
     )
 
 
-def _rung(one: Rung) -> dict[str, Any]:
+def _rung(one: Rung, axes: Axes, is_believable: bool) -> dict[str, Any]:
+    change = one.change
+    names = [on_axes(name, axes).path for name in change.names] if change.kind == "parameter" else list(change.names)
     return {
-        "label": one.label,
-        "rmse": one.rmse,
-        "holdout_rmse": one.holdout_rmse,
+        "label": rung_label(change, axes),
+        "kind": change.kind,
+        "names": names,
+        "orders": list(change.orders),
+        "rmse": one.rmse if is_believable else None,  # in floors
+        "holdout_rmse": one.holdout_rmse if is_believable else None,
         "signals": one.signals,
         "holdout_signals": one.holdout_signals,
         "recordings": one.recordings,

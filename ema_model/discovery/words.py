@@ -7,9 +7,10 @@ from collections.abc import Iterator, Sequence
 from ema_model.actuator.naming import on_axes
 from ema_model.actuator.readings import sentences as phrases_of
 from ema_model.comparison.sentences import cause_of
-from ema_model.discovery.result import Added, Discovery, Rung
+from ema_model.discovery.repeated import repeated
+from ema_model.discovery.result import Added, Change, Discovery, Rung
 from ema_model.discovery.verify import Verified
-from ema_model.effects import find
+from ema_model.effects import CATALOGUE, find
 from ema_model.effects.effect import FAMILIES
 from ema_model.errors import InputError
 from ema_model.estimation import Calibrated
@@ -30,6 +31,7 @@ VERDICTS = {
     "not_converged": "the calibration has not converged; what looks like missing physics may be an unfinished fit",
     "not_repeatable": "the run does not repeat itself, so that a comparison over time means nothing",
 }
+_SIGNS = {"effect": "+", "removed": "−"}
 FLOOR_NOTE = (
     "Errors are rms over all fitted signals in units of the floor: 1 is what noise and the model's own limits leave. "
     "A little below 1 is usual, as the floor is measured on the safe side."
@@ -74,6 +76,20 @@ def remains(found: Discovery) -> str:
     return f"{number(found.ladder[-1].rmse, 2)} times the floor remains, cause unknown{goes}"
 
 
+def repeatability(found: Discovery) -> list[str]:
+    """How near the rig comes to itself, where a command was recorded twice."""
+    twice = repeated(found)
+    if twice is None:
+        return []
+    axes = found.actuator.axes
+    each = [of_signal(name, axes).scaled([value]).text(value) for name, value in twice.signals.items()]
+    told = f"{' and '.join(twice.recordings)} are of one command, and apart by {_listed(each)} rms"
+    told += f", {number(twice.apart, 2)} times the floor"
+    if twice.floor_believable:
+        return [f"{told}."]
+    return [f"{told}: the rig repeats itself less well than the floor has it, so that errors count in units alone."]
+
+
 def not_claimed(found: Discovery) -> list[str]:
     """A line for each effect that the data would pay for, with what speaks against it."""
     return [f"{effect_title(name)} is not claimed: {why}." for name, why in found.not_claimed.items()]
@@ -104,7 +120,7 @@ def sentences(found: Discovery) -> list[str]:
     told += not_claimed(found)
     if found.curve is not None:
         told.append(f"A torque curve stands in for it, with which the error falls from {_times(first, last)}.")
-    return told
+    return told + repeatability(found)
 
 
 def verification(found: Discovery, saved: Verified) -> str:
@@ -154,15 +170,32 @@ def effect_title(name: str) -> str:
         return name
 
 
-def rung_title(label: str, axes: Axes) -> str:
-    """'+ Cogging torque' of '+ cogging_torque'."""
-    sign, _, name = label.partition(" ")
-    if sign in ("+", "−"):
-        return f"{sign} {effect_title(name)}"
-    path, outside, _ = label.partition(" outside its tolerance")
-    if outside:
-        return f"{on_axes(path, axes).title} freed"
+def rung_title(one: Change, axes: Axes) -> str:
+    """'+ Cogging torque'."""
+    if one.kind in _SIGNS:
+        return f"{_SIGNS[one.kind]} {_listed([effect_title(name) for name in one.names])}{_of_orders(one)}"
+    if one.kind == "parameter":
+        return f"{on_axes(one.names[0], axes).title} freed"
+    label = rung_label(one, axes)
     return label[:1].upper() + label[1:]
+
+
+def rung_label(one: Change, axes: Axes) -> str:
+    """'+ cogging_torque of orders 28, 14', by the library's names: for the terminal and JSON."""
+    if one.kind == "fault":
+        return f"fault {_listed([BY_NAME[name].label for name in one.names])}"
+    if one.kind == "parameter":
+        return f"{on_axes(one.names[0], axes).path} outside its tolerance"
+    if one.kind == "without_controller":
+        return "calibrated, without the controller"
+    if one.kind == "calibrated":
+        return one.kind
+    names = [name if name in CATALOGUE else in_sentence(effect_title(name)) for name in one.names]
+    return f"{_SIGNS[one.kind]} {_listed(names)}{_of_orders(one)}"
+
+
+def _of_orders(one: Change) -> str:
+    return f" of orders {', '.join(f'{order:g}' for order in one.orders)}" if one.orders else ""
 
 
 def value(one: Calibrated) -> str:
@@ -184,10 +217,8 @@ def fitted_of(found: Discovery, one: Added, name: str) -> Calibrated:
 
 def document_of(found: Discovery) -> Document:
     """All that the terminal and a notebook show: the verdict, the effects, the ladder, the candidates."""
-    notes = [Note(warning) for warning in found.warnings]
-    # "Nothing is missing" is no word for a drive that is not the file's.
-    said = headline(found)
-    head = Lines([f"{found.verdict}: {said}"])
+    notes = [Note(sentence) for sentence in [*found.warnings, *repeatability(found)]]
+    head = Lines([f"{found.verdict}: {headline(found)}"])
     return Document([head, *notes, *_added(found), *_tables(found), *_rest(found)])
 
 
@@ -219,7 +250,8 @@ def per_recording(found: Discovery) -> Table | None:
 
 
 def _tables(found: Discovery) -> Iterator[Table]:
-    rungs = [[one.label, _three(one.rmse), _three(one.holdout_rmse)] for one in found.ladder]
+    axes = found.actuator.axes
+    rungs = [[rung_label(one.change, axes), _three(one.rmse), _three(one.holdout_rmse)] for one in found.ladder]
     yield Table(("fitted", "held out"), rungs, "error ladder", unit="(1 is the floor)")
     if (table := per_recording(found)) is not None:
         yield table

@@ -20,7 +20,7 @@ def figure(found: Discovery, *, dark: bool = False) -> go.Figure:
     chart = theme.new("Error after each step", "", "rms error / floor [-]", dark=dark)
     # Numbered within: two steps may have the same title.
     places = list(range(len(found.ladder)))
-    titles = [theme.plain(rung_title(rung.label, found.actuator.axes)) for rung in found.ladder]
+    titles = [theme.plain(rung_title(rung.change, found.actuator.axes)) for rung in found.ladder]
     lines = [("fitted", FITTED, "circle", [rung.rmse for rung in found.ladder])]
     held = [rung.holdout_rmse for rung in found.ladder]
     if any(value is not None for value in held):

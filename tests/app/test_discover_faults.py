@@ -11,6 +11,7 @@ from support.rig import Rig
 from ema_model.actuator import load_actuator
 from ema_model.challenges.truth import Truth
 from ema_model.discovery.criteria import LEAST_BIC
+from ema_model.discovery.result import Change
 from ema_model.discovery.words import faults, headline, sentences
 from ema_model.errors import InputError
 from emaviz.page.discover.result import answer
@@ -45,7 +46,7 @@ def test_start_takes_the_fault_into_the_model(worn):
     look = worn.look
     assert list(look.found.faults) == ["k2"] and not look.added
     assert all(one.predicted_drop < 2.0 * LEAST_BIC for one in look.promising), "what is left asks for no effect"
-    assert [rung.label for rung in look.found.ladder] == ["calibrated", "fault k2 backlash"]
+    assert [rung.change for rung in look.found.ladder] == [Change(), Change("fault", ("k2",))]
     assert look.rmse < 1.1 < look.found.ladder[0].rmse
     assert headline(look.found) == "No physics is missing: the actuator has the fault k2 backlash."
     assert "k2 backlash" in faults(look.found)["k2"] and "mrad" in faults(look.found)["k2"]
@@ -84,7 +85,7 @@ def test_a_session_keeps_the_fault_and_undo_takes_it_back(rig, worn):
     before = worn.look.found
     worn.restore(saved, {name: name for name in worn.files()})
     rig.done()
-    assert [rung.label for rung in worn.look.found.ladder] == [rung.label for rung in before.ladder]
+    assert [rung.change for rung in worn.look.found.ladder] == [rung.change for rung in before.ladder]
     assert worn.look.rmse == pytest.approx(before.ladder[-1].rmse, rel=0.01)
     assert worn.look.found.faults["k2"].value == pytest.approx(before.faults["k2"].value, abs=0.01)
     worn.undo()

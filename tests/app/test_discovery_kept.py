@@ -59,7 +59,7 @@ def solved(rigs):
 
 
 def ladder(rig):
-    return [(one.label, one.rmse, one.holdout_rmse) for one in rig.discovering.look.found.ladder]
+    return [(one.change, one.rmse, one.holdout_rmse) for one in rig.discovering.look.found.ladder]
 
 
 @pytest.mark.long

@@ -101,7 +101,10 @@ def test_json_is_whole_and_plain(cogged):
     assert {"name", "parameters", "rmse_before", "rmse_after", "holdout_rmse_after", "same_as"} <= set(
         document["effects"][0]
     )
-    assert document["ladder"][0]["label"] == "calibrated"
+    assert [(rung["label"], rung["kind"], rung["names"]) for rung in document["ladder"]] == [
+        ("calibrated", "calibrated", []),
+        ("+ cogging_torque", "effect", ["cogging_torque"]),
+    ]
     assert document["candidates"][0]["tested"] is True
 
 

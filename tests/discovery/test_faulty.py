@@ -13,6 +13,7 @@ from ema_model.discovery.discover import result_of
 from ema_model.discovery.faults import fault_for
 from ema_model.discovery.model_fit import holdout_error
 from ema_model.discovery.path import begun
+from ema_model.discovery.result import Change
 from ema_model.discovery.summary import as_dict
 from ema_model.faults import vector
 from ema_model.simulation.run import Run, simulate_reference
@@ -81,7 +82,7 @@ def test_a_fault_stays_in_the_model_that_is_judged_shown_and_taken_back():
     trial = story.fault(story.ranked(), lambda: [])
     assert trial is not None and trial.faults == ("k2",) and trial.drop > 1e4
     story.add(trial)
-    assert story.current.faults == ("k2",) and story.ladder[-1].label == "fault k2 backlash" and not story.added
+    assert story.current.faults == ("k2",) and story.ladder[-1].change == Change("fault", ("k2",)) and not story.added
     assert story.held is not None
     assert holdout_error(story.held, story.current) < 1.1 < holdout_error(story.held, healthy)
     assert story.fault(story.ranked(), lambda: []) is None, "there is no second one"

@@ -38,7 +38,7 @@ def sharper(story, times: float):
     ]
     data = replace(story.data, floors=floors)
     fits = [replace(one.fit, calibration=_counted(one.fit.calibration, times)) for one in story.steps]
-    steps = [Step(fit, rung_of(one.rung.label, fit, data, None), one.added) for fit, one in zip(fits, story.steps)]
+    steps = [Step(fit, rung_of(one.rung.change, fit, data, None), one.added) for fit, one in zip(fits, story.steps)]
     return replace(story, data=data, held=None, steps=steps, _calm={})
 
 

@@ -17,7 +17,7 @@ def test_servo_on_a_pendulum_lacks_load_dependent_friction(data_folder, actuator
     folder = data_folder / "xl330"
     fitted = [*read(folder, "*kp100*.csv", actuator), *read(folder, "*kp800*.csv", actuator)]
     found = discover(fitted, actuator, holdout=read(folder, "*kp400*.csv", actuator))
-    print([(rung.label, rung.signals, rung.holdout_signals, rung.rmse, rung.holdout_rmse) for rung in found.ladder])
+    print([(rung.change, rung.signals, rung.holdout_signals, rung.rmse, rung.holdout_rmse) for rung in found.ladder])
     assert "load_dependent_friction" in [one.name for one in found.effects]
     before, after = found.ladder[0].holdout_rmse, found.ladder[-1].holdout_rmse
     assert before is not None and after is not None and after <= 0.85 * before
@@ -28,7 +28,7 @@ def test_spin_ups_lack_cogging(data_folder, actuators):
     actuator = load_actuator(actuators / "odrive.toml")
     folder = data_folder / "odrive"
     found = discover(read(folder, "spinup_4*.csv", actuator), actuator, holdout=read(folder, "spinup_5*.csv", actuator))
-    print([(rung.label, rung.signals, rung.holdout_signals) for rung in found.ladder])
+    print([(rung.change, rung.signals, rung.holdout_signals) for rung in found.ladder])
     assert {one.name for one in found.effects} == {"cogging_torque"}
     orders = [one.chosen["order"] for one in found.effects]
     assert orders[0] == 7.0 and len({7.0, 12.0, 14.0, 28.0, 36.0, 84.0} & set(orders)) >= 4

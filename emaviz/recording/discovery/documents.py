@@ -39,7 +39,7 @@ def verdict(found: Discovery) -> str:
     lines += ["", "## Error over floor", "", "| step | | fitted | held out |", "|---|---|---|---|"]
     for i, rung in enumerate(found.ladder):
         held = "" if rung.holdout_rmse is None else number(rung.holdout_rmse)
-        title = words.rung_title(rung.label, found.actuator.axes)
+        title = words.rung_title(rung.change, found.actuator.axes)
         lines.append(f"| {i} | {escaped(title)} | {number(rung.rmse)} | {held} |")
     return "\n".join([*lines, "", escaped(words.FLOOR_NOTE)])
 

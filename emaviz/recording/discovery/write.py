@@ -159,7 +159,7 @@ class DiscoveryWriter(RecordingWriter):
 
     def _layout(self) -> rrb.Blueprint:
         steps = [
-            Step(i, rung_title(rung.label, self._found.actuator.axes), name, self._largest.get(name, 0.0))
+            Step(i, rung_title(rung.change, self._found.actuator.axes), name, self._largest.get(name, 0.0))
             for name in self._shown
             for i, rung in enumerate(self._found.ladder)
         ]

@@ -29,7 +29,7 @@ class Ladder(Section[Told]):
         heads += [f"{one.title}, rms" for one in shown.values()]
         rows = []
         for rung in found.ladder:
-            row = [rung_title(rung.label, found.actuator.axes), number(rung.rmse)]
+            row = [rung_title(rung.change, found.actuator.axes), number(rung.rmse)]
             if held:
                 row.append("–" if rung.holdout_rmse is None else number(rung.holdout_rmse))
             rows.append([*row, *(one.text(rung.signals[name]) for name, one in shown.items())])

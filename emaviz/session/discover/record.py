@@ -116,9 +116,8 @@ def _take(story: Story, saved: Mapping[str, Any], tell: Tell) -> None:
         name = catalogue_name(new[0])
         trial = Trial(Candidate(name, 0.0, effects[new[0]]), effects, found, story.current.chi2 - found.chi2)
         check_value(trial)
-        several = ", ".join(f"{effects[key].get('order', 0.0):g}" for key in new)
         rivals = [str(one) for one in saved.get("same_as", ()) if one in CATALOGUE and one not in model.effects]
-        story.add(trial, "" if len(new) == 1 else f"+ {name} of orders {several}", rivals)
+        story.add(trial, rivals)
     else:
         raise InputError(_DAMAGED)
 

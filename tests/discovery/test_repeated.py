@@ -1,0 +1,57 @@
+"""Where a command was recorded twice, the rig's own repeatability says whether the floor is believable."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from ema_model.actuator import load_actuator
+from ema_model.commands import command
+from ema_model.discovery.discover import result_of
+from ema_model.discovery.path import begun
+from ema_model.discovery.repeated import repeated
+from ema_model.discovery.summary import as_dict
+from ema_model.discovery.words import document_of
+from ema_model.faults import vector
+from ema_model.simulation.run import Run, simulate_reference
+from ema_model.simulation.sensors import Sensors
+
+ACTUATOR = load_actuator()
+
+
+def recorded(name, seed, frequency=4.0, **faults):
+    run = Run(command("sine", {"amplitude_rad": 0.02, "frequency_Hz": frequency}), 0.5)
+    clean = simulate_reference(run, ACTUATOR, vector(faults))
+    return replace(Sensors(current_noise_A=0.2, encoder_bits=14).record(clean, seed), name=name)
+
+
+def found_in(fitted, held=()):
+    return result_of(begun(fitted, ACTUATOR, held))
+
+
+def test_a_rig_that_repeats_itself_bears_out_the_floor():
+    found = found_in([recorded("one", 1), recorded("other", 2, 3.0)], [recorded("again", 3)])
+    twice = repeated(found)
+    assert twice is not None and twice.recordings == ("one", "again")
+    assert 0.4 < twice.apart < 1.3 and twice.signals["current_A"] > 0.0
+    document = as_dict(found)
+    assert document["floor_believable"] and document["ladder"][0]["rmse"] == pytest.approx(found.ladder[0].rmse)
+    assert "one and again are of one command" in str(document_of(found))
+
+
+def test_a_rig_that_does_not_has_errors_in_units_alone():
+    found = found_in([recorded("one", 1), recorded("worn", 2, k1=0.6)])
+    twice = repeated(found)
+    assert twice is not None and twice.apart > 2.0
+    document = as_dict(found)
+    (rung,) = document["ladder"]
+    assert document["floor_believable"] is False and document["repeatability"]["over_floor"] > 2.0
+    assert rung["rmse"] is None and rung["holdout_rmse"] is None and rung["signals"]["current_A"] > 0.0
+    assert "errors count in units alone" in str(document_of(found))
+
+
+def test_where_no_command_was_repeated_nothing_is_said():
+    found = found_in([recorded("one", 1), recorded("other", 2, 3.0)])
+    assert repeated(found) is None and as_dict(found)["repeatability"] is None
+    assert as_dict(found)["floor_believable"]

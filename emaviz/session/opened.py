@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ema_model.actuator import Actuator
 from ema_model.errors import InputError
 from ema_model.files.limits import PAGE_BYTES
+from ema_model.files.refusal import shown
 from ema_model.recordings import ColumnMapping, Measurement, prepared, read_columns, read_head, read_side_file
 from ema_model.recordings.file import NONE, hints_of
 from ema_model.recordings.formats.text_layout import Head, Hints
@@ -60,7 +61,8 @@ def read_opened(name: str, path: Path, actuator: Actuator, side: SideFile) -> Op
     except InputError as error:
         if head is None:
             raise
-        return Opened(name, path, {}, ColumnMapping(), head, hints, problem=str(error))
+        problem = str(error).removeprefix(f"{shown(path, 300)}: ")
+        return Opened(name, path, {}, ColumnMapping(), head, hints, problem=problem)
     reading = how_to_read(path, actuator, side=side, columns=columns)
     table = Opened(name, path, columns, reading.proposed(columns), head, hints)
     return table if reading.is_guess else measured(table, actuator, side)

@@ -37,10 +37,10 @@ class LayoutControls:
             control.visible = head is not None
         if head is None:
             return
-        told = head.told or "no line with the columns' names"
         what = "As said" if said != Hints() else "Found"
+        told = html("{}: {}.", what, head.told) if head.told else "No line with the columns' names is found."
         why = html('<div style="color:#e8590c;overflow-wrap:anywhere">▲ {}</div>', opened.problem)
-        self._told.content = html("<div {}>{}: {}.{}</div>", _BOX, what, told, why if opened.problem else "")
+        self._told.content = html("<div {}>{}{}</div>", _BOX, told, why if opened.problem else "")
         _offer(self._header, range(1, min(len(head.lines), _MOST_LINES) + 1), said.header_line)
         _offer(self._encoding, ENCODINGS.values(), said.encoding and ENCODINGS.get(said.encoding, said.encoding))
 

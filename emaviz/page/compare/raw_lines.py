@@ -55,7 +55,8 @@ class RawLines:
         self._style.content = unescaped(f"<style>{''.join(rules)}</style>")
         self._style.visible = self._about.visible = bool(lines)
         self._about.content = html(
-            "<div {}>The file's lines. <b>Click the one with the columns' names</b> where another is marked.</div>",
+            "<div {}>The file's lines: <b>click the one with the columns' names</b> where another is marked, or none."
+            "</div>",
             _BOX,
         )
 
@@ -76,5 +77,6 @@ def _styled(button: str, colours: str) -> str:
     return (
         f"{one}{{{_LINE}{colours}}}div:has(> {one}){{padding-bottom:0!important}}"
         f"{one} .mantine-Button-inner{{justify-content:flex-start}}"
-        f"{one} .mantine-Button-label{{white-space:pre;text-overflow:ellipsis;display:block;text-align:left}}"
+        f"{one} .mantine-Button-label{{white-space:pre;text-overflow:ellipsis;display:block;line-height:19px;"
+        "text-box:normal}"
     )

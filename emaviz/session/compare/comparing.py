@@ -13,7 +13,7 @@ from typing import Any
 from ema_model.actuator import Actuator
 from ema_model.comparison.result import Comparison
 from ema_model.errors import InputError, quoted
-from ema_model.files.refusal import shown
+from ema_model.files.refusal import refusal, shown
 from ema_model.quantities.titles import in_sentence
 from ema_model.recordings import (
     SIGNALS,
@@ -141,7 +141,7 @@ class Comparing:
             side = self._side_of(opened, text=hints, mapping=None)
             found = read_opened(name, opened.path, self.actuator, side)
             if found.problem:
-                raise InputError(found.problem)
+                raise refusal(name, found.problem)
         except InputError:
             notify(self.events.refused)
             raise

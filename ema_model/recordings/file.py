@@ -124,7 +124,7 @@ def read_columns(path: str | os.PathLike[str], *, max_bytes: int = FILE_BYTES, h
         )
 
 
-def hints_of(path: str, side: SideFile, given: Hints) -> Hints:
+def hints_of(path: str, side: SideFile, given: Hints = NONE) -> Hints:
     """What is said of a text's layout: as given, then as in the side file, which may stand beside other formats too."""
     return given.before(side.text) if format_of(path).hinted is not None else given
 

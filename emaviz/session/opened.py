@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +12,7 @@ from ema_model.actuator import Actuator
 from ema_model.errors import InputError
 from ema_model.files.limits import PAGE_BYTES
 from ema_model.files.refusal import shown
-from ema_model.recordings import ColumnMapping, Measurement, prepared, read_columns, read_head, read_side_file
-from ema_model.recordings.file import NONE, hints_of
+from ema_model.recordings import ColumnMapping, Measurement, hints_of, prepared, read_columns, read_head, read_side_file
 from ema_model.recordings.formats.text_layout import Head, Hints
 from ema_model.recordings.health.card import Health, health
 from ema_model.recordings.read import how_to_read, recorded
@@ -32,7 +31,7 @@ class Opened:
     columns: dict[str, Array]  # as they stand in the file; none where its layout is not clear
     mapping: ColumnMapping  # in use, or guessed
     head: Head | None = None  # of a text
-    hints: Hints = NONE  # what was said of its layout
+    hints: Hints = field(default_factory=Hints)  # what was said of its layout
     recorded: Measurement | None = None  # as files name the signals, for any actuator
     measurement: Measurement | None = None  # as the chosen actuator's model needs it
     health: Health | None = None
@@ -54,7 +53,7 @@ def read_opened(name: str, path: Path, actuator: Actuator, side: SideFile) -> Op
 
     InputError for what is no table; but of a text there are the first lines, for somebody to find the table by.
     """
-    hints = hints_of(str(path), side, NONE)
+    hints = hints_of(str(path), side)
     head = read_head(path, max_bytes=PAGE_BYTES, hints=hints)
     try:
         columns = read_columns(path, max_bytes=PAGE_BYTES, hints=hints)

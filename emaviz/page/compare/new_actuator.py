@@ -41,7 +41,7 @@ class NewActuator:
             self._told = add_html(gui)
         for control in (self._motor, self._user, self._controller, self._drive):
             control.on_update(lambda event: event.client and page.screen.post("new actuator", self._ask))
-        make.on_click(lambda _: page.screen.post("make actuator", lambda: page.checked(self._make)))
+        make.on_click(lambda _: page.screen.post("make actuator", self._make))
         self._ask()
 
     def _description(self) -> Description:
@@ -76,6 +76,9 @@ class NewActuator:
                     self._about.append(add_html(gui, _about(one)))
 
     def _make(self) -> None:
+        self._page.checked(self._save)
+
+    def _save(self) -> None:
         name, doubts = self._description().save(self._folder)
         self._take(name)
         lines = joined(html('<div style="color:#e8590c">▲ {}</div>', line) for line in doubts)

@@ -54,7 +54,10 @@ def read_opened(name: str, path: Path, actuator: Actuator, side: SideFile) -> Op
     InputError for what is no table; but of a text there are the first lines, for somebody to find the table by.
     """
     hints = hints_of(str(path), side)
-    head = read_head(path, max_bytes=PAGE_BYTES, hints=hints)
+    try:
+        head = read_head(path, max_bytes=PAGE_BYTES, hints=hints)
+    except InputError:  # which reading the columns tells, where it is what was said
+        head = read_head(path, max_bytes=PAGE_BYTES)
     try:
         columns = read_columns(path, max_bytes=PAGE_BYTES, hints=hints)
     except InputError as error:

@@ -205,6 +205,18 @@ def test_a_header_found_wrongly_is_named_and_remembered(comparing, heard, record
     again.close()
 
 
+def test_a_side_file_of_another_layout_is_corrected(comparing, heard, recording):
+    path = comparing.folder.uploads / "run.csv"
+    write_measurement(recording, path)
+    side_path(path).write_text("[text]\nheader_line = 2\nencoding = 'utf-16'\n")
+    comparing.add("uploads/run.csv")
+    opened = heard.wait(heard.opened)
+    assert opened.problem == "has no line 2 among its first; name another header line"
+    assert opened.head.lines[0].startswith("time_s,")
+    comparing.use_layout(opened.name, Hints())
+    assert heard.wait(heard.opened, 2).measurement is not None
+
+
 def test_a_text_without_a_table_is_there_to_look_at(comparing, heard):
     (comparing.folder.uploads / "note.csv").write_text("What was measured\non Monday\n")
     comparing.add("uploads/note.csv")

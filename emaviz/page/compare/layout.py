@@ -39,8 +39,8 @@ class LayoutControls:
             return
         what = "As said" if said != Hints() else "Found"
         told = html("{}: {}.", what, head.told) if head.told else "No line with the columns' names is found."
-        why = html('<div style="color:#e8590c;overflow-wrap:anywhere">▲ {}</div>', opened.problem)
-        self._told.content = html("<div {}>{}{}</div>", _BOX, told, why if opened.problem else "")
+        why = html('<span style="color:#e8590c;overflow-wrap:anywhere">▲ {}</span>', opened.problem)
+        self._told.content = html("<div {}>{}</div>", _BOX, why if opened.problem else told)
         _offer(self._header, range(1, min(len(head.lines), _MOST_LINES) + 1), said.header_line)
         _offer(self._encoding, ENCODINGS.values(), said.encoding and ENCODINGS.get(said.encoding, said.encoding))
 

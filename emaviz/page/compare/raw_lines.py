@@ -41,7 +41,7 @@ class RawLines:
         """The lines of a file, with its header among them; none of one that is no text."""
         head = opened.head
         lines = head.lines if head is not None else ()
-        layout = head.layout if head is not None else None
+        layout = head.layout if head is not None and not opened.problem else None
         self._header = header = layout.header_line if layout is not None else 0
         self._name, self._first = opened.name, header - _ABOVE if header > _SHOWN else 0
         marks = {header: _CHOSEN} | ({layout.units_line: _UNITS} if layout is not None and layout.units_line else {})

@@ -18,7 +18,10 @@ from ema_model.actuator.parameters import SECTIONS, default_of, facts_of
 from ema_model.actuator.unread import unread
 from ema_model.errors import InputError, quoted
 from ema_model.quantities.axes import Axes
+from ema_model.quantities.numbers import number
 
+# Drives that each controller may act through, the usual one first.
+DRIVES = {"cascade": ("current", "hysteresis"), "position": ("voltage", "current"), "open": (), "unknown": ()}
 _GUESSED = 0.3  # tolerance of a guess, relative: 3 σ reach a tenth and twice of it
 _SIMULATED_ALONE = ("motor.static_friction_Nm",)  # inverse dynamics leaves out rest, and sees nothing of it
 _ENTRY = re.compile(r"\s*([^±,]*?)\s*(?:(?:±|\+-)\s*([^±,%]*?)\s*(%)?)?\s*(fixed)?\s*")
@@ -47,6 +50,34 @@ def needed(controller: str, drive: str) -> tuple[str, ...]:
     """Every "section.parameter" that the file of an actuator of these kinds must say."""
     kinds = {"controller": controller, "inverter": drive}
     return tuple(f"{section}.{name}" for section in SECTIONS for name in layout(section, kinds)[0])
+
+
+def asked(controller: str, drive: str) -> tuple[str, ...]:
+    """What to ask of an actuator of these kinds, as "section.parameter"; the gear is always known to somebody."""
+    return tuple(dict.fromkeys(("transmission.gear_ratio", *needed(controller, drive))))
+
+
+def unanswered(path: str, axes: Axes) -> str:
+    """What an answer left empty is taken for: 'guess 0.05', 'as if there were none'."""
+    guess = facts_of(path, axes).guess
+    return "as if there were none" if guess == default_of(path) else f"guess {number(guess)}"
+
+
+def gear_of(text: str, where: str) -> float:
+    """The user's motion per the motor's, from '0.002', '1/500', '500:1', or '10 mm', which a screw moves in a turn.
+
+    InputError, which begins with `where`.
+    """
+    if text.strip().endswith("mm"):
+        return 1e-3 * entry_of(text.strip().removesuffix("mm"), where)["value"] / math.tau
+    for mark, is_inverse in (("/", False), (":", True)):
+        above, found, below = text.partition(mark)
+        if found:
+            one, other = (entry_of(part, where)["value"] for part in (above, below))
+            if not (one > 0.0 and other > 0.0):
+                break
+            return other / one if is_inverse else one / other
+    return entry_of(text, where)["value"]
 
 
 def described(document: Mapping[str, Any], controller: str, drive: str, where: str) -> Actuator:

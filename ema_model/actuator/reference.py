@@ -10,7 +10,7 @@ from itertools import product
 from ema_model.actuator import keys
 from ema_model.actuator.layout import CONTROLLER_KINDS, INVERTER_KINDS, WITHOUT_DRIVE, layout
 from ema_model.actuator.naming import on_axes
-from ema_model.actuator.parameters import SECTIONS, default_of, facts_of, numbers
+from ema_model.actuator.parameters import SECTIONS, Facts, default_of, facts_of, numbers
 from ema_model.actuator.unread import unread
 from ema_model.effects import CATALOGUE
 from ema_model.effects.user.entries import KEYS as USERS
@@ -58,17 +58,22 @@ def parameter_rows() -> Iterator[ParameterRow]:
                     having.append(_kind(controller, drive))
                     if name in needed:
                         needing.append(having[-1])
-            usual = f"{facts.tolerance:.1%}".replace(".0%", "%") if facts.tolerance else ""
             yield ParameterRow(
                 path,
                 on_axes(path, _LINES).path,
                 facts.meaning,
                 named.unit,
                 _default(path, having, needing),
-                usual or (f"± {facts.sigma:g}" if facts.sigma else ""),
+                usual_tolerance(facts),
                 f"{number(facts.low)} … {number(facts.high)}",
                 tuple(having),
             )
+
+
+def usual_tolerance(facts: Facts) -> str:
+    """'5%' of the value, or '± 0.02'; "" where it counts as known."""
+    share = f"{facts.tolerance:.1%}".replace(".0%", "%") if facts.tolerance else ""
+    return share or (f"± {facts.sigma:g}" if facts.sigma else "")
 
 
 def _kind(controller: str, drive: str) -> str:

@@ -23,7 +23,7 @@ from ema_model.recordings.checks import check_finite, check_length, check_names,
 from ema_model.recordings.columns.mapping import ColumnMapping, apply_mapping, parse_mapping
 from ema_model.recordings.columns.reading import Reading
 from ema_model.recordings.formats import Format, format_of
-from ema_model.recordings.formats.text_layout import Hints
+from ema_model.recordings.formats.text_layout import Head, Hints
 from ema_model.recordings.measurement import Measurement
 from ema_model.recordings.side_file.read import SideFile, find_side_file, read_side_file
 
@@ -49,13 +49,13 @@ def read_measurement(
     """
     path = os.fspath(path)
     check_file(path, max_bytes)
-    file_format = said_format(path, hints)
     notes = []
     if side is None:
         found = find_side_file(path)
         side = read_side_file(found) if found else SideFile()
         if found:
             notes.append(f"the side file {shown(found.name, 100)} is used")
+    file_format = said_format(path, hints_of(path, side, hints))
     with _told(path):
         header = file_format.header(path, max_bytes)
         used = _merged(path, side, mapping, header)
@@ -92,6 +92,18 @@ def read_header(path: str, max_bytes: int, hints: Hints = NONE) -> list[str]:
         return said_format(path, hints).header(path, max_bytes)
 
 
+def read_head(path: str | os.PathLike[str], *, max_bytes: int = FILE_BYTES, hints: Hints = NONE) -> Head | None:
+    """The first lines of a text and the layout found in them, for a person to look at; None for another format.
+
+    Raises InputError for what is no text, and for hints that do not fit it.
+    """
+    path = os.fspath(path)
+    check_file(path, max_bytes)
+    with _told(path):
+        head = said_format(path, hints).head
+        return head(path, max_bytes) if head is not None else None
+
+
 def read_columns(path: str | os.PathLike[str], *, max_bytes: int = FILE_BYTES, hints: Hints = NONE) -> dict[str, Array]:
     """The columns of numbers as they stand in the file, for a mapping step to show; others are left out.
 
@@ -110,6 +122,11 @@ def read_columns(path: str | os.PathLike[str], *, max_bytes: int = FILE_BYTES, h
             file_format.read(path, names, max_bytes, False).arrays
             or file_format.read(path, names, max_bytes, True).arrays
         )
+
+
+def hints_of(path: str, side: SideFile, given: Hints = NONE) -> Hints:
+    """What is said of a text's layout: as given, then as in the side file, which may stand beside other formats too."""
+    return given.before(side.text) if format_of(path).hinted is not None else given
 
 
 def said_format(path: str, hints: Hints) -> Format:

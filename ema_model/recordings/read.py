@@ -24,7 +24,7 @@ from ema_model.recordings.columns.guess import doubt, guess_mapping
 from ema_model.recordings.columns.mapping import ColumnMapping, MappedColumn, parse_mapping, unit_in_name
 from ema_model.recordings.columns.reading import Reading, without_unit
 from ema_model.recordings.equivalent_current import PHASES
-from ema_model.recordings.file import NONE, check_file, read_columns, read_header, read_measurement
+from ema_model.recordings.file import NONE, check_file, hints_of, read_columns, read_header, read_measurement
 from ema_model.recordings.formats.text_layout import Hints
 from ema_model.recordings.measurement import Measurement
 from ema_model.recordings.prepared import prepared
@@ -50,7 +50,8 @@ def read(
     """A recording for the model of this actuator: in SI, under the names inside, with a current where one can be made.
 
     `mapping`, or texts as of `--map`, goes before what the side file says.  `side` is the side file, where it is
-    known already.  `hints` say how a text is laid out that is read wrongly without.  `needs` are the signals that
+    known already.  `hints` say how a text is laid out that is read wrongly without; they go before
+    the side file's, too.  `needs` are the signals that
     must be there, and sure, when columns have to be guessed; without it what the actuator's model needs.  The
     measurement's `reading` tells how it was read.  Raises InputError, one line, for whatever is wrong with the
     file, and for columns that are not clear: it lists them, with the `--map` to give.
@@ -73,6 +74,7 @@ def recorded(
     """The first half of `read`: under the names of files, so that `prepared` makes it fit any actuator."""
     path = os.fspath(path)
     side = _side_file(path, actuator, side, max_bytes)
+    hints = hints_of(path, side, hints)
     reading = how_to_read(path, actuator, mapping, side=side, max_bytes=max_bytes, hints=hints)
     if needs is None:
         needs = needed(actuator, is_map=side.kind == "map")
@@ -94,6 +96,7 @@ def how_to_read(
     """What `read` takes which column for; `columns` are the file's, where they are read already."""
     path = os.fspath(path)
     side = _side_file(path, actuator, side, max_bytes)
+    hints = hints_of(path, side, hints)
     header = read_header(path, max_bytes, hints)
     given = mapping if isinstance(mapping, ColumnMapping) else parse_mapping(mapping, header)
     by_side = side.mapping is not None and bool(side.mapping.entries)

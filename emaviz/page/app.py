@@ -24,6 +24,7 @@ from emaviz.page import recordings as recordings_tab
 from emaviz.page.campaigns.controls import CampaignControls
 from emaviz.page.compare.keep import KeepControls
 from emaviz.page.compare.leads import leads as compare_leads
+from emaviz.page.compare.raw_lines import RawLines
 from emaviz.page.compare.result import ResultPanel
 from emaviz.page.compare.tab import ComparePanel
 from emaviz.page.discover.keep import DiscoveryKeep
@@ -150,6 +151,7 @@ class App:
             result = ResultPanel(
                 self.page,
                 self.strip,
+                lambda: RawLines(self.page, self.comparing),
                 lambda: compare_leads(self.page, self.discovering),
                 lambda: KeepControls(self.page, self.comparing, self.viewer),
             )

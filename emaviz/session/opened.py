@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 from ema_model.actuator import Actuator
 from ema_model.errors import InputError
 from ema_model.files.limits import PAGE_BYTES
-from ema_model.recordings import ColumnMapping, Measurement, prepared, read_side_file
+from ema_model.files.refusal import shown
+from ema_model.recordings import ColumnMapping, Measurement, hints_of, prepared, read_columns, read_head, read_side_file
+from ema_model.recordings.formats.text_layout import Head, Hints
 from ema_model.recordings.health.card import Health, health
-from ema_model.recordings.read import recorded
+from ema_model.recordings.read import how_to_read, recorded
 from ema_model.recordings.side_file.read import SideFile, find_side_file
 from emaviz.session.data_folder import DataFolder
 
@@ -26,11 +28,14 @@ class Opened:
 
     name: str  # relative to the data folder
     path: Path
-    columns: dict[str, Array]  # as they stand in the file
+    columns: dict[str, Array]  # as they stand in the file; none where its layout is not clear
     mapping: ColumnMapping  # in use, or guessed
+    head: Head | None = None  # of a text
+    hints: Hints = field(default_factory=Hints)  # what was said of its layout
     recorded: Measurement | None = None  # as files name the signals, for any actuator
     measurement: Measurement | None = None  # as the chosen actuator's model needs it
     health: Health | None = None
+    problem: str = ""  # why there are no columns
 
 
 def side_file_of(path: Path, folder: DataFolder) -> SideFile | None:
@@ -41,6 +46,33 @@ def side_file_of(path: Path, folder: DataFolder) -> SideFile | None:
     if found != beside and not folder.holds(found):
         raise InputError(f"{found.name} leads out of the data folder; replace the link by the file")
     return read_side_file(found)
+
+
+def read_opened(name: str, path: Path, actuator: Actuator, side: SideFile) -> Opened:
+    """A file as its side file says it is to be read; a table only, where somebody must say which columns are which.
+
+    InputError for what is no table; but of a text there are the first lines, for somebody to find the table by.
+    """
+    hints = hints_of(str(path), side)
+    try:
+        head = read_head(path, max_bytes=PAGE_BYTES, hints=hints)
+    except InputError:  # which reading the columns tells, where it is what was said
+        head = read_head(path, max_bytes=PAGE_BYTES)
+    try:
+        columns = read_columns(path, max_bytes=PAGE_BYTES, hints=hints)
+    except InputError as error:
+        if head is None:
+            raise
+        problem = str(error).removeprefix(f"{shown(path, 300)}: ")
+        return Opened(name, path, {}, ColumnMapping(), head, hints, problem=problem)
+    reading = how_to_read(path, actuator, side=side, columns=columns)
+    table = Opened(name, path, columns, reading.proposed(columns), head, hints)
+    return table if reading.is_guess else measured(table, actuator, side)
+
+
+def guesses(opened: Opened, actuator: Actuator) -> bool:
+    """Whether there are columns of which this actuator's file does not say what they are."""
+    return how_to_read(opened.path, actuator, side=SideFile(text=opened.hints), columns=opened.columns).is_guess
 
 
 def measured(opened: Opened, actuator: Actuator, side: SideFile | None = None) -> Opened:

@@ -96,6 +96,10 @@ class HtmlPiece:
     def content(self, content: str) -> None:
         self._handle.content = _sent(content)
 
+    def remove(self) -> None:
+        """Takes it off the page."""
+        self._handle.remove()
+
     @property
     def visible(self) -> bool:
         """Whether it is seen."""

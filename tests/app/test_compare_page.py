@@ -7,7 +7,7 @@ import time
 
 import numpy as np
 import pytest
-from support.on_page import wait_until
+from support.on_page import choose, field, wait_until
 
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
@@ -162,6 +162,39 @@ def test_a_column_is_corrected_by_hand(compare, app, rig_file, tmp_path):
     assert measurement["temperature_C"].max() == 6.0
     raw = app.comparing.opened[name].columns["iq [mA]"]
     assert np.allclose(measurement["current_A"], -1e-3 * raw)
+
+
+@pytest.mark.long
+def test_a_header_found_wrongly_is_clicked(compare, app, recording, tmp_path):
+    """Below channels' codes, which look as much like a header, stand the names."""
+    page = compare
+    columns = {"t [ms]": 1e3 * recording.time_s, "Soll <b> [°]": np.rad2deg(recording["command_rad"])}
+    columns |= {"Istwinkel Motor [°]": np.rad2deg(recording["motor_position_rad"])}
+    columns |= {"Strom iq [mA]": 1e3 * recording["current_A"]}
+    header = f"Prüfstand;7\n\nK1;K2;K3;K4\n{';'.join(columns)}"
+    path, table = tmp_path / "coded.csv", np.column_stack(list(columns.values()))
+    np.savetxt(path, table, delimiter=";", header=header, comments="", fmt="%.10g", encoding="cp1252")
+    upload(page, path)
+    page.get_by_text("Found: header in line 3, Windows-1252.").wait_for()
+    page.get_by_role("button", name="1  Prüfstand;7", exact=True).wait_for()
+    name = "uploads/coded.csv"
+    assert list(app.comparing.opened[name].columns) == ["K1", "K2", "K3", "K4"]
+
+    choose(page, "Header in line", "1")
+    page.get_by_text("line 1: no table begins there").wait_for()
+    wait_until(lambda: field(page, "Header in line").input_value() == "found by itself")
+    page.get_by_role("button", name="4  t [ms];Soll <b> [°]").click()
+    page.get_by_text("As said: header in line 4, Windows-1252.").wait_for()
+    assert list(app.comparing.opened[name].columns) == list(columns)
+    choose(page, "Encoding", "DOS 850")
+    page.get_by_text("As said: header in line 4, DOS 850.").wait_for()
+    choose(page, "Encoding", "found by itself")
+    page.get_by_text("← Strom iq [mA]").wait_for()
+
+    page.get_by_role("button", name="Use these columns").click()
+    wait_until(lambda: app.comparing.comparison and app.comparing.comparison.recordings[0].name == "coded")
+    page.get_by_text("Compared in").wait_for()
+    assert np.allclose(app.comparing.opened[name].measurement["current_A"], recording["current_A"], atol=1e-6)
 
 
 def test_a_bad_file_is_one_line_and_the_app_goes_on(compare, app, tmp_path):

@@ -15,6 +15,7 @@ from ema_model.commands import command
 from ema_model.errors import InputError
 from ema_model.files.limits import FILE_BYTES, PAGE_BYTES
 from ema_model.recordings import ColumnMapping, MappedColumn, Measurement, read_side_file, side_path, write_measurement
+from ema_model.recordings.formats.text_layout import Hints
 from ema_model.simulation.run import Run, simulate_reference
 from ema_model.simulation.sensors import Sensors
 from emaviz.recording import read
@@ -125,7 +126,7 @@ def test_foreign_columns_wait_for_the_user_and_are_remembered(comparing, heard, 
 def test_the_page_takes_less_than_the_command_line(comparing, heard, recording, monkeypatch):
     assert PAGE_BYTES < FILE_BYTES
     foreign_csv(recording, comparing.folder.uploads / "rig.csv")
-    monkeypatch.setattr("emaviz.session.compare.comparing.PAGE_BYTES", 1000)
+    monkeypatch.setattr("emaviz.session.opened.PAGE_BYTES", 1000)
     comparing.add("uploads/rig.csv")
     assert re.search(r"rig\.csv: is [0-9.]+ MB large, over the limit of 0\.001 MB", heard.wait(heard.told))
 
@@ -154,6 +155,78 @@ def test_a_mapping_that_does_not_fit_is_told_and_not_remembered(comparing, heard
     assert "time must increase" in line and "\n" not in line and str(comparing.folder.folder) not in line
     assert not side_path(path).exists()
     assert comparing.opened[opened.name].measurement is None
+
+
+def coded_csv(recording, path):
+    """With a line of channels' codes above that of the names, which looks as much like a header."""
+    names = {"t [ms]": 1e3 * recording.time_s, "Soll [°]": np.rad2deg(recording["command_rad"])}
+    names["Strom [mA]"] = 1e3 * recording["current_A"]
+    table = np.column_stack(list(names.values()))
+    header = f"K1;K2;K3\n{';'.join(names)}"
+    np.savetxt(path, table, delimiter=";", header=header, comments="", fmt="%.10g", encoding="cp1252")
+    return path
+
+
+def test_a_header_found_wrongly_is_named_and_remembered(comparing, heard, recording):
+    path = coded_csv(recording, comparing.folder.uploads / "rig.csv")
+    comparing.add("uploads/rig.csv")
+    opened = heard.wait(heard.opened)
+    assert list(opened.columns) == ["K1", "K2", "K3"] and opened.measurement is None
+    assert opened.head.told == "header in line 1, Windows-1252" and opened.head.lines[1].startswith("t [ms];Soll [°]")
+
+    refused = []
+    comparing.events.refused.append(lambda: refused.append(comparing.opened[opened.name]))
+    for hints, line in (
+        (Hints(100_000), "has no line 100000 among its first; name another header line"),
+        (Hints(encoding="utf-16-le"), "no table is seen in it as UTF-16; name another encoding"),
+    ):
+        comparing.use_layout(opened.name, hints)
+        heard.wait(refused, len(refused) + 1)
+        assert line in heard.wait(heard.told, len(refused)) and refused[-1] is opened
+    assert not side_path(path).exists()
+
+    comparing.use_layout(opened.name, Hints(2))
+    read = heard.wait(heard.opened, 2)
+    assert list(read.columns) == ["t [ms]", "Soll [°]", "Strom [mA]"] and read.hints == Hints(2)
+    assert {entry.signal for entry in read.mapping.entries} >= {"time_s", "current_A"}
+    mapping = [MappedColumn("time_s", "t [ms]", "ms"), MappedColumn("command_rad", "Soll [°]", "deg")]
+    comparing.use_mapping(read.name, ColumnMapping((*mapping, MappedColumn("current_A", "Strom [mA]", "mA"))))
+    mapped = heard.wait(heard.opened, 3)
+    assert np.allclose(mapped.measurement["current_A"], recording["current_A"], atol=1e-6)
+    assert mapped.hints == Hints(2)
+
+    again = Comparing(comparing.session, comparing.folder)
+    later = Heard(again)
+    again.add("uploads/rig.csv")
+    assert later.wait(later.opened).measurement is not None, "the side file is used the next time"
+    assert np.allclose(again.measurement("uploads/rig.csv")["current_A"], recording["current_A"], atol=1e-6)
+    again.use_layout("uploads/rig.csv", Hints())
+    assert list(later.wait(later.opened, 2).columns) == ["K1", "K2", "K3"]
+    again.close()
+
+
+def test_a_side_file_of_another_layout_is_corrected(comparing, heard, recording):
+    path = comparing.folder.uploads / "run.csv"
+    write_measurement(recording, path)
+    side_path(path).write_text("[text]\nheader_line = 2\nencoding = 'utf-16'\n")
+    comparing.add("uploads/run.csv")
+    opened = heard.wait(heard.opened)
+    assert opened.problem == "has no line 2 among its first; name another header line"
+    assert opened.head.lines[0].startswith("time_s,")
+    comparing.use_layout(opened.name, Hints())
+    assert heard.wait(heard.opened, 2).measurement is not None
+
+
+def test_a_text_without_a_table_is_there_to_look_at(comparing, heard):
+    (comparing.folder.uploads / "note.csv").write_text("What was measured\non Monday\n")
+    comparing.add("uploads/note.csv")
+    opened = heard.wait(heard.opened)
+    assert opened.problem and not opened.columns and opened.head.lines == ("What was measured", "on Monday")
+    with pytest.raises(InputError, match=r"note\.csv: its table was not found; say under Columns"):
+        comparing.compare()
+    comparing.choose_actuator(comparing.session.actuator.name)
+    comparing.use_layout("uploads/note.csv", Hints(1))
+    assert "line 1: no table begins there" in heard.wait(heard.told)
 
 
 def test_canonical_names_need_no_mapping(comparing, heard, recording):

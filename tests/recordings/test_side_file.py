@@ -22,6 +22,7 @@ from ema_model.recordings import (
     write_side_file,
 )
 from ema_model.recordings.file import read_measurement
+from ema_model.recordings.formats.text_layout import ENCODINGS, Hints
 from ema_model.recordings.side_file.read import SENSOR_KEYS
 
 N = 600
@@ -97,6 +98,36 @@ def test_what_is_no_file_is_no_side_file(tmp_path):
     assert read_measurement(path).side == SideFile()
 
 
+def test_a_texts_layout_is_said(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("A;B\ntime_s;iq [mA]\n" + "".join(f"{k / 1e3};{k}\n" for k in range(N)))
+    side_path(path).write_text('[text]\nheader_line = 2\n[mapping]\ncurrent_A = { column = "iq [mA]", unit = "mA" }\n')
+    assert read_measurement(path)["current_A"][-1] == pytest.approx((N - 1) / 1e3)
+    with pytest.raises(InputError, match=r"no column 'iq \[mA\]' for current_A"):
+        read_measurement(path, hints=Hints(header_line=1))
+    # A folder's stands beside recordings that are no texts, too.
+    np.save(tmp_path / "b.npy", np.zeros(N, [("time_s", float), ("current_A", float)]))
+    (tmp_path / "recordings.toml").write_text("[text]\nheader_line = 2\n")
+    with pytest.raises(InputError, match="time must increase"):
+        read_measurement(tmp_path / "b.npy")
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("header_line = 0", r"\[text\] header_line must be the number of a line, from 1 on, not 0"),
+        ("header_line = true", "header_line must be"),
+        ('encoding = "klingon"', r"\[text\] encoding 'klingon' is none; write utf-8, cp1252 or utf-16"),
+        ("encoding = 8", "encoding '8' is none"),
+        ("row = 1", r"\[text\] unknown entry 'row'"),
+    ],
+)
+def test_a_layout_that_makes_no_sense_is_refused(tmp_path, text, line):
+    (tmp_path / "a.toml").write_text(f"[text]\n{text}\n")
+    with pytest.raises(InputError, match=line):
+        read_side_file(tmp_path / "a.toml")
+
+
 names = st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=20)
 finite = st.floats(allow_nan=False, allow_infinity=False)
 sized = st.floats(-1e30, 1e30).filter(lambda value: value != 0.0)
@@ -123,6 +154,7 @@ side_files = st.builds(
     sensors=st.dictionaries(st.sampled_from(SENSOR_KEYS), st.floats(0.0, 1e300), max_size=4),
     window_s=st.none() | st.tuples(finite, finite).filter(lambda pair: pair[0] < pair[1]),
     segments=st.none() | st.lists(st.integers(-(2**53), 2**53), min_size=1, max_size=4).map(tuple),
+    text=st.builds(Hints, st.none() | st.integers(1, 2**53), st.sampled_from([None, *ENCODINGS])),
 )
 
 
@@ -133,7 +165,7 @@ def test_written_and_read_back(tmp_path, side):
     write_side_file(side, path)
     again = read_side_file(path)
     assert again.path == str(path)
-    for name in ("actuator", "kind", "sampling", "mapping", "sensors", "window_s", "segments"):
+    for name in ("actuator", "kind", "sampling", "mapping", "sensors", "window_s", "segments", "text"):
         assert getattr(again, name) == getattr(side, name)
 
 

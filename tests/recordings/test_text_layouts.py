@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import gzip
+
 import numpy as np
 import pytest
 
 from ema_model.errors import InputError
-from ema_model.recordings import read_columns
+from ema_model.recordings import read_columns, read_head
 from ema_model.recordings.file import read_header, read_measurement
 from ema_model.recordings.formats.text_layout import Hints
 
@@ -141,3 +143,30 @@ def test_a_said_layout_goes_before_what_is_found(tmp_path):
     assert read_header(str(path), 10_000_000, Hints(1)) == ["a", "b"]
     with pytest.raises(InputError, match="line 244: no table begins there"):
         read_header(str(path), 10_000_000, Hints(240 + 4))
+    with pytest.raises(InputError, match=r"no table is seen in it as UTF-16; name another encoding"):
+        read_header(str(path), 10_000_000, Hints(encoding="utf-16-le"))
+
+
+def test_names_that_are_numbers_are_a_header_where_somebody_says_so(tmp_path):
+    path = written(tmp_path, ["Rig;7", "", "1;2", *rows(";", *PLAIN[:2])], "utf-8")
+    with pytest.raises(InputError, match="line 1: names of columns are expected, found Rig, 7"):
+        read_columns(path)
+    columns = read_columns(path, hints=Hints(3))
+    assert list(columns) == ["1", "2"]
+    np.testing.assert_allclose(columns["2"], ANGLE, atol=1e-6)
+
+
+@pytest.mark.parametrize("packed", [False, True])
+def test_the_first_lines_are_shown_as_they_stand(tmp_path, packed):
+    lines, encoding, told, _ = FILES["diadem"]
+    path = written(tmp_path, lines, encoding)
+    if packed:
+        path = tmp_path / "run.csv.gz"
+        path.write_bytes(gzip.compress((tmp_path / "run.csv").read_bytes()))
+    head = read_head(path)
+    assert list(head.lines) == lines and head.told == told
+    assert read_head(path, hints=Hints(encoding="cp850")).lines[0] != lines[0]
+    plain = read_head(written(tmp_path, ["t,x", *rows(",", *PLAIN[:2])], "utf-8"))
+    assert plain.told == "header in line 1" and plain.lines[0] == "t,x"
+    np.save(tmp_path / "run.npy", TIME)
+    assert read_head(tmp_path / "run.npy") is None

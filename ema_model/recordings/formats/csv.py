@@ -21,7 +21,7 @@ from ema_model.errors import quoted
 from ema_model.files.limits import LINE_BYTES, megabytes
 from ema_model.files.refusal import listed, refusal, shown
 from ema_model.recordings.formats.format import Array, Columns, Format, check_size
-from ema_model.recordings.formats.text_layout import Hints, find_layout, split
+from ema_model.recordings.formats.text_layout import Head, Hints, find_layout, read_head, split
 from ema_model.recordings.formats.text_table import TextTable, read_leaving_out, read_table, table_of
 
 _HEAD_BYTES = 65_536
@@ -51,7 +51,11 @@ def hinted(hints: Hints) -> Format:
         unusual = _unusual(path, hints)
         return read_table(unusual, names, max_bytes, strict) if unusual else _read(path, names, max_bytes, strict)
 
-    return Format(".csv", "CSV", header, read, _write, (".txt", ".tsv", ".asc", ".lvm"), (".txt",), hinted)
+    def head(path: str, max_bytes: int) -> Head:
+        del max_bytes
+        return read_head(path, hints)
+
+    return Format(".csv", "CSV", header, read, _write, (".txt", ".tsv", ".asc", ".lvm"), (".txt",), hinted, head)
 
 
 def _unusual(path: str, hints: Hints) -> TextTable | None:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ema_model.files.limits import megabytes
 from ema_model.files.refusal import refusal
-from ema_model.recordings.formats.text_layout import Hints
+from ema_model.recordings.formats.text_layout import Head, Hints
 
 Array = NDArray[np.float64]
 
@@ -52,6 +52,7 @@ class Format:
     others: tuple[str, ...] = ()  # further suffixes of the same kind of file
     doubtful: tuple[str, ...] = ()  # suffixes that files of other things have as well: notes, settings, a run's record
     hinted: Callable[[Hints], Format] | None = None  # the same for a text of which somebody has said the layout
+    head: Callable[[str, int], Head | None] | None = None  # path, max_bytes: a text's first lines; None for no text
 
     @property
     def suffixes(self) -> tuple[str, ...]:

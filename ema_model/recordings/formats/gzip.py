@@ -12,7 +12,7 @@ from ema_model.errors import InputError
 from ema_model.files.limits import megabytes
 from ema_model.files.refusal import refusal
 from ema_model.recordings.formats.format import Columns, Format
-from ema_model.recordings.formats.text_layout import Hints
+from ema_model.recordings.formats.text_layout import Head, Hints
 
 _PIECE = 1 << 20
 _SUFFIX = ".gz"
@@ -36,7 +36,12 @@ def hinted(hints: Hints) -> Format:
 
         return Columns(found.arrays, place, found.notes, found.title, found.layout)
 
-    return Format(_SUFFIX, "gzip", header, read, hinted=hinted)
+    def head(path: str, max_bytes: int) -> Head | None:
+        with _unpacked(path, max_bytes) as (inner, packed):
+            inside = _inner(path, packed, hints)
+            return inside.head(inner, max_bytes) if inside.head is not None else None
+
+    return Format(_SUFFIX, "gzip", header, read, hinted=hinted, head=head)
 
 
 def _inner(path: str, packed: str, hints: Hints) -> Format:

@@ -28,7 +28,20 @@ _NUMBER = re.compile(
 )
 _THOUSANDS = re.compile(r"[+-]?\d{1,3}(['\u00a0\u202f ]\d{3})+([.,]\d+)?")
 _BLANKS = "'\u00a0\u202f "
-_ENCODINGS = {"utf-8": "UTF-8", "cp1252": "Windows-1252", "utf-16-le": "UTF-16", "utf-16-be": "UTF-16"}
+# Those that logs are usually written in, with their titles; Python's others can be said, too.
+ENCODINGS = {
+    "utf-8": "UTF-8",
+    "cp1252": "Windows-1252",
+    "utf-16-le": "UTF-16",
+    "utf-16-be": "UTF-16, big-endian",
+    "cp1250": "Windows-1250",
+    "cp1251": "Windows-1251",
+    "cp850": "DOS 850",
+    "mac-roman": "Mac Roman",
+    "gb18030": "GB 18030",
+    "shift_jis": "Shift JIS",
+    "euc_kr": "EUC-KR",
+}
 _BOMS = ((codecs.BOM_UTF8, "utf-8"), (codecs.BOM_UTF16_LE, "utf-16-le"), (codecs.BOM_UTF16_BE, "utf-16-be"))
 _CONTROL = re.compile(r"[\0-\x08\x0e-\x1f]")
 _UNIT_WORDS = frozenset("volt volts ampere amp second seconds sec % 1 - bar mbar hz khz dimensionless n/a".split())
@@ -40,6 +53,10 @@ class Hints:
 
     header_line: int | None = None  # from 1
     encoding: str | None = None
+
+    def before(self, others: Hints) -> Hints:
+        """These; what they leave open is as the others say."""
+        return Hints(self.header_line or others.header_line, self.encoding or others.encoding)
 
 
 @dataclass(frozen=True)
@@ -67,10 +84,26 @@ class Layout:
         if self.units_line:
             parts.append(f"units in line {self.units_line}")
         if self.encoding != "utf-8":
-            parts.append(_ENCODINGS.get(self.encoding, self.encoding))
+            parts.append(ENCODINGS.get(self.encoding, self.encoding))
         if self.thousands:
             parts.append(f"thousands set off by {_SIGNS.get(self.thousands, 'blanks')}")
         return ", ".join(parts)
+
+
+@dataclass(frozen=True)
+class Head:
+    """The first lines of a text as they stand, for a person to look at, and how they were understood."""
+
+    lines: tuple[str, ...]
+    encoding: str
+    layout: Layout | None  # where a table is seen
+
+    @property
+    def told(self) -> str:
+        """What was found: "header in line 4, units in line 5, Windows-1252"; "" where there is no table."""
+        if self.layout is None:
+            return ""
+        return ", ".join(filter(None, ("header in line 1" if self.layout.header_line == 1 else "", self.layout.told)))
 
 
 _SIGNS = {",": "commas", ".": "points", "'": "apostrophes"}
@@ -118,11 +151,17 @@ def lines_of(path: str, said: str | None = None) -> tuple[list[str], str, int, b
     return re.split(r"\r\n|\r|\n", text), encoding, mark, is_cut
 
 
+def read_head(path: str, hints: Hints) -> Head:
+    """The first lines and their layout; InputError as `find_layout` raises it."""
+    lines, encoding, _, is_cut = lines_of(path, hints.encoding)
+    return Head(tuple(lines[:-1] if is_cut or not lines[-1] else lines), encoding, find_layout(path, hints))
+
+
 def find_layout(path: str, hints: Hints) -> Layout | None:
     """The layout of a text whose table begins with names; None if no table is seen in its first lines.
 
     The header is the line of names with the most rows of numbers below it, the first of equals.  InputError for what
-    is no text, and for a said header that has no row of numbers below it.
+    is no text, for a said header without rows of numbers below it, and for a said encoding in which no table is seen.
     """
     lines, encoding, mark, is_cut = lines_of(path, hints.encoding)
     if is_cut:
@@ -130,7 +169,7 @@ def find_layout(path: str, hints: Hints) -> Layout | None:
     best: tuple[float, int, int, str] | None = None
     tables = {separator: [split(line, separator) for line in lines] for separator in SEPARATORS}
     if hints.header_line is not None and not 0 < hints.header_line <= len(lines):
-        raise refusal(path, f"has no line {hints.header_line} among its first; correct --header-line")
+        raise refusal(path, f"has no line {hints.header_line} among its first; name another header line")
     for separator, rows in tables.items():
         for at in range(len(rows)) if hints.header_line is None else [hints.header_line - 1]:
             if hints.header_line is None and not _is_names(rows, at):
@@ -141,7 +180,11 @@ def find_layout(path: str, hints: Hints) -> Layout | None:
     if best is None:
         if hints.header_line is not None:
             found = shown(lines[hints.header_line - 1], 60)
-            raise refusal(path, f"line {hints.header_line}: no table begins there ({found!r}); correct --header-line")
+            problem = f"no table begins there ({found!r}); name another header line"
+            raise refusal(path, f"line {hints.header_line}: {problem}")
+        if hints.encoding is not None:
+            told = ENCODINGS.get(encoding, encoding)
+            raise refusal(path, f"no table is seen in it as {told}; name another encoding")
         return None
     _, at, first, separator = best
     rows = tables[separator]

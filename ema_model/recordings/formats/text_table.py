@@ -198,7 +198,7 @@ def _understood(
         parsed = _parsed(table, places, pa.string(), options, False)
     except pa.ArrowException as error:
         problem = f"cannot be read as a table ({shown(error, 80)})"
-        raise refusal(table.path, f"{problem}; correct it, or say --header-line") from None
+        raise refusal(table.path, f"{problem}; correct it, or name another header line") from None
     texts = {i: parsed.column(f"{i}") for i in places}
     rows = np.delete(
         np.arange(parsed.num_rows + len(other)), [i for i in other if 0 <= i < parsed.num_rows + len(other)]

@@ -1,4 +1,4 @@
-"""The side file NAME.toml beside a recording: its actuator, mapping, sensors, sampling, window and kind.
+"""The side file NAME.toml beside a recording: its actuator, mapping, sensors, sampling, window, kind and text layout.
 
 One named recordings.toml serves the recordings of its folder that have none of their own.
 """
@@ -20,12 +20,13 @@ from ema_model.files.user_file import open_user_file
 from ema_model.quantities.si import of_name, without_unit
 from ema_model.quantities.signals import SIGNALS
 from ema_model.recordings.columns.mapping import ColumnMapping, MappedColumn, parse_mapping
+from ema_model.recordings.formats.text_layout import Hints, known_encoding
 
 Kind = Literal["run", "map"]
 Sampling = Literal["mean", "instantaneous"]
 
 OF_A_FOLDER = "recordings.toml"
-_KEYS = ("schema", "actuator", "kind", "sampling", "segments", "window", "mapping", "sensors")
+_KEYS = ("schema", "actuator", "kind", "sampling", "segments", "window", "text", "mapping", "sensors")
 _LARGEST = 2**53  # up to which whole numbers are exact as floats
 _NUMBERS = ("sign", "scale", "offset")
 _COLUMN_KEYS = ("column", "unit", *_NUMBERS)
@@ -56,6 +57,7 @@ class SideFile:
     sensors: dict[str, float] = field(default_factory=dict)  # of SENSOR_KEYS
     window_s: tuple[float, float] | None = None
     segments: tuple[int, ...] | None = None  # those to use
+    text: Hints = field(default_factory=Hints)  # how a text is laid out, where another layout is found by itself
     path: str | None = None
 
     @property
@@ -116,6 +118,7 @@ def _parsed(path: str, document: dict[str, Any]) -> SideFile:
         accuracy,
         _window(path, document),
         _segments(path, document),
+        _text(path, _table(path, document, "text")),
         path,
     )
 
@@ -177,6 +180,19 @@ def _segments(path: str, document: dict[str, Any]) -> tuple[int, ...] | None:
     ):
         raise refusal(path, f"segments must be a list of whole numbers, e.g. [0, 1, 4], not {shown(given)}")
     return tuple(given)
+
+
+def _text(path: str, table: dict[str, Any]) -> Hints:
+    _check_keys(path, "[text] ", table, ("header_line", "encoding"))
+    line, encoding = table.get("header_line"), table.get("encoding")
+    if line is not None and (type(line) is not int or not 0 < line <= _LARGEST):
+        raise refusal(path, f"[text] header_line must be the number of a line, from 1 on, not {shown(line)}")
+    if encoding is not None:
+        try:
+            encoding = known_encoding(encoding)
+        except (TypeError, ValueError):
+            raise refusal(path, f"[text] encoding {shown(encoding)!r} is none; write utf-8, cp1252 or utf-16") from None
+    return Hints(line, encoding)
 
 
 def _table(path: str, document: dict[str, Any], name: str) -> dict[str, Any]:

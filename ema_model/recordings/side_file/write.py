@@ -34,6 +34,9 @@ def side_text(side: SideFile) -> str:
     if side.window_s is not None:
         names = zip(("from_s", "to_s"), side.window_s)
         lines += ["", "[window]", *(f"{name} = {value!r}" for name, value in names if math.isfinite(value))]
+    said = {"header_line": side.text.header_line, "encoding": side.text.encoding and _quoted(side.text.encoding)}
+    if any(said.values()):
+        lines += ["", "[text]", *(f"{name} = {value}" for name, value in said.items() if value)]
     if side.sensors:
         lines += ["", "[sensors]", *(f"{name} = {value!r}" for name, value in side.sensors.items())]
     if side.mapping is not None and side.mapping.entries:

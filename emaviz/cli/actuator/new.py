@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ema_model.actuator import save_actuator
-from ema_model.actuator.describe import described, entry_of
+from ema_model.actuator.describe import described, entry_of, gear_of
 from ema_model.actuator.keys import KINDS
 from ema_model.actuator.plausible import implausible, missing
 from ema_model.effects.user.entries import kind_of
@@ -126,14 +126,7 @@ def _gear(arguments: argparse.Namespace) -> float | None:
         return 1e-3 * arguments.lead_mm / (2.0 * math.pi)
     if arguments.gear is None:
         return None
-    for mark, is_inverse in (("/", False), (":", True)):
-        above, found, below = arguments.gear.partition(mark)
-        if found:
-            one, other = (entry_of(part, "--gear")["value"] for part in (above, below))
-            if not (one > 0.0 and other > 0.0):
-                break
-            return other / one if is_inverse else one / other
-    return entry_of(arguments.gear, "--gear")["value"]
+    return gear_of(arguments.gear, "--gear")
 
 
 def _effect(text: str) -> tuple[str, dict[str, Any]]:

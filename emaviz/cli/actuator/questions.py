@@ -5,16 +5,12 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from ema_model.actuator.describe import actuator_axes, entry_of, needed
+from ema_model.actuator.describe import DRIVES, actuator_axes, asked, entry_of, unanswered
 from ema_model.actuator.keys import KINDS
 from ema_model.actuator.naming import on_axes
-from ema_model.actuator.parameters import default_of, facts_of
+from ema_model.actuator.parameters import facts_of
 from ema_model.errors import InputError
 from ema_model.quantities.axes import KINDS as AXES
-from ema_model.quantities.numbers import number
-
-# Drives that each controller may act through, the usual one first.
-_DRIVES = {"cascade": ("current", "hysteresis"), "position": ("voltage", "current"), "open": (), "unknown": ()}
 
 
 def ask(document: dict[str, Any], arguments: argparse.Namespace) -> None:
@@ -24,13 +20,12 @@ def ask(document: dict[str, Any], arguments: argparse.Namespace) -> None:
         if getattr(arguments, side) is None:
             axes[side] = _choice(about, dict.fromkeys(AXES, ""))
     arguments.controller = _choice("Which controller", KINDS["controller"])
-    drives = _DRIVES[arguments.controller]
+    drives = DRIVES[arguments.controller]
     if drives and arguments.drive is None:
         arguments.drive = _choice("Which drive", {name: KINDS["inverter"][name] for name in drives})
     print("Now the parameters: a number, with its tolerance if you know it (1e-4 ± 5%); Enter for what you don't know.")
-    wanted = needed(arguments.controller, arguments.drive or "current")
     shown = actuator_axes(document)
-    for path in dict.fromkeys(("transmission.gear_ratio", *wanted)):
+    for path in asked(arguments.controller, arguments.drive or "current"):
         section, name = path.partition(".")[0], on_axes(path, shown).name
         if name not in document.get(section, {}) and (entry := _number(path, shown)) is not None:
             document.setdefault(section, {})[name] = entry
@@ -50,8 +45,7 @@ def _choice(question: str, choices: dict[str, str]) -> str:
 
 
 def _number(path: str, axes: Any) -> dict[str, Any] | None:
-    named, facts = on_axes(path, axes), facts_of(path, axes)
-    usual = "as if there were none" if facts.guess == default_of(path) else f"guess {number(facts.guess)}"
+    named, facts, usual = on_axes(path, axes), facts_of(path, axes), unanswered(path, axes)
     while True:
         text = input(f"{named.title}: {facts.meaning}{f', {named.unit}' if named.unit else ''} [{usual}] ").strip()
         if not text:

@@ -21,7 +21,7 @@ def recordings_list(opened: Iterable[Opened]) -> Html:
     rows = []
     for one in opened:
         if one.measurement is None or one.health is None:
-            mark, text = _mark("warning"), "columns to be checked"
+            mark, text = _mark("warning"), "no table is found in it" if one.problem else "columns to be checked"
         else:
             m = one.measurement
             mark = _mark(one.health.severity)

@@ -12,6 +12,7 @@ from ema_model.errors import InputError, quoted
 from ema_model.quantities.units import known_units
 from ema_model.recordings import SIGNALS, ColumnMapping, MappedColumn
 from emaviz.page.compare.cards import mapping_table
+from emaviz.page.compare.layout import LayoutControls
 from emaviz.page.page import Page
 from emaviz.session.compare.comparing import Comparing
 from emaviz.session.opened import Opened
@@ -30,6 +31,7 @@ class MappingStep:
         gui = page.server.gui
         self.folder = gui.add_folder("Columns", visible=False)
         with self.folder:
+            self._layout = LayoutControls(page, comparing)
             self._table = add_html(gui)
             self._column = gui.add_dropdown("Column", [NOT_USED])
             titles = [NOT_USED, *(_title(name) for name in SIGNALS)]
@@ -51,9 +53,13 @@ class MappingStep:
     def show(self, opened: Opened) -> None:
         """Opens the step for a file; on the screen's thread."""
         self._opened = opened
+        self._layout.show(opened)
         names = list(opened.columns)[:_MOST_COLUMNS]
-        first = next((name for name, _ in opened.mapping.unmapped if name in names), names[0])
-        self._column.options, self._column.value = names, first
+        for control in (self._table, self._column, self._signal, self._use):
+            control.visible = bool(names)
+        if names:
+            first = next((name for name, _ in opened.mapping.unmapped if name in names), names[0])
+            self._column.options, self._column.value = names, first
         self._show_column()
         self.folder.visible = True
         self._draw()

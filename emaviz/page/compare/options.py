@@ -8,6 +8,7 @@ import viser
 
 from ema_model.actuator.naming import on_axes
 from ema_model.recordings import SIGNALS
+from emaviz.page.compare.new_actuator import NewActuator
 from emaviz.page.page import Page
 from emaviz.session.compare.comparing import COMPARABLE, Comparing
 from emaviz.session.data_folder import ACTUATOR_SUFFIX
@@ -30,6 +31,7 @@ class AskedControls:
                 "Actuator", comparing.actuators(), initial_value=comparing.session.actuator.name
             )
             uploads.add_button("Upload an actuator file", ACTUATOR_SUFFIX, icon=viser.Icon.UPLOAD, color="gray")
+            NewActuator(page, comparing.folder, self.choose)
             self._calibrate = gui.add_checkbox("Calibrate it first", comparing.calibrate)
             self._free_folder = gui.add_folder("What the calibration may move", expand_by_default=False)
         self._free: list[Any] = []

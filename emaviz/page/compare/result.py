@@ -11,11 +11,13 @@ import viser
 
 from ema_model.comparison.result import Comparison, Region
 from ema_model.comparison.words import per_recording
+from ema_model.errors import InputError
 from ema_model.quantities.numbers import number
 from emaviz.figures import mapped_columns, quantity
 from emaviz.page.compare import WORKSPACE
 from emaviz.page.compare.moment import motion_of
 from emaviz.page.compare.plots import ComparePlots, View
+from emaviz.page.compare.raw_lines import RawLines
 from emaviz.page.kept import Cleared
 from emaviz.page.page import Page
 from emaviz.page.playback import PlaybackStrip
@@ -35,14 +37,15 @@ _PLAYING_REDRAW_S, _LEAST_MOVE_S = 1.0, 1e-4
 class ResultPanel:
     """Everything here is built and changed on the screen's thread.
 
-    strip: its clock, for Compare's recording on the 3D actuator; leads(): adds what may follow, below the answer;
-    keep(): adds what saves a comparison, below the plots.
+    strip: its clock, for Compare's recording on the 3D actuator; lines(): adds a text's first lines, above the preview;
+    leads(): adds what may follow, below the answer; keep(): adds what saves a comparison, below the plots.
     """
 
     def __init__(
         self,
         page: Page,
         strip: PlaybackStrip,
+        lines: Callable[[], RawLines],
         leads: Callable[[], object],
         keep: Callable[[], Cleared],
     ) -> None:
@@ -56,6 +59,8 @@ class ResultPanel:
         gui = page.server.gui
         self._headline = add_html(gui, html("<div {}>Nothing is compared yet: upload a recording.</div>", _BOX))
         self._place = gui.add_folder("Preview of the columns", visible=False)
+        with self._place:
+            self._lines = lines()
         self._answer = gui.add_folder("Where the model fails", visible=False)
         with self._answer:
             self._hint = add_html(gui)
@@ -76,14 +81,21 @@ class ResultPanel:
     # --- before a comparison ----------------------------------------------------------------------------------------
 
     def preview(self, opened: Opened) -> None:
-        """The signals of a file as they are mapped now."""
-        figure, aspect = mapped_columns.figure(opened.columns, opened.mapping)
-        if self._preview is None:
-            with self._place:
-                self._preview = self._page.server.gui.add_plotly(figure, config=_CONFIG, aspect=aspect)
+        """The lines of a text, and the signals of a file as they are mapped now."""
+        said = "as its columns are read"
+        self._lines.show(opened)
+        try:
+            figure, aspect = mapped_columns.figure(opened.columns, opened.mapping)
+        except InputError as error:
+            said = "no table is found in it" if opened.problem else str(error)
+            if self._preview is not None:
+                self._preview.visible = False
         else:
-            self._preview.figure, self._preview.aspect = figure, aspect
-        self._headline.content = html("<div {}><b>{}</b>, as its columns are read</div>", _BOX, opened.path.name)
+            if self._preview is None:
+                with self._place:
+                    self._preview = self._page.server.gui.add_plotly(figure, config=_CONFIG, aspect=aspect)
+            self._preview.figure, self._preview.aspect, self._preview.visible = figure, aspect, True
+        self._headline.content = html("<div {}><b>{}</b>, {}</div>", _BOX, opened.path.name, said)
         self._place.visible = True
         self._show_answer(False)
 

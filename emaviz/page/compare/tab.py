@@ -66,6 +66,7 @@ class ComparePanel:
         self._stop.on_click(lambda _: comparing.stop())
         events = comparing.events
         events.opened.append(lambda opened: page.screen.post(f"opened {opened.name}", lambda: self._opened(opened)))
+        events.refused.append(lambda: page.screen.post("columns", self._open_columns))
         events.removed.append(lambda: page.screen.post("removed", self._removed))
         events.progressed.append(lambda text: page.screen.post("compare progress", lambda: self._progressed(text)))
         events.compared.append(lambda *found: page.screen.post("compared", lambda: self._compared(*found)))
@@ -115,7 +116,8 @@ class ComparePanel:
     def _opened(self, opened: Opened) -> None:
         self._show(opened.name)
         if opened.measurement is None:
-            self._say(Html("Check which column is which signal, then press <b>Use these columns</b>."))
+            todo = Html("Check which column is which signal, then press <b>Use these columns</b>.")
+            self._say(Html("Click the line with the columns' names, on the right.") if opened.problem else todo)
             return
         if self._comparing.comparison is None:
             self._result.preview(opened)

@@ -13,8 +13,7 @@ from typing import Any
 from ema_model.actuator import Actuator
 from ema_model.comparison.result import Comparison
 from ema_model.errors import InputError, quoted
-from ema_model.files.limits import PAGE_BYTES
-from ema_model.files.refusal import shown
+from ema_model.files.refusal import refusal, shown
 from ema_model.quantities.titles import in_sentence
 from ema_model.recordings import (
     SIGNALS,
@@ -22,16 +21,15 @@ from ema_model.recordings import (
     Measurement,
     prepared,
     read,
-    read_columns,
     write_side_file,
 )
-from ema_model.recordings.read import how_to_read
+from ema_model.recordings.formats.text_layout import Hints
 from ema_model.recordings.side_file.read import SideFile
 from emaviz.session import actuators as actuator_files
 from emaviz.session.compare.keep import keep
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.events import notify
-from emaviz.session.opened import Opened, measured, side_file_of
+from emaviz.session.opened import Opened, guesses, measured, read_opened, side_file_of
 from emaviz.session.session import Session
 from emaviz.session.settings import number
 from emaviz.session.worker import Steps, Worker
@@ -47,7 +45,8 @@ _MOST_WEIGHT = 1e3
 class CompareEvents:
     """What the screen listens to; called on the threads that work, so listeners only hand over."""
 
-    opened: list[Callable[[Opened], None]] = field(default_factory=list)  # also when mapped anew
+    opened: list[Callable[[Opened], None]] = field(default_factory=list)  # also when mapped or laid out anew
+    refused: list[Callable[[], None]] = field(default_factory=list)  # a layout that does not fit: all is as it was
     removed: list[Callable[[], None]] = field(default_factory=list)
     progressed: list[Callable[[str], None]] = field(default_factory=list)
     compared: list[Callable[[Comparison, float], None]] = field(default_factory=list)  # and how long it took, s
@@ -111,16 +110,17 @@ class Comparing:
         """Reads the file with this mapping soon, and remembers it in the side file."""
         self._files.post(f"map {name}", lambda: self._map(name, mapping))
 
+    def use_layout(self, name: str, hints: Hints) -> None:
+        """Reads the text anew, as somebody says that it is laid out, soon, and remembers it in the side file."""
+        self._files.post(f"lay out {name}", lambda: self._lay_out(name, hints))
+
     def _open(self, name: str) -> None:
         path = self.folder.measurement(name)
         if name not in self.opened and len(self.opened) >= MOST_RECORDINGS:
             raise InputError(f"{MOST_RECORDINGS} recordings are the most to compare at once; remove one first")
-        columns = read_columns(path, max_bytes=PAGE_BYTES)
         side = side_file_of(path, self.folder)
         refused = self._take_actuator(side) if side is not None else None
-        reading = how_to_read(path, self.actuator, side=side or SideFile(), columns=columns)
-        table = Opened(name, path, columns, reading.proposed(columns))
-        self._opened(table if reading.is_guess else measured(table, self.actuator, side))
+        self._opened(read_opened(name, path, self.actuator, side or SideFile()))
         if refused is not None:
             raise refused  # told once the recording is there all the same
 
@@ -128,10 +128,30 @@ class Comparing:
         opened = self.opened.get(name)
         if opened is None:
             return
-        beside = self.folder.beside(opened.path)
-        side = replace(side_file_of(opened.path, self.folder) or SideFile(), mapping=mapping, path=str(beside))
+        side = self._side_of(opened, mapping=mapping)
         self._opened(measured(replace(opened, mapping=mapping), self.actuator, side))
-        write_side_file(side, beside)  # last, so that nothing wrong is remembered
+        write_side_file(side, self.folder.beside(opened.path))  # last, so that nothing wrong is remembered
+
+    def _lay_out(self, name: str, hints: Hints) -> None:
+        opened = self.opened.get(name)
+        if opened is None or hints == opened.hints:
+            return
+        try:
+            # Another header makes other columns, of which the mapping says nothing.
+            side = self._side_of(opened, text=hints, mapping=None)
+            found = read_opened(name, opened.path, self.actuator, side)
+            if found.problem:
+                raise refusal(name, found.problem)
+        except InputError:
+            notify(self.events.refused)
+            raise
+        self._opened(found)
+        write_side_file(side, self.folder.beside(opened.path))
+
+    def _side_of(self, opened: Opened, **said: Any) -> SideFile:
+        """The recording's side file with what somebody has said now, which is kept beside the recording itself."""
+        known = side_file_of(opened.path, self.folder) or SideFile()
+        return replace(known, **said, path=str(self.folder.beside(opened.path)))
 
     def _opened(self, opened: Opened) -> None:
         self.opened[opened.name] = opened
@@ -165,7 +185,7 @@ class Comparing:
         for opened in list(self.opened.values()):
             if opened.recorded is not None:
                 self.opened[opened.name] = replace(opened, measurement=prepared(opened.recorded, chosen))
-            elif not how_to_read(opened.path, chosen, side=SideFile(), columns=opened.columns).is_guess:
+            elif opened.columns and not guesses(opened, chosen):
                 self.add(opened.name)  # this actuator's file knows their columns
 
     def _use(self, actuator: Actuator) -> None:
@@ -210,9 +230,11 @@ class Comparing:
 
         Raises InputError when something is missing.
         """
-        waiting = [o.name for o in self.opened.values() if o.measurement is None]
-        if waiting:
-            raise InputError(f"{quoted(waiting[0])}: its columns are not mapped yet; check them and press Use")
+        for waiting in (o for o in self.opened.values() if o.measurement is None):
+            todo = "columns are not mapped yet; check them and press Use"
+            if waiting.problem:
+                todo = "table was not found; say under Columns… where it begins, or remove the file"
+            raise InputError(f"{quoted(waiting.name)}: its {todo}")
         measurements = [o.measurement for o in self.opened.values() if o.measurement is not None]
         if not measurements:
             raise InputError("no recording is chosen; upload one, or choose one of the data folder")

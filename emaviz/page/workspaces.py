@@ -17,7 +17,7 @@ import viser
 
 from emaviz.page.docked import WINDOWS_PX, Docked
 from emaviz.page.style import unseen
-from emaviz.server.viser_private import Inside
+from emaviz.server.viser_private import Inside, id_of
 from emaviz.session.worker import Worker
 from emaviz.text.html import add_html
 
@@ -112,12 +112,11 @@ class Workspaces:
         for px in WINDOWS_PX:
             widths[px] = button = gui.add_button(f"window:{px}")
             button.on_click(lambda event, px=px: event.client and self._docked.fit(event.client.client_id, px))
-        add_html(gui, unseen([button._impl.uuid for button in (*buttons.values(), *widths.values())]))
+        add_html(gui, unseen([id_of(button) for button in (*buttons.values(), *widths.values())]))
         views = [
-            {"name": name, "title": one.title, "button": buttons[name]._impl.uuid}
-            for name, one in self._members.items()
+            {"name": name, "title": one.title, "button": id_of(buttons[name])} for name, one in self._members.items()
         ]
-        fits = [{"px": px, "button": button._impl.uuid} for px, button in widths.items()]
+        fits = [{"px": px, "button": id_of(button)} for px, button in widths.items()]
         script = _SCRIPT.replace("VIEWS", json.dumps(views)).replace("WIDTHS", json.dumps(fits))
         self._inside.run(script.replace("FIRST", json.dumps(self.first)))
 

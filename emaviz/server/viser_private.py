@@ -11,6 +11,11 @@ from viser import _gui_api, _gui_handles, _icons, _messages
 from websockets.datastructures import Headers
 
 
+def id_of(control: Any) -> str:
+    """The id of what shows a control in the page."""
+    return control._impl.uuid
+
+
 def keep_icons() -> None:
     """Icons are read once: viser opens its archive of 5,000, most of a tenth of a second, for each of ours again."""
     _gui_api.svg_from_icon = _gui_handles.svg_from_icon = _icon  # type: ignore[assignment]

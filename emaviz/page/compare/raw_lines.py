@@ -7,6 +7,7 @@ from typing import Any
 
 from ema_model.errors import quoted
 from emaviz.page.page import Page
+from emaviz.server.viser_private import id_of
 from emaviz.session.compare.comparing import Comparing
 from emaviz.session.opened import Opened
 from emaviz.text.html import Html, add_html, html, unescaped
@@ -51,7 +52,7 @@ class RawLines:
             button.visible = number <= len(lines)
             if button.visible:
                 button.label = f"{number:3}  {_cut(lines[number - 1])}"
-                rules.append(_styled(button._impl.uuid, marks.get(number, _RESTING)))
+                rules.append(_styled(id_of(button), marks.get(number, _RESTING)))
         self._style.content = unescaped(f"<style>{''.join(rules)}</style>")
         self._style.visible = self._about.visible = bool(lines)
         self._about.content = html(

@@ -19,6 +19,7 @@ from emaviz.page.discover.own_effect import OwnEffect
 from emaviz.page.discover.result import DiscoveryPanel
 from emaviz.page.discover.source import SourceControls
 from emaviz.page.page import Page
+from emaviz.server.viser_private import id_of
 from emaviz.session.discover.discovering import Discovering
 from emaviz.session.pace import Pace
 from emaviz.session.uploads import Uploads
@@ -208,7 +209,7 @@ class DiscoverPanel:
         return button
 
     def _click(self, button: Any) -> None:
-        one = next((one for uuid, one in self._shown() if uuid == button._impl.uuid), None)
+        one = next((one for uuid, one in self._shown() if uuid == id_of(button)), None)
         if one is not None:
             self._open(None if one.name == self._opened else one.name)
 
@@ -232,7 +233,7 @@ class DiscoverPanel:
     def _shown(self) -> list[tuple[str, Candidate | None]]:
         found: list[tuple[str, Candidate | None]] = []
         for _, slots, ones in self._groups():
-            found += [(slot._impl.uuid, one) for slot, one in zip(slots, ones)]
+            found += [(id_of(slot), one) for slot, one in zip(slots, ones)]
         return found
 
     def _draw_cards(self, look: Look | None) -> None:

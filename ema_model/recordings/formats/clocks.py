@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 GAP = 10.0  # median steps without a sample, from which on nothing is put between its ends
-_SELDOM = 0.1  # of its samples, at which a state changes at most
+_STATES, _SELDOM = 16, 0.1  # values of a state at most, or the share of its samples at which it changes
 _CYCLIC, _ALIKE = 0.9, 0.2  # the share of steps that are so near the median where a logger samples by the clock
 
 
@@ -33,10 +33,11 @@ def main_clock(clocks: Mapping[str, int]) -> str:
 
 
 def is_state(values: NDArray) -> bool:
-    """Whether a channel without a unit holds between its samples: whole numbers that seldom change, no counts."""
+    """Whether a channel without a unit holds between samples: few whole numbers, or seldom changing ones."""
     values = np.asarray(values, np.float64)
     is_whole = bool(np.all(values == np.round(values)))
-    return is_whole and int(np.count_nonzero(np.diff(values))) <= _SELDOM * values.size
+    changes = int(np.count_nonzero(np.diff(values)))
+    return is_whole and (changes <= _SELDOM * values.size or np.unique(values).size <= _STATES)
 
 
 def rule(holds: bool) -> str:

@@ -14,6 +14,7 @@ from ema_model.discovery import discover
 from ema_model.errors import InputError
 from ema_model.identification.objective import Objective
 from ema_model.models.sampling import on_even_grid
+from ema_model.models.stretches import fit_stretches
 from ema_model.recordings import Measurement
 from ema_model.simulation.run import Run, simulate_monitor, simulate_reference
 
@@ -78,3 +79,15 @@ def test_runs_of_one_sample_each_are_told():
 def test_a_run_is_as_long_as_can_be_held(simulate):
     with pytest.raises(InputError, match=r"600 s at 16000 Hz are 6\.7e\+07 steps of the model"):
         simulate(Run(duration_s=600.0, sample_rate_Hz=16_000.0), THESIS)
+
+
+def test_no_part_of_a_long_recording_reaches_over_a_gap():
+    samples = 20_000
+    recording = sampled_every(1e-3, samples)
+    scatter = 1e-4 * np.random.default_rng(0).uniform(-1.0, 1.0, samples)
+    time = recording.time_s + scatter + np.where(np.arange(samples) < 7_000, 0.0, 5.0)
+    recording = recording.with_signals(time_s=time)
+    parts, runs = fit_stretches([recording], THESIS), on_even_grid(recording).runs
+    assert parts is not None and parts[0] is not None and len(parts[0]) > 1 and len(runs) == 2
+    for part in parts[0]:
+        assert any(run.start <= part.start and part.stop <= run.stop for run in runs)

@@ -1,11 +1,11 @@
 """How much later a speed comes than the position that it is the derivative of, and how sure that is.
 
 Over a window the position changes as the speed's integral does, moved by the delay d: Δp(t) = a·ΔV(t + d) + b·Δt, with
-the speed's scale and offset in a and b.  Gauss-Newton steps in d, with the position's own curvature as instrument:
-noise of the speed is in no instrument, and noise of the position in none that it could move d by, so that neither
-makes d smaller or its interval narrower than it is (instrumental variables).  The interval is Student's over blocks of
-time, which need be neither white nor alike inside (a cluster-robust covariance; Cameron and Miller, J. Human Resources
-50 (2015)); a block counts by its share of the motion.
+the speed's scale and offset in a and b.  Gauss-Newton steps in d have the position's own curvature for an instrument:
+the speed's noise is not in it, and the position's lies evenly about the window's ends, so that neither moves d nor
+makes its interval narrower than it is.  The interval is Student's over blocks of time, which need be neither white nor
+alike inside (a cluster-robust covariance; Cameron and Miller, J. Human Resources 50 (2015)); a block counts by its share
+of the motion.
 """
 
 from __future__ import annotations
@@ -53,7 +53,8 @@ def speed_lag(position: Array, speed: Array, time: Array, stretches: list[slice]
         return None
     samples = sum(one.time.size for one in parts)
     windows = [2**i for i in range(1, 16) if 6 * 2**i <= samples // _BLOCKS]
-    found = [one for window in windows if (one := _lag(parts, window, start)) is not None]
+    with np.errstate(all="ignore"):  # what does not move tells nothing, and is left out
+        found = [one for window in windows if (one := _lag(parts, window, start)) is not None]
     # The narrowest of several intervals is narrower than it should be, by its luck.
     return sorted(found, key=lambda one: one.high_s - one.low_s)[:2][-1] if found else None
 

@@ -4,8 +4,8 @@ Over a window the position changes as the speed's integral does, moved by the de
 the speed's scale and offset in a and b.  Gauss-Newton steps in d have the position's own curvature for an instrument:
 the speed's noise is not in it, and the position's lies evenly about the window's ends, so that neither moves d nor
 makes its interval narrower than it is.  The interval is Student's over blocks of time, which need be neither white nor
-alike inside (a cluster-robust covariance; Cameron and Miller, J. Human Resources 50 (2015)); a block counts by its share
-of the motion.
+alike inside (a cluster-robust covariance; Cameron and Miller, J. Human Resources 50 (2015)); a block counts by its
+share of the motion.
 """
 
 from __future__ import annotations

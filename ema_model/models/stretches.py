@@ -8,6 +8,7 @@ import numpy as np
 
 from ema_model.actuator import Actuator
 from ema_model.models.loop_window import BLOCK_S
+from ema_model.models.sampling import on_even_grid
 from ema_model.recordings import Measurement
 
 _FIT_STEPS = 300_000  # of the model over all recordings, for a calibration: 3 s at 1e-5 s
@@ -33,6 +34,7 @@ def _stretches(
 ) -> list[list[slice] | None] | None:
     if any(measurement.is_map for measurement in measurements):
         return None
+    measurements = [on_even_grid(measurement) for measurement in measurements]  # whose samples the slices count
     if actuator.controller.kind == "unknown":  # a sample costs as much as some steps of a simulation
         steps = [_STEPS_A_SAMPLE * measurement.samples for measurement in measurements]
         blocks = 0.0

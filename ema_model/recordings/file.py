@@ -22,7 +22,9 @@ from ema_model.files.user_file import check_user_file
 from ema_model.recordings.checks import check_finite, check_length, check_names, check_values, choose_columns
 from ema_model.recordings.columns.mapping import ColumnMapping, apply_mapping, parse_mapping
 from ema_model.recordings.columns.reading import Reading
+from ema_model.recordings.delays import without_delays
 from ema_model.recordings.formats import Format, format_of
+from ema_model.recordings.formats.clocks import Clocks
 from ema_model.recordings.formats.text_layout import Head, Hints
 from ema_model.recordings.measurement import Measurement
 from ema_model.recordings.side_file.read import SideFile, find_side_file, read_side_file
@@ -75,7 +77,10 @@ def read_measurement(
     told = (*([columns.layout] if columns.layout else []), *columns.notes, *notes, *done)
     bare = _measurement(path, signals, told, foreign, side)
     name = " ".join(filter(None, (bare.name, columns.title)))
-    measurement = replace(bare, name=name, reading=Reading(layout=columns.layout))
+    clocks = columns.clocks and _of_signals(columns.clocks, used)
+    measurement = replace(bare, name=name, reading=Reading(clocks=clocks, layout=columns.layout))
+    measurement = without_delays(measurement, used)
+    check_length(path, measurement.samples)
     if side.window_s is not None or side.segments is not None:
         try:
             measurement = measurement.selected(side.window_s, side.segments)
@@ -168,6 +173,13 @@ def _merged(
             missing = f"no column {shown(entry.column)!r} for {entry.signal}{asker}"
             raise refusal(path, f"{missing}; correct the mapping (present: {listed(header)})")
     return merged
+
+
+def _of_signals(clocks: Clocks, mapping: ColumnMapping) -> Clocks:
+    mapped = {entry.column for entry in mapping.entries}
+    of = {name: clock for name, clock in clocks.of.items() if name not in mapped}
+    of |= {entry.signal: clocks.of[entry.column] for entry in mapping.entries if entry.column in clocks.of}
+    return replace(clocks, of=of)
 
 
 def check_file(path: str, max_bytes: int) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import pairwise
 from typing import TypeVar, overload
 
@@ -15,12 +16,14 @@ from ema_model.files.refusal import listed, shown
 from ema_model.quantities.axes import Axes
 from ema_model.quantities.signals import SIGNALS
 from ema_model.recordings.columns.reading import Reading
+from ema_model.recordings.formats.clocks import GAP
 from ema_model.recordings.side_file.read import SideFile
 
 Array = NDArray[np.float64]
 Default = TypeVar("Default")
 
 _MOST_SAMPLES = 100_000_000
+_SELDOM = 0.01  # of all steps, up to which long ones are gaps
 _JITTER = 1e-3  # of the period, from which on the samples count as off the grid
 
 
@@ -77,10 +80,24 @@ class Measurement:
         return self.time_s.size
 
     @property
-    def runs(self) -> list[slice]:
-        """The samples of each run: all of them, or those between changes of the `segment` signal."""
+    def segments(self) -> list[slice]:
+        """The samples of each run by its number: all of them, or those between changes of the `segment` signal."""
         changes = np.flatnonzero(np.diff(self.signals["segment"])) + 1 if "segment" in self else np.zeros(0, int)
-        edges = [0, *changes.tolist(), self.samples]
+        return self._cut(changes)
+
+    @cached_property
+    def runs(self) -> list[slice]:
+        """The samples of each run: those of a segment, cut at its gaps, in which nobody knows what happened."""
+        steps = np.diff(self.time_s)
+        starts = np.array([one.start for one in self.segments[1:]], int)
+        within = np.delete(steps, starts - 1)
+        gaps = np.flatnonzero(steps > GAP * np.median(within)) + 1 if within.size else starts
+        if self.is_map or gaps.size > _SELDOM * steps.size:  # samples that come when they like have no gaps
+            gaps = starts
+        return self._cut(np.union1d(starts, gaps))
+
+    def _cut(self, starts: NDArray[np.intp]) -> list[slice]:
+        edges = [0, *starts.tolist(), self.samples]
         return [slice(start, stop) for start, stop in pairwise(edges) if start < stop]
 
     @property

@@ -80,7 +80,10 @@ def recorded(
         needs = needed(actuator, is_map=side.kind == "map")
     _ask(path, actuator, reading, read_header(path, max_bytes, hints), needs)
     measurement = read_measurement(path, reading.mapping, side=side, max_bytes=max_bytes, hints=hints)
-    return replace(measurement, reading=replace(reading, layout=measurement.reading.layout))
+    return replace(
+        measurement,
+        reading=replace(reading, clocks=measurement.reading.clocks, layout=measurement.reading.layout),
+    )
 
 
 def how_to_read(

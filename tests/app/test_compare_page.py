@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import time
 
 import numpy as np
 import pytest
 from support.on_page import choose, field, wait_until
+from support.two_clocks import write_two_clocks
 
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
@@ -139,6 +141,20 @@ def test_from_a_file_to_the_region_where_the_model_fails(compare, app, rig_file)
     for tab, title in (("Against", "against"), ("Turn", "orders"), ("Why", "explains"), ("Fit", "Calibrated")):
         page.get_by_role("tab", name=tab, exact=True).click()
         wait_until(lambda title=title: any(title in drawn for drawn, _ in figures(page)))
+
+
+def test_data_health_tells_a_clock_that_is_late(compare, app, recording, tmp_path):
+    page, path = compare, tmp_path / "two clocks.csv"
+    write_two_clocks(path, recording, 0.005)
+    upload(page, path)
+    page.get_by_text("Data health").wait_for()
+    page.get_by_text("The motor speed comes").wait_for()
+    line = page.get_by_text("The motor speed comes").inner_text()
+    assert "a delay between their clocks" in line and "[delay_s=0.005" in line
+    low, high = (float(text) for text in re.search(r"90 % interval (\S+) to (\S+) ms", line).groups())
+    assert 4.5 < low <= 5.0 <= high < 5.5
+    page.get_by_text("others are in order").click()
+    page.get_by_text("The file has 2 clocks: brought onto one, linearly between their samples: motor speed.").wait_for()
 
 
 @pytest.mark.long

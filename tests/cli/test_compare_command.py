@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from support.two_clocks import write_two_clocks
 
 from ema_model.actuator import load_actuator
 from ema_model.recordings.file import read_measurement
@@ -61,6 +62,21 @@ def test_foreign_columns_are_mapped(rig, tmp_path):
     result = json.loads(out.read_text())
     assert set(result["signals"]) == {"current_A", "motor_position_rad"}
     assert result["explained_by"][0]["variable"] == "motor_angle"
+
+
+def test_a_late_clock_is_told_and_taken_out(rig, tmp_path):
+    """The delay stands in the card's numbers with its interval, and the option that the card names takes it out."""
+    path, out = tmp_path / "two.csv", tmp_path / "r.json"
+    write_two_clocks(path, read_measurement(rig[0]), 0.005)
+    found = []
+    for more in ([], ["--map", "motor_speed_rad_s=motor_speed_rad_s[delay_s=0.005]"]):
+        assert main(["compare", str(path), "--no-calibrate", "--to", "0.5", *more, "--json", str(out)]) == 0
+        findings = json.loads(out.read_text())["recordings"][0]["health"]["findings"]
+        found.append(next(one for one in findings if one["check"] == "speed_delay"))
+    late, moved = found
+    assert late["values"]["delay_low_s"] <= 0.005 <= late["values"]["delay_high_s"] and late["severity"] == "warning"
+    assert "delay_s=0.005" in late["sentence"] and "90 % interval" in late["sentence"]
+    assert moved["values"]["delay_low_s"] <= 0.0 <= moved["values"]["delay_high_s"] and moved["severity"] == "good"
 
 
 def test_options_reach_the_comparison(rig, tmp_path):

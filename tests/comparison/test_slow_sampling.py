@@ -13,6 +13,8 @@ from ema_model.comparison import compare
 from ema_model.discovery import discover
 from ema_model.errors import InputError
 from ema_model.identification.objective import Objective
+from ema_model.models.sampling import on_even_grid
+from ema_model.models.stretches import fit_stretches
 from ema_model.recordings import Measurement
 from ema_model.simulation.run import Run, simulate_monitor, simulate_reference
 
@@ -53,8 +55,18 @@ def test_an_identification_takes_recordings_whole_and_no_more_than_can_be_held()
 def test_a_gap_is_not_filled_with_samples():
     recording = sampled_every(1e-4)
     late = np.where(np.arange(500) < 250, recording.time_s, recording.time_s + 1e6)
+    cut = on_even_grid(recording.with_signals(time_s=late))
+    assert cut.samples == 500 and cut.runs == [slice(0, 250), slice(250, 500)]
+    assert cut.duration_s == pytest.approx(0.0498)
+    compared = compare([cut], THESIS, calibrate=False).recordings[0]
+    assert np.all((compared.time_s < 0.025) | (compared.time_s > 1e6))
+
+
+def test_many_gaps_are_told():
+    recording = sampled_every(1e-4)
+    late = recording.time_s + 100.0 * (np.arange(500) // 20)
     for actuator in (THESIS, SERVO, LOOSE):
-        with pytest.raises(InputError, match=r"500 samples, 0\.0001 s apart at the median, last for 1e\+06 s"):
+        with pytest.raises(InputError, match=r"500 samples, 0\.0001 s apart at the median, last for 2400\.05 s"):
             compare([recording.with_signals(time_s=late)], actuator)
 
 
@@ -67,3 +79,16 @@ def test_runs_of_one_sample_each_are_told():
 def test_a_run_is_as_long_as_can_be_held(simulate):
     with pytest.raises(InputError, match=r"600 s at 16000 Hz are 6\.7e\+07 steps of the model"):
         simulate(Run(duration_s=600.0, sample_rate_Hz=16_000.0), THESIS)
+
+
+def test_no_part_of_a_long_recording_reaches_over_a_gap():
+    samples = 20_000
+    recording = sampled_every(1e-3, samples)
+    steps = np.where(np.arange(samples) % 5, 1e-3, 1.5e-3)  # so that the even grid has more samples
+    steps[7_300] = 5.0
+    time = np.cumsum(steps)
+    recording = recording.with_signals(time_s=time)
+    parts, runs = fit_stretches([recording], THESIS), on_even_grid(recording).runs
+    assert parts is not None and parts[0] is not None and len(parts[0]) > 1 and len(runs) == 2
+    for part in parts[0]:
+        assert any(run.start <= part.start and part.stop <= run.stop for run in runs)

@@ -20,15 +20,17 @@ Array = NDArray[np.float64]
 
 _LATE_START_S = 1e5  # clocks of a computer start later than any recording lasts
 _MOST = 1e30  # so that no product overflows
+_WITHOUT_DELAY = ("time_s", "segment")  # which say when all others are
 _FORM = "write signal=column[unit], e.g. motor_speed_rad_s=speed[rpm]"
-_OPTION = re.compile(r"(sign|scale|offset)\s*=\s*(\S+)")
+_OPTION = re.compile(r"(sign|scale|offset|delay_s)\s*=\s*(\S+)")
 
 
 @dataclass(frozen=True)
 class MappedColumn:
     """One column as one signal: signal = sign·scale·(column in SI) + offset; the offset in the signal's SI unit.
 
-    Raises InputError for an unknown signal or unit, a sign other than ±1 and numbers that are too large.
+    The column comes delay_s later than its time says; reading moves it back.  Raises InputError for an unknown signal
+    or unit, a sign other than ±1 and numbers that are too large.
     """
 
     signal: str
@@ -37,6 +39,7 @@ class MappedColumn:
     sign: int = 1
     scale: float = 1.0
     offset: float = 0.0
+    delay_s: float = 0.0
     confidence: float = 1.0  # of a guess, 0 to 1
     reason: str = ""  # of a guess, in plain words
     rivals: tuple[str, ...] = ()  # columns that a guess finds as likely
@@ -50,6 +53,10 @@ class MappedColumn:
             raise InputError(f"mapping of {self.signal}: the sign must be 1 or -1, not {shown(self.sign)}")
         if not 0.0 < abs(self.scale) <= _MOST or not abs(self.offset) <= _MOST:
             raise InputError(f"mapping of {self.signal}: scale and offset must be numbers up to 1e30, the scale not 0")
+        if not abs(self.delay_s) <= _MOST or (self.delay_s and self.signal in _WITHOUT_DELAY):
+            raise InputError(
+                f"mapping of {self.signal}: delay_s must be a number of seconds, and 0 for time_s and segment"
+            )
         _unit(self.signal, self.unit)
 
     @property
@@ -59,7 +66,7 @@ class MappedColumn:
 
     @property
     def text(self) -> str:
-        """As on the command line: `signal=column[unit, sign=-1, scale=2.0, offset=0.1]`."""
+        """As on the command line: `signal=column[unit, sign=-1, scale=2.0, offset=0.1, delay_s=0.005]`."""
         options = [
             *([self.unit] if self.unit else []),
             # Said where the column's name would say otherwise.
@@ -67,6 +74,7 @@ class MappedColumn:
             *([f"sign={self.sign}"] if self.sign != 1 else []),
             *([f"scale={self.scale!r}"] if self.scale != 1.0 else []),
             *([f"offset={self.offset!r}"] if self.offset != 0.0 else []),
+            *([f"delay_s={self.delay_s!r}"] if self.delay_s != 0.0 else []),
         ]
         return f"{self.signal}={self.column}" + (
             f"[{', '.join(options)}]" if options or self.column.endswith("]") else ""
@@ -146,7 +154,9 @@ def _parsed(text: str, columns: Collection[str]) -> MappedColumn:
         if name in given:
             raise InputError(f"mapping {shown(text)!r}: {name} stands twice; {_FORM}")
         given[name] = value
-    numbers = {name: _number(text, name, given[name]) for name in ("sign", "scale", "offset") if name in given}
+    numbers = {
+        name: _number(text, name, given[name]) for name in ("sign", "scale", "offset", "delay_s") if name in given
+    }
     if numbers.get("sign", 1.0) not in (1.0, -1.0):
         raise InputError(f"mapping {shown(text)!r}: the sign must be 1 or -1, not {shown(given['sign'])}")
     return MappedColumn(
@@ -156,6 +166,7 @@ def _parsed(text: str, columns: Collection[str]) -> MappedColumn:
         int(numbers.get("sign", 1.0)),
         numbers.get("scale", 1.0),
         numbers.get("offset", 0.0),
+        numbers.get("delay_s", 0.0),
     )
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from ema_model.files.refusal import shown
 from ema_model.quantities.signals import SIGNALS
 from ema_model.recordings.columns.mapping import ColumnMapping, MappedColumn, unit_in_name
+from ema_model.recordings.formats.clocks import Clocks
 
 
 @dataclass(frozen=True)
@@ -18,6 +19,7 @@ class Reading:
     guessed: tuple[MappedColumn, ...] = ()  # those of the mapping that nobody has said
     doubts: tuple[tuple[MappedColumn, str], ...] = ()  # guesses that are not used, and why
     made: tuple[str, ...] = ()  # signals made from others
+    clocks: Clocks | None = None  # of the signals, by their names in files, where they had several
     layout: str = ""  # what was found out of how the file is laid out: "header in line 4, units in line 5"
 
     @property

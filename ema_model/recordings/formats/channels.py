@@ -30,7 +30,7 @@ class Channel:
     values: Callable[[], NDArray[Any]]
     unit: str = ""
     clock: str = ""  # of the log's clocks; "" where the format knows of none
-    holds: bool = False  # between its samples the last value holds: a state, whole numbers without a unit
+    holds: bool = False  # whole numbers without a unit: a state, which holds between its samples, or counts
 
 
 @dataclass(frozen=True)

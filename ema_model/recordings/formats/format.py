@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ema_model.files.limits import megabytes
 from ema_model.files.refusal import refusal
+from ema_model.recordings.formats.clocks import Clocks
 from ema_model.recordings.formats.text_layout import Head, Hints
 
 Array = NDArray[np.float64]
@@ -23,6 +24,7 @@ class Columns:
     place: Callable[[int], str]  # the sample's index → where it stands: "line 2", "row 1"
     notes: tuple[str, ...] = ()
     title: str = ""  # what the file calls the run, beside its own name
+    clocks: Clocks | None = None  # of the columns, where they have several
     layout: str = ""  # what was found out by itself of how the file is laid out, for a person to look at
 
 

@@ -7,6 +7,7 @@ import tempfile
 import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 
 from ema_model.errors import InputError
 from ema_model.files.limits import megabytes
@@ -34,7 +35,7 @@ def hinted(hints: Hints) -> Format:
                 again = _inner(path, packed, hints).read(inner, list(found.arrays), max_bytes, False)
                 return again.place(row)
 
-        return Columns(found.arrays, place, found.notes, found.title, found.layout)
+        return replace(found, place=place)
 
     def head(path: str, max_bytes: int) -> Head | None:
         with _unpacked(path, max_bytes) as (inner, packed):

@@ -18,7 +18,7 @@ from ema_model.files import apart
 from ema_model.files.refusal import listed, refusal, shown
 from ema_model.recordings.formats.arrays import check_lengths
 from ema_model.recordings.formats.channels import Channel, Log, NoLog, named, told
-from ema_model.recordings.formats.clocks import between, covered, main_clock, usable
+from ema_model.recordings.formats.clocks import Clocks, between, covered, is_state, main_clock, rule, usable
 from ema_model.recordings.formats.format import Array, Columns, Format, check_size
 
 _PATIENCE_S = 20.0  # for one question; some libraries never end
@@ -45,11 +45,12 @@ def log_format(module: str, title: str, *suffixes: str, needs: str = "", doubtfu
         return names
 
     def read(path: str, names: Sequence[str], max_bytes: int, strict: bool) -> Columns:
-        (found, notes, title), arrays = ask("columns_of", path, max_bytes, list(names), strict)
+        (found, notes, title, clocks), arrays = ask("columns_of", path, max_bytes, list(names), strict)
         columns = dict(zip(found, arrays))
         if strict:
             check_lengths(path, columns)
-        return Columns(columns, lambda row: f"sample {row + 1}", tuple(notes), title)
+        clocks = Clocks(*clocks) if clocks else None
+        return Columns(columns, lambda row: f"sample {row + 1}", tuple(notes), title, clocks)
 
     return Format(suffixes[0], title, header, read, others=suffixes[1:], doubtful=doubtful)
 
@@ -65,8 +66,8 @@ def names_of(module: str, path: str, max_bytes: int) -> tuple[list[str], list[Ar
 
 def columns_of(
     module: str, path: str, max_bytes: int, names: Sequence[str], strict: bool
-) -> tuple[tuple[list[str], list[str], str], list[Array]]:
-    """Names and notes, and the columns; asked in the process of its own."""
+) -> tuple[tuple[list[str], list[str], str, tuple[dict[str, str], str, str] | None], list[Array]]:
+    """Names, notes, title and what `Clocks` takes, and the columns; asked in the process of its own."""
     log = _opened(module, path, max_bytes)
     columns = _columns(path, log)
     if any(name not in columns for name in names):
@@ -78,10 +79,10 @@ def columns_of(
     if log.left_aside:
         notes.append(f"left aside, as they are no columns of numbers: {listed(log.left_aside)}")
     with _told(module, path):
-        arrays, done = _on_one_clock(path, {name: columns[name] for name in names}, log, strict)
+        arrays, done, clocks = _on_one_clock(path, {name: columns[name] for name in names}, log, strict)
     if strict:
         _close()
-    return (list(arrays), notes + done, log.title), list(arrays.values())
+    return (list(arrays), notes + done, log.title, clocks), list(arrays.values())
 
 
 def _opened(module: str, path: str, max_bytes: int) -> Log:
@@ -136,13 +137,13 @@ def _samples(column: Channel | str, log: Log) -> int:
 
 def _on_one_clock(
     path: str, columns: dict[str, Channel | str], log: Log, strict: bool
-) -> tuple[dict[str, Array], list[str]]:
+) -> tuple[dict[str, Array], list[str], tuple[dict[str, str], str, str] | None]:
     """The columns with one length, by the rule of `clocks`: the clock with the most samples is that of all."""
     samples = {one.clock: one.samples for one in columns.values() if isinstance(one, Channel) and one.clock}
     if not samples:  # of the clock alone
         samples = {one.clock: one.samples for one in log.channels if one.clock}
     if not samples:
-        return {name: _numbers(one.values()) for name, one in columns.items() if isinstance(one, Channel)}, []
+        return {name: _numbers(one.values()) for name, one in columns.items() if isinstance(one, Channel)}, [], None
     main = main_clock(samples)
     clocks = {name: _numbers(log.clocks[name]()) for name in samples}
     start = min((float(time[0]) for time in clocks.values() if time.size), default=0.0)
@@ -150,32 +151,32 @@ def _on_one_clock(
     keep = usable(time)
     repeated = int(keep.size - np.count_nonzero(keep))
     arrays: dict[str, Array] = {}
-    moved = [one for one in columns.values() if isinstance(one, Channel) and one.clock and _differs(clocks, one, main)]
+    timed = {name: one for name, one in columns.items() if isinstance(one, Channel) and one.clock}
+    moved = [name for name, one in timed.items() if _differs(clocks, one, main)]
+    numbers = {name: _numbers(one.values()) for name, one in columns.items() if isinstance(one, Channel)}
+    states = {name for name in moved if timed[name].holds and is_state(numbers[name])}
     within = keep.copy()
-    for one in moved if strict else ():
-        within &= covered(time, clocks[one.clock], one.holds)
+    for name in moved if strict else ():
+        within &= covered(time, clocks[timed[name].clock], name in states)
     if strict and not within.any():
         raise refusal(path, "its channels have no time in common; choose others, or record them together")
     for name, one in columns.items():
         if isinstance(one, str):
             arrays[name] = (time - start)[within]
-        elif not one.clock:
-            arrays[name] = _numbers(one.values())
-        elif one in moved:
-            arrays[name] = between(time, clocks[one.clock], _numbers(one.values()), one.holds)[within]
+        elif name in moved:
+            arrays[name] = between(time, clocks[one.clock], numbers[name], name in states)[within]
         else:
-            arrays[name] = _numbers(one.values())[within]
+            arrays[name] = numbers[name][within] if one.clock else numbers[name]
     notes = []
     if repeated:
         notes.append(f"{repeated} samples are left out, whose time is not after the one before")
-    if moved:
-        held = any(one.holds for one in moved)
-        rule = "linearly between their samples" + (", states held" if held else "")
-        names = listed(name for name, one in columns.items() if one in moved)
-        notes.append(f"brought onto the clock of {shown(_whose(main))}, {rule}: {names}")
-        if (lost := int(np.count_nonzero(keep & ~within))) > 0:
-            notes.append(f"{lost} samples are left out, where one of these was not recorded")
-    return arrays, notes
+    if not moved:
+        return arrays, notes, None
+    done = rule(bool(states))
+    notes.append(f"brought onto the clock of {shown(_whose(main))}, {done}: {listed(moved)}")
+    if (lost := int(np.count_nonzero(keep & ~within))) > 0:
+        notes.append(f"{lost} samples are left out, where one of these was not recorded")
+    return arrays, notes, ({name: one.clock if name in moved else main for name, one in timed.items()}, main, done)
 
 
 def _whose(clock: str) -> str:

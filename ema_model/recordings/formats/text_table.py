@@ -19,18 +19,16 @@ import pyarrow.csv as csv
 
 from ema_model.errors import InputError, quoted
 from ema_model.files.limits import LINE_BYTES, megabytes
-from ema_model.files.refusal import listed, refusal, shown
+from ema_model.files.refusal import refusal, shown
 from ema_model.quantities.signals import SIGNALS
 from ema_model.quantities.units import find_unit
-from ema_model.recordings.columns.words import QUANTITIES, readings
 from ema_model.recordings.formats.channels import with_unit
-from ema_model.recordings.formats.clocks import between, covered, main_clock
 from ema_model.recordings.formats.format import Array, Columns, check_size
 from ema_model.recordings.formats.stamps import is_stamp, seconds
+from ema_model.recordings.formats.text_clocks import is_time, on_one_clock, own_clocks, since_one_moment
 from ema_model.recordings.formats.text_layout import SEPARATORS, Layout, is_number, lines_of, split
 
 pc: Any = pyarrow.compute  # its functions are made when it is imported
-_TIME = QUANTITIES["time"]
 _MOST_TEXT = 0.25  # of a file's limit, up to which cells are understood one by one
 _MOST_AT_THE_END = 200  # lines of text below the numbers
 _NUMBER = r"^\s*[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\s*$|^\s*[+-]?(?i:nan|inf|infinity)\s*$"
@@ -67,11 +65,11 @@ def table_of(path: str, layout: Layout, hint: str | None = None) -> TextTable:
         is_said = bool(own) and (found := find_unit(unit, own)) is not None and found.is_si
         name = cell if is_said else with_unit(cell, unit) if cell else ""
         if cell and i in stamps:
-            name = with_unit(cell if _is_time(cell) else f"{cell} time", "s")
-        elif cell and i == 0 and find_unit(unit, "s") and not _is_time(cell):
+            name = with_unit(cell if is_time(cell) else f"{cell} time", "s")
+        elif cell and i == 0 and find_unit(unit, "s") and not is_time(cell):
             name = with_unit(f"{cell} time", unit)
         names.append(name)
-    clocks = _own_clocks(names)
+    clocks = own_clocks(names)
     times = set(clocks.values())
     kept = [i for i in range(len(names)) if i not in times or i == min(times)]
     if not clocks:
@@ -79,24 +77,6 @@ def table_of(path: str, layout: Layout, hint: str | None = None) -> TextTable:
     return TextTable(
         path, layout, [names[i] for i in kept], {names[i]: i for i in kept}, stamps, clocks, layout.data_line - 1
     )
-
-
-def _is_time(name: str) -> bool:
-    return any(not _TIME.isdisjoint(one.words) for one in readings(name))
-
-
-def _own_clocks(names: Sequence[str]) -> dict[int, int]:
-    """Where columns of time stand before as many others each: those others' own times."""
-    times = [i for i, name in enumerate(names) if _is_time(name)]
-    if len(times) < 2 or times[0] != 0:
-        return {}
-    ends = [*times[1:], max(i for i, name in enumerate(names) if name) + 1]
-    if len({end - start for start, end in zip(times, ends)}) != 1 or ends[0] < 2:
-        return {}
-    units = {one.unit for i in times for one in readings(names[i])[:1]}
-    if len(units) != 1:
-        return {}
-    return {i: start for start, end in zip(times, ends) for i in range(start, end)}
 
 
 def read_table(table: TextTable, names: Sequence[str], max_bytes: int, strict: bool) -> Columns:
@@ -115,13 +95,17 @@ def read_table(table: TextTable, names: Sequence[str], max_bytes: int, strict: b
             names = [name for name in names if table.places[name] != i]
     check_size(table.path, sum(values.size for values in found.values() if values is not None), max_bytes)
     arrays = {name: values for name in names if (values := found[table.places[name]]) is not None}
+    clocks = None
     if table.clocks:
-        arrays, done = _on_one_clock(table, arrays, found, strict)
+        arrays, done, clocks = on_one_clock(
+            table.path, table.layout.cells, table.clocks, table.places, arrays, found, strict
+        )
         notes += done
     return Columns(
         arrays,
         lambda row: place_of(table, row if kept is None or row >= kept.size else int(kept[row])),
         tuple(notes),
+        clocks=clocks,
         layout=table.layout.told,
     )
 
@@ -205,6 +189,8 @@ def _understood(
     )
     rows = rows[: parsed.num_rows]
     values = {i: _column(table, i, text) for i, text in texts.items()}
+    stamps = table.stamps.intersection(table.clocks.values(), places)
+    since_one_moment(stamps, texts, {i: (numbers, wrong) for i, (numbers, wrong, _) in values.items()})
     bad = np.all([one[1] for one in values.values()], axis=0) if values else np.zeros(rows.size, bool)
     blank = np.all([one[2] for one in values.values()], axis=0) if values else np.zeros(rows.size, bool)
     good = np.flatnonzero(~bad)
@@ -284,44 +270,6 @@ def _refuse_cell(table: TextTable, i: int, row: int, cell: str | None) -> None:
     if not (cell or "").strip():
         raise refusal(table.path, f"{where}: blank; a number is expected, fill it or remove the line")
     raise refusal(table.path, f"{where}: a number is expected, found {shown(cell)!r}; correct it or remove the line")
-
-
-def _on_one_clock(
-    table: TextTable, arrays: dict[str, Array], found: dict[int, Array | None], strict: bool
-) -> tuple[dict[str, Array], list[str]]:
-    """The columns on the time with the most samples; see `clocks`."""
-    times = {i: time for i in sorted(set(table.clocks.values())) if (time := found.get(i)) is not None}
-    if not times:
-        return arrays, []
-    main = int(main_clock({f"{i}": time.size for i, time in times.items()}))
-    time, moved = times[main], []
-    within = np.ones(time.size, bool)
-    for name in arrays:
-        own = times.get(table.clocks.get(table.places[name], -1))
-        if own is not None and not np.array_equal(own, time):
-            moved.append(name)
-            if strict and table.places[name] not in times:
-                within &= covered(time, own, False)
-    if strict and not within.any():
-        raise refusal(table.path, "its columns have no time in common; choose others, or record them together")
-    result = {}
-    for name, values in arrays.items():
-        place = table.places[name]
-        if place in times:
-            result[name] = time[within]
-        elif name in moved:
-            own = times[table.clocks[place]]
-            length = min(own.size, values.size)
-            result[name] = between(time, own[:length], values[:length], False)[within]
-        else:
-            result[name] = values[within] if values.size == time.size else values
-    moved = [name for name in moved if table.places[name] not in times]
-    if not moved:
-        return result, []
-    notes = [f"each with a time of its own, brought onto one linearly between their samples: {listed(moved)}"]
-    if lost := int(np.count_nonzero(~within)):
-        notes.append(f"{lost} samples are left out, where one of these was not recorded")
-    return result, notes
 
 
 def place_of(table: TextTable, row: int) -> str:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ema_model.recordings.health import checks
+from ema_model.recordings.health.clocks import clocks
 from ema_model.recordings.health.finding import Finding, Severity
 from ema_model.recordings.measurement import Measurement
 
@@ -68,6 +69,7 @@ def _findings(measurement: Measurement, limit: float | None, pole_pairs: float |
     if measurement.is_map:
         return
     yield from checks.delay(measurement)
+    yield from clocks(measurement)
     yield from checks.signs(measurement)
     yield from checks.phases(measurement, pole_pairs)
     yield from checks.standstill(measurement)

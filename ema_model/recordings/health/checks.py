@@ -30,7 +30,7 @@ _UNIT_FACTORS = {
 
 def sampling(measurement: Measurement) -> Iterator[Finding]:
     """Rate, jitter, gaps and duration."""
-    steps = np.concatenate([np.diff(measurement.time_s[run]) for run in measurement.runs])
+    steps = np.concatenate([np.diff(measurement.time_s[run]) for run in measurement.segments])
     if not steps.size:
         return
     period, runs = float(np.median(steps)), len(measurement.runs)

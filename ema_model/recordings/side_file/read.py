@@ -28,7 +28,7 @@ Sampling = Literal["mean", "instantaneous"]
 OF_A_FOLDER = "recordings.toml"
 _KEYS = ("schema", "actuator", "kind", "sampling", "segments", "window", "text", "mapping", "sensors")
 _LARGEST = 2**53  # up to which whole numbers are exact as floats
-_NUMBERS = ("sign", "scale", "offset")
+_NUMBERS = ("sign", "scale", "offset", "delay_s")
 _COLUMN_KEYS = ("column", "unit", *_NUMBERS)
 
 

@@ -12,9 +12,29 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from ema_model.face import InputError, compare, discover, identify, load_actuator, read, simulate
+    from ema_model.face import (
+        InputError,
+        compare,
+        discover,
+        health,
+        identify,
+        load_actuator,
+        read,
+        save_actuator,
+        simulate,
+    )
 
-__all__ = ["InputError", "compare", "discover", "identify", "load_actuator", "read", "simulate"]
+__all__ = [
+    "InputError",
+    "compare",
+    "discover",
+    "health",
+    "identify",
+    "load_actuator",
+    "read",
+    "save_actuator",
+    "simulate",
+]
 
 
 def __getattr__(name: str) -> Any:

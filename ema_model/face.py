@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from ema_model import comparison, discovery, recordings
-from ema_model.actuator import Actuator, load_actuator
+from ema_model.actuator import Actuator, load_actuator, save_actuator
 from ema_model.commands import command as command_of
 from ema_model.comparison import Comparison
 from ema_model.discovery import Discovery
@@ -22,6 +23,7 @@ from ema_model.identification.objective import Objective
 from ema_model.identification.run import ROBUST, Identification
 from ema_model.identification.run import identify as identified
 from ema_model.recordings import Measurement
+from ema_model.recordings.health.card import Health, health_of
 from ema_model.simulation import plant
 from ema_model.simulation.run import Run
 from ema_model.simulation.sensors import Sensors
@@ -29,12 +31,28 @@ from ema_model.simulation.sensors import Sensors
 One = str | os.PathLike[str] | Measurement
 Recordings = One | Sequence[One]
 
-__all__ = ["InputError", "compare", "discover", "identify", "load_actuator", "read", "simulate"]
+__all__ = [
+    "InputError",
+    "compare",
+    "discover",
+    "health",
+    "identify",
+    "load_actuator",
+    "read",
+    "save_actuator",
+    "simulate",
+]
 
 
 def read(path: str | os.PathLike[str], actuator: Actuator | None = None, mapping: Sequence[str] = ()) -> Measurement:
     """A recording in SI, as the model needs it; mapping: texts such as "time_s=t[ms]" for columns of other names."""
     return recordings.read(path, actuator or load_actuator(), mapping)
+
+
+def health(of: One, actuator: Actuator | None = None) -> Health:
+    """What a recording's own numbers say of its sampling, its sensors, its signs and the drive's limits."""
+    actuator = actuator or load_actuator()
+    return health_of(_read(of, actuator)[0], actuator)
 
 
 def simulate(
@@ -54,12 +72,12 @@ def simulate(
     """One run of the Reference Model, or of the Monitor Model where an actuator has none, as sensors record it.
 
     settings: of the command; faults: k1 … k8 by name, in [0, 1]; effects: settings by effect; noise_A: rms;
-    encoder_bits: per motor turn, 0 is a perfect one.
+    encoder_bits: per motor turn, 0 is a perfect one.  It bears the command's name.
     """
     run = Run(command_of(command, settings or {}), duration_s, sample_rate_Hz, load_torque_Nm)
     hidden = {name: find(name).settings(dict(given)) for name, given in (effects or {}).items()}
     clean = plant.simulate(run, actuator or load_actuator(), vector(dict(faults or {})), hidden)
-    return Sensors(noise_A, encoder_bits).record(clean, seed)
+    return replace(Sensors(noise_A, encoder_bits).record(clean, seed), name=command)
 
 
 def compare(

@@ -109,7 +109,7 @@ def _of_the_library(name: str, severity: int, phase_drawn: bool) -> Callable[[in
     if phase_drawn:
         return lambda seed: {name: draws.effect_of(name, severity, seed)}
     effect = CATALOGUE[name]
-    return lambda seed: {name: effect.settings({effect.parameters[0].name: effect.severities[severity]})}
+    return lambda seed: {name: effect.at_severity(severity)}
 
 
 def _load(entry: Any, actuator: Actuator) -> list[Choice]:

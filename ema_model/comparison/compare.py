@@ -23,7 +23,7 @@ from ema_model.faults import named
 from ema_model.models import Model, model_for
 from ema_model.models.stretches import evaluation_stretches, fit_stretches
 from ema_model.recordings import Measurement
-from ema_model.recordings.health.card import health
+from ema_model.recordings.health.card import health_of
 from ema_model.recordings.prepared import prepared
 from ema_model.recordings.read import check_same_actuator
 from ema_model.recordings.side_file.read import stated
@@ -60,10 +60,7 @@ def compare(
     tell("checking the data")
     recordings = [prepared(measurement, actuator) for measurement in measurements]
     unseen = [prepared(measurement, actuator) for measurement in holdout]
-    cards = [
-        health(m, current_limit_A=_finite(actuator.controller.current_limit_A), pole_pairs=actuator.motor.pole_pairs)
-        for m in recordings
-    ]
+    cards = [health_of(measurement, actuator) for measurement in recordings]
     faults = actuator.faults if k is None else named(k)
     actuator = replace(actuator, effects=_with_settings(actuator, effects), faults=faults)
     wanted = weights_of(signals, actuator)
@@ -115,10 +112,6 @@ def compare(
         warnings=judgement.warnings,
         holdout=held,
     )
-
-
-def _finite(value: float) -> float | None:
-    return value if np.isfinite(value) else None
 
 
 def _with_settings(

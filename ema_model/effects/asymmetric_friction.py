@@ -27,6 +27,7 @@ EFFECT = Effect(
     severities=(0.06, 0.12, 0.25),
     places=(moving_friction,),
     shows="as an offset of the current in motion, in either direction alike",
+    against="motor_speed",
     mistaken_for="current sensor bias",
     family="mechanics",
 )

@@ -30,6 +30,7 @@ EFFECT = Effect(
     severities=(3.0, 6.0, 10.0),
     places=(bus_voltage,),
     shows="in the top speed, and in the current near the voltage limit",
+    against="motor_speed",
     mistaken_for="winding resistance",
     family="electrics",
 )

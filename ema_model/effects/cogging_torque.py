@@ -42,6 +42,7 @@ EFFECT = Effect(
     severities=(0.006, 0.012, 0.024),
     places=(shaft_torque,),
     shows="periodic in the motor angle, at any current",
+    against="motor_angle",
     mistaken_for="eccentricity, torque ripple",
     family="electrics",
 )

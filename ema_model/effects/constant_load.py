@@ -34,6 +34,7 @@ EFFECT = Effect(
     severities=(3.0, 6.0, 12.0),
     places=(shaft_torque,),
     shows="as a constant offset of the current",
+    against="motor_speed",
     mistaken_for="current sensor bias",
     family="mechanics",
     duplicates="sensors.current_bias_A",

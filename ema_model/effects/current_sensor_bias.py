@@ -35,6 +35,7 @@ EFFECT = Effect(
     severities=(0.1, 0.2, 0.4),
     places=(current_reading, current_reference),
     shows="as a constant load: in the recorded current where a loop integrates, else in the position as well",
+    against="current",
     mistaken_for="constant load, asymmetric friction",
     family="sensor",
 )

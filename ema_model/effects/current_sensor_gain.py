@@ -26,6 +26,7 @@ EFFECT = Effect(
     severities=(0.03, 0.06, 0.12),
     places=(current_reading,),
     shows="in the recorded current, in proportion to it, not in the motion",
+    against="current",
     mistaken_for="demagnetisation",
     family="sensor",
 )

@@ -27,6 +27,7 @@ EFFECT = Effect(
     severities=(5e-5, 1e-4, 2e-4),
     places=(position_error,),
     shows="in the position at rest and at each turn of a slow motion",
+    against="motor_speed",
     mistaken_for="backlash, dry friction, position sensor bias, presliding friction",
     family="drive",
 )

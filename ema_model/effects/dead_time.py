@@ -31,6 +31,7 @@ EFFECT = Effect(
     severities=(0.5, 1.0, 2.0),
     places=(back_emf,),
     shows="in the current and the speed in saturating steps",
+    against="current",
     mistaken_for="winding resistance, bus voltage sag",
     family="electrics",
 )

@@ -31,6 +31,7 @@ EFFECT = Effect(
     severities=(0.04, 0.08, 0.15),
     places=(electric_torque, back_emf),
     shows="in the current, in proportion to the current; top speed",
+    against="current",
     mistaken_for="current sensor gain, short circuit of all phases alike",
     family="electrics",
     duplicates="motor.torque_constant_Nm_A",

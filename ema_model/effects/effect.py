@@ -12,6 +12,7 @@ from ema_model.quantities.axes import ROTARY, Axes
 from ema_model.quantities.si import linear_unit
 from ema_model.quantities.sides import MOTOR, NEITHER, USER, Side
 from ema_model.quantities.titles import labelled, parameter_title, unit_of
+from ema_model.quantities.variables import VARIABLES
 
 __all__ = ["ADVANCE", "MOTOR", "NEITHER", "PLACES", "USER", "Effect", "Parameter"]  # what effects' files need
 
@@ -139,12 +140,15 @@ class Effect:
     advance_states: Callable[..., Any] | None = None  # (*ema_model.stacks.ADVANCE, parameters, states) → new states
     duplicates: str = ""  # path of the base parameter that does the same, e.g. "motor.inertia_kgm2"
     is_load: bool = False  # pulls at the user from outside, so that its torque counts as the load
+    against: str = "time"  # of `quantities.variables`: what its residual follows; time where it follows nothing else
     nothing: float = 0.0  # the first parameter, the others at their defaults, with which kernels go on as without it
     name: str = ""  # of the file; the catalogue fills it in
 
     def __post_init__(self) -> None:
         if self.family not in FAMILIES:
             raise ValueError(f"effect {self.title}: family must be one of {', '.join(FAMILIES)}")
+        if self.against not in VARIABLES:
+            raise ValueError(f"effect {self.title}: against must be one of {', '.join(VARIABLES)}")
 
     @property
     def acts_in_drive(self) -> bool:
@@ -160,6 +164,10 @@ class Effect:
     def neutral(self) -> dict[str, float]:
         """Settings with which it does nothing, all parameters in order; they may lie outside what a user may set."""
         return {p.name: p.default for p in self.parameters} | {self.parameters[0].name: self.nothing}
+
+    def at_severity(self, severity: int) -> dict[str, float]:
+        """All settings when it is slight (0), clear (1) or strong (2)."""
+        return self.settings({self.parameters[0].name: self.severities[severity]})
 
     def on(self, axes: Axes) -> Effect:
         """The effect as these axes show it: its parameters' names, units and ranges, and how strong it usually is."""

@@ -26,6 +26,7 @@ EFFECT = Effect(
     severities=(0.1, 0.2, 0.4),
     places=(moving_friction,),
     shows="in the current under a load from outside, with the direction of motion",
+    against="motor_speed",
     mistaken_for="load-dependent friction, dry friction",
     family="mechanics",
 )

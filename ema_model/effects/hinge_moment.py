@@ -30,6 +30,7 @@ EFFECT = Effect(
     severities=(500.0, 1000.0, 2000.0),
     places=(shaft_torque,),
     shows="in the current, in proportion to the user position",
+    against="user_position",
     mistaken_for="position gain, inertia in a sine",
     family="mechanics",
     is_load=True,

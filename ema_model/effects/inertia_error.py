@@ -25,6 +25,7 @@ EFFECT = Effect(
     severities=(0.15, 0.2, 0.3),
     places=(inverse_inertia,),
     shows="in the current, in proportion to acceleration",
+    against="acceleration",
     mistaken_for="position gain, torque constant, torsional compliance",
     family="mechanics",
     duplicates="motor.inertia_kgm2",

@@ -25,6 +25,7 @@ EFFECT = Effect(
     severities=(0.08, 0.15, 0.25),
     places=(moving_friction,),
     shows="in the current under load, with the direction of motion",
+    against="current",
     mistaken_for="dry friction, viscous friction",
     family="mechanics",
 )

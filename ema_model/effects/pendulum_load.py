@@ -31,6 +31,7 @@ EFFECT = Effect(
     severities=(500.0, 1000.0, 2000.0),
     places=(shaft_torque,),
     shows="against the user position, in motion and at rest",
+    against="user_position",
     mistaken_for="hinge moment, constant load",
     family="mechanics",
     is_load=True,

@@ -31,6 +31,7 @@ EFFECT = Effect(
     severities=(3e-4, 6e-4, 1.2e-3),
     places=(position_reading,),
     shows="in the user position against the motor angle, as a lag, and in the current as frequency rises",
+    against="motor_speed",
     mistaken_for="inertia error, position gain",
     family="sensor",
     states=("late_rad",),

@@ -60,6 +60,7 @@ EFFECT = Effect(
     severities=(20.0, 8.0, 3.0),
     places=(friction,),
     shows="as hysteresis of the current just after reversals and at rest",
+    against="motor_speed",
     mistaken_for="backlash",
     family="mechanics",
     states=("bend_rad",),

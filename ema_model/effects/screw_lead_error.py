@@ -42,6 +42,7 @@ EFFECT = Effect(
     severities=(5e-6, 1e-5, 2e-5),
     places=(user_position,),
     shows="in the user position against the motor angle, periodic",
+    against="motor_angle",
     mistaken_for="an error of the position sensor, cogging torque",
     family="mechanics",
 )

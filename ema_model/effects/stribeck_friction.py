@@ -31,6 +31,7 @@ EFFECT = Effect(
     severities=(3.0, 10.0, 25.0),
     places=(moving_friction,),
     shows="in the current just after reversals and at low speed",
+    against="motor_speed",
     mistaken_for="backlash, dry friction",
     family="mechanics",
 )

@@ -43,6 +43,7 @@ EFFECT = Effect(
     severities=(0.03, 0.06, 0.12),
     places=(electric_torque,),
     shows="in the current, periodic in the motor angle and in proportion to the current",
+    against="motor_angle",
     mistaken_for="short circuit, eccentricity, cogging torque",
     family="electrics",
 )

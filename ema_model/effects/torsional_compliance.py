@@ -60,6 +60,7 @@ EFFECT = Effect(
     severities=(64000.0, 28400.0, 7100.0),  # the mode at 90, 60, 30 Hz
     places=(user_position, shaft_torque),
     shows="in the user position, as a lag near the mode, and in the current",
+    against="acceleration",
     mistaken_for="backlash, inertia error",
     family="mechanics",
     states=("deflection_rad", "speed_rad_s", "twist_Nm"),

@@ -35,6 +35,7 @@ EFFECT = Effect(
     severities=(3e-5, 7e-5, 1.5e-4),
     places=(shaft_torque,),
     shows="in the current, in proportion to speed",
+    against="motor_speed",
     mistaken_for="load-dependent friction",
     family="mechanics",
     duplicates="motor.viscous_friction_Nms_rad",

@@ -25,6 +25,7 @@ EFFECT = Effect(
     severities=(0.2, 0.3, 0.5),
     places=(winding_resistance,),
     shows="in the current and the speed near the voltage limit",
+    against="motor_speed",
     mistaken_for="bus voltage sag, dead time",
     family="electrics",
     duplicates="motor.resistance_Ohm",

@@ -18,6 +18,7 @@ from ema_model.quantities.signals import SIGNALS
 from ema_model.recordings.columns.reading import Reading
 from ema_model.recordings.formats.clocks import GAP
 from ema_model.recordings.side_file.read import SideFile
+from ema_model.text import InWords
 
 Array = NDArray[np.float64]
 Default = TypeVar("Default")
@@ -27,8 +28,8 @@ _SELDOM = 0.01  # of all steps, up to which long ones are gaps
 _JITTER = 1e-3  # of the period, from which on the samples count as off the grid
 
 
-@dataclass(frozen=True, eq=False)
-class Measurement:
+@dataclass(frozen=True, eq=False, repr=False)
+class Measurement(InWords):
     """Signals of one run on a common time base, in SI units under canonical names (`ema_model.recordings.SIGNALS`).
 
     `signals` are float64 arrays of one length that cannot be written to; they include `time_s`.  Time

@@ -1,16 +1,31 @@
-"""A run with an effect beside the same run without: what the effect does, and which signal shows it most."""
+"""A run with an effect beside the same run without: what the effect does, and which signal and run show it most."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ema_model.actuator import Actuator
+from ema_model.commands import command
+from ema_model.effects import Effect, find
+from ema_model.errors import InputError
 from ema_model.recordings import Measurement
+from ema_model.simulation.run import Run, simulate_monitor
+
+Array = NDArray[np.float64]
 
 SHOWN = ("current_A", "user_position_rad", "motor_speed_rad_s")
+RUNS: dict[str, Run] = {
+    "sine of 3 Hz": Run(command("sine", {"amplitude_rad": 0.03, "frequency_Hz": 3.0}), 0.5),
+    "sine of 3 Hz, loaded": Run(command("sine", {"amplitude_rad": 0.03, "frequency_Hz": 3.0}), 0.5, 10_000.0, 200.0),
+    "step": Run(command("step", {"final_rad": 0.005}), 0.2),
+    "chirp": Run(command("chirp"), 0.5),
+}
+_SATURATED = "step"  # where the drive stands at its limits, so that a small effect shifts the whole transient
 _LEAST = 1e-3  # of a signal's range, rms
 
 
@@ -24,11 +39,23 @@ class WithEffect:
     with_it: Measurement
     without: Measurement
 
-    def change(self, name: str) -> tuple[float, NDArray[np.float64]]:
+    def change(self, name: str) -> tuple[float, Array]:
         """What changes in a signal, (samples,), and its rms as a share of the signal's range; 0 for next to nothing."""
         change = self.with_it[name] - self.without[name]
         share = float(np.sqrt(np.mean(change**2))) / (float(np.ptp(self.without[name])) or 1.0)
         return (share if share > _LEAST else 0.0), change
+
+    def against(self, variable: str) -> Array:
+        """A variable of `ema_model.quantities.variables` in the run with the effect, (samples,), in its unit.
+
+        KeyError for one that no run has: a temperature.
+        """
+        run = self.with_it
+        if variable == "acceleration":
+            return np.gradient(run["motor_speed_rad_s"], run.time_s)
+        if variable == "load":
+            return run.get("load_torque_Nm", np.zeros(run.samples))
+        return run[_SIGNALS[variable]]
 
     @property
     def shows(self) -> str:
@@ -39,3 +66,57 @@ class WithEffect:
     def visibility(self) -> float:
         """How much of that signal's range changes, rms."""
         return self.change(self.shows)[0]
+
+
+_SIGNALS = {
+    "motor_angle": "motor_position_rad",
+    "user_position": "user_position_rad",
+    "motor_speed": "motor_speed_rad_s",
+    "current": "current_A",
+    "time": "time_s",
+}
+
+
+class EffectRuns:
+    """An actuator's effects in `RUNS`; the runs without them are simulated once."""
+
+    def __init__(self, actuator: Actuator) -> None:
+        self.actuator = actuator
+        self._without: dict[str, Measurement] = {}
+
+    def felt(self, name: str, settings: Mapping[str, float], run: str) -> WithEffect:
+        """With and without, by the Monitor Model; InputError where the actuator does not stand the effect."""
+        try:
+            if run not in self._without:
+                self._without[run] = simulate_monitor(RUNS[run], self.actuator)
+            with_it = simulate_monitor(RUNS[run], self.actuator, effects={name: dict(settings)})
+        except FloatingPointError as error:
+            raise InputError(f"{find(name).title}: {error}; make it weaker") from None
+        return WithEffect(name, run, dict(settings), with_it, self._without[run])
+
+    def clearest(self, effect: Effect) -> WithEffect | None:
+        """An effect at its clear severity in the run that shows it most; None where the actuator stands none.
+
+        What follows a variable is looked for in the saturated run last.
+        """
+        found: list[WithEffect] = []
+        for run in RUNS:
+            with suppress(InputError):
+                found.append(self.felt(effect.name, effect.at_severity(1), run))
+
+        def rank(felt: WithEffect) -> tuple[bool, float]:
+            fits = effect.against == "time" or felt.run != _SATURATED
+            return fits and felt.visibility > 0.0, felt.visibility
+
+        return max(found, key=rank, default=None)
+
+    def severities(self, effect: Effect) -> list[WithEffect]:
+        """An effect when slight, clear and strong, in the run of `clearest`; none where the actuator stands none.
+
+        Raises InputError where it does not stand the effect when that is strong.
+        """
+        clear = self.clearest(effect)
+        if clear is None:
+            return []
+        slight, strong = (self.felt(effect.name, effect.at_severity(i), clear.run) for i in (0, 2))
+        return [slight, clear, strong]

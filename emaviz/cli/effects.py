@@ -11,6 +11,7 @@ from ema_model.effects import CATALOGUE, Effect, Parameter, find
 from ema_model.effects.effect import FAMILIES
 from ema_model.effects.user.entries import KEYS, TITLES
 from ema_model.quantities.axes import Axes
+from ema_model.quantities.variables import VARIABLES
 from emaviz.cli import files
 from emaviz.cli.options import add_json
 from emaviz.cli.output import configuration, write_json
@@ -77,6 +78,7 @@ def explain(effect: Effect) -> str:
         "",
         f"Belongs to    {FAMILIES[effect.family]}",
         f"Shows         {effect.shows}",
+        *([f"Follows       the {VARIABLES[effect.against].noun}"] if effect.against != "time" else []),
         f"Mistaken for  {effect.mistaken_for}",
         *([f"Duplicates    {effect.duplicates}, which a calibration moves"] if effect.duplicates else []),
         f"Severities    {effect.parameters[0].name} = {severities}",
@@ -104,6 +106,7 @@ def _facts(effect: Effect) -> dict[str, Any]:
         "parameters": [asdict(p) for p in effect.parameters],
         "severities": effect.severities,
         "shows": effect.shows,
+        "against": effect.against,
         "mistaken_for": effect.mistaken_for,
         "family": effect.family,
         "duplicates": effect.duplicates,

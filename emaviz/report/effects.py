@@ -5,19 +5,28 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from ema_model.actuator import load_actuator
 from ema_model.effects import CATALOGUE, Effect
 from ema_model.effects.effect import FAMILIES
 from ema_model.effects.user.entries import KEYS, TITLES
 from ema_model.errors import InputError, quoted
 from ema_model.files.whole_file import whole_file
 from ema_model.quantities.axes import Axes
+from ema_model.quantities.variables import VARIABLES
+from ema_model.simulation.with_effect import EffectRuns
+from emaviz.figures.effect_residual import legend, pictures
 from emaviz.report.markup import escape, paragraph, table
 from emaviz.text.mathml import mathml
 
 _STYLE = (
-    "body{font:16px/1.5 system-ui,sans-serif;max-width:52rem;margin:2rem auto;padding:0 1rem;color-scheme:light dark}"
+    ":root{color-scheme:light dark}"
+    "body{font:16px/1.5 system-ui,sans-serif;max-width:52rem;margin:2rem auto;padding:0 1rem}"
     "table{border-collapse:collapse}td,th{padding:2px 14px 2px 0;text-align:left;vertical-align:top}"
     "math{font-size:1.25em;margin:1rem 0}h2{font-size:1.05em;margin-top:1.4em}"
+    ".pictures{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,24rem),1fr));"
+    "gap:1rem;margin:.5rem 0 1.2rem}"
+    ".pictures svg{max-width:30rem}"
+    ".legend{display:flex;flex-wrap:wrap;gap:0 1.2em;font-size:.9em}"
 )
 _LINEAR = Axes("linear", "linear")
 
@@ -27,8 +36,9 @@ def write_effects_reference(folder: str | Path) -> list[Path]:
     target = Path(folder)
     if target.exists() and not target.is_dir():
         raise InputError(f"--html {quoted(target)}: is a file; name a folder")
+    runs = EffectRuns(load_actuator())
     pages = {"index": _index()}
-    pages |= {name: _page(effect.title, _effect(effect)) for name, effect in CATALOGUE.items()}
+    pages |= {name: _page(effect.title, _effect(effect, runs)) for name, effect in CATALOGUE.items()}
     pages |= {name: _page(TITLES[name], _users(name)) for name in KEYS}
     written = []
     try:
@@ -70,7 +80,7 @@ def _links(members: Sequence[tuple[str, str, str]]) -> str:
     return f"<table>{''.join(rows)}</table>"
 
 
-def _effect(effect: Effect) -> str:
+def _effect(effect: Effect, runs: EffectRuns) -> str:
     rows = []
     for one in effect.parameters:
         there = one.on(_LINEAR).shown
@@ -79,14 +89,25 @@ def _effect(effect: Effect) -> str:
         )
     heads = ["Parameter", "means", "range", "default", "on a linear axis"]
     facts = [["Shows", effect.shows], ["Mistaken for", effect.mistaken_for], ["Source", effect.source]]
+    if effect.against != "time":
+        facts.insert(1, ["Follows", f"the {VARIABLES[effect.against].noun}"])
     if effect.duplicates:
         facts.append(["Duplicates", f"{effect.duplicates}, which a calibration moves"])
     usual = ", ".join(f"{value:g}" for value in effect.severities)
     facts.append(["Slight, clear, strong", f"{effect.parameters[0].name} = {usual}"])
     return (
-        f"{mathml(effect.equation)}{paragraph(effect.explanation)}"
+        f"{mathml(effect.equation)}{paragraph(effect.explanation)}{_picture(effect, runs)}"
         f"{table(heads, rows, text_columns=5)}{table(['', ''], facts, text_columns=2)}"
     )
+
+
+def _picture(effect: Effect, runs: EffectRuns) -> str:
+    """How it looks in the residual, in the run that shows it most; nothing where the actuator does not stand it."""
+    felt = runs.severities(effect)
+    if not felt:
+        return ""
+    told = f"In a {felt[0].run}, with the effect minus without:"
+    return f"<h2>How it looks in the residual</h2>{paragraph(told)}{legend(effect)}{pictures(effect, felt)}"
 
 
 def _users(name: str) -> str:

@@ -3,25 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from dataclasses import dataclass, field
 
-from ema_model.commands import command
 from ema_model.effects import CATALOGUE, find
 from ema_model.errors import InputError, quoted
 from ema_model.quantities.titles import in_sentence
-from ema_model.recordings import Measurement
-from ema_model.simulation.run import Run, simulate_monitor
-from ema_model.simulation.with_effect import WithEffect
+from ema_model.simulation.with_effect import RUNS, EffectRuns, WithEffect
 from emaviz.session.session import Session
 from emaviz.session.worker import Steps
-
-RUNS: dict[str, Run] = {
-    "sine of 3 Hz": Run(command("sine", {"amplitude_rad": 0.03, "frequency_Hz": 3.0}), 0.5),
-    "sine of 3 Hz, loaded": Run(command("sine", {"amplitude_rad": 0.03, "frequency_Hz": 3.0}), 0.5, 10_000.0, 200.0),
-    "step": Run(command("step", {"final_rad": 0.005}), 0.2),
-    "chirp": Run(command("chirp"), 0.5),
-}
 
 
 @dataclass
@@ -39,7 +28,7 @@ class Library:
     def __init__(self, session: Session) -> None:
         self.session = session
         self.events = LibraryEvents()
-        self._without: dict[str, Measurement] = {}
+        self._runs = EffectRuns(session.actuator)
 
     def feel(self, name: str, settings: Mapping[str, float], run: str) -> None:
         """Simulates soon; of several requests the last one counts.  InputError for a setting out of range."""
@@ -49,7 +38,7 @@ class Library:
 
         def job() -> None:
             self._say("Simulating; the first time, the library is compiled, which takes some seconds …")
-            found = self._felt(name, full, run)
+            found = self._runs.felt(name, full, run)
             self._say("")
             for listener in self.events.felt:
                 listener(found)
@@ -64,26 +53,12 @@ class Library:
         for i, name in enumerate(CATALOGUE):
             effect = find(name, self.session.actuator.axes)
             self._say(f"Running {in_sentence(effect.title)} … {i + 1} of {len(CATALOGUE)}")
-            settings = effect.settings({effect.parameters[0].name: effect.severities[1]})
-            found: list[WithEffect] = []
-            for run in RUNS:
-                with suppress(InputError):  # an effect that this actuator does not stand there
-                    found.append(self._felt(effect.name, settings, run))
-            if found:
-                best = max(found, key=lambda felt: felt.visibility)
+            best = self._runs.clearest(effect)
+            if best is not None:
                 for listener in self.events.drawn:
                     listener(best)
             yield
         self._say("")
-
-    def _felt(self, name: str, settings: Mapping[str, float], run: str) -> WithEffect:
-        try:
-            if run not in self._without:
-                self._without[run] = simulate_monitor(RUNS[run], self.session.actuator)
-            with_it = simulate_monitor(RUNS[run], self.session.actuator, effects={name: dict(settings)})
-        except FloatingPointError as error:
-            raise InputError(f"{find(name).title}: {error}; make it weaker") from None
-        return WithEffect(name, run, dict(settings), with_it, self._without[run])
 
     def _say(self, text: str) -> None:
         for listener in self.events.said:

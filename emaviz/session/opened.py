@@ -14,7 +14,7 @@ from ema_model.files.limits import PAGE_BYTES
 from ema_model.files.refusal import shown
 from ema_model.recordings import ColumnMapping, Measurement, hints_of, prepared, read_columns, read_head, read_side_file
 from ema_model.recordings.formats.text_layout import Head, Hints
-from ema_model.recordings.health.card import Health, health
+from ema_model.recordings.health.card import Health, health_of
 from ema_model.recordings.read import how_to_read, recorded
 from ema_model.recordings.side_file.read import SideFile, find_side_file
 from emaviz.session.data_folder import DataFolder
@@ -79,8 +79,4 @@ def measured(opened: Opened, actuator: Actuator, side: SideFile | None = None) -
     """The same with what was measured and its health; `side` is the recording's side file, where it has one."""
     found = recorded(opened.path, actuator, side=side or SideFile(), max_bytes=PAGE_BYTES)
     measurement = prepared(found, actuator)
-    limit: float | None = actuator.controller.current_limit_A
-    if not np.isfinite(limit):  # a drive whose limit is not known
-        limit = None
-    card = health(measurement, current_limit_A=limit, pole_pairs=actuator.motor.pole_pairs)
-    return replace(opened, recorded=found, measurement=measurement, health=card)
+    return replace(opened, recorded=found, measurement=measurement, health=health_of(measurement, actuator))

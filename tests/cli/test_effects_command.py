@@ -11,6 +11,7 @@ import pytest
 from ema_model.effects import CATALOGUE
 from ema_model.effects.user.entries import KEYS
 from emaviz.cli import main
+from emaviz.report import effects as reference
 from emaviz.text.mathml import mathml
 
 
@@ -26,17 +27,12 @@ def test_the_users_own_are_listed_and_explained(tmp_path, capsys):
         assert all(key in told and meaning in told for key, meaning in keys.items())
 
 
-def test_pages_are_whole_and_lead_to_each_other(tmp_path, capsys):
+def test_pages_are_written_where_they_can_be(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(reference, "CATALOGUE", {"hinge_moment": CATALOGUE["hinge_moment"]})  # all: tests/report
     folder = tmp_path / "pages"
     assert main(["effects", "--html", str(folder)]) == 0
-    names = [*CATALOGUE, *KEYS]
-    assert sorted(page.stem for page in folder.iterdir()) == sorted([*names, "index"])
-    index = (folder / "index.html").read_text(encoding="utf-8")
-    assert sorted(re.findall(r'href="(\w+)\.html"', index)) == sorted(names)
-    for name, effect in CATALOGUE.items():
-        text = (folder / f"{name}.html").read_text(encoding="utf-8")
-        assert "<math" in text and "<script" not in text
-        assert all(parameter.name in text for parameter in effect.parameters)
+    assert sorted(page.stem for page in folder.iterdir()) == sorted(["hinge_moment", "index", *KEYS])
+    assert f"{2 + len(KEYS)} pages; begin with index.html" in capsys.readouterr().out
     (tmp_path / "file").write_text("")
     assert main(["effects", "--html", str(tmp_path / "file")]) == 2
 

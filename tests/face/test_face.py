@@ -12,7 +12,6 @@ from pathlib import Path
 import pytest
 
 import ema_model as em
-from ema_model.discovery import Discovery
 from ema_model.recordings import write_measurement
 from ema_model.text import Document, Lines, Note, Table
 
@@ -50,6 +49,21 @@ def test_what_is_shown_in_a_notebook_is_escaped():
     assert "<script" not in Document(blocks).html and Document(blocks).html.count("&lt;script&gt;") == 3 + 6
 
 
+def test_a_recording_and_its_health_show_themselves(recording, tmp_path):
+    assert re.search(r"^chirp: 5001 samples over 0\.500 s$", str(recording), re.M)
+    assert re.search(r"^  motor_speed_rad_s +−?\d+ +\d+ +rad/s$", str(recording), re.M)
+    path = tmp_path / "log.csv"
+    names = ["t [ms]", "target position [deg]", "actual position [deg]", "<b>shaft"]
+    columns = zip(1e3 * recording["time_s"], *(recording[name] for name in ("command_rad", "user_position_rad") * 2))
+    path.write_text("\n".join([",".join(names), *(",".join(f"{one:.9g}" for one in row[:4]) for row in columns)]))
+    read = em.read(path)
+    assert "from target position [deg]" in str(read) and "left aside: <b>shaft" in str(read)
+    assert "&lt;b&gt;shaft" in read._repr_html_() and "<b>shaft" not in read._repr_html_()
+    told = str(em.health(path)).splitlines()
+    assert told[0] == "Data health log" and any(line.startswith("  ✓ No gaps") for line in told)
+    assert [line.strip()[0] for line in told[1:]] == sorted((line.strip()[0] for line in told[1:]), key="▲●✓".index)
+
+
 def test_a_table_is_aligned():
     table = Table(("fitted", "held out"), [["calibrated", "1.785", "2.345"], ["+ effect", "0.719", ""]], "ladder")
     assert table.text.splitlines() == [
@@ -74,18 +88,44 @@ def test_the_readmes_example_runs(recording, tmp_path, monkeypatch, capsys):
     assert "not healthy: k1" in capsys.readouterr().out
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_a_notebook_runs(path):
+def test_a_notebook_runs(path, tmp_path, monkeypatch):
     """Its cells in order; what ends a cell shows itself."""
-    cells = [cell for cell in json.loads(path.read_text(encoding="utf-8"))["cells"] if cell["cell_type"] == "code"]
+    monkeypatch.chdir(tmp_path)
+    notebook = json.loads(path.read_text(encoding="utf-8"))
     names: dict = {}
-    for cell in cells:
+    shown: list = []
+    for cell in (one for one in notebook["cells"] if one["cell_type"] == "code"):
+        assert not cell["outputs"] and cell["execution_count"] is None, "outputs are not kept"
         tree = ast.parse("".join(cell["source"]))
         *body, last = tree.body
         exec(compile(ast.Module(body, []), path.name, "exec"), names)
         assert isinstance(last, ast.Expr), "a cell ends with what it shows"
-        shown = eval(compile(ast.Expression(last.value), path.name, "eval"), names)
-        assert "<table" in shown._repr_html_()
-    if isinstance(names.get("found"), Discovery):
-        assert [one.name for one in names["found"].effects] == ["cogging_torque"]
-        assert shown.adequate
+        shown.append(eval(compile(ast.Expression(last.value), path.name, "eval"), names))
+        assert re.search("<table|<p>|plotly", shown[-1]._repr_html_())
+    SHOWS[path.stem](names, shown)
+
+
+def broken_and_found(names, shown):
+    assert [one.name for one in names["found"].effects] == ["cogging_torque"] and shown[-1].adequate
+
+
+def log_compared(names, shown):
+    read = shown[1].reading
+    assert len(read.guessed) == 4 and [column for column, _ in read.mapping.unmapped] == ["Kanal 5"]
+    assert "Kanal 5" in str(shown[1]) and "from Kanal 5" in str(shown[2])
+    assert max(abs(names["recording"]["current_A"] - names["run"]["current_A"])) < 1e-8  # in A again
+    assert "Data health bench" in str(shown[3]) and "●" in str(shown[3])
+    assert names["result"].explained_by[0].variable == "user_position" and not names["result"].adequate
+    without = shown[-1]
+    assert "current_A" not in without.signals and without.explained_by[0].variable != "user_position"
+
+
+def discovered(names, shown):
+    assert [one.name for one in names["found"].effects] == ["load_dependent_friction"]
+    before, after = (names[name].signals["current_A"] for name in ("before", "after"))
+    assert after.rmse < 0.2 * before.rmse and names["after"].adequate and not names["before"].adequate
+
+
+SHOWS = {"break_and_find": broken_and_found, "compare_a_log": log_compared, "discover": discovered}

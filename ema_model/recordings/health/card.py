@@ -8,18 +8,18 @@ from typing import Any
 
 import numpy as np
 
+from ema_model.actuator import Actuator
 from ema_model.recordings.health import checks
 from ema_model.recordings.health.clocks import clocks
-from ema_model.recordings.health.finding import Finding, Severity
+from ema_model.recordings.health.finding import MARKS, Finding, Severity
 from ema_model.recordings.measurement import Measurement
+from ema_model.text import InWords
 
-__all__ = ["Finding", "Health", "health"]
-
-_WORST_FIRST: tuple[Severity, ...] = ("warning", "note", "good")
+__all__ = ["Finding", "Health", "health", "health_of"]
 
 
-@dataclass(frozen=True)
-class Health:
+@dataclass(frozen=True, repr=False)
+class Health(InWords):
     """All findings, in the order of the checks."""
 
     name: str
@@ -29,7 +29,7 @@ class Health:
     def severity(self) -> Severity:
         """The worst of all findings."""
         found = {finding.severity for finding in self.findings}
-        for severity in _WORST_FIRST:
+        for severity in MARKS:
             if severity in found:
                 return severity
         return "good"
@@ -47,6 +47,14 @@ class Health:
             entry["values"] = {k: v if np.isfinite(v) else None for k, v in finding.values.items()}
             findings.append(entry)
         return {"name": self.name, "severity": self.severity, "findings": findings}
+
+
+def health_of(measurement: Measurement, actuator: Actuator) -> Health:
+    """The health card of a recording of this actuator."""
+    limit: float | None = actuator.controller.current_limit_A
+    if not np.isfinite(limit):  # a drive whose limit is not known
+        limit = None
+    return health(measurement, current_limit_A=limit, pole_pairs=actuator.motor.pole_pairs)
 
 
 def health(

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 Severity = Literal["good", "note", "warning"]
+MARKS: dict[Severity, str] = {"warning": "▲", "note": "●", "good": "✓"}  # before a sentence, the worst first
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import viser
 
 from ema_model.effects import CATALOGUE, Effect, find
 from ema_model.faults import HEALTHY
-from ema_model.simulation.with_effect import WithEffect
+from ema_model.simulation.with_effect import RUNS, WithEffect
 from emaviz.figures.effect_signature import EffectCharts, small_picture
 from emaviz.page.discover import cards
 from emaviz.page.discover.effect import about
@@ -17,7 +17,7 @@ from emaviz.page.page import Page
 from emaviz.page.playback import PlaybackStrip
 from emaviz.scene.motion import motion
 from emaviz.server.viser_private import id_of
-from emaviz.session.library import RUNS, Library
+from emaviz.session.library import Library
 from emaviz.text.html import add_html, html, unescaped
 
 _CARD = (

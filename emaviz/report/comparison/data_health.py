@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from ema_model.comparison.result import Comparison
 from ema_model.recordings.health.card import Health
+from ema_model.recordings.health.finding import MARKS
 from emaviz.report.markup import bullets, escape
 from emaviz.report.section import Figures, Section
-
-_MARKS = {"warning": "▲", "note": "●", "good": "✓"}
 
 
 class DataHealth(Section[Comparison]):
@@ -29,9 +28,9 @@ class DataHealth(Section[Comparison]):
 
 def findings(health: Health) -> str:
     """A line for each, with its mark."""
-    rank = list(_MARKS)
+    rank = list(MARKS)
     items = [
-        f'<li><span class="{finding.severity}" title="{finding.severity}">{_MARKS[finding.severity]}</span>'
+        f'<li><span class="{finding.severity}" title="{finding.severity}">{MARKS[finding.severity]}</span>'
         f"{escape(finding.sentence)}</li>"
         for finding in sorted(health.findings, key=lambda finding: rank.index(finding.severity))
     ]

@@ -9,18 +9,17 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from ema_model.actuator import Actuator, load_actuator
 from ema_model.comparison.explain import Explanation
-from ema_model.discovery.claims import against, still_against
+from ema_model.discovery.claims import against
 from ema_model.discovery.contradiction import contradictions
-from ema_model.discovery.criteria import HALF, LARGEST_GROUP, LEAST_BIC, SECOND, TIE
+from ema_model.discovery.criteria import HALF, LARGEST_GROUP, SECOND, TIE
+from ema_model.discovery.dropped import drop_doubtful, drop_idle
 from ema_model.discovery.evidence import evidence
 from ema_model.discovery.harmonics import Further, further_orders
 from ema_model.discovery.next_experiment import next_experiment
 from ema_model.discovery.path import Story, begun, refreshed, with_drops
-from ema_model.discovery.refit import Trial, fitted_count, pays
+from ema_model.discovery.refit import Trial, pays
 from ema_model.discovery.remaining import at_floor
 from ema_model.discovery.result import Candidate, Discovery, Experiment
 from ema_model.discovery.second_opinion import Opinion, compared, second_opinion, support_of, taken_over
@@ -143,8 +142,8 @@ class _Walk:
         while self._going:
             self.go()
         story, tell = self.story, self._tell
-        _drop_idle(story, tell)
-        _drop_doubtful(story, tell)
+        drop_idle(story, tell)
+        drop_doubtful(story, tell)
         unknown = story.left().explanation
         if unknown is not None and not _named(story):
             unknown = _with_curve(story, self._curve, unknown, tell)
@@ -231,29 +230,6 @@ def _further(story: Story, best: Trial, tell: Progress) -> Further | None:
     if not find(best.candidate.name).is_periodic:
         return None
     return further_orders(story.data, story.held, best, tell)
-
-
-def _drop_idle(story: Story, tell: Progress) -> None:
-    """Takes out effects that later ones have made idle."""
-    for one in story.added[:-1]:
-        tell(f"trying without {one.name}")
-        smaller = story.without(one.key, tell)
-        needed = fitted_count(one.key) * np.log(len(smaller.residual)) + LEAST_BIC
-        if evidence(story.data, smaller, story.current) < needed:
-            story.remove(one.key, smaller)
-
-
-def _drop_doubtful(story: Story, tell: Progress) -> None:
-    """Takes out effects that the last model bends away from what they were claimed as."""
-    while len({one.name for one in story.added}) > 1:
-        doubts = {one.key: still_against(story.data, story.base, story.current, one.key) for one in story.added}
-        key = next((key for key in reversed(doubts) if doubts[key]), None)
-        if key is None:
-            return
-        name = next(one.name for one in story.added if one.key == key)
-        tell(f"taking out {name}")
-        story.refused[name] = doubts[key]
-        story.remove(key)
 
 
 def _with_curve(story: Story, curve: Trial | None, unknown: Explanation, tell: Progress) -> Explanation:

@@ -198,6 +198,7 @@ def _strong(name):
 # --- in a browser -----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 @pytest.mark.browser
 def test_a_preset_moves_the_sliders_and_a_slider_leaves_the_preset(page, app):
     page.get_by_label("Preset", exact=True).click()

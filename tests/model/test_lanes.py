@@ -29,7 +29,7 @@ STACKS = [
     {},
     {"cogging_torque": {"amplitude_Nm": 0.02, "order": 7.0, "phase_rad": 0.4}},
 ]
-each_circuit = pytest.mark.parametrize("circuit", CIRCUITS)
+each_circuit = pytest.mark.parametrize("circuit", first_of(sorted(CIRCUITS)))
 each_stack = pytest.mark.parametrize("effects", first_of(STACKS), ids=["two effects", "none", "cogging"])
 
 

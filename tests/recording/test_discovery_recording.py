@@ -92,6 +92,7 @@ def test_it_opens_arranged(written):
         assert title in texts, title
 
 
+@pytest.mark.long
 def test_nothing_held_out_and_only_a_curve_added(tmp_path):
     found = with_unknown()
     write_discovery(found, tmp_path / "d.rrd")

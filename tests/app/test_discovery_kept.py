@@ -144,7 +144,7 @@ def test_recordings_of_compare_are_taken_again_with_what_was_asked(rigs, tmp_pat
         assert again == label
         # The fit goes on from where it had ended: a little deeper, which moves what was not fitted more.
         assert same == pytest.approx(rmse, rel=0.01) and same_held == pytest.approx(held, rel=0.03)
-    assert ladder(there)[2][0].startswith("−")
+    assert ladder(there)[2][0].kind == "removed"
     look = there.discovering.look
     assert look.reach == ("chirp-2",) and look.held == ("unseen",)
     assert "motor.inertia_kgm2" not in look.found.calibration.parameters

@@ -12,12 +12,13 @@ from dataclasses import replace
 from typing import Any
 
 from ema_model import comparison, discovery, recordings
-from ema_model.actuator import Actuator, load_actuator, save_actuator
+from ema_model.actuator import Actuator, load_actuator
+from ema_model.actuator import save_actuator as save_actuator
 from ema_model.commands import command as command_of
 from ema_model.comparison import Comparison
 from ema_model.discovery import Discovery
 from ema_model.effects import find
-from ema_model.errors import InputError
+from ema_model.errors import InputError as InputError
 from ema_model.faults import vector
 from ema_model.identification.objective import Objective
 from ema_model.identification.run import ROBUST, Identification
@@ -30,18 +31,6 @@ from ema_model.simulation.sensors import Sensors
 
 One = str | os.PathLike[str] | Measurement
 Recordings = One | Sequence[One]
-
-__all__ = [
-    "InputError",
-    "compare",
-    "discover",
-    "health",
-    "identify",
-    "load_actuator",
-    "read",
-    "save_actuator",
-    "simulate",
-]
 
 
 def read(path: str | os.PathLike[str], actuator: Actuator | None = None, mapping: Sequence[str] = ()) -> Measurement:

@@ -11,16 +11,15 @@ from dataclasses import dataclass, replace
 
 from ema_model.actuator import Actuator, load_actuator
 from ema_model.comparison.explain import Explanation
-from ema_model.discovery.claims import against
+from ema_model.discovery.claim import claimed
 from ema_model.discovery.contradiction import contradictions
-from ema_model.discovery.criteria import HALF, LARGEST_GROUP, SECOND, TIE
+from ema_model.discovery.criteria import HALF
 from ema_model.discovery.dropped import drop_doubtful, drop_idle
-from ema_model.discovery.evidence import evidence
-from ema_model.discovery.harmonics import Further, further_orders
 from ema_model.discovery.next_experiment import next_experiment
 from ema_model.discovery.path import Story, begun, refreshed, with_drops
 from ema_model.discovery.refit import Trial, pays
 from ema_model.discovery.remaining import at_floor
+from ema_model.discovery.repeated import repeated
 from ema_model.discovery.result import Candidate, Discovery, Experiment
 from ema_model.discovery.second_opinion import Opinion, compared, second_opinion, support_of, taken_over
 from ema_model.discovery.sentences import as_well, held_back, masked, mismatch, untold
@@ -162,7 +161,7 @@ class _Walk:
             return True
         self._first = self._first or with_drops(ranked, trials)
         accepted = [trial for trial in trials if pays(story.current, trial, story.data, story.held)]
-        claim = _claimed(story, accepted, tell) if accepted else None
+        claim = claimed(story, accepted, tell)
         if claim is None:
             return False
         best, others, more = claim
@@ -176,60 +175,6 @@ class _Walk:
         if more:
             story.add(more)
         return True
-
-
-def _claimed(story: Story, accepted: Sequence[Trial], tell: Progress) -> tuple[Trial, list[Trial], Trial | None] | None:
-    """The best trial that nothing speaks against, those that cannot be told from it, and further orders of it.
-
-    None where none is to be claimed.  A trial that tells far less than one that is refused only bends as that one does.
-    """
-    left = [trial for trial in accepted if trial.drop > SECOND * accepted[0].drop]
-    while left:
-        best, others = _chosen(story, left)
-        further = _further(story, best, tell)
-        more, reason = None if further is None else further.trial, ""
-        apart = _of_other_parts(best, others)
-        if len(apart) >= LARGEST_GROUP:
-            reason = f"{len(apart)} others tell as much"
-        elif further is not None and not further.stands_out:
-            reason = f"its order {best.candidate.settings['order']:g} tells no more than its neighbours"
-        # Without a controller there is no twin, whose floor would tell a further order from what is left.
-        for whole in () if reason else (best, more) if story.data.guarded else (more, best):
-            if whole is None:
-                continue
-            keys = [*best.effects, *(whole.effects if whole is more else ())]
-            spoken = against(story.data, story.current, whole.fit, keys, lambda found: story.settled(found, tell))
-            if not spoken:
-                return best, others, more if whole is more else None
-            reason = spoken if whole is best else reason
-        story.refused[best.candidate.name] = reason
-        left = [trial for trial in left if trial is not best]
-    return None
-
-
-def _chosen(story: Story, accepted: Sequence[Trial]) -> tuple[Trial, list[Trial]]:
-    """The best of the trials, and those that cannot be told from it.
-
-    Of what cannot be told apart, a parameter outside its tolerance comes after an effect.
-    """
-    first = accepted[0]
-    tied = [trial for trial in accepted if trial is first or evidence(story.data, trial.fit, first.fit) < TIE]
-    best = next((trial for trial in tied if not find(trial.candidate.name).duplicates), tied[0])
-    return best, [trial for trial in tied if trial is not best]
-
-
-def _of_other_parts(best: Trial, others: Sequence[Trial]) -> list[Trial]:
-    """Those that are of another part than the best: a drive's delays are alike, and any of them names the drive."""
-    if find(best.candidate.name).family != "drive":
-        return list(others)
-    return [trial for trial in others if find(trial.candidate.name).family != "drive"]
-
-
-def _further(story: Story, best: Trial, tell: Progress) -> Further | None:
-    """Further orders of a periodic effect, beside it."""
-    if not find(best.candidate.name).is_periodic:
-        return None
-    return further_orders(story.data, story.held, best, tell)
 
 
 def _with_curve(story: Story, curve: Trial | None, unknown: Explanation, tell: Progress) -> Explanation:
@@ -302,6 +247,7 @@ def result_of(
         ],
         controller_seen=story.controller_seen,
         disagreements=story.disagreements,
+        repeated=repeated(story.data, story.held, calibration.actuator),
     )
 
 

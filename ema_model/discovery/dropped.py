@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ema_model.discovery.claims import against, still_against
 from ema_model.discovery.criteria import LEAST_BIC
 from ema_model.discovery.evidence import evidence
 from ema_model.discovery.model_fit import Fit
+from ema_model.discovery.objections import against, still_against
 from ema_model.discovery.path import Story
 from ema_model.discovery.refit import fitted_count
 
@@ -33,7 +33,7 @@ def drop_doubtful(story: Story, tell: Progress) -> None:
         key = next((key for key in reversed(doubts) if doubts[key]), None)
         if key is None:
             return
-        later = [one for one in story.added[[*doubts].index(key) + 1 :]]
+        later = story.added[[*doubts].index(key) + 1 :]
         _take_out(story, key, doubts[key], tell)
         for one in reversed(later):  # each was claimed beside what is gone
             smaller = story.without(one.key, tell)

@@ -6,14 +6,14 @@ from the sensors' noise, the floor is not to be believed: the rig has a noise of
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 
+from ema_model.actuator import Actuator
 from ema_model.discovery.model_fit import Data
-from ema_model.discovery.result import Discovery
 from ema_model.estimation import Floor
 from ema_model.models.model import Window
 from ema_model.recordings import Measurement
@@ -37,28 +37,33 @@ class Repeated:
         return self.apart < _MOST
 
 
-def repeated(found: Discovery) -> Repeated | None:
+def repeated(data: Data, held: Data | None, actuator: Actuator) -> Repeated | None:
     """The two recordings of one command, fitted or held out, that are furthest apart; None where none was repeated."""
-    parts = [part for data in (found.data, found.held) if data is not None for part in _parts(data, found)]
-    pairs = [
+    known = [(one, part) for part in (data, held) if part is not None for one in part.measurements]
+    pairs = [pair for pair in combinations(known, 2) if pair[0][0] is not pair[1][0]]
+    twice = [pair for pair in pairs if _is_same(pair[0][0], pair[1][0])]
+    cut = {id(part): _parts(part, actuator) for pair in twice for _, part in pair}
+    found = [
         pair
-        for one, other in combinations(parts, 2)
-        if one[0] is not other[0] and (pair := _apart(one, other, list(found.data.signals))) is not None
+        for (first, of_first), (second, of_second) in twice
+        for one in cut[id(of_first)]
+        for other in cut[id(of_second)]
+        if one[0] is first and other[0] is second and (pair := _apart(one, other, list(data.signals))) is not None
     ]
-    return max(pairs, key=lambda pair: pair.apart, default=None)
+    return max(found, key=lambda pair: pair.apart, default=None)
 
 
 _Part = tuple[Measurement, Window, Floor]
 
 
-def _parts(data: Data, found: Discovery) -> Iterator[_Part]:
-    for window, floor in zip(data.plant(found.actuator).windows, data.floors):
-        yield data.measurements[window.recording], window, floor
+def _parts(data: Data, actuator: Actuator) -> Sequence[_Part]:
+    windows = data.plant(actuator).windows
+    return [(data.measurements[window.recording], window, floor) for window, floor in zip(windows, data.floors)]
 
 
 def _apart(one: _Part, other: _Part, names: list[str]) -> Repeated | None:
     (first, its, floor), (second, theirs, _) = one, other
-    if its.first != theirs.first or not _is_same(first, second):
+    if its.first != theirs.first:
         return None
     blocks = min(its.blocks, theirs.blocks)
     known = [name for name in names if name in its.measured and name in theirs.measured]

@@ -12,6 +12,7 @@ from ema_model.actuator import Actuator
 from ema_model.comparison.explain import Explanation
 from ema_model.discovery.controller_seen import ControllerSeen
 from ema_model.discovery.model_fit import Data
+from ema_model.discovery.repeated import Repeated
 from ema_model.estimation import Calibrated, Calibration, Floor
 from ema_model.models import Model
 from ema_model.text import InWords
@@ -139,6 +140,12 @@ class Discovery(InWords):
     warnings: Sequence[str] = field(default_factory=tuple)
     controller_seen: ControllerSeen | None = None  # where the drive's controller is not the file's
     disagreements: Sequence[Contradiction] = field(default_factory=tuple)  # held-out recordings at odds with the fitted
+    repeated: Repeated | None = None  # where a command was recorded twice
+
+    @property
+    def floor_believable(self) -> bool:
+        """Whether errors may be counted in floors: nothing that was recorded twice says otherwise."""
+        return self.repeated is None or self.repeated.floor_believable
 
     @property
     def ranked(self) -> list[Candidate]:

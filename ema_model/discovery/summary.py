@@ -9,7 +9,6 @@ import numpy as np
 from ema_model.actuator.naming import on_axes
 from ema_model.comparison.summary import calibration_dict, parameter_dict, plain
 from ema_model.discovery.controller_seen import ControllerSeen
-from ema_model.discovery.repeated import repeated
 from ema_model.discovery.result import Added, Discovery, Experiment, Rung
 from ema_model.discovery.words import rung_label
 from ema_model.effects import find
@@ -20,8 +19,7 @@ def as_dict(found: Discovery) -> dict[str, Any]:
     """Everything but the series, in numbers and texts that JSON can hold; unknown numbers are None."""
     axes = found.actuator.axes
     unknown = found.unknown
-    twice = repeated(found)
-    is_believable = twice is None or twice.floor_believable
+    twice, is_believable = found.repeated, found.floor_believable
     return plain(
         {
             "verdict": found.verdict,

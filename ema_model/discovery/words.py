@@ -7,7 +7,6 @@ from collections.abc import Iterator, Sequence
 from ema_model.actuator.naming import on_axes
 from ema_model.actuator.readings import sentences as phrases_of
 from ema_model.comparison.sentences import cause_of
-from ema_model.discovery.repeated import repeated
 from ema_model.discovery.result import Added, Change, Discovery, Rung
 from ema_model.discovery.verify import Verified
 from ema_model.effects import CATALOGUE, find
@@ -78,7 +77,7 @@ def remains(found: Discovery) -> str:
 
 def repeatability(found: Discovery) -> list[str]:
     """How near the rig comes to itself, where a command was recorded twice."""
-    twice = repeated(found)
+    twice = found.repeated
     if twice is None:
         return []
     axes = found.actuator.axes
@@ -250,9 +249,7 @@ def per_recording(found: Discovery) -> Table | None:
 
 
 def _tables(found: Discovery) -> Iterator[Table]:
-    axes = found.actuator.axes
-    rungs = [[rung_label(one.change, axes), _three(one.rmse), _three(one.holdout_rmse)] for one in found.ladder]
-    yield Table(("fitted", "held out"), rungs, "error ladder", unit="(1 is the floor)")
+    yield _ladder(found)
     if (table := per_recording(found)) is not None:
         yield table
     if found.candidates:
@@ -262,6 +259,25 @@ def _tables(found: Discovery) -> Iterator[Table]:
         ]
         remarks = [one.untestable_reason for one in found.candidates]
         yield Table(("predicted", "refitted"), rows, "candidates", remarks, "(fall of χ²)")
+
+
+def _ladder(found: Discovery) -> Table:
+    """Errors in floors; in the signals' units where the floor is not to be believed."""
+    axes = found.actuator.axes
+    labels = [rung_label(one.change, axes) for one in found.ladder]
+    if found.floor_believable:
+        errors = [[_three(one.rmse), _three(one.holdout_rmse)] for one in found.ladder]
+        return _table(("fitted", "held out"), labels, errors, "(1 is the floor)")
+    shown = {
+        name: of_signal(name, axes).scaled([one.signals[name] for one in found.ladder])
+        for name in found.ladder[0].signals
+    }
+    errors = [[one.text(rung.signals[name]) for name, one in shown.items()] for rung in found.ladder]
+    return _table([one.title for one in shown.values()], labels, errors, "(rms of what was fitted)")
+
+
+def _table(heads: Sequence[str], labels: Sequence[str], errors: Sequence[list[str]], unit: str) -> Table:
+    return Table(tuple(heads), [[label, *one] for label, one in zip(labels, errors)], "error ladder", unit=unit)
 
 
 def _rest(found: Discovery) -> Iterator[Lines]:

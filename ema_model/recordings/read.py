@@ -50,11 +50,10 @@ def read(
     """A recording for the model of this actuator: in SI, under the names inside, with a current where one can be made.
 
     `mapping`, or texts as of `--map`, goes before what the side file says.  `side` is the side file, where it is
-    known already.  `hints` say how a text is laid out that is read wrongly without; they go before
-    the side file's, too.  `needs` are the signals that
-    must be there, and sure, when columns have to be guessed; without it what the actuator's model needs.  The
-    measurement's `reading` tells how it was read.  Raises InputError, one line, for whatever is wrong with the
-    file, and for columns that are not clear: it lists them, with the `--map` to give.
+    known already.  `hints` say how a text is laid out that is read wrongly without, and go before the side file's.
+    `needs` are the signals that must be there, and sure, when columns have to be guessed; without it what the
+    actuator's model needs.  The measurement's `reading` tells how it was read.  Raises InputError, one line, for
+    whatever is wrong with the file, and for columns that are not clear: it lists them, with the `--map` to give.
     """
     return prepared(
         recorded(path, actuator, mapping, side=side, needs=needs, max_bytes=max_bytes, hints=hints), actuator

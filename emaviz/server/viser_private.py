@@ -16,6 +16,11 @@ def id_of(control: Any) -> str:
     return control._impl.uuid
 
 
+def selector_of(control: Any) -> str:
+    """What a style rule calls it."""
+    return f'[id="{id_of(control)}"]'
+
+
 def keep_icons() -> None:
     """Icons are read once: viser opens its archive of 5,000, most of a tenth of a second, for each of ours again."""
     _gui_api.svg_from_icon = _gui_handles.svg_from_icon = _icon  # type: ignore[assignment]

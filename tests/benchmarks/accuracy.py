@@ -13,6 +13,7 @@ import numpy as np
 
 from ema_model import faults
 from ema_model.actuator import load_actuator
+from ema_model.campaign.thesis.cases import CASES
 from ema_model.identification.objective import Objective
 from ema_model.identification.optimisers import create
 from ema_model.identification.run import identify
@@ -20,19 +21,6 @@ from ema_model.simulation.plant import simulated
 from ema_model.simulation.run import Run
 from ema_model.simulation.sensors import Sensors
 
-CASES = (
-    ("friction k1 = 0.25", {"k1": 0.25}),
-    ("friction k1 = 0.75", {"k1": 0.75}),
-    ("backlash k2 = 0.25", {"k2": 0.25}),
-    ("backlash k2 = 0.75", {"k2": 0.75}),
-    ("short circuit k3 = 0.25", {"k3": 0.25}),
-    ("short circuit k3 = 0.75", {"k3": 0.75}),
-    ("gain k8 = 0.25", {"k8": 0.25}),
-    ("gain k8 = 0.75", {"k8": 0.75}),
-    ("eccentricity k6 = 0.25", {"k6": 0.25}),
-    ("eccentricity k6 = 0.75", {"k6": 0.75}),
-    ("multi-fault (T 5.3)", {"k1": 0.0133, "k2": 0.05, "k3": 0.003, "k6": 0.012, "k8": 0.35}),
-)
 ALGORITHMS = ("ssa", "hba", "do")
 
 
@@ -44,8 +32,8 @@ def main() -> None:
         columns = [*ALGORITHMS, *(f"{algorithm} polished" for algorithm in ALGORITHMS), "robust"]
         print("| fault | " + " | ".join(columns) + " |")
         print("|---" * (len(columns) + 1) + "|")
-        for name, fault in CASES:
-            truth = faults.vector(fault)
+        for case in CASES:
+            truth = case.k
             clean = simulated(run, actuator, truth)
             errors: dict[str, list[float]] = {column: [] for column in columns}
             for seed in range(seeds):
@@ -56,7 +44,7 @@ def main() -> None:
                         objective, algorithm, seed=seed, truth=truth, parameters_known=True, polish=bool(polished)
                     )
                     errors[column].append(answer.error_percent or 0.0)
-            print(f"| {name} | " + " | ".join(f"{np.mean(e):.2f} ({max(e):.2f})" for e in errors.values()) + " |")
+            print(f"| {case.title} | " + " | ".join(f"{np.mean(e):.2f} ({max(e):.2f})" for e in errors.values()) + " |")
     reflected(seeds)
 
 
@@ -66,8 +54,7 @@ def reflected(seeds: int) -> None:
     turned = np.arange(8) < 6
     print(f"\nPull towards 0, {seeds} seeds, noise-free: Err % mean (worst)\n")
     print("| fault | algorithm | coordinates as they are | k1…k6 turned round |\n|---|---|---|---|")
-    for name, fault in (("healthy", {}), CASES[0], CASES[-1]):
-        truth = faults.vector(fault)
+    for name, truth in (("healthy", faults.HEALTHY), *((case.title, case.k) for case in (CASES[0], CASES[-1]))):
         objective = Objective([simulated(run, actuator, truth)], actuator)
         for algorithm in ALGORITHMS:
             shown = []

@@ -167,7 +167,7 @@ def _row(job: tuple[str, float, int, str]) -> tuple[tuple[str, float, int, str],
 
 
 def at(points: list[tuple[int, float, float]], column: int, limit: float) -> float:
-    """The error of the last point within the limit; of nothing known, that of a healthy guess is not taken: NaN."""
+    """The error of the last point within the limit; NaN before the first."""
     within = [point[2] for point in points if point[column] <= limit]
     return within[-1] if within else float("nan")
 

@@ -10,7 +10,6 @@ from ema_model.actuator import load_actuator
 from ema_model.commands import command
 from ema_model.discovery.discover import result_of
 from ema_model.discovery.path import begun
-from ema_model.discovery.repeated import repeated
 from ema_model.discovery.summary import as_dict
 from ema_model.discovery.words import document_of
 from ema_model.faults import vector
@@ -32,7 +31,7 @@ def found_in(fitted, held=()):
 
 def test_a_rig_that_repeats_itself_bears_out_the_floor():
     found = found_in([recorded("one", 1), recorded("other", 2, 3.0)], [recorded("again", 3)])
-    twice = repeated(found)
+    twice = found.repeated
     assert twice is not None and twice.recordings == ("one", "again")
     assert 0.4 < twice.apart < 1.3 and twice.signals["current_A"] > 0.0
     document = as_dict(found)
@@ -42,16 +41,17 @@ def test_a_rig_that_repeats_itself_bears_out_the_floor():
 
 def test_a_rig_that_does_not_has_errors_in_units_alone():
     found = found_in([recorded("one", 1), recorded("worn", 2, k1=0.6)])
-    twice = repeated(found)
+    twice = found.repeated
     assert twice is not None and twice.apart > 2.0
     document = as_dict(found)
     (rung,) = document["ladder"]
     assert document["floor_believable"] is False and document["repeatability"]["over_floor"] > 2.0
     assert rung["rmse"] is None and rung["holdout_rmse"] is None and rung["signals"]["current_A"] > 0.0
-    assert "errors count in units alone" in str(document_of(found))
+    text = str(document_of(found))
+    assert "errors count in units alone" in text and "(rms of what was fitted)" in text and "1 is the floor" not in text
 
 
 def test_where_no_command_was_repeated_nothing_is_said():
     found = found_in([recorded("one", 1), recorded("other", 2, 3.0)])
-    assert repeated(found) is None and as_dict(found)["repeatability"] is None
+    assert found.repeated is None and as_dict(found)["repeatability"] is None
     assert as_dict(found)["floor_believable"]

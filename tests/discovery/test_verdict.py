@@ -15,7 +15,7 @@ from ema_model.comparison.residuals import Residuals
 from ema_model.comparison.result import SignalError
 from ema_model.comparison.verdict import judge
 from ema_model.discovery import as_dict, begun, result_of
-from ema_model.discovery.claims import ratio
+from ema_model.discovery.objections import ratio
 from ema_model.discovery.path import Step, rung_of
 from ema_model.discovery.result import VERDICTS
 from ema_model.discovery.snapshot import known_of

@@ -22,7 +22,8 @@ _LATE_START_S = 1e5  # clocks of a computer start later than any recording lasts
 _MOST = 1e30  # so that no product overflows
 _WITHOUT_DELAY = ("time_s", "segment")  # which say when all others are
 _FORM = "write signal=column[unit], e.g. motor_speed_rad_s=speed[rpm]"
-_OPTION = re.compile(r"(sign|scale|offset|delay_s)\s*=\s*(\S+)")
+NUMBERS = {"sign": 1, "scale": 1.0, "offset": 0.0, "delay_s": 0.0}  # of a column, and what they are where left out
+_OPTION = re.compile(rf"({'|'.join(NUMBERS)})\s*=\s*(\S+)")
 
 
 @dataclass(frozen=True)
@@ -65,16 +66,18 @@ class MappedColumn:
         return _unit(self.signal, self.unit)
 
     @property
+    def numbers(self) -> dict[str, float]:
+        """Those of `NUMBERS` that are other than where they are left out."""
+        return {name: value for name, usual in NUMBERS.items() if (value := getattr(self, name)) != usual}
+
+    @property
     def text(self) -> str:
         """As on the command line: `signal=column[unit, sign=-1, scale=2.0, offset=0.1, delay_s=0.005]`."""
         options = [
             *([self.unit] if self.unit else []),
             # Said where the column's name would say otherwise.
             *([SIGNALS[self.signal].unit] if self._must_say_si else []),
-            *([f"sign={self.sign}"] if self.sign != 1 else []),
-            *([f"scale={self.scale!r}"] if self.scale != 1.0 else []),
-            *([f"offset={self.offset!r}"] if self.offset != 0.0 else []),
-            *([f"delay_s={self.delay_s!r}"] if self.delay_s != 0.0 else []),
+            *(f"{name}={value!r}" for name, value in self.numbers.items()),
         ]
         return f"{self.signal}={self.column}" + (
             f"[{', '.join(options)}]" if options or self.column.endswith("]") else ""
@@ -154,9 +157,7 @@ def _parsed(text: str, columns: Collection[str]) -> MappedColumn:
         if name in given:
             raise InputError(f"mapping {shown(text)!r}: {name} stands twice; {_FORM}")
         given[name] = value
-    numbers = {
-        name: _number(text, name, given[name]) for name in ("sign", "scale", "offset", "delay_s") if name in given
-    }
+    numbers = {name: _number(text, name, given[name]) for name in NUMBERS if name in given}
     if numbers.get("sign", 1.0) not in (1.0, -1.0):
         raise InputError(f"mapping {shown(text)!r}: the sign must be 1 or -1, not {shown(given['sign'])}")
     return MappedColumn(

@@ -161,10 +161,7 @@ def _check_text(table: TextTable, max_bytes: int) -> None:
     """Cells that are looked at one by one take four times their file's size, and time."""
     if os.path.getsize(table.path) > _MOST_TEXT * max_bytes:
         most = megabytes(int(_MOST_TEXT * max_bytes))
-        problem = (
-            f"is over {most} large, and more than one header line and plain numbers; cut it, or export plain numbers"
-        )
-        raise refusal(table.path, problem)
+        raise refusal(table.path, f"is over {most} and no plain table; cut it, or export one header line and numbers")
 
 
 def _understood(

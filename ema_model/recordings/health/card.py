@@ -28,11 +28,14 @@ class Health(InWords):
     @property
     def severity(self) -> Severity:
         """The worst of all findings."""
-        found = {finding.severity for finding in self.findings}
-        for severity in MARKS:
-            if severity in found:
-                return severity
-        return "good"
+        worst = self.worst_first
+        return worst[0].severity if worst else "good"
+
+    @property
+    def worst_first(self) -> list[Finding]:
+        """All findings, warnings before notes."""
+        rank = list(MARKS)
+        return sorted(self.findings, key=lambda finding: rank.index(finding.severity))
 
     def of(self, check: str, signal: str | None = None) -> Finding | None:
         """The first finding of a check, such as "noise", of one signal where given."""

@@ -9,6 +9,5 @@ from ema_model.text import Document, Lines
 
 def document_of(card: Health) -> Document:
     """A line for each finding, with its mark."""
-    rank = list(MARKS)
-    ordered = sorted(card.findings, key=lambda finding: rank.index(finding.severity))
-    return Document([Lines([f"{MARKS[one.severity]} {one.sentence}" for one in ordered], f"Data health {card.name}")])
+    lines = [f"{MARKS[one.severity]} {one.sentence}" for one in card.worst_first]
+    return Document([Lines(lines, f"Data health {card.name}")])

@@ -19,7 +19,7 @@ from ema_model.files.toml_text import toml_of
 from ema_model.files.user_file import open_user_file
 from ema_model.quantities.si import of_name, without_unit
 from ema_model.quantities.signals import SIGNALS
-from ema_model.recordings.columns.mapping import ColumnMapping, MappedColumn, parse_mapping
+from ema_model.recordings.columns.mapping import NUMBERS, ColumnMapping, MappedColumn, parse_mapping
 from ema_model.recordings.formats.text_layout import Hints, known_encoding
 
 Kind = Literal["run", "map"]
@@ -28,8 +28,7 @@ Sampling = Literal["mean", "instantaneous"]
 OF_A_FOLDER = "recordings.toml"
 _KEYS = ("schema", "actuator", "kind", "sampling", "segments", "window", "text", "mapping", "sensors")
 _LARGEST = 2**53  # up to which whole numbers are exact as floats
-_NUMBERS = ("sign", "scale", "offset", "delay_s")
-_COLUMN_KEYS = ("column", "unit", *_NUMBERS)
+_COLUMN_KEYS = ("column", "unit", *NUMBERS)
 
 
 def stated(name: str, what: str) -> str:
@@ -142,7 +141,7 @@ def _entry(path: str, signal: str, given: object) -> MappedColumn:
     fields: dict[str, Any] = {}
     if isinstance(given, dict):
         _check_keys(path, f"{where}: ", given, _COLUMN_KEYS)
-        fields = {name: _number(path, f"{where} {name}", given[name]) for name in _NUMBERS if name in given}
+        fields = {name: _number(path, f"{where} {name}", given[name]) for name in NUMBERS if name in given}
         for name in ("column", "unit"):
             fields[name] = given.get(name, "")
             if not isinstance(fields[name], str):

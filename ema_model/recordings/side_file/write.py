@@ -11,8 +11,6 @@ from ema_model.files.whole_file import whole_file
 from ema_model.recordings.columns.mapping import MappedColumn
 from ema_model.recordings.side_file.read import SideFile
 
-_USUAL = {"sign": 1, "scale": 1.0, "offset": 0.0, "delay_s": 0.0}
-
 
 def write_side_file(side: SideFile, path: str | os.PathLike[str]) -> None:
     """Writes the side file, whole or not at all; an older one is replaced.  Raises InputError if it cannot."""
@@ -51,13 +49,8 @@ def _column(entry: MappedColumn) -> str:
     parts = [f"column = {_quoted(entry.column)}"]
     if entry.unit:
         parts.append(f"unit = {_quoted(entry.unit)}")
-    parts += [f"{name} = {getattr(entry, name)!r}" for name in _USUAL if _matters(entry, name)]
+    parts += [f"{name} = {value!r}" for name, value in entry.numbers.items()]
     return "{ " + ", ".join(parts) + " }"
-
-
-def _matters(entry: MappedColumn, name: str) -> bool:
-    """Whether a number of the entry is other than when left out."""
-    return getattr(entry, name) != _USUAL[name]
 
 
 def _quoted(text: str) -> str:

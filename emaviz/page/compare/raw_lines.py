@@ -7,7 +7,7 @@ from typing import Any
 
 from ema_model.errors import quoted
 from emaviz.page.page import Page
-from emaviz.server.viser_private import id_of
+from emaviz.server.viser_private import selector_of
 from emaviz.session.compare.comparing import Comparing
 from emaviz.session.opened import Opened
 from emaviz.text.html import Html, add_html, html, unescaped
@@ -52,7 +52,7 @@ class RawLines:
             button.visible = number <= len(lines)
             if button.visible:
                 button.label = f"{number:3}  {_cut(lines[number - 1])}"
-                rules.append(_styled(id_of(button), marks.get(number, _RESTING)))
+                rules.append(_styled(selector_of(button), marks.get(number, _RESTING)))
         self._style.content = unescaped(f"<style>{''.join(rules)}</style>")
         self._style.visible = self._about.visible = bool(lines)
         self._about.content = html(
@@ -72,9 +72,8 @@ def _cut(line: str) -> str:
     return "\t".join(quoted(cell) for cell in line[: _MOST + 1].split("\t"))[:_MOST] + "…" * (len(line) > _MOST)
 
 
-def _styled(button: str, colours: str) -> str:
+def _styled(one: str, colours: str) -> str:
     """viser's buttons are tall and in the middle; these are lines of a text, one close below another."""
-    one = f'[id="{button}"]'
     return (
         f"{one}{{{_LINE}{colours}}}div:has(> {one}){{padding-bottom:0!important}}"
         f"{one} .mantine-Button-inner{{justify-content:flex-start}}"

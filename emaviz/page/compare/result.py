@@ -21,7 +21,7 @@ from emaviz.page.compare.raw_lines import RawLines
 from emaviz.page.kept import Cleared
 from emaviz.page.page import Page
 from emaviz.page.playback import PlaybackStrip
-from emaviz.server.viser_private import id_of
+from emaviz.server.viser_private import selector_of
 from emaviz.session.opened import Opened
 from emaviz.text.html import Html, add_html, html, joined, table_of, unescaped
 
@@ -159,7 +159,7 @@ class ResultPanel:
         """viser's buttons have one line; a region's sentence is longer, so they become a list of cards."""
         rules = []
         for i, button in enumerate(self._buttons):
-            one = f'[id="{id_of(button)}"]'
+            one = selector_of(button)
             colours = _CHOSEN if i == chosen else _RESTING
             rules.append(f"{one}{{{_CARD}{colours}}}{one} .mantine-Button-inner{{justify-content:flex-start}}")
             rules.append(f"{one} .mantine-Button-label{{white-space:normal;text-align:left;line-height:1.3}}")

@@ -16,7 +16,7 @@ from emaviz.page.library import WORKSPACE
 from emaviz.page.page import Page
 from emaviz.page.playback import PlaybackStrip
 from emaviz.scene.motion import motion
-from emaviz.server.viser_private import id_of
+from emaviz.server.viser_private import selector_of
 from emaviz.session.library import Library
 from emaviz.text.html import add_html, html, unescaped
 
@@ -86,7 +86,7 @@ class LibraryPanel:
     def _draw_style(self) -> None:
         rules = []
         for name, button in self._cards.items():
-            one = f'[id="{id_of(button)}"]'
+            one = selector_of(button)
             picture = self._pictures.get(name, "")
             if picture:
                 picture = f'background-image:url("{picture}")!important;background-repeat:no-repeat!important;'

@@ -28,10 +28,9 @@ class DataHealth(Section[Comparison]):
 
 def findings(health: Health) -> str:
     """A line for each, with its mark."""
-    rank = list(MARKS)
     items = [
         f'<li><span class="{finding.severity}" title="{finding.severity}">{MARKS[finding.severity]}</span>'
         f"{escape(finding.sentence)}</li>"
-        for finding in sorted(health.findings, key=lambda finding: rank.index(finding.severity))
+        for finding in health.worst_first
     ]
     return f'<ul class="findings">{"".join(items)}</ul>'

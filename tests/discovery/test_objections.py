@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ema_model.actuator import Tolerance
-from ema_model.discovery import claims
+from ema_model.discovery import objections
 from ema_model.discovery.stability import disagreement
 from ema_model.estimation import Calibrated
 from ema_model.quantities.axes import ROTARY
@@ -89,28 +89,30 @@ def test_a_single_recording_is_judged_by_its_halves():
 )
 def test_values_that_no_such_part_has_are_not_claimed(name, settings, said):
     found = fitted([1.0, 1.0], settings=settings, path=f"effects.{name}.{next(iter(settings))}")
-    reason = claims._implausible(found, name)
+    reason = objections._implausible(found, name)
     assert (said in reason) if said else not reason
 
 
 def test_a_parameter_at_its_bound_is_no_claim():
     found = fitted([1.0, 1.0], at_bound=True)
-    assert "at the bound" in claims._bent(found, found, KEY)
-    assert not claims._bent(fitted([1.0, 1.0]), fitted([1.0, 1.0]), KEY)
+    assert "at the bound" in objections._bent(found, found, KEY)
+    assert not objections._bent(fitted([1.0, 1.0]), fitted([1.0, 1.0]), KEY)
 
 
 def test_a_sensor_that_was_not_recorded_has_no_bias():
     blind = SimpleNamespace(measurements=[{"user_position_rad": 0}])
-    assert "not recorded" in claims._unmeasured(blind, "current_sensor_bias")
-    assert not claims._unmeasured(blind, "position_sensor_bias") and not claims._unmeasured(DATA, "current_sensor_bias")
-    assert not claims._unmeasured(blind, "cogging_torque_2")
+    assert "not recorded" in objections._unmeasured(blind, "current_sensor_bias")
+    assert not objections._unmeasured(blind, "position_sensor_bias") and not objections._unmeasured(
+        DATA, "current_sensor_bias"
+    )
+    assert not objections._unmeasured(blind, "cogging_torque_2")
 
 
 def test_what_takes_nothing_away_within_the_tolerances_is_not_claimed(monkeypatch):
-    monkeypatch.setattr(claims, "ratio", lambda _, found: found)
-    monkeypatch.setattr(claims, "at_floor", lambda *_: False)
-    assert "does not fall" in claims._idle(DATA, 4.07, 4.06)
-    assert not claims._idle(DATA, 4.07, 3.90)
+    monkeypatch.setattr(objections, "ratio", lambda _, found: found)
+    monkeypatch.setattr(objections, "at_floor", lambda *_: False)
+    assert "does not fall" in objections._idle(DATA, 4.07, 4.06)
+    assert not objections._idle(DATA, 4.07, 3.90)
 
 
 @pytest.mark.parametrize(
@@ -119,9 +121,9 @@ def test_what_takes_nothing_away_within_the_tolerances_is_not_claimed(monkeypatc
 )
 def test_the_share_that_counts_is_of_what_the_settled_models_leave(monkeypatch, bent, calm, said):
     """A model that is bent to an error of unknown cause tells more of it than it may; near the floor two share it."""
-    monkeypatch.setattr(claims, "ratio", lambda _, found: float(np.sqrt(np.mean(found.residual**2))))
-    monkeypatch.setattr(claims, "at_floor", lambda *_: False)
+    monkeypatch.setattr(objections, "ratio", lambda _, found: float(np.sqrt(np.mean(found.residual**2))))
+    monkeypatch.setattr(objections, "at_floor", lambda *_: False)
     before, after = (fitted([1.0, 1.0], noise=one) for one in bent)
     settled = {found: fitted([1.0, 1.0], noise=one) for found, one in zip((before, after), calm)}
-    found = claims._against_settled(DATA, before, after, [KEY], settled.__getitem__)
+    found = objections._against_settled(DATA, before, after, [KEY], settled.__getitem__)
     assert found.startswith(said) and bool(found) == bool(said)

@@ -1,0 +1,78 @@
+"""Which of the refitted candidates is claimed: the best that nothing speaks against, at one order or at several."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+from ema_model.discovery.criteria import LARGEST_GROUP, SECOND, TIE
+from ema_model.discovery.evidence import evidence
+from ema_model.discovery.harmonics import Further, further_orders
+from ema_model.discovery.objections import against
+from ema_model.discovery.path import Story
+from ema_model.discovery.refit import Trial
+from ema_model.effects import find
+
+Progress = Callable[[str], None]
+
+
+class Claim(NamedTuple):
+    """A trial that is claimed, those that cannot be told from it, and the same with further orders of its effect."""
+
+    best: Trial
+    others: list[Trial]
+    more: Trial | None
+
+
+def claimed(story: Story, accepted: Sequence[Trial], tell: Progress) -> Claim | None:
+    """The best trial that nothing speaks against, those that cannot be told from it, and further orders of it.
+
+    None where none is to be claimed.  A trial that tells far less than one that is refused only bends as that one does.
+    """
+    left = [trial for trial in accepted if trial.drop > SECOND * accepted[0].drop]
+    while left:
+        best, others = _chosen(story, left)
+        further = _further(story, best, tell)
+        more, reason = None if further is None else further.trial, ""
+        apart = _of_other_parts(best, others)
+        if len(apart) >= LARGEST_GROUP:
+            reason = f"{len(apart)} others tell as much"
+        elif further is not None and not further.stands_out:
+            reason = f"its order {best.candidate.settings['order']:g} tells no more than its neighbours"
+        # Without a controller there is no twin, whose floor would tell a further order from what is left.
+        for whole in () if reason else (best, more) if story.data.guarded else (more, best):
+            if whole is None:
+                continue
+            keys = [*best.effects, *(whole.effects if whole is more else ())]
+            spoken = against(story.data, story.current, whole.fit, keys, lambda found: story.settled(found, tell))
+            if not spoken:
+                return Claim(best, others, more if whole is more else None)
+            reason = spoken if whole is best else reason
+        story.refused[best.candidate.name] = reason
+        left = [trial for trial in left if trial is not best]
+    return None
+
+
+def _chosen(story: Story, accepted: Sequence[Trial]) -> tuple[Trial, list[Trial]]:
+    """The best of the trials, and those that cannot be told from it.
+
+    Of what cannot be told apart, a parameter outside its tolerance comes after an effect.
+    """
+    first = accepted[0]
+    tied = [trial for trial in accepted if trial is first or evidence(story.data, trial.fit, first.fit) < TIE]
+    best = next((trial for trial in tied if not find(trial.candidate.name).duplicates), tied[0])
+    return best, [trial for trial in tied if trial is not best]
+
+
+def _of_other_parts(best: Trial, others: Sequence[Trial]) -> list[Trial]:
+    """Those that are of another part than the best: a drive's delays are alike, and any of them names the drive."""
+    if find(best.candidate.name).family != "drive":
+        return list(others)
+    return [trial for trial in others if find(trial.candidate.name).family != "drive"]
+
+
+def _further(story: Story, best: Trial, tell: Progress) -> Further | None:
+    """Further orders of a periodic effect, beside it."""
+    if not find(best.candidate.name).is_periodic:
+        return None
+    return further_orders(story.data, story.held, best, tell)

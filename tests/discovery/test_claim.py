@@ -1,0 +1,102 @@
+"""Which orders of an effect are claimed, and what happens to an effect that rested on one that is taken out."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import pytest
+
+from ema_model.discovery import claim, dropped
+from ema_model.discovery.harmonics import Further
+from ema_model.discovery.refit import Trial
+from ema_model.discovery.result import Added, Candidate
+
+OUTDONE = "a curve over the motor angle tells more"
+
+
+def trial(orders: int, drop: float) -> Trial:
+    """A refit of so many orders of cogging."""
+    effects = {f"cogging_torque_{i}": {"order": 6.0 * (i + 1)} for i in range(orders)}
+    candidate = Candidate("cogging_torque", {"order": 6.0}, drop)
+    return Trial(candidate, effects, SimpleNamespace(actuator=None), drop)
+
+
+@pytest.fixture
+def of_cogging(monkeypatch):
+    """Claims on cogging of one order or of three, where `outdone` counts how many orders a curve outdoes."""
+    alone, together = trial(1, 900.0), trial(3, 1500.0)
+    monkeypatch.setattr(claim, "_chosen", lambda story, accepted: (alone, []))
+    monkeypatch.setattr(claim, "further_orders", lambda *args: Further(True, together))
+    asked: list[int] = []
+
+    def ask(guarded: bool, outdone: int):
+        asked.clear()
+
+        def spoken(data, before, after, keys, settled):
+            asked.append(1 if after is alone.fit else 3)
+            return OUTDONE if asked[-1] <= outdone else ""
+
+        monkeypatch.setattr(claim, "against", spoken)
+        story = SimpleNamespace(data=SimpleNamespace(guarded=guarded), held=None, current=None, refused={})
+        return claim.claimed(story, [alone], lambda text: None), story.refused, list(asked)
+
+    return ask, alone, together
+
+
+def test_in_inverse_dynamics_further_orders_count_where_one_alone_is_outdone(of_cogging):
+    ask, alone, together = of_cogging
+    assert ask(guarded=True, outdone=1) == ((alone, [], together), {}, [1, 3])
+    assert ask(guarded=True, outdone=0) == ((alone, [], None), {}, [1]), "one order that is enough needs no more"
+
+
+def test_in_a_closed_loop_all_orders_are_judged_before_one(of_cogging):
+    ask, alone, together = of_cogging
+    assert ask(guarded=False, outdone=1) == ((alone, [], together), {}, [3])
+
+
+def test_where_a_curve_outdoes_all_orders_nothing_is_claimed(of_cogging):
+    ask, _, _ = of_cogging
+    for guarded in (False, True):
+        found, refused, asked = ask(guarded, outdone=3)
+        assert found is None and refused == {"cogging_torque": OUTDONE} and sorted(asked) == [1, 3]
+
+
+class Grown:
+    """A model with these effects, that can lose them."""
+
+    def __init__(self, *names: str) -> None:
+        self.added = tuple(Added(name, {}, 2.0, 1.0, 2.0, 1.0, (), name) for name in names)
+        self.refused: dict[str, str] = {}
+        self.data, self.base = SimpleNamespace(), "bare"
+
+    @property
+    def current(self) -> str:
+        return "with " + " ".join(one.name for one in self.added)
+
+    def without(self, key, tell=None) -> str:
+        return "with " + " ".join(one.name for one in self.added if one.key != key)
+
+    def settled(self, found, tell=None):
+        return found
+
+    def remove(self, key, found=None) -> None:
+        assert found in (None, self.without(key))
+        self.added = tuple(one for one in self.added if one.key != key)
+
+
+@pytest.mark.parametrize("stands, left", [(True, ["viscous_drift", "hinge_moment"]), (False, ["viscous_drift"])])
+def test_what_rested_on_an_effect_that_is_taken_out_is_judged_again(monkeypatch, stands, left):
+    """Of three effects the second is bent away; the third came after it, the first before."""
+    story, judged = Grown("viscous_drift", "current_bias", "hinge_moment"), []
+
+    def again(data, before, after, keys, settled):
+        judged.append((keys, before, after))
+        return "" if stands else "it tells nothing by itself"
+
+    bent = {"current_bias": "its sign turned"}
+    monkeypatch.setattr(dropped, "still_against", lambda data, base, current, key: bent.get(key, ""))
+    monkeypatch.setattr(dropped, "against", again)
+    dropped.drop_doubtful(story, lambda text: None)
+    assert [one.name for one in story.added] == left
+    assert judged == [(["hinge_moment"], "with viscous_drift", "with viscous_drift hinge_moment")]
+    assert story.refused == bent | ({} if stands else {"hinge_moment": "it tells nothing by itself"})

@@ -5,8 +5,6 @@ To add a command, add a file with a subclass of `Command`.
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
 from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
@@ -14,20 +12,15 @@ from typing import Any
 from ema_model.commands.command import Command
 from ema_model.commands.recorded import Recorded
 from ema_model.errors import InputError, quoted
+from ema_model.members import classes
 
 __all__ = ["COMMANDS", "Command", "Recorded", "command"]
 
-for _module in pkgutil.iter_modules(__path__):
-    importlib.import_module(f"{__name__}.{_module.name}")
-
-# The thesis's four first, then the rest; a recorded command is made from a file, not from settings.
-_ORDER = ("step", "ramp", "sine", "chirp")
+# A recorded command is made from a file, not from settings.
 COMMANDS: dict[str, type[Command]] = {
-    cls.name: cls
-    for cls in sorted(
-        Command.__subclasses__(), key=lambda cls: (_ORDER.index(cls.name) if cls.name in _ORDER else 9, cls.name)
-    )
-    if cls is not Recorded
+    one.name: one
+    for one in sorted(classes(__name__, Command), key=lambda one: (one.place, one.name))
+    if one is not Recorded
 }
 
 

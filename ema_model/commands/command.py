@@ -20,6 +20,7 @@ class Command(ABC):
     """A position command at the user, rad.  The dataclass's fields are its settings."""
 
     name: ClassVar[str]
+    place: ClassVar[int] = 9  # in lists; those of one place stand by their names
     title: ClassVar[str]
 
     @abstractmethod

@@ -14,6 +14,7 @@ class Ramp(Command):
     """A constant speed from a start time on."""
 
     name = "ramp"
+    place = 2  # the thesis's four come first
     title = "Ramp"
     slope_rad_s: float = 1e-3
     initial_rad: float = 0.0

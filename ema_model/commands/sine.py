@@ -14,6 +14,7 @@ class Sine(Command):
     """A sine about a bias."""
 
     name = "sine"
+    place = 3  # the thesis's four come first
     title = "Sine"
     amplitude_rad: float = 5e-3
     frequency_Hz: float = 15.0

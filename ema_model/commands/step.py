@@ -14,6 +14,7 @@ class Step(Command):
     """From one position to another at a time; the thesis's 1 rad cannot be reached within 0.5 s."""
 
     name = "step"
+    place = 1  # the thesis's four come first
     title = "Step"
     initial_rad: float = 0.0
     final_rad: float = 1.0

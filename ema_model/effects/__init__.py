@@ -5,14 +5,13 @@ To add an effect, add a file with an `EFFECT`: the models, the command line, the
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
 from dataclasses import replace
 from difflib import get_close_matches
 from typing import TypeVar
 
 from ema_model.effects.effect import Effect, Parameter
 from ema_model.errors import InputError
+from ema_model.members import members
 from ema_model.quantities.axes import ROTARY, Axes
 from ema_model.quantities.sides import MOTOR, NEITHER, USER
 
@@ -21,9 +20,7 @@ __all__ = ["CATALOGUE", "MOTOR", "NEITHER", "USER", "Effect", "Parameter", "cata
 AnyEffect = TypeVar("AnyEffect", bound=Effect)
 
 CATALOGUE: dict[str, Effect] = {
-    module.name: replace(importlib.import_module(f"{__name__}.{module.name}").EFFECT, name=module.name)
-    for module in sorted(pkgutil.iter_modules(__path__), key=lambda module: module.name)
-    if module.name != "effect" and not module.ispkg
+    name: replace(effect, name=name) for name, effect in members(__name__, "EFFECT").items()
 }
 _OF_THE_USER: dict[str, Effect] = {}  # made at run time by `ema_model.effects.user`; not part of the catalogue
 

@@ -1,4 +1,4 @@
-"""The command line: one file a command, each with `HELP`, `add_arguments(parser)` and `run(arguments)`.
+"""The command line: `verbs` has a file for each of its commands, beside it stands what they share.
 
 Exit codes: 0 done, 2 the input or the arguments are wrong (one line on stderr), 1 an internal failure.
 """
@@ -8,13 +8,12 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
+from ema_model.members import names
+
 # Whatever takes time is imported where an interrupt ends the program as it should.
 from emaviz.cli.interrupt import EXIT_CODE, until_interrupted
 
-COMMANDS = (
-    *("gui", "simulate", "identify", "compare", "discover", "track"),
-    *("actuator", "effects", "view", "recover", "campaign", "reproduce"),
-)
+COMMANDS = tuple(names("emaviz.cli.verbs"))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

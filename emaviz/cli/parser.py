@@ -1,9 +1,10 @@
-"""The command line's parser: one file a command, with `HELP`, `add_arguments(parser)` and `run(arguments)`."""
+"""The command line's parser, of what each verb's file states: its `HELP`, its `PLACE` in the list, and its options."""
 
 from __future__ import annotations
 
 import argparse
 import importlib
+from collections.abc import Iterable
 from functools import partial
 from types import ModuleType
 from typing import Any, NoReturn
@@ -34,14 +35,19 @@ def parser_of(wanted: str) -> Parser:
     parser = Parser(prog="emaviz", description="Break, watch and identify the model of an electromechanical actuator.")
     parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    for name in COMMANDS if wanted not in COMMANDS else (wanted,):
-        command = importlib.import_module(f"emaviz.cli.{name}")
-        sub = commands.add_parser(name, help=command.HELP, description=command.HELP)
-        command.add_arguments(sub)
-        sub.set_defaults(run=partial(_run, command, sub))
+    add_verbs(commands, "emaviz.cli.verbs", COMMANDS if wanted not in COMMANDS else (wanted,), "run")
     return parser
 
 
-def _run(command: ModuleType, parser: argparse.ArgumentParser, arguments: argparse.Namespace) -> int:
+def add_verbs(to: Any, package: str, verbs: Iterable[str], run: str) -> None:
+    """Parsers of the verbs of a package, in their order; what is to be run is the `run` of what they parse."""
+    modules = {name: importlib.import_module(f"{package}.{name}") for name in verbs}
+    for name, verb in sorted(modules.items(), key=lambda one: one[1].PLACE):
+        sub = to.add_parser(name, help=verb.HELP, description=verb.HELP)
+        verb.add_arguments(sub)
+        sub.set_defaults(**{run: partial(_run, verb, sub)})
+
+
+def _run(verb: ModuleType, parser: argparse.ArgumentParser, arguments: argparse.Namespace) -> int:
     check_files(parser, arguments)
-    return command.run(arguments)
+    return verb.run(arguments)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 import plotly.graph_objects as go
 
+from ema_model.members import classes
 from emaviz.report.markup import escape
 
 Subject = TypeVar("Subject")
@@ -35,7 +36,14 @@ class Section(ABC, Generic[Subject]):
 
     title: str
     anchor: str
+    place: int  # among the sections of its report
 
     @abstractmethod
     def body(self, subject: Subject, figures: Figures) -> str:
         """The HTML below the heading; "" leaves the section out."""
+
+
+def sections(package: str) -> tuple[Any, ...]:
+    """The sections that the files of a report's folder define, in their order."""
+    found: list[Any] = classes(package, Section)
+    return tuple(sorted((one() for one in found), key=lambda one: one.place))

@@ -5,16 +5,11 @@ To add one, add a file with a `KIND`: plans, tables and reports find it.
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
 from dataclasses import replace
 
 from ema_model.campaign.kinds.kind import COMMON, HOW, Kind
+from ema_model.members import members
 
 __all__ = ["COMMON", "HOW", "KINDS", "Kind"]
 
-KINDS: dict[str, Kind] = {
-    module.name: replace(importlib.import_module(f"{__name__}.{module.name}").KIND, name=module.name)
-    for module in sorted(pkgutil.iter_modules(__path__), key=lambda module: module.name)
-    if module.name != "kind"
-}
+KINDS: dict[str, Kind] = {name: replace(kind, name=name) for name, kind in members(__name__, "KIND").items()}

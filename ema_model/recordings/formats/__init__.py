@@ -5,10 +5,8 @@ To add a format, add a file with a `FORMAT`: reading, writing and their messages
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
-
 from ema_model.files.refusal import refusal, shown
+from ema_model.members import members
 from ema_model.recordings.formats.format import Columns, Format
 
 __all__ = ["FORMATS", "WRITTEN", "Columns", "Format", "add_format", "format_of"]
@@ -36,7 +34,7 @@ def format_of(path: str, known: dict[str, Format] = FORMATS) -> Format:
         raise refusal(path, f"{found}; a measurement ends in {' or '.join(known)}") from None
 
 
-_modules = [importlib.import_module(f"{__name__}.{module.name}") for module in pkgutil.iter_modules(__path__)]
-_found = [module.FORMAT for module in _modules if hasattr(module, "FORMAT")]
-for _one in sorted(_found, key=lambda one: (one.suffix not in (".csv", ".parquet"), one.write is None)):
+for _one in sorted(
+    members(__name__, "FORMAT").values(), key=lambda one: (one.suffix not in (".csv", ".parquet"), one.write is None)
+):
     add_format(_one)

@@ -5,26 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from ema_model.campaign.store import Store
-from emaviz.report.campaign.answers import Answers
-from emaviz.report.campaign.convergence import Convergence
-from emaviz.report.campaign.distributions import Distributions
-from emaviz.report.campaign.effort import Effort
-from emaviz.report.campaign.errors import Errors
-from emaviz.report.campaign.progress import Progress
 from emaviz.report.campaign.subject import Rows
-from emaviz.report.campaign.tables import Tables
 from emaviz.report.page import page, write
-from emaviz.report.section import Section
+from emaviz.report.section import Section, sections
 
-SECTIONS: tuple[Section[Rows], ...] = (
-    Progress(),
-    Tables(),
-    Distributions(),
-    Answers(),
-    Convergence(),
-    Errors(),
-    Effort(),
-)
+SECTIONS: tuple[Section[Rows], ...] = sections(__name__)
 
 
 def write_campaign_report(store: Store, path: str | Path) -> None:

@@ -18,6 +18,7 @@ class Answers(Section[Rows]):
 
     title = "Answers"
     anchor = "answers"
+    place = 40
 
     def body(self, subject: Rows, figures: Figures) -> str:
         """Left out where nothing was discovered or compared."""

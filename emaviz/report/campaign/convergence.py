@@ -13,6 +13,7 @@ class Convergence(Section[Rows]):
 
     title = "Convergence"
     anchor = "convergence"
+    place = 50
 
     def body(self, subject: Rows, figures: Figures) -> str:
         """Left out where nothing was identified."""

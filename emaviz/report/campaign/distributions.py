@@ -17,6 +17,7 @@ class Distributions(Section[Rows]):
 
     title = "Distributions"
     anchor = "distributions"
+    place = 30
 
     def body(self, subject: Rows, figures: Figures) -> str:
         """Left out where no truth is known."""

@@ -16,6 +16,7 @@ class Effort(Section[Rows]):
 
     title = "Effort"
     anchor = "effort"
+    place = 70
 
     def body(self, subject: Rows, figures: Figures) -> str:
         """Left out where nothing was computed."""

@@ -15,6 +15,7 @@ class Errors(Section[Rows]):
 
     title = "Errors"
     anchor = "errors"
+    place = 60
 
     def body(self, subject: Rows, figures: Figures) -> str:
         """Left out where there are none."""

@@ -13,6 +13,7 @@ class Progress(Section[Rows]):
 
     title = "Tasks"
     anchor = "tasks"
+    place = 10
 
     def body(self, subject: Rows, figures: Figures) -> str:
         """Always there."""

@@ -13,6 +13,7 @@ class Tables(Section[Rows]):
 
     title = "Results"
     anchor = "results"
+    place = 20
 
     def body(self, subject: Rows, figures: Figures) -> str:
         """Left out where there are no rows."""

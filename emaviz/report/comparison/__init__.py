@@ -5,27 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from ema_model.comparison.result import Comparison
-from emaviz.report.comparison.answer import Answer
-from emaviz.report.comparison.calibration import CalibrationTable
-from emaviz.report.comparison.data_health import DataHealth
-from emaviz.report.comparison.errors_per_signal import ErrorsPerSignal
-from emaviz.report.comparison.explanation import WhatExplains
-from emaviz.report.comparison.held_out import HeldOut
-from emaviz.report.comparison.recordings import Recordings
-from emaviz.report.comparison.worst_regions import WorstRegions
 from emaviz.report.page import page, write
-from emaviz.report.section import Section
+from emaviz.report.section import Section, sections
 
-SECTIONS: tuple[Section[Comparison], ...] = (
-    Answer(),
-    ErrorsPerSignal(),
-    HeldOut(),
-    WorstRegions(),
-    WhatExplains(),
-    Recordings(),
-    CalibrationTable(),
-    DataHealth(),
-)
+SECTIONS: tuple[Section[Comparison], ...] = sections(__name__)
 
 
 def write_report(comparison: Comparison, path: str | Path) -> None:

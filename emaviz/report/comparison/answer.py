@@ -12,6 +12,7 @@ class Answer(Section[Comparison]):
 
     title = "The answer"
     anchor = "answer"
+    place = 10
 
     def body(self, subject: Comparison, figures: Figures) -> str:
         """Always there."""

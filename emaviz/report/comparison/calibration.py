@@ -17,6 +17,7 @@ class CalibrationTable(Section[Comparison]):
 
     title = "Calibration"
     anchor = "calibration"
+    place = 70
 
     def body(self, subject: Comparison, figures: Figures) -> str:
         """Convergence, figure, table, warnings."""

@@ -14,6 +14,7 @@ class DataHealth(Section[Comparison]):
 
     title = "Data health"
     anchor = "health"
+    place = 80
 
     def body(self, subject: Comparison, figures: Figures) -> str:
         """Always there."""

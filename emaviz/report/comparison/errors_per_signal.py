@@ -21,6 +21,7 @@ class ErrorsPerSignal(Section[Comparison]):
 
     title = "Errors"
     anchor = "errors"
+    place = 20
 
     def body(self, subject: Comparison, figures: Figures) -> str:
         """Always there."""

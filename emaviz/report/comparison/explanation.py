@@ -22,6 +22,7 @@ class WhatExplains(Section[Comparison]):
 
     title = "What explains the residual"
     anchor = "explained"
+    place = 50
 
     def body(self, subject: Comparison, figures: Figures) -> str:
         """Without variables that are known there is nothing to tell."""

@@ -13,6 +13,7 @@ class HeldOut(Section[Comparison]):
 
     title = "Not fitted"
     anchor = "held-out"
+    place = 30
 
     def body(self, subject: Comparison, figures: Figures) -> str:
         """A line for each."""

@@ -13,6 +13,7 @@ class Recordings(Section[Comparison]):
 
     title = "Recordings"
     anchor = "recordings"
+    place = 60
 
     def body(self, subject: Comparison, figures: Figures) -> str:
         """Always there."""

@@ -22,6 +22,7 @@ class WorstRegions(Section[Comparison]):
 
     title = "Where it fails"
     anchor = "regions"
+    place = 40
 
     def body(self, subject: Comparison, figures: Figures) -> str:
         """Says so where no region stands out of the floor."""

@@ -7,32 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from ema_model.discovery import Discovery
-from emaviz.report.discovery.added_effects import AddedEffects
-from emaviz.report.discovery.calibrated import Calibrated
-from emaviz.report.discovery.candidates import Candidates
-from emaviz.report.discovery.how_made import HowMade
-from emaviz.report.discovery.ladder import Ladder
-from emaviz.report.discovery.missing import Missing
-from emaviz.report.discovery.next_experiment import NextExperiment
-from emaviz.report.discovery.outside_tolerance import OutsideTolerance
-from emaviz.report.discovery.residuals import Residuals
 from emaviz.report.discovery.subject import Told
-from emaviz.report.discovery.verdict import Verdict
 from emaviz.report.page import page, write
-from emaviz.report.section import Section
+from emaviz.report.section import Section, sections
 
-SECTIONS: tuple[Section[Told], ...] = (
-    Verdict(),
-    Ladder(),
-    AddedEffects(),
-    Missing(),
-    OutsideTolerance(),
-    Candidates(),
-    NextExperiment(),
-    Residuals(),
-    Calibrated(),
-    HowMade(),
-)
+SECTIONS: tuple[Section[Told], ...] = sections(__name__)
 
 
 def write_discovery_report(found: Discovery, path: str | Path, configuration: Mapping[str, Any] | None = None) -> None:

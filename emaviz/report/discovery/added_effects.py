@@ -18,6 +18,7 @@ class AddedEffects(Section[Told]):
 
     title = "What was added"
     anchor = "added"
+    place = 30
 
     def body(self, subject: Told, figures: Figures) -> str:
         """Equation, cause, parameters, errors before and after, rivals."""

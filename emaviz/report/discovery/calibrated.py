@@ -18,6 +18,7 @@ class Calibrated(Section[Told]):
 
     title = "Calibration of the last model"
     anchor = "calibration"
+    place = 90
 
     def body(self, subject: Told, figures: Figures) -> str:
         """Always there."""

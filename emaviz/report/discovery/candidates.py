@@ -19,6 +19,7 @@ class Candidates(Section[Told]):
 
     title = "Candidates"
     anchor = "candidates"
+    place = 60
 
     def body(self, subject: Told, figures: Figures) -> str:
         """Left out where none was scored."""

@@ -23,6 +23,7 @@ class HowMade(Section[Told]):
 
     title = "How it was made"
     anchor = "made"
+    place = 100
 
     def body(self, subject: Told, figures: Figures) -> str:
         """Always there."""

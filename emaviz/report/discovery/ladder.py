@@ -16,6 +16,7 @@ class Ladder(Section[Told]):
 
     title = "The ladder"
     anchor = "ladder"
+    place = 20
 
     def body(self, subject: Told, figures: Figures) -> str:
         """Always there."""

@@ -19,6 +19,7 @@ class Missing(Section[Told]):
 
     title = "What is missing and has no name"
     anchor = "missing"
+    place = 40
 
     def body(self, subject: Told, figures: Figures) -> str:
         """The sentence and the curve."""

@@ -13,6 +13,7 @@ class NextExperiment(Section[Told]):
 
     title = "Next experiment"
     anchor = "next"
+    place = 70
 
     def body(self, subject: Told, figures: Figures) -> str:
         """The command and what it would settle."""

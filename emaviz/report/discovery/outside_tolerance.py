@@ -19,6 +19,7 @@ class OutsideTolerance(Section[Told]):
 
     title = "Parameters outside their tolerance"
     anchor = "outside"
+    place = 50
 
     def body(self, subject: Told, figures: Figures) -> str:
         """A table of them."""

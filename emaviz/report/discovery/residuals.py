@@ -17,6 +17,7 @@ class Residuals(Section[Told]):
 
     title = "Residuals before and after"
     anchor = "residuals"
+    place = 80
 
     def body(self, subject: Told, figures: Figures) -> str:
         """Always there."""

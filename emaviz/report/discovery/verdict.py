@@ -15,6 +15,7 @@ class Verdict(Section[Told]):
 
     title = "The verdict"
     anchor = "verdict"
+    place = 10
 
     def body(self, subject: Told, figures: Figures) -> str:
         """Always there."""

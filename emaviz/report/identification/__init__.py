@@ -9,15 +9,11 @@ from typing import Any
 from ema_model.identification.objective import Objective
 from ema_model.identification.run import Identification
 from ema_model.identification.words import verdict
-from emaviz.report.identification.convergence import Convergence
-from emaviz.report.identification.faults import Faults
-from emaviz.report.identification.fit import Fit
-from emaviz.report.identification.settings import Settings
 from emaviz.report.identification.subject import Identified
 from emaviz.report.page import page, write
-from emaviz.report.section import Section
+from emaviz.report.section import Section, sections
 
-SECTIONS: tuple[Section[Identified], ...] = (Faults(), Fit(), Convergence(), Settings())
+SECTIONS: tuple[Section[Identified], ...] = sections(__name__)
 
 
 def write_identification_report(

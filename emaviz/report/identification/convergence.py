@@ -17,6 +17,7 @@ class Convergence(Section[Identified]):
 
     title = "Convergence"
     anchor = "convergence"
+    place = 30
 
     def body(self, subject: Identified, figures: Figures) -> str:
         """Always there."""

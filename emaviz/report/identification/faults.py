@@ -19,6 +19,7 @@ class Faults(Section[Identified]):
 
     title = "Faults"
     anchor = "faults"
+    place = 10
 
     def body(self, subject: Identified, figures: Figures) -> str:
         """Always there."""

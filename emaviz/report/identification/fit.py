@@ -14,6 +14,7 @@ class Fit(Section[Identified]):
 
     title = "Fit"
     anchor = "fit"
+    place = 20
 
     def body(self, subject: Identified, figures: Figures) -> str:
         """Always there."""

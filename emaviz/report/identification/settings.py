@@ -15,6 +15,7 @@ class Settings(Section[Identified]):
 
     title = "How it was made"
     anchor = "made"
+    place = 40
 
     def body(self, subject: Identified, figures: Figures) -> str:
         """Always there."""

@@ -7,31 +7,10 @@ from pathlib import Path
 from ema_model.campaign.thesis import Evaluation
 from ema_model.campaign.thesis.responses import Drawn
 from emaviz.report.page import page, write
-from emaviz.report.reproduce.answer import Answer
-from emaviz.report.reproduce.coefficients import Coefficients
-from emaviz.report.reproduce.convergence import Convergence
-from emaviz.report.reproduce.deviations import Deviations
-from emaviz.report.reproduce.how_made import HowMade
-from emaviz.report.reproduce.model_bias import ModelBias
-from emaviz.report.reproduce.models import Models
-from emaviz.report.reproduce.row_by_row import RowByRow
-from emaviz.report.reproduce.severities import Severities
 from emaviz.report.reproduce.subject import Reproduced
-from emaviz.report.reproduce.trade_off import TradeOff
-from emaviz.report.section import Section
+from emaviz.report.section import Section, sections
 
-SECTIONS: tuple[Section[Reproduced], ...] = (
-    Answer(),
-    RowByRow(),
-    Coefficients(),
-    ModelBias(),
-    Deviations(),
-    Convergence(),
-    TradeOff(),
-    Models(),
-    Severities(),
-    HowMade(),
-)
+SECTIONS: tuple[Section[Reproduced], ...] = sections(__name__)
 
 
 def write_reproduction_report(evaluation: Evaluation, drawn: Drawn, path: str | Path) -> None:

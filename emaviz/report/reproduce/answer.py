@@ -14,6 +14,7 @@ class Answer(Section[Reproduced]):
 
     title = "Answer"
     anchor = "answer"
+    place = 10
 
     def body(self, subject: Reproduced, figures: Figures) -> str:
         """Always there."""

@@ -13,6 +13,7 @@ class Coefficients(Section[Reproduced]):
 
     title = "Performance coefficients"
     anchor = "coefficients"
+    place = 30
 
     def body(self, subject: Reproduced, figures: Figures) -> str:
         """Left out where no fault has been computed with all three algorithms."""

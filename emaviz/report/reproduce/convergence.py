@@ -16,6 +16,7 @@ class Convergence(Section[Reproduced]):
 
     title = "Convergence (figure 5.4)"
     anchor = "convergence"
+    place = 60
 
     def body(self, subject: Reproduced, figures: Figures) -> str:
         """Left out where nothing was searched."""

@@ -13,6 +13,7 @@ class Deviations(Section[Reproduced]):
 
     title = "Where this deviates from the thesis, and why"
     anchor = "deviations"
+    place = 50
 
     def body(self, subject: Reproduced, figures: Figures) -> str:
         """Always there."""

@@ -14,6 +14,7 @@ class HowMade(Section[Reproduced]):
 
     title = "How it was made"
     anchor = "made"
+    place = 100
 
     def body(self, subject: Reproduced, figures: Figures) -> str:
         """Always there."""

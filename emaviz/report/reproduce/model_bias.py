@@ -15,6 +15,7 @@ class ModelBias(Section[Reproduced]):
 
     title = "Search or model?"
     anchor = "bias"
+    place = 40
 
     def body(self, subject: Reproduced, figures: Figures) -> str:
         """Left out where nothing was computed."""

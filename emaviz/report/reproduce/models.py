@@ -22,6 +22,7 @@ class Models(Section[Reproduced]):
 
     title = "Reference against monitor model (figures 3.17–3.24)"
     anchor = "models"
+    place = 80
 
     def body(self, subject: Reproduced, figures: Figures) -> str:
         """Always there."""

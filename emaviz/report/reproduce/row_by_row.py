@@ -13,6 +13,7 @@ class RowByRow(Section[Reproduced]):
 
     title = "Row by row"
     anchor = "rows"
+    place = 20
 
     def body(self, subject: Reproduced, figures: Figures) -> str:
         """Always there: the thesis's rows are."""

@@ -16,6 +16,7 @@ class Severities(Section[Reproduced]):
 
     title = "Severities of each fault (figures 3.27–3.70)"
     anchor = "severities"
+    place = 90
 
     def body(self, subject: Reproduced, figures: Figures) -> str:
         """Always there."""

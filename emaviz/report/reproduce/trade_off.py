@@ -19,6 +19,7 @@ class TradeOff(Section[Reproduced]):
 
     title = "How much search an answer takes (chapter 6)"
     anchor = "effort"
+    place = 70
 
     def body(self, subject: Reproduced, figures: Figures) -> str:
         """Left out where nothing was searched."""

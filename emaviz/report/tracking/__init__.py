@@ -7,12 +7,9 @@ from pathlib import Path
 from ema_model.tracking.result import Tracked
 from ema_model.tracking.words import answer
 from emaviz.report.page import page, write
-from emaviz.report.section import Section
-from emaviz.report.tracking.flights import Flights
-from emaviz.report.tracking.in_words import Answer
-from emaviz.report.tracking.remaining import RemainingLife
+from emaviz.report.section import Section, sections
 
-SECTIONS: tuple[Section[Tracked], ...] = (Answer(), RemainingLife(), Flights())
+SECTIONS: tuple[Section[Tracked], ...] = sections(__name__)
 
 
 def write_tracking_report(result: Tracked, actuator: str, path: str | Path) -> None:

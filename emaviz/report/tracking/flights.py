@@ -12,6 +12,7 @@ class Flights(Section[Tracked]):
 
     title = "k over the flights"
     anchor = "flights"
+    place = 30
 
     def body(self, subject: Tracked, figures: Figures) -> str:
         """A figure each."""

@@ -13,6 +13,7 @@ class Answer(Section[Tracked]):
 
     title = "The answer"
     anchor = "answer"
+    place = 10
 
     def body(self, subject: Tracked, figures: Figures) -> str:
         """Always there."""

@@ -12,6 +12,7 @@ class RemainingLife(Section[Tracked]):
 
     title = "Remaining life"
     anchor = "remaining"
+    place = 20
 
     def body(self, subject: Tracked, figures: Figures) -> str:
         """Left out where nothing ends."""

@@ -16,6 +16,7 @@ from emaviz.cli.numbers import whole
 from emaviz.text.reproduce import aligned, answer, short_table
 
 HELP = "compute the thesis's evaluation anew, and set its numbers beside ours"
+PLACE = 12
 _PLAN = files.Input("a plan (.toml)", is_file=lambda name: bool(Path(name).suffix))
 REPORT, RECORDING = "reproduce.html", "reproduce.rrd"
 

@@ -16,6 +16,7 @@ from ema_model.text import Document, Lines
 from emaviz.cli import files, options, output
 
 HELP = "say what an actuator file lacks, what is hard to believe, and what a recording cannot tell of it"
+PLACE = 2
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -10,6 +10,7 @@ from emaviz.cli.numbers import whole
 from emaviz.cli.options import add_actuator
 
 HELP = "the app in the browser (also without a command)"
+PLACE = 1
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

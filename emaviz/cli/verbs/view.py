@@ -9,6 +9,7 @@ from emaviz.cli.files import Input
 from emaviz.cli.numbers import whole
 
 HELP = "open a .rrd recording in the Rerun viewer (in the browser, no network needed)"
+PLACE = 9
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

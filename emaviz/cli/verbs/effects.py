@@ -17,6 +17,7 @@ from emaviz.cli.options import add_json
 from emaviz.cli.output import configuration, write_json
 
 HELP = "list the physical effects that can be added to the models, or explain one"
+PLACE = 8
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -24,6 +24,7 @@ from emaviz.cli import files, options, output
 from emaviz.cli.numbers import whole
 
 HELP = "find the faults k1 … k8 of recordings, or of a simulated actuator"
+PLACE = 3
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -9,6 +9,7 @@ from ema_model.actuator.reference import markdown, parameter_rows
 from emaviz.cli import options, output
 
 HELP = "print the reference of every key of an actuator file, as Markdown"
+PLACE = 3
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -9,6 +9,7 @@ from ema_model.errors import InputError
 from emaviz.cli import files, options, output
 
 HELP = "make a whole recording of one that was cut off (FILE.part)"
+PLACE = 10
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -12,6 +12,7 @@ from emaviz.cli import files, options, output
 from emaviz.cli.numbers import whole
 
 HELP = "find the physical effects that the model lacks, and add them"
+PLACE = 5
 _CURRENT_ONLY = ("current_A",)
 
 

@@ -10,6 +10,7 @@ from ema_model.errors import InputError
 from emaviz.cli import files, options, output
 
 HELP = "show where the model fails beside recordings"
+PLACE = 4
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -16,10 +16,11 @@ from ema_model.effects.user.entries import kind_of
 from ema_model.errors import InputError, quoted
 from ema_model.quantities.axes import KINDS as AXES
 from emaviz.cli import files, options, output
-from emaviz.cli.actuator.questions import ask
 from emaviz.cli.numbers import FINITE
+from emaviz.cli.verbs.actuator.questions import ask
 
 HELP = "write an actuator file with comments, from options or from answers on the terminal"
+PLACE = 1
 _HERE = "actuator new"
 _TEXTS = ("expression", "variable", "modulator")  # of a user's effect
 

@@ -18,6 +18,7 @@ from emaviz.cli import files, options, output
 from emaviz.cli.numbers import FINITE
 
 HELP = "simulate one run of the reference or the monitor model and write it as a recording"
+PLACE = 2
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

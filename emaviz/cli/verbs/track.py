@@ -14,6 +14,7 @@ from ema_model.tracking.track import check_thresholds, track
 from emaviz.cli import files, options, output
 
 HELP = "follow k over the flights of one unit: what drifts, and what life remains"
+PLACE = 6
 _FLIGHT = files.Input("the file of a measurement", has_side_file=True, is_file=lambda name: not Path(name).is_dir())
 
 

@@ -16,6 +16,7 @@ from emaviz.cli.numbers import whole
 from emaviz.text.campaign import progress_table, report_text
 
 HELP = "compute the many tasks of a plan, in processes or on a Dask cluster; status and report of one"
+PLACE = 11
 _STATUS, _REPORT = "status", "report"
 _PLAN = files.Input("a plan (.toml)", is_file=lambda name: bool(Path(name).suffix))
 

@@ -1,17 +1,16 @@
-"""Finds the workspaces: every folder here that says it is one."""
+"""Finds the tabs: every folder here that states a `WORKSPACE`, and whose `tab.py` defines its tab."""
 
 from __future__ import annotations
 
 import importlib
-import pkgutil
 
-import emaviz.page
-from emaviz.page.workspaces import Workspace
+from ema_model.members import classes_in, members
+from emaviz.page.tab import Tab
 
 
-def workspaces() -> list[Workspace]:
-    """In the order of their tabs."""
-    folders = [one.name for one in pkgutil.iter_modules(emaviz.page.__path__) if one.ispkg]
-    modules = [importlib.import_module(f"emaviz.page.{name}") for name in folders]
-    found = [module.WORKSPACE for module in modules if hasattr(module, "WORKSPACE")]
-    return sorted(found, key=lambda one: one.place)
+def tabs() -> list[type[Tab]]:
+    """In their order."""
+    folders = members("emaviz.page", "WORKSPACE", files=False, folders=True)
+    modules = [importlib.import_module(f"emaviz.page.{name}.tab") for name in folders]
+    found: list[type[Tab]] = [one for module in modules for one in classes_in(module, Tab)]
+    return sorted(found, key=lambda one: one.workspace.place)

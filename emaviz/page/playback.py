@@ -14,6 +14,7 @@ from emaviz.page.style import page as style
 from emaviz.scene.actuator import ActuatorScene
 from emaviz.scene.motion import Motion
 from emaviz.scene.playback import SPEEDS, Playback
+from emaviz.session.signal import Signal
 from emaviz.text.html import add_html
 
 _SLOWEST_STEP_S = 1e-4
@@ -29,7 +30,7 @@ class PlaybackStrip:
     def __init__(self, page: Page, scene: ActuatorScene, actuator: Actuator, theme: Callable[[bool], None]) -> None:
         self._page, self._scene, self._theme = page, scene, theme
         self._span_s = (0.0, 0.5)
-        self.moves: list[Callable[[str, float, tuple[float, float]], None]] = []
+        self.moves: Signal[[str, float, tuple[float, float]]] = Signal()
         self.playback = Playback(scene, actuator, self._moved)
         gui = page.server.gui
         self._panel = gui.add_panel()
@@ -52,7 +53,7 @@ class PlaybackStrip:
         self._opacity.on_update(lambda _: self._scene.set_opacity(min(max(float(self._opacity.value), 0.0), 1.0)))
         self._labels.on_update(lambda _: self._scene.show_labels(bool(self._labels.value)))
         self._dark.on_update(lambda _: self._set_dark())
-        page.workspaces.entered.append(self._enter)
+        page.workspaces.entered.connect(self._enter)
 
         @self._view.on_click
         def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
@@ -123,8 +124,7 @@ class PlaybackStrip:
                 self._span_s = span_s
                 self._moment.min, self._moment.max = (round(edge, 4) for edge in span_s)
             self._moment.value = round(time_s, 4)
-            for listener in self.moves:
-                listener(on, time_s, span_s)
+            self.moves(on, time_s, span_s)
 
     def _scrub(self) -> None:
         self.play(False)

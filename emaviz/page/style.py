@@ -15,9 +15,6 @@ STRIP = Html('<div class="emaviz-strip"></div>')  # stands in the panel that bec
 TIME_CHARTS = Html('<div class="emaviz-time"></div>')  # stands beside charts over time
 LONG_LABELS = Html('<div class="emaviz-long"></div>')  # stands beside controls with long labels
 # stands before the upload button that takes dropped files, which is not to be seen
-DROP = Html(
-    '<div class="emaviz-drop"></div><style>div:has(> .emaviz-drop),div:has(> .emaviz-drop)+div{display:none}</style>'
-)
 WIDE_MODAL = Html("<style>.mantine-Modal-root{--modal-size:min(960px,92vw)!important}</style>")
 STRIP_HEIGHT_PX = 68
 _ROW_PX = 48

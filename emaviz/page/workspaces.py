@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 import threading
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,6 +17,7 @@ import viser
 from emaviz.page.docked import WINDOWS_PX, Docked
 from emaviz.page.style import unseen
 from emaviz.server.viser_private import Inside, id_of
+from emaviz.session.signal import Signal
 from emaviz.session.worker import Worker
 from emaviz.text.html import add_html
 
@@ -90,7 +90,7 @@ class Workspaces:
     def __init__(self, server: viser.ViserServer, screen: Worker, docked: Docked, first: str) -> None:
         self._server, self._inside, self._screen, self._docked = server, Inside(server), screen, docked
         self.first = first  # where a window without a place in its address begins
-        self.entered: list[Callable[[str], object]] = []
+        self.entered: Signal[[str]] = Signal()
         self._members: dict[str, Workspace] = {}
         self._at: dict[int, str] = {}  # by window
         self._changing = threading.Lock()
@@ -133,11 +133,7 @@ class Workspaces:
         with self._changing:
             self._at[client.client_id] = name
         self._docked.show(client.client_id, name)
-        self._screen.post("workspace", lambda: self._enter(name))
-
-    def _enter(self, name: str) -> None:
-        for listener in self.entered:
-            listener(name)
+        self._screen.post("workspace", lambda: self.entered(name))
 
     def _left(self, client: viser.ClientHandle) -> None:
         with self._changing:

@@ -48,7 +48,7 @@ class Playback:
     """
 
     def __init__(self, scene: ActuatorScene, actuator: Actuator, moved: Callable[[float, float], None]) -> None:
-        self._scene, self._actuator, self._moved = scene, actuator, moved
+        self.scene, self._actuator, self._moved = scene, actuator, moved
         self.speed = 0.1
         self.reels: dict[str, Reel] = {FIRST: Reel()}
         self._reel = self.reels[FIRST]
@@ -140,7 +140,7 @@ class Playback:
                     moves = reel.playing or self._stale
                     if moves:
                         self._show_damage(shown)
-                        shown.pose(self._scene, reel.clock_s)
+                        shown.pose(self.scene, reel.clock_s)
                 else:
                     moves = False
                 stale, self._stale = self._stale, False
@@ -172,4 +172,4 @@ class Playback:
     def _show_damage(self, shown: Motion) -> None:
         if shown is not self._damaged:
             self._damaged = shown
-            shown.damage(self._scene)
+            shown.damage(self.scene)

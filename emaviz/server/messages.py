@@ -78,7 +78,7 @@ class CommandTriggerMessage(Message):
 
 
 class FileTransferStartUpload(Message):
-    """Of an upload button that can be pressed; `emaviz.session.uploads` limits the sizes, and says so to the user."""
+    """Of an upload button that can be pressed; `emaviz.server.uploads` limits the sizes, and says so to the user."""
 
     source_component_uuid: _Id
     transfer_uuid: _Id
@@ -89,7 +89,7 @@ class FileTransferStartUpload(Message):
 
 
 class FileTransferPart(Message):
-    """One of an unknown transfer, of another client's, or out of turn is ignored by `emaviz.session.uploads`."""
+    """One of an unknown transfer, of another client's, or out of turn is ignored by `emaviz.server.uploads`."""
 
     source_component_uuid: _Id | None
     transfer_uuid: _Id

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import zipfile
+from collections.abc import Callable
 from functools import cache
 from typing import Any
 
 import viser
 from viser import _gui_api, _gui_handles, _icons, _messages
+from viser._messages import FileTransferPart as TransferPart
+from viser._messages import FileTransferStartUpload as TransferStart
 from websockets.datastructures import Headers
 
 
@@ -95,6 +98,35 @@ class Inside:
             self._server.gui._websock_interface.queue_message(message)
         else:
             self._push(client, message)
+
+    def take_transfers(
+        self, started: Callable[[int, TransferStart], None], came: Callable[[int, TransferPart], None]
+    ) -> None:
+        """Answers uploads in viser's place: with the page that sends, on the server's thread."""
+        interface = self._server.gui._websock_interface
+        for message in (TransferStart, TransferPart):
+            interface.unregister_handler(message)
+        interface.register_handler(TransferStart, started)
+        interface.register_handler(TransferPart, came)
+
+    def acknowledge(self, client: int, source: str | None, uuid: str, written: int, total: int) -> None:
+        """Tells the page that uploads, and it alone, how much of a transfer is here; `source` is its button."""
+        self._send(
+            client,
+            _messages.FileTransferPartAck(
+                source_component_uuid=source, transfer_uuid=uuid, transferred_bytes=written, total_bytes=total
+            ),
+        )
+
+    def take_away(self, client: int, notification: str) -> None:
+        """Takes a notification away again."""
+        self._send(client, _messages.RemoveNotificationMessage(notification))
+
+    def _send(self, client: int, message: Any) -> None:
+        """To one page alone: what all are sent is repeated to every page that opens later."""
+        handle = self._server.get_clients().get(client)
+        if handle is not None:
+            handle._websock_connection.queue_message(message)
 
     def _push(self, client: int, message: Any) -> None:
         state = self._server._websock_server._client_state_from_id.get(client)

@@ -22,8 +22,8 @@ from ema_model.identification.objective import Objective
 from ema_model.identification.run import steps
 from ema_model.recordings import Measurement
 from emaviz.session.data_folder import DataFolder
-from emaviz.session.events import notify
 from emaviz.session.session import Session
+from emaviz.session.signal import Signal
 from emaviz.session.worker import Steps
 
 _HEADER = "campaign.json"
@@ -34,8 +34,8 @@ _DEPTHS = ("*", "*/*")  # below the data folder
 class CampaignEvents:
     """What the screen listens to; called on the compute thread, so listeners only hand over."""
 
-    said: list[Callable[[str], None]] = field(default_factory=list)
-    opened: list[Callable[[Path, Measurement], None]] = field(default_factory=list)  # the recording, and its run
+    said: Signal[[str]] = field(default_factory=Signal)
+    opened: Signal[[Path, Measurement]] = field(default_factory=Signal)  # the recording, and its run
 
 
 class Campaigns:
@@ -82,7 +82,7 @@ class Campaigns:
             path = self._path(task)
             yield from _RECORDED[task.kind](task, it, path, self._tell)
             self._say(f"{path.name}: {task.group}, {task.case or 'one case'}, seed {task.seed}")
-            notify(self.events.opened, path, it.fitted[0])
+            self.events.opened(path, it.fitted[0])
         except FloatingPointError as error:
             raise InputError(str(error)) from None
 
@@ -96,7 +96,7 @@ class Campaigns:
         self._session.worker.breathe()
 
     def _say(self, text: str) -> None:
-        notify(self.events.said, text)
+        self.events.said(text)
 
 
 def _configuration(task: Task) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from ema_model.effects import CATALOGUE, find
@@ -10,6 +10,7 @@ from ema_model.errors import InputError, quoted
 from ema_model.quantities.titles import in_sentence
 from ema_model.simulation.with_effect import RUNS, EffectRuns, WithEffect
 from emaviz.session.session import Session
+from emaviz.session.signal import Signal
 from emaviz.session.worker import Steps
 
 
@@ -17,9 +18,9 @@ from emaviz.session.worker import Steps
 class LibraryEvents:
     """What the screen listens to; called on the compute thread, so listeners only hand over."""
 
-    felt: list[Callable[[WithEffect], None]] = field(default_factory=list)  # the effect that was asked for
-    drawn: list[Callable[[WithEffect], None]] = field(default_factory=list)  # one of all, at its clear severity
-    said: list[Callable[[str], None]] = field(default_factory=list)
+    felt: Signal[[WithEffect]] = field(default_factory=Signal)  # the effect that was asked for
+    drawn: Signal[[WithEffect]] = field(default_factory=Signal)  # one of all, at its clear severity
+    said: Signal[[str]] = field(default_factory=Signal)
 
 
 class Library:
@@ -40,8 +41,7 @@ class Library:
             self._say("Simulating; the first time, the library is compiled, which takes some seconds …")
             found = self._runs.felt(name, full, run)
             self._say("")
-            for listener in self.events.felt:
-                listener(found)
+            self.events.felt(found)
 
         self.session.worker.post("library", job)
 
@@ -55,11 +55,9 @@ class Library:
             self._say(f"Running {in_sentence(effect.title)} … {i + 1} of {len(CATALOGUE)}")
             best = self._runs.clearest(effect)
             if best is not None:
-                for listener in self.events.drawn:
-                    listener(best)
+                self.events.drawn(best)
             yield
         self._say("")
 
     def _say(self, text: str) -> None:
-        for listener in self.events.said:
-            listener(text)
+        self.events.said(text)

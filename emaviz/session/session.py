@@ -23,9 +23,9 @@ from ema_model.identification.run import Identification, Progress, warm_up
 from ema_model.recordings import Measurement
 from ema_model.simulation import plant
 from ema_model.simulation.run import simulate_monitor
-from emaviz.session.events import notify
 from emaviz.session.race import Race, Reins, begin, run, target
 from emaviz.session.settings import Settings
+from emaviz.session.signal import Signal
 from emaviz.session.worker import Steps, Worker
 
 if TYPE_CHECKING:  # rerun may be missing or broken, and takes a second to import
@@ -52,13 +52,13 @@ class Simulation:
 class Events:
     """What the screen listens to; called on the compute thread, so listeners only hand over."""
 
-    simulated: list[Callable[[Simulation], None]] = field(default_factory=list)
-    progressed: list[Callable[[Race], None]] = field(default_factory=list)
-    identified: list[Callable[[Race], None]] = field(default_factory=list)
-    ended: list[Callable[[], None]] = field(default_factory=list)  # an identification, with an answer or without
-    told: list[Callable[[str, str], None]] = field(default_factory=list)  # title, one line
-    status: list[Callable[[str], None]] = field(default_factory=list)
-    plants: list[Callable[[], None]] = field(default_factory=list)  # the plant is another model's
+    simulated: Signal[[Simulation]] = field(default_factory=Signal)
+    progressed: Signal[[Race]] = field(default_factory=Signal)
+    identified: Signal[[Race]] = field(default_factory=Signal)
+    ended: Signal[[]] = field(default_factory=Signal)  # an identification, with an answer or without
+    told: Signal[[str, str]] = field(default_factory=Signal)  # title, one line
+    status: Signal[[str]] = field(default_factory=Signal)
+    plants: Signal[[]] = field(default_factory=Signal)  # the plant is another model's
 
 
 class Session:
@@ -107,7 +107,7 @@ class Session:
         self.plant = str(name)
         for index, value in enumerate(self.plants[self.plant].k):
             self.settings.set_fault(index, value)
-        notify(self.events.plants)
+        self.events.plants()
 
     def model_in_words(self, monitor: str) -> str:
         """'healthy', 'same faults', 'identified 16:09'."""
@@ -128,7 +128,7 @@ class Session:
         name, actuator = self.plant, self.plants[self.plant]
         compiling = not plant.is_compiled(actuator, settings.effects)
         if compiling:
-            notify(self.events.status, "Compiling the plant with the library of effects…")
+            self.events.status("Compiling the plant with the library of effects…")
         started = time.perf_counter()
         run, start = settings.run(), settings.start_rad()
         fitted = self.identified.k if self.identified is not None else HEALTHY
@@ -148,20 +148,20 @@ class Session:
             raise InputError(str(error)) from None
         elapsed = time.perf_counter() - started
         if compiling:
-            notify(self.events.status, f"Ready ({elapsed:.1f} s).")
+            self.events.status(f"Ready ({elapsed:.1f} s).")
         reference = settings.sensors.record(reference, settings.seed)
         model = self.model_in_words(settings.monitor)
         self.simulation = Simulation(
             reference, monitor, settings.k, elapsed, settings.command, model, "" if name == OWN_PLANT else name
         )
-        notify(self.events.simulated, self.simulation)
+        self.events.simulated(self.simulation)
 
     def _warm_up(self) -> None:
         started = time.perf_counter()
-        notify(self.events.status, "Compiling the models for this computer (the first time takes some seconds)…")
+        self.events.status("Compiling the models for this computer (the first time takes some seconds)…")
         if not plant.can_be_explored(self.actuator):
             self.ready.set()
-            notify(self.events.status, "Ready.")
+            self.events.status("Ready.")
             return
         plant.compile_own(self.actuator)
         run = Settings().run()
@@ -169,10 +169,10 @@ class Session:
         simulate_monitor(run, self.actuator)
         self.ready.set()
         self._simulate()
-        notify(self.events.status, "Compiling the identification…")
+        self.events.status("Compiling the identification…")
         warm_up(Objective([reference], self.actuator))
         plant.compile_behind(self.actuator)
-        notify(self.events.status, f"Ready ({time.perf_counter() - started:.1f} s).")
+        self.events.status(f"Ready ({time.perf_counter() - started:.1f} s).")
 
     # --- identification ---------------------------------------------------------------------------------------------
 
@@ -204,7 +204,7 @@ class Session:
             def tell(race: Race, progress: Progress | None) -> None:
                 if story is not None and progress is not None:
                     story.iteration(progress)
-                notify(self.events.progressed, race)
+                self.events.progressed(race)
                 if progress is None:
                     self.worker.breathe()  # the sliders, while the answer is fitted
 
@@ -215,7 +215,7 @@ class Session:
         finally:
             if story is not None:
                 story.close()
-            notify(self.events.ended)
+            self.events.ended()
 
     def _keep(self, race: Race, story: IdentificationStory | None) -> None:
         best = race.best
@@ -226,8 +226,8 @@ class Session:
             story.finish(best.answer, *others)
             race.path = None if story.failed else story.path
             if story.failed:
-                notify(self.events.told, "The recording could not be written", story.failed)
-        notify(self.events.identified, race)
+                self.events.told("The recording could not be written", story.failed)
+        self.events.identified(race)
         if self.settings.monitor == "identified":
             self.refresh()
 
@@ -244,15 +244,15 @@ class Session:
                 path, objective, measurement, source, race.truth, readable(settings), settings.algorithms
             )
         except (OSError, ImportError) as error:  # a run without its recording is still a run
-            notify(self.events.told, "The recording cannot be written", " ".join(str(error).split()))
+            self.events.told("The recording cannot be written", " ".join(str(error).split()))
             return None
 
     def _on_error(self, error: BaseException) -> None:
         if isinstance(error, InputError):
-            notify(self.events.told, "The run has failed", str(error))
+            self.events.told("The run has failed", str(error))
             return
         traceback.print_exception(error)
-        notify(self.events.told, "Something failed; the app goes on", f"{type(error).__name__}: {quoted(error)}")
+        self.events.told("Something failed; the app goes on", f"{type(error).__name__}: {quoted(error)}")
 
 
 def readable(settings: Settings) -> dict[str, Any]:

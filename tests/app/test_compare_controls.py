@@ -13,6 +13,7 @@ from ema_model.commands import command
 from ema_model.recordings import write_measurement
 from ema_model.simulation.run import Run, simulate_reference
 from ema_model.simulation.sensors import Sensors
+from emaviz.page.compare.tab import CompareTab
 from emaviz.recording import read
 
 pytestmark = [pytest.mark.browser, pytest.mark.long]
@@ -31,7 +32,7 @@ def page(browser, app):
         run = Run(command("sine", {"amplitude_rad": 0.02, "frequency_Hz": frequency}), 0.6)
         true = simulate_reference(run, load_actuator(), effects=effects)
         write_measurement(Sensors(0.2, 12).record(true, 1), app.comparing.folder.uploads / f"{name}.csv")
-    app.compare.refresh_files()
+    app.tab(CompareTab).panel.refresh_files()
     page = browser.new_page(viewport={"width": 1400, "height": 900})
     page.goto(app.address)
     page.get_by_role("tab", name="Compare", exact=True).click(timeout=60_000)
@@ -143,7 +144,7 @@ def test_a_comparison_is_stopped(page, app):
     resting(app)
     comparing.calibrate = True
     before = comparing.comparison
-    comparing.events.progressed.append(lambda text: time.sleep(0.2))  # else it is over too soon
+    comparing.events.progressed.connect(lambda text: time.sleep(0.2))  # else it is over too soon
     page.get_by_role("button", name="Compare", exact=True).click()
     wait_until(lambda: comparing.running)
     page.get_by_role("button", name="Stop", exact=True).click()

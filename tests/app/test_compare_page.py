@@ -17,6 +17,7 @@ from ema_model.recordings import write_measurement
 from ema_model.simulation.run import Run, simulate_reference
 from ema_model.simulation.sensors import Sensors
 from emaviz.page.app import App
+from emaviz.page.explore.tab import ExploreTab
 
 pytestmark = pytest.mark.browser
 
@@ -65,7 +66,7 @@ def signals_in_front(app):
     def in_front():
         app.session.refresh()
         time.sleep(0.2)
-        return app.signals_panel.visible
+        return app.tab(ExploreTab).right.visible
 
     wait_until(in_front)
 
@@ -231,7 +232,7 @@ def test_a_bad_file_is_one_line_and_the_app_goes_on(compare, app, tmp_path):
 
 def test_too_large_an_upload_is_refused(compare, app, tmp_path, monkeypatch):
     page = compare
-    monkeypatch.setattr(app.compare.uploads, "most_bytes", 100_000)
+    monkeypatch.setattr(app.shared.uploads, "most_bytes", 100_000)
     large = tmp_path / "large.csv"
     large.write_bytes(b"0" * 700_000)  # in two parts
     before = set(app.comparing.folder.uploads.iterdir())

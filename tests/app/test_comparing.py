@@ -69,11 +69,11 @@ class Heard:
     def __init__(self, comparing):
         self.told, self.opened, self.progress = [], [], []
         self.compared, self.ended = [], []
-        comparing.session.events.told.append(lambda title, text: self.told.append(text))
-        comparing.events.opened.append(self.opened.append)
-        comparing.events.progressed.append(self.progress.append)
-        comparing.events.compared.append(lambda comparison, elapsed: self.compared.append(comparison))
-        comparing.events.ended.append(self.ended.append)
+        comparing.session.events.told.connect(lambda title, text: self.told.append(text))
+        comparing.events.opened.connect(self.opened.append)
+        comparing.events.progressed.connect(self.progress.append)
+        comparing.events.compared.connect(lambda comparison, elapsed: self.compared.append(comparison))
+        comparing.events.ended.connect(self.ended.append)
 
     @staticmethod
     def wait(what, count=1, seconds=60.0):
@@ -175,7 +175,7 @@ def test_a_header_found_wrongly_is_named_and_remembered(comparing, heard, record
     assert opened.head.told == "header in line 1, Windows-1252" and opened.head.lines[1].startswith("t [ms];Soll [°]")
 
     refused = []
-    comparing.events.refused.append(lambda: refused.append(comparing.opened[opened.name]))
+    comparing.events.refused.connect(lambda: refused.append(comparing.opened[opened.name]))
     for hints, line in (
         (Hints(100_000), "has no line 100000 among its first; name another header line"),
         (Hints(encoding="utf-16-le"), "no table is seen in it as UTF-16; name another encoding"),
@@ -273,7 +273,7 @@ def test_a_comparison_names_the_motors_angle(comparing, heard, recording):
 
 def test_a_comparison_is_kept_as_report_and_recording(comparing, heard, recording):
     kept = []
-    comparing.events.kept.append(kept.append)
+    comparing.events.kept.connect(kept.append)
     comparing.save_report()
     assert "nothing is compared yet" in heard.wait(heard.told)
     write_measurement(recording, comparing.folder.uploads / "run.csv")
@@ -295,7 +295,7 @@ def test_stop_ends_it_soon_and_keeps_the_last_result(comparing, heard, recording
     comparing.add("uploads/run.csv")
     heard.wait(heard.opened)
     begun = threading.Event()
-    comparing.events.progressed.append(lambda text: begun.set())
+    comparing.events.progressed.connect(lambda text: begun.set())
     assert comparing.compare()
     assert begun.wait(30.0)
     comparing.stop()

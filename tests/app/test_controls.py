@@ -13,6 +13,8 @@ from support.on_page import choose, field, fill, wait_until
 
 from ema_model.faults import HEALTHY
 from ema_model.identification.next_experiment import Suggestion
+from emaviz.page.explore.tab import ExploreTab
+from emaviz.page.identify.tab import IdentifyTab
 from emaviz.recording import read
 from emaviz.session.settings import Settings
 
@@ -53,9 +55,9 @@ def page(tab, app):
     """The tab, the session as it was at the start."""
     app.session.settings.restore(Settings().saved())
     before = app.session.simulation
-    app.explore.show_settings()
-    app.identify.show_settings()
-    wait_until(lambda: app.session.simulation is not before and app.signals_panel.visible)
+    app.tab(ExploreTab).panel.show_settings()
+    app.tab(IdentifyTab).panel.show_settings()
+    wait_until(lambda: app.session.simulation is not before and app.tab(ExploreTab).right.visible)
     yield tab
     app.session.stop()
     wait_until(lambda: not app.session.worker.busy)
@@ -83,10 +85,10 @@ def raced(app, page, seconds=60.0):
         races.append(race)
         done.set()
 
-    app.session.events.identified.append(keep)
+    app.session.events.identified.connect(keep)
     page.get_by_role("button", name="Identify", exact=True).click()
     assert done.wait(seconds)
-    app.session.events.identified.remove(keep)
+    app.session.events.identified.disconnect(keep)
     wait_until(lambda: not app.session.worker.busy)
     return races[0]
 
@@ -133,8 +135,8 @@ def test_each_command_has_its_settings(page, app, title, name, label, value, set
 
 
 def test_the_charts_show_a_part_of_the_run_and_the_phases(page, app):
-    app.explore.set_faults(HEALTHY)
-    wait_until(lambda: app.signals_panel.visible)
+    app.tab(ExploreTab).panel.set_faults(HEALTHY)
+    wait_until(lambda: app.tab(ExploreTab).right.visible)
     show(page, "Signals")
     wait_until(lambda: chart(page, "Motor speed").ndim == 2)
     thumb = page.locator(".multi-slider-thumb").first
@@ -192,7 +194,7 @@ def test_stop_ends_several_searches_at_once_even_while_they_rest(page, app):
     app.session.settings.set_algorithms(["do", "hba", "ssa"])
     app.session.settings.set_iterations(5000)
     app.session.settings.set_fault(0, 0.3)
-    app.identify.show_settings()
+    app.tab(IdentifyTab).panel.show_settings()
     show(page, "Identify")
     choose(page, "Fitness", "raw")
     wait_until(lambda: app.session.settings.fitness == "raw")
@@ -217,7 +219,7 @@ def test_the_search_is_looked_at_from_all_sides_and_its_landscape_drawn(page, ap
     app.session.settings.set_iterations(12)
     app.session.settings.set_fault(0, 0.3)
     app.session.settings.set_fault(5, 0.4)
-    app.identify.show_settings()
+    app.tab(IdentifyTab).panel.show_settings()
     show(page, "Identify")
     race = raced(app, page)
     show(page, "Search")
@@ -255,7 +257,7 @@ def test_the_search_is_looked_at_from_all_sides_and_its_landscape_drawn(page, ap
 
 
 def test_a_landscape_is_stopped(page, app, monkeypatch):
-    race = app.identify._race
+    race = app.tab(IdentifyTab).panel._race
     plain = type(race.objective).__call__
 
     def slow(self, k):
@@ -278,7 +280,7 @@ def test_what_does_not_fit_is_taken_to_discover(page, app):
     settings.set_algorithms(["robust"])
     settings.set_population(10)
     settings.set_iterations(10)
-    app.identify.show_settings()
+    app.tab(IdentifyTab).panel.show_settings()
     show(page, "Identify")
     race = raced(app, page)
     assert not race.best.answer.uncertainty.adequate
@@ -297,13 +299,13 @@ def test_what_does_not_fit_is_taken_to_discover(page, app):
 
 
 def test_a_separating_command_is_set_in_explore(page, app):
-    race = app.identify._race
+    race = app.tab(IdentifyTab).panel._race
     sine = Suggestion("sine", {"amplitude_rad": 0.05, "frequency_Hz": 2.0}, 0.4, 3.0)
     answer = race.best.answer
     race.best.answer = replace(answer, uncertainty=replace(answer.uncertainty, separated_by=sine))
     show(page, "Identify")
     show(page, "Answer")
-    app.identify._result.draw()
+    app.tab(IdentifyTab).panel._result.draw()
     page.get_by_text("a sine with amplitude 0.05 rad, frequency 2 Hz, for 0.4 s").wait_for()
     page.get_by_role("button", name="Set that command in Explore").click()
     settings = app.session.settings
@@ -337,13 +339,13 @@ def test_a_recording_is_chosen_and_watched_while_it_grows(page, app):
 
     session.settings.set_algorithms(["hba"])
     session.settings.set_iterations(5000)
-    app.identify.show_settings()
+    app.tab(IdentifyTab).panel.show_settings()
     show(page, "Identify")
     page.get_by_role("button", name="Identify", exact=True).click()
     page.get_by_role("button", name="Watch it in Rerun, here").click()
     frame = page.locator("iframe.emaviz-rerun")
     frame.wait_for()
-    growing = session.folder / app.identify._race.growing.name
+    growing = session.folder / app.tab(IdentifyTab).panel._race.growing.name
     assert growing.name in frame.get_attribute("src") and not growing.exists(), "it is still being written"
     page.get_by_role("button", name="Close the viewer").click()
     frame.wait_for(state="detached")

@@ -25,7 +25,7 @@ def rig(tmp_path_factory):
     rig = Rig(tmp_path_factory.mktemp("worn"))
     rig.session.settings.set_fault(1, 0.2)
     sealed = []
-    rig.discovering.sealing.events.sealed.append(sealed.append)
+    rig.discovering.sealing.events.sealed.connect(sealed.append)
     assert rig.discovering.sealing.seal("Worn", "It rattles.")
     wait_until(lambda: sealed)
     (name,) = rig.discovering.source.sealed
@@ -57,7 +57,7 @@ def test_start_takes_the_fault_into_the_model(worn):
 @pytest.mark.long
 def test_the_improved_model_is_kept_with_its_fault_and_verified(worn):
     told = []
-    worn.events.verified.append(lambda path, text: told.append((path, text)))
+    worn.events.verified.connect(lambda path, text: told.append((path, text)))
     worn.keep(".toml")
     wait_until(lambda: told)
     [(path, text)] = told

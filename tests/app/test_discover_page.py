@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from support.on_page import wait_until
 
+from emaviz.page.explore.tab import ExploreTab
+
 pytestmark = pytest.mark.browser
 
 FIGURES = """() => Array.from(document.querySelectorAll('.js-plotly-plot'), plot => ({
@@ -24,7 +26,7 @@ def in_front(app, panel):
 def signals_in_front(app):
     """As a new page is known by its charts."""
     wait_until(lambda: not app.discovering.running)
-    wait_until(lambda: in_front(app, app.signals_panel))
+    wait_until(lambda: in_front(app, app.tab(ExploreTab).right))
 
 
 @pytest.fixture
@@ -261,7 +263,7 @@ def test_a_challenge_of_ones_own_is_sealed_sent_opened_and_revealed(discover, ap
     page.get_by_role("tab", name="Explore", exact=True).click()
     for name, value in {"amplitude_Nm": 0.02, "order": 12.0, "phase_rad": 0.5}.items():
         settings.set_effect("cogging_torque", name, value)
-    app.screen.post("test", app.explore.show_settings)
+    app.screen.post("test", app.tab(ExploreTab).panel.show_settings)
     page.get_by_role("button", name="Seal as a challenge").click()
     seal = page.get_by_role("button", name="Seal it")
     seal.click()
@@ -277,7 +279,7 @@ def test_a_challenge_of_ones_own_is_sealed_sent_opened_and_revealed(discover, ap
     (kept,) = app.comparing.folder.challenges.glob("*.challenge")
     assert kept.read_bytes() == mine.read_bytes()
     settings.remove_effect("cogging_torque")
-    app.screen.post("test", app.explore.show_settings)
+    app.screen.post("test", app.tab(ExploreTab).panel.show_settings)
 
     page.get_by_role("tab", name="Discover", exact=True).click()
     button = page.get_by_role("button", name="Open a sealed challenge")

@@ -88,7 +88,7 @@ def test_a_signature_is_beside_the_residual_that_it_explains(fresh):
 def test_a_stopped_step_leaves_the_model_as_it_was(fresh):
     before = fresh.look
     told = []
-    fresh.events.ended.append(told.append)
+    fresh.events.ended.connect(told.append)
     assert fresh.add("stribeck_friction")
     with pytest.raises(InputError, match="a step is running"):
         fresh.undo()
@@ -156,14 +156,14 @@ def previewed(discovering, text, values):
     """What the page is told with an expression's sliders at these values: a preview, or why there is none."""
     told = []
     events = discovering.events
-    events.previewed.append(told.append)
-    events.unpreviewed.append(told.append)
+    events.previewed.connect(told.append)
+    events.unpreviewed.connect(told.append)
     try:
         discovering.preview_own(user_torque(text), values)
         wait_until(lambda: told)
     finally:
-        events.previewed.remove(told.append)
-        events.unpreviewed.remove(told.append)
+        events.previewed.disconnect(told.append)
+        events.unpreviewed.disconnect(told.append)
     return told[0]
 
 
@@ -199,7 +199,7 @@ WITHOUT_VALUE = [
 @pytest.mark.parametrize("text", WITHOUT_VALUE)
 def test_a_torque_without_value_fails_as_a_candidate_and_nothing_else(fresh, text):
     before, said = fresh.look, []
-    fresh.session.events.told.append(lambda title, line: said.append(line))
+    fresh.session.events.told.connect(lambda title, line: said.append(line))
     line = previewed(fresh, text, {"c": 0.01})
     assert isinstance(line, str) and "has no value" in line and "\n" not in line
     assert fresh.add_own(user_torque(text), {"c": 0.01})
@@ -214,7 +214,7 @@ def test_what_is_kept_opens_again(fresh):
     fresh.add("cogging_torque")
     wait_until(lambda: not fresh.running)
     kept = []
-    fresh.events.kept.append(kept.append)
+    fresh.events.kept.connect(kept.append)
     for suffix in (".html", ".rrd", ".toml"):
         fresh.keep(suffix)
         wait_until(lambda suffix=suffix: any(path.suffix == suffix for path in kept))

@@ -40,7 +40,7 @@ def solved(rigs):
         settings.set_effect("cogging_torque", name, value)
     settings.set_fault(0, 0.0)
     sealed = []
-    here.discovering.sealing.events.sealed.append(sealed.append)
+    here.discovering.sealing.events.sealed.connect(sealed.append)
     with pytest.raises(InputError, match="no story yet"):
         here.discovering.sealing.seal("Mine", "  ")
     assert here.discovering.sealing.seal("../Mine & yours", "It hums.")
@@ -85,7 +85,7 @@ def test_a_session_keeps_the_ladder(rigs, solved):
     path = solved.save()
     before = solved.discovering.look
     looks = []
-    there.discovering.events.looked.append(looks.append)
+    there.discovering.events.looked.connect(looks.append)
     there.load(path)
     kept = there.discovering.saved()
     there.done()

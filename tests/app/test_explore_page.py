@@ -21,6 +21,7 @@ from emaviz.figures import run_signals
 from emaviz.figures.run_metrics import differences, metrics, rise_time_s
 from emaviz.figures.signals import _within, at, beneath
 from emaviz.page.explore.presets import CUSTOM, PRESETS, name_of
+from emaviz.page.explore.tab import ExploreTab
 from emaviz.session.session import Session
 from emaviz.session.settings import Settings
 
@@ -156,7 +157,7 @@ def test_effects_are_hidden_changed_and_taken_out():
 def test_the_plant_is_simulated_as_it_is_set(tmp_path):
     session = Session(load_actuator(), tmp_path)
     shown = []
-    session.events.simulated.append(shown.append)
+    session.events.simulated.connect(shown.append)
     session.start()
     wait_until(lambda: shown, 120.0)
 
@@ -209,9 +210,9 @@ def test_a_preset_moves_the_sliders_and_a_slider_leaves_the_preset(page, app):
         "xpath=ancestor::div[contains(@class,'mantine-Flex-root')][1]"
     )
     box.locator("input:not([type=hidden])").first.fill("0.3")
-    wait_until(lambda: app.explore._preset.value == CUSTOM)
+    wait_until(lambda: app.tab(ExploreTab).panel._preset.value == CUSTOM)
     page.get_by_role("button", name="Reset to healthy").click()
-    wait_until(lambda: app.explore._preset.value == "healthy" and app.session.settings.k[1] == 0.0)
+    wait_until(lambda: app.tab(ExploreTab).panel._preset.value == "healthy" and app.session.settings.k[1] == 0.0)
 
 
 @pytest.mark.browser
@@ -219,8 +220,8 @@ def test_a_frozen_run_stays_while_the_plant_changes(page, app):
     wait_until(lambda: app.session.simulation is not None)
     healthy = chart(page, "Equivalent current")[3]
     page.get_by_role("button", name="Freeze this run").click()
-    wait_until(lambda: app.charts.ghost is not None)
-    app.explore.set_faults([0.8, *HEALTHY[1:]])
+    wait_until(lambda: app.tab(ExploreTab).charts.ghost is not None)
+    app.tab(ExploreTab).panel.set_faults([0.8, *HEALTHY[1:]])
     wait_until(lambda: not np.allclose(chart(page, "Equivalent current")[3], healthy))
     page.wait_for_timeout(400)
     data = chart(page, "Equivalent current")
@@ -229,8 +230,8 @@ def test_a_frozen_run_stays_while_the_plant_changes(page, app):
     page.get_by_text("frozen plant").wait_for()
     page.get_by_role("tab", name="Signals").click()
     page.get_by_role("button", name="Drop the frozen run").click()
-    wait_until(lambda: app.charts.ghost is None)
-    app.explore.set_faults(HEALTHY)
+    wait_until(lambda: app.tab(ExploreTab).charts.ghost is None)
+    app.tab(ExploreTab).panel.set_faults(HEALTHY)
 
 
 @pytest.mark.browser

@@ -9,7 +9,8 @@ from support.on_page import choose, wait_until
 from support.representative import first_of
 
 from emaviz.page.app import App
-from emaviz.page.identify.tab import PLANT
+from emaviz.page.explore.tab import ExploreTab
+from emaviz.page.identify.controls import PLANT
 from emaviz.text.html import said
 
 pytestmark = pytest.mark.browser
@@ -48,9 +49,8 @@ def tab(page, name):
 def test_explore(page, app):
     def told(line):
         """Again where the session says something of its own in between."""
-        for listener in app.session.events.status:
-            listener(line)
-        return app.explore.status.content == said(line)
+        app.session.events.status(line)
+        return app.tab(ExploreTab).panel.status.content == said(line)
 
     for name in hostile.NAMES:
         wait_until(lambda name=name: told(f"Recovered: {name}.rrd"))
@@ -70,8 +70,7 @@ def test_compare(page, app, name):
     wait_until(lambda: MARKDOWN in app.comparing.actuator_name)
     page.get_by_role("button", name="Remove", exact=True).click()
     wait_until(lambda: not app.comparing.opened)
-    for listener in app.comparing.events.ended:
-        listener(f"{name}.csv: has no current")
+    app.comparing.events.ended(f"{name}.csv: has no current")
     seen(page, f"{name}.csv: has no current")
 
 
@@ -107,8 +106,7 @@ def test_discover(page, app):
     page.get_by_role("button", name="Start", exact=True).click()
     wait_until(lambda: not app.discovering.running)
     seen(page, IMAGE)
-    for listener in app.discovering.events.ended:
-        listener(f"{FRAME}.csv: cannot be used")
+    app.discovering.events.ended(f"{FRAME}.csv: cannot be used")
     seen(page, f"{FRAME}.csv: cannot be used")
 
 

@@ -49,12 +49,12 @@ def raced(session, algorithms, seconds=120.0):
         races.append(race)
         done.set()
 
-    session.events.identified.append(keep)
+    session.events.identified.connect(keep)
     try:
         assert session.identify()
         assert done.wait(seconds)
     finally:
-        session.events.identified.remove(keep)
+        session.events.identified.disconnect(keep)
     wait_until(lambda: not session.worker.busy)
     return races[0]
 
@@ -94,8 +94,8 @@ def test_a_pause_stops_the_search_while_sliders_are_answered(session):
     session.settings.set_iterations(400)
     session.settings.set_algorithms(["hba"])
     races, drawn = [], []
-    session.events.progressed.append(races.append)
-    session.events.simulated.append(drawn.append)
+    session.events.progressed.connect(races.append)
+    session.events.simulated.connect(drawn.append)
     try:
         assert session.identify()
         wait_until(lambda: races)
@@ -112,8 +112,8 @@ def test_a_pause_stops_the_search_while_sliders_are_answered(session):
         wait_until(lambda: not session.worker.busy)
         assert races[0].answers[0].stopped
     finally:
-        session.events.progressed.remove(races.append)
-        session.events.simulated.remove(drawn.append)
+        session.events.progressed.disconnect(races.append)
+        session.events.simulated.disconnect(drawn.append)
 
 
 def test_a_file_is_identified_without_a_truth(session, tmp_path):

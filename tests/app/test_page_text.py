@@ -14,7 +14,9 @@ from support.on_page import wait_until
 import emaviz
 from emaviz.figures import signature, theme, two_recordings
 from emaviz.page.app import App
-from emaviz.page.recordings.tab import _card
+from emaviz.page.discover.tab import DiscoverTab
+from emaviz.page.explore.tab import ExploreTab
+from emaviz.page.recordings.controls import _card
 from emaviz.session.archive import Recorded, recovered
 from emaviz.text.html import Html, escape, html, joined, said
 
@@ -68,7 +70,7 @@ def app(tmp_path_factory):
     assert len(lines) == 2
     app = App("127.0.0.1", 0, data.folder)
     assert app.wait_for_first_picture(120.0)
-    wait_until(lambda: "Ready" in app.explore.status.content)  # the last that it says of its own accord
+    wait_until(lambda: "Ready" in app.tab(ExploreTab).panel.status.content)  # the last that it says of its own accord
     app.lines = lines
     yield app
     app.close()
@@ -90,8 +92,7 @@ def check(app, *names):
 
 def test_what_explore_says_of_recovered_recordings(app):
     for line in app.lines:
-        for listener in app.session.events.status:
-            listener(line)
+        app.session.events.status(line)
         check(app, line)
 
 
@@ -103,18 +104,16 @@ def test_recordings_on_compare_and_what_is_said_of_them(app, name):
         check(app, f"{kind}{name}.csv")
     check(app, f"{name} of a column")
     wait_until(lambda: not app.comparing.running)  # whose end is said in the same place
-    for listener in app.comparing.events.ended:
-        listener(f"{name}.csv: line 1, column {name}: is wrong")
+    app.comparing.events.ended(f"{name}.csv: line 1, column {name}: is wrong")
     check(app, f"{name}.csv: line 1, column {name}: is wrong")
-    for listener in app.discovering.events.ended:
-        listener(f"{name}.csv: cannot be used")
+    app.discovering.events.ended(f"{name}.csv: cannot be used")
     check(app, f"{name}.csv: cannot be used")
     for kind in ("", "columns "):
         app.comparing.remove(f"uploads/{kind}{name}.csv")
 
 
 def test_the_story_of_a_challenge(app):
-    app.discover.source.uploaded(app.comparing.folder.challenges / f"{hostile.IMAGE}.challenge")
+    app.tab(DiscoverTab).panel.source.uploaded(app.comparing.folder.challenges / f"{hostile.IMAGE}.challenge")
     check(app, f"{hostile.IMAGE}.", f"{hostile.FRAME} {hostile.MARKDOWN}")
 
 

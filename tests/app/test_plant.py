@@ -16,6 +16,7 @@ from ema_model.simulation import precompile as ahead
 from ema_model.simulation.one_stack import library_stack, own_stack, stack_at_hand
 from ema_model.simulation.run import Run, simulate_monitor, simulate_reference
 from emaviz.page.app import App
+from emaviz.page.explore.tab import ExploreTab
 from emaviz.session.actuators import shipped_actuators
 from emaviz.session.session import Session
 
@@ -58,9 +59,9 @@ def test_a_drive_without_a_controller_is_refused_in_one_line():
 def test_a_session_of_either_starts_and_tells_no_failure(name, tmp_path):
     session = Session(actuator(name), tmp_path)
     told, shown, ended = [], [], threading.Event()
-    session.events.told.append(lambda title, text: told.append(f"{title}: {text}"))
-    session.events.simulated.append(shown.append)
-    session.events.ended.append(ended.set)
+    session.events.told.connect(lambda title, text: told.append(f"{title}: {text}"))
+    session.events.simulated.connect(shown.append)
+    session.events.ended.connect(ended.set)
     session.start()
     try:
         assert session.ready.wait(120.0)
@@ -93,11 +94,11 @@ def test_the_page_says_what_it_cannot_show(browser, tmp_path, name, capfd):
         page.goto(app.address)
         page.get_by_text(plant.note(app.session.actuator)[:60]).wait_for(timeout=60_000)
         if name == SERVO:
-            app.explore.set_faults(replace_first(HEALTHY, 0.8))
+            app.tab(ExploreTab).panel.set_faults(replace_first(HEALTHY, 0.8))
             before = app.session.simulation
             wait_until(lambda: app.session.simulation is not before)
         else:
-            app.explore.set_faults(replace_first(HEALTHY, 0.8))
+            app.tab(ExploreTab).panel.set_faults(replace_first(HEALTHY, 0.8))
         for tab in ("Identify", "Compare", "Recordings", "Explore"):
             page.get_by_role("tab", name=tab, exact=True).click()
         page.wait_for_timeout(500)

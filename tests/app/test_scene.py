@@ -17,7 +17,7 @@ from ema_model.commands import command
 from ema_model.faults import vector
 from ema_model.simulation.run import Run, simulate_reference
 from emaviz.page.docked import LEFT_PX, _width_px
-from emaviz.page.members import workspaces
+from emaviz.page.members import tabs
 from emaviz.page.style import STRIP_HEIGHT_PX
 from emaviz.scene import drive_box, drivetrain, motor, solids
 from emaviz.scene.actuator import _NAMES, ActuatorScene
@@ -338,7 +338,7 @@ WINDOWS = ((1400, 900), (1920, 1080), (1100, 700))
 
 def pictures():
     """Sizes of the picture that the panels leave, in px."""
-    shares = {one.share for one in workspaces()}
+    shares = {one.workspace.share for one in tabs()}
     return [(w - LEFT_PX - _width_px(w, share), h - STRIP_HEIGHT_PX) for w, h in WINDOWS for share in shares]
 
 

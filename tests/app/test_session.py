@@ -28,7 +28,7 @@ def session(tmp_path):
 def identified(session, seconds=60.0):
     """Starts an identification and waits for its answer and path."""
     done, result = threading.Event(), []
-    session.events.identified.append(lambda race: (result.append((race.best.answer, race.path)), done.set()))
+    session.events.identified.connect(lambda race: (result.append((race.best.answer, race.path)), done.set()))
     assert session.identify()
     assert done.wait(seconds)
     return result[-1]
@@ -67,9 +67,9 @@ def test_stop_keeps_the_best_so_far(session):
     session.settings.set_iterations(5000)
     session.settings.set_algorithm("hba")
     done, result = threading.Event(), []
-    session.events.identified.append(lambda race: (result.append(race.best.answer), done.set()))
+    session.events.identified.connect(lambda race: (result.append(race.best.answer), done.set()))
     begun = threading.Event()
-    session.events.progressed.append(lambda race: begun.set())
+    session.events.progressed.connect(lambda race: begun.set())
     assert session.identify()
     assert begun.wait(30.0)
     asked = time.perf_counter()
@@ -82,7 +82,7 @@ def test_stop_keeps_the_best_so_far(session):
 
 def test_a_run_goes_on_when_its_recording_cannot_be_written(session):
     told = []
-    session.events.told.append(lambda title, text: told.append(text))
+    session.events.told.connect(lambda title, text: told.append(text))
     shutil.rmtree(session.folder)
     answer, path = identified(session)
     assert path is None and math.isfinite(answer.rmse)
@@ -91,7 +91,7 @@ def test_a_run_goes_on_when_its_recording_cannot_be_written(session):
 
 def test_a_diverging_model_is_told_and_the_session_goes_on(session, monkeypatch):
     told, drawn = threading.Event(), threading.Event()
-    session.events.told.append(lambda title, text: told.set())
+    session.events.told.connect(lambda title, text: told.set())
 
     def diverge(*_, **__):
         raise FloatingPointError("the reference model diverged")
@@ -100,7 +100,7 @@ def test_a_diverging_model_is_told_and_the_session_goes_on(session, monkeypatch)
         patch.setattr("ema_model.simulation.plant.simulate_reference", diverge)
         session.refresh()
         assert told.wait(10.0)
-    session.events.simulated.append(lambda _: drawn.set())
+    session.events.simulated.connect(lambda _: drawn.set())
     session.refresh()
     assert drawn.wait(10.0)
 

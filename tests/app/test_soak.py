@@ -47,7 +47,7 @@ def soak(browser, folder, capfd, rounds, iterations, seconds):
     faults, readings = [], []
     try:
         assert app.wait_for_first_picture(120.0) and app.session.ready.wait(60.0)
-        app.session.events.told.append(lambda title, text: faults.append(f"{title}: {text}"))
+        app.session.events.told.connect(lambda title, text: faults.append(f"{title}: {text}"))
         page = browser.new_page(viewport={"width": 1000, "height": 650})
         page.on("pageerror", lambda error: faults.append(str(error)))
         page.goto(app.address)
@@ -56,7 +56,7 @@ def soak(browser, folder, capfd, rounds, iterations, seconds):
         app.session.settings.set_population(20)
         app.session.settings.set_iterations(iterations)
         done = threading.Event()
-        app.session.events.identified.append(lambda race: done.set())
+        app.session.events.identified.connect(lambda race: done.set())
         process, end = psutil.Process(), time.monotonic() + seconds
         for number in range(rounds):
             one_round(app, page, number, done)

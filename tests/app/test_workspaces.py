@@ -13,6 +13,7 @@ from ema_model.commands import command
 from ema_model.recordings import write_measurement
 from ema_model.simulation.run import Run, simulate_reference
 from ema_model.simulation.sensors import Sensors
+from emaviz.page.explore.tab import ExploreTab
 
 pytestmark = pytest.mark.browser
 
@@ -174,7 +175,7 @@ def test_explore_says_its_model_and_keeps_it(tab, app):
     session.settings.set_algorithms(["robust"])
     session.settings.set_iterations(30)
     went_on = []
-    session.events.progressed.append(lambda race: went_on.extend(t.fitting for t in race.tracks.values() if t.fitting))
+    session.events.progressed.connect(lambda race: went_on.extend(t.fitting for t in race.tracks.values() if t.fitting))
     assert session.identify()
     wait_until(lambda: session.identified is not None and not session.worker.busy)
     assert session.settings.monitor == "healthy" and session.simulation.model == "healthy"
@@ -199,11 +200,11 @@ def test_identify_answers_in_physical_units(tab, app):
 
 def test_a_note_stays_when_the_status_changes(tab, app):
     go(tab, "Explore")
-    app.explore.note("Recovered a recording of an interrupted run: x.rrd")
-    app._status("Ready.")
+    app.tab(ExploreTab).panel.note("Recovered a recording of an interrupted run: x.rrd")
+    app.session.events.status("Ready.")
     tab.get_by_text("Ready.").wait_for()
     tab.get_by_text("Recovered a recording").wait_for()
-    app.explore.note("")
+    app.tab(ExploreTab).panel.note("")
 
 
 def test_keys_change_the_workspace_and_play(tab, app):

@@ -22,8 +22,8 @@ class Rig:
         self.discovering = Discovering(self.session, self.comparing)
         self.part = Part(self.discovering.saved, self.discovering.restore, self.discovering.files)
         self.told, self.ended = [], []
-        self.session.events.told.append(lambda *line: self.told.append(line))
-        self.discovering.events.ended.append(self.ended.append)
+        self.session.events.told.connect(lambda *line: self.told.append(line))
+        self.discovering.events.ended.connect(self.ended.append)
 
     def close(self):
         self.discovering.close()

@@ -50,8 +50,8 @@ class CampaignControls:
         self._group.on_update(lambda event: event.client and self._post(self._show_rows))
         self._open.on_click(lambda _: self._post(self._open_chosen))
         again.on_click(lambda _: self._post(self.refresh))
-        campaigns.events.said.append(lambda text: page.screen.post("campaign", lambda: self._say(text)))
-        campaigns.events.opened.append(lambda path, run: self._post(lambda: opened(path, run)))
+        campaigns.events.said.connect(lambda text: page.screen.post("campaign", lambda: self._say(text)))
+        campaigns.events.opened.connect(lambda path, run: self._post(lambda: opened(path, run)))
         self._post(self.refresh)
 
     # --- on the files' thread ---------------------------------------------------------------------------------------

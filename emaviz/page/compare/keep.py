@@ -6,7 +6,7 @@ from pathlib import Path
 
 import viser
 
-from emaviz.page.identify.tab import recording_link
+from emaviz.page.identify.controls import recording_link
 from emaviz.page.page import Page
 from emaviz.recording.viewer import ViewerHost
 from emaviz.session.compare.comparing import Comparing
@@ -30,7 +30,7 @@ class KeepControls:
 
         report.on_click(save)
         record.on_click(lambda _: comparing.record())
-        comparing.events.kept.append(lambda path: page.screen.post("kept", lambda: self._kept(path)))
+        comparing.events.kept.connect(lambda path: page.screen.post("kept", lambda: self._kept(path)))
 
     def clear(self) -> None:
         """Another comparison is shown: what was kept of the one before is told no more."""

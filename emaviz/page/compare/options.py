@@ -10,9 +10,9 @@ from ema_model.actuator.naming import on_axes
 from ema_model.recordings import SIGNALS
 from emaviz.page.compare.new_actuator import NewActuator
 from emaviz.page.page import Page
+from emaviz.server.uploads import Uploads
 from emaviz.session.compare.comparing import COMPARABLE, Comparing
 from emaviz.session.data_folder import ACTUATOR_SUFFIX
-from emaviz.session.uploads import Uploads
 
 
 class AskedControls:

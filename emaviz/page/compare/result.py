@@ -76,7 +76,7 @@ class ResultPanel:
         self._save = gui.add_folder("Keep it", visible=False)
         with self._save:
             self._kept = keep()
-        strip.moves.append(self._moved)
+        strip.moves.connect(self._moved)
         self._recording.on_update(lambda event: event.client and self._chosen())
 
     # --- before a comparison ----------------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""The Compare tab: recordings in, their columns and health, what is compared, and the run."""
+"""The Compare tab: the model beside measurements."""
 
 from __future__ import annotations
 
@@ -7,207 +7,43 @@ from pathlib import Path
 
 import viser
 
-from ema_model.comparison.result import Comparison
-from ema_model.errors import InputError
 from ema_model.recordings.formats import FORMATS
-from emaviz.page.compare.cards import health_card, recordings_list
-from emaviz.page.compare.mapping import MappingStep
-from emaviz.page.compare.options import AskedControls
+from emaviz.page.compare import WORKSPACE
+from emaviz.page.compare.controls import ComparePanel
+from emaviz.page.compare.keep import KeepControls
+from emaviz.page.compare.kept import kept
+from emaviz.page.compare.leads import leads
+from emaviz.page.compare.raw_lines import RawLines
 from emaviz.page.compare.result import ResultPanel
-from emaviz.page.page import Page
-from emaviz.page.style import DROP
-from emaviz.session.actuators import UPLOADED
-from emaviz.session.compare.comparing import Comparing
-from emaviz.session.data_folder import ACTUATOR_SUFFIX, CHALLENGE_SUFFIX, SESSION_SUFFIX
-from emaviz.session.opened import Opened
-from emaviz.session.pace import Pace
-from emaviz.session.uploads import Uploads
-from emaviz.text.html import Html, add_html, said
-from emaviz.text.time_left import going_on
-
-_NONE = "–"
+from emaviz.page.tab import Shared, Tab
+from emaviz.session.data_folder import ACTUATOR_SUFFIX
+from emaviz.session.saved import Part
 
 
-class ComparePanel:
-    """The tab's controls.  `result` is the panel on the right, which shows previews and the comparison."""
+class CompareTab(Tab):
+    """Takes measurements and actuator files from the browser."""
 
-    def __init__(self, page: Page, comparing: Comparing, result: ResultPanel) -> None:
-        self._page, self._comparing, self._result = page, comparing, result
-        self._shown: str | None = None
-        self._again = False
-        self._pace = Pace()
-        self.session_uploaded: Callable[[Path], None] = lambda path: None  # a whole session, not a recording
-        self.challenge_uploaded: Callable[[Path], None] = lambda path: None  # a sealed one, for Discover
-        gui = page.server.gui
-        self.uploads = Uploads(page.server, comparing.folder, self._uploaded, self._refused)
-        gui.add_markdown("Upload a recording of a test bench, or **drop it anywhere** on the page.")
-        self.uploads.add_button("Upload a recording", ",".join(FORMATS), icon=viser.Icon.UPLOAD)
-        self._choice = gui.add_dropdown("Data folder", [_NONE])
-        add = gui.add_button("Add this file", icon=viser.Icon.PLUS, color="gray")
-        with gui.add_folder("Recordings"):
-            self._list = add_html(gui, recordings_list([]))
-            self._which = gui.add_dropdown("Shown", [_NONE], visible=False)
-            self._columns = gui.add_button("Columns…", icon=viser.Icon.TABLE, color="gray", visible=False)
-            self._remove = gui.add_button("Remove", icon=viser.Icon.X, color="gray", visible=False)
-        self._mapping = MappingStep(page, comparing, result.preview)
-        self._start = gui.add_button("Compare", icon=viser.Icon.ARROWS_DIFF, disabled=True)
-        self._stop = gui.add_button("Stop", icon=viser.Icon.PLAYER_STOP, color="red", disabled=True)
-        self._bar = gui.add_progress_bar(0.0, visible=False)
-        self._status = add_html(gui)
-        self._health_folder = gui.add_folder("Data health", visible=False)
-        with self._health_folder:
-            self._health = add_html(gui)
-        self.asked = AskedControls(page, comparing, self.uploads)
-        add.on_click(lambda _: self._add())
-        self._which.on_update(lambda event: event.client and self._post_show(str(self._which.value)))
-        self._columns.on_click(lambda _: page.screen.post("columns", self._open_columns))
-        self._remove.on_click(lambda _: self._remove_shown())
-        self._start.on_click(lambda _: self._begin())
-        self._stop.on_click(lambda _: comparing.stop())
-        events = comparing.events
-        events.opened.append(lambda opened: page.screen.post(f"opened {opened.name}", lambda: self._opened(opened)))
-        events.refused.append(lambda: page.screen.post("columns", self._open_columns))
-        events.removed.append(lambda: page.screen.post("removed", self._removed))
-        events.progressed.append(lambda text: page.screen.post("compare progress", lambda: self._progressed(text)))
-        events.compared.append(lambda *found: page.screen.post("compared", lambda: self._compared(*found)))
-        events.ended.append(lambda why: page.screen.post("compare ended", lambda: self._ended(why)))
-        self.refresh_files()
+    workspace = WORKSPACE
 
-    def add_drop(self) -> None:
-        """An unseen upload button here, outside all tabs: a tab's own is there only once that tab was opened."""
-        add_html(self._page.server.gui, DROP)
-        self.uploads.add_button("Drop", ",".join((*FORMATS, ACTUATOR_SUFFIX, SESSION_SUFFIX, CHALLENGE_SUFFIX)))
+    def __init__(self, shared: Shared, right: viser.PanelHandle) -> None:
+        super().__init__(shared, right)
+        with right.add_tab("Comparison", viser.Icon.ARROWS_DIFF):
+            self.result = ResultPanel(
+                self.page,
+                shared.strip,
+                lambda: RawLines(self.page, shared.comparing),
+                lambda: leads(self.page, shared.discovering),
+                lambda: KeepControls(self.page, shared.comparing, shared.viewer),
+            )
 
-    def refresh_files(self) -> None:
-        """Reads the data folder's list again."""
-        names = self._comparing.folder.measurements() or [_NONE]
-        if list(self._choice.options) != names:
-            self._choice.options = names
+    def build(self) -> None:
+        """Recordings in, what is compared, and the run."""
+        self.panel = ComparePanel(self.page, self.shared.comparing, self.result, self.shared.uploads)
 
-    # --- files ------------------------------------------------------------------------------------------------------
+    def kept(self) -> dict[str, Part]:
+        """What is opened and asked."""
+        return {"compare": kept(self.shared.comparing, self.panel.asked.show_settings)}
 
-    def _uploaded(self, path: Path) -> None:
-        """A file is kept; on the server's thread."""
-        name = self._comparing.folder.name_of(path)
-        if path.suffix.lower() == SESSION_SUFFIX:
-            self.session_uploaded(path)
-            return
-        if path.suffix.lower() == CHALLENGE_SUFFIX:
-            self.challenge_uploaded(path)
-            return
-        if path.suffix.lower() == ACTUATOR_SUFFIX:
-            self._page.screen.post("actuator", lambda: self.asked.choose(UPLOADED + name))
-        else:
-            self._comparing.add(name)
-        self._page.screen.post("files", self.refresh_files)
-
-    def _refused(self, line: str) -> None:
-        self._page.notify("The file cannot be read", line)
-
-    def _add(self) -> None:
-        name = str(self._choice.value)
-        if name != _NONE:
-            self._comparing.add(name)
-
-    def _remove_shown(self) -> None:
-        if self._shown is not None:
-            self._comparing.remove(self._shown)
-
-    def _opened(self, opened: Opened) -> None:
-        self._show(opened.name)
-        if opened.measurement is None:
-            todo = Html("Check which column is which signal, then press <b>Use these columns</b>.")
-            self._say(Html("Click the line with the columns' names, on the right.") if opened.problem else todo)
-            return
-        if self._comparing.comparison is None:
-            self._result.preview(opened)
-        self._begin(told=False)
-
-    def _removed(self) -> None:
-        self._show(next(reversed(self._comparing.opened), None))
-
-    def _post_show(self, name: str) -> None:
-        self._page.screen.post("shown", lambda: self._show(name))
-
-    def _show(self, name: str | None) -> None:
-        """One of the recordings in the cards below the list."""
-        everything = self._comparing.opened
-        opened = everything.get(name or "")
-        self._shown = opened.name if opened is not None else None
-        self._list.content = recordings_list(everything.values())
-        self._which.visible = len(everything) > 1
-        if everything:
-            self._which.options = list(everything)
-            self._which.value = self._shown or next(iter(everything))
-        for control in (self._columns, self._remove):
-            control.visible = opened is not None
-        self._start.disabled = self._comparing.session.worker.busy or opened is None
-        self.asked.show_signals()
-        card = opened.health if opened is not None else None
-        self._health_folder.visible = card is not None
-        self._health.content = "" if card is None else health_card(card)
-        if opened is not None and opened.measurement is None:
-            self._mapping.show(opened)
-        else:
-            self._mapping.hide()
-            self._result.end_preview()
-
-    def _open_columns(self) -> None:
-        opened = self._comparing.opened.get(self._shown or "")
-        if opened is not None:
-            self._mapping.show(opened)
-
-    # --- the run ----------------------------------------------------------------------------------------------------
-
-    def _begin(self, told: bool = True) -> None:
-        """Starts a comparison; of one that runs already, and is out of date, a second one follows."""
-        try:
-            started = self._comparing.compare()
-        except InputError as error:
-            if told:
-                self._page.notify("The comparison cannot start", str(error))
-            else:
-                self._say(str(error))
-            return
-        if started:
-            self._again = False
-            self._pace.begin("compare, calibrated" if self._comparing.calibrate else "compare")
-            self._bar.value, self._bar.visible = 0.0, True
-            self._start.disabled, self._stop.disabled = True, False
-            ready = self._comparing.session.ready.is_set()
-            self._say("Comparing…" if ready else "Waiting for the models to be compiled…")
-        elif self._comparing.running:
-            self._again = True
-        else:
-            self._page.notify("One at a time", "An identification is running; stop it first.", "yellow")
-
-    def _say(self, text: str) -> None:
-        self._status.content = said(text)
-
-    def _progressed(self, text: str) -> None:
-        if not self._comparing.running:
-            return
-        elapsed, share = self._pace.at(text)
-        self._bar.value, self._bar.animated = (100.0, True) if share is None else (100.0 * share, False)
-        self._say(f"{text[:1].upper()}{text[1:]} … {going_on(elapsed, share)}")
-
-    def _compared(self, comparison: Comparison, elapsed_s: float) -> None:
-        self._pace.end()
-        self._free()
-        fitted = "" if comparison.calibration is None else f", calibrated in {comparison.calibration.evaluations} steps"
-        self._say(f"Compared in {elapsed_s:.1f} s{fitted}.")
-        self._result.show(comparison)
-        self._follow()
-
-    def _ended(self, why: str) -> None:
-        self._free()
-        self._say(why)
-        self._follow()
-
-    def _free(self) -> None:
-        self._bar.visible = False
-        self._start.disabled, self._stop.disabled = not self._comparing.opened, True
-
-    def _follow(self) -> None:
-        if self._again:
-            self._begin(told=False)
+    def takes(self) -> dict[str, Callable[[Path], None]]:
+        """Measurements and actuator files."""
+        return {**dict.fromkeys(FORMATS, self.panel.take), ACTUATOR_SUFFIX: self.panel.take}

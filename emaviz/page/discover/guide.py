@@ -71,8 +71,8 @@ class Guide:
             end = gui.add_button("Leave the guide", icon=viser.Icon.X, color="gray")
         self._offer.on_click(lambda _: page.screen.post("guide", self._start))
         end.on_click(lambda _: page.screen.post("guide", self._end))
-        discovering.events.revealed.append(lambda: page.screen.post("guide", self.refresh))
-        discovering.events.began.append(lambda _: page.screen.post("guide", self.refresh))
+        discovering.events.revealed.connect(lambda: page.screen.post("guide", self.refresh))
+        discovering.events.began.connect(lambda _: page.screen.post("guide", self.refresh))
 
     def show(self, look: Look | None, opened: str | None) -> None:
         """The story is here now; on the screen's thread."""

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import viser
 
-from emaviz.page.identify.tab import recording_link
+from emaviz.page.identify.controls import recording_link
 from emaviz.page.page import Page
 from emaviz.recording.viewer import ViewerHost
 from emaviz.session.discover.discovering import Discovering
@@ -29,8 +29,8 @@ class DiscoveryKeep:
             button.on_click(lambda event, suffix=suffix: self._ask(event.client, suffix))
         self._links = add_html(gui)
         events = discovering.events
-        events.kept.append(lambda path: page.screen.post(f"kept {path.suffix}", lambda: self._kept(path)))
-        events.verified.append(lambda path, text: page.screen.post("verified", lambda: self._name(path, text)))
+        events.kept.connect(lambda path: page.screen.post(f"kept {path.suffix}", lambda: self._kept(path)))
+        events.verified.connect(lambda path, text: page.screen.post("verified", lambda: self._name(path, text)))
 
     def clear(self) -> None:
         """Another model is shown: what was kept of the one before is told no more."""

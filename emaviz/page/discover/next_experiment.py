@@ -42,7 +42,7 @@ class NextTest:
             lambda event: page.screen.post("load test", lambda: self._with(lambda one: load(one, event.client)))
         )
         self._csv.on_click(self._send)
-        discovering.events.unsuggested.append(lambda: page.screen.post("unsuggested", self._nothing))
+        discovering.events.unsuggested.connect(lambda: page.screen.post("unsuggested", self._nothing))
 
     def connect(self, ask: Callable[[Callable[[], bool]], None]) -> None:
         """ask(begin) starts a step."""

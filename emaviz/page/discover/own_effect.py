@@ -55,8 +55,8 @@ class OwnEffect:
             )
         self._text.on_update(lambda event: event.client and page.screen.post("own effect", self._check))
         events = discovering.events
-        events.previewed.append(lambda found: page.screen.post("own preview", lambda: self._draw(found)))
-        events.unpreviewed.append(lambda why: page.screen.post("own preview", lambda: self._hide(why)))
+        events.previewed.connect(lambda found: page.screen.post("own preview", lambda: self._draw(found)))
+        events.unpreviewed.connect(lambda why: page.screen.post("own preview", lambda: self._hide(why)))
 
     def connect(self, ask: Callable[[Callable[[], bool]], None]) -> None:
         """ask(begin) starts a step."""

@@ -161,8 +161,7 @@ class DiscoveryPanel:
     def _show_truth(self) -> None:
         if self._look is not None:
             self._truth.content = reveal(self._discovering.source.reveal(), self._look.found, self._look.added)
-            for tell in self._discovering.events.revealed:
-                tell()
+            self._discovering.events.revealed()
 
 
 def answer(look: Look) -> Html:

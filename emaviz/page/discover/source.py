@@ -12,10 +12,10 @@ from ema_model.challenges import Challenge
 from ema_model.discovery.snapshot import Look
 from emaviz.page.discover import cards
 from emaviz.page.page import Page
+from emaviz.server.uploads import Uploads
 from emaviz.session.data_folder import CHALLENGE_SUFFIX
 from emaviz.session.discover.discovering import Discovering
 from emaviz.session.discover.source import COMPARED
-from emaviz.session.uploads import Uploads
 from emaviz.text.html import Html, add_html, html
 
 _STARS = "●○"
@@ -50,10 +50,10 @@ class SourceControls:
         self._held = gui.add_folder("Hold out, to judge by", visible=False, expand_by_default=False)
         self._boxes: list[Any] = []
         self._source.on_update(lambda event: event.client and post("source", self._take))
-        discovering.sealing.events.sealed.append(lambda _: post("sealed listed", self._refresh))
+        discovering.sealing.events.sealed.connect(lambda _: post("sealed listed", self._refresh))
         compare = discovering.comparing.events
-        compare.opened.append(lambda _: post("discover source", lambda: self.show(self._look)))
-        compare.removed.append(lambda: post("discover source", lambda: self.show(self._look)))
+        compare.opened.connect(lambda _: post("discover source", lambda: self.show(self._look)))
+        compare.removed.connect(lambda: post("discover source", lambda: self.show(self._look)))
 
     def busy(self, busy: bool) -> None:
         """Whether a step runs."""

@@ -1,260 +1,56 @@
-"""The Discover tab: which recordings, the run, the candidates as cards, and the steps so far."""
+"""The Discover tab: what the model lacks, step by step."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from pathlib import Path
 
 import viser
 
-from ema_model.discovery import Candidate
-from ema_model.discovery.snapshot import AT_FLOOR, Look
-from ema_model.discovery.words import effect_title
-from ema_model.effects import CATALOGUE
-from ema_model.quantities.numbers import number
-from emaviz.page.discover import cards
-from emaviz.page.discover.entries import EntriesControl
-from emaviz.page.discover.guide import Guide
-from emaviz.page.discover.own_effect import OwnEffect
+from ema_model.discovery.result import Experiment
+from emaviz.page.discover import WORKSPACE
+from emaviz.page.discover.controls import DiscoverPanel
+from emaviz.page.discover.keep import DiscoveryKeep
+from emaviz.page.discover.leads import leads
 from emaviz.page.discover.result import DiscoveryPanel
-from emaviz.page.discover.source import SourceControls
-from emaviz.page.page import Page
-from emaviz.server.viser_private import id_of
-from emaviz.session.discover.discovering import Discovering
-from emaviz.session.pace import Pace
-from emaviz.session.uploads import Uploads
-from emaviz.text.html import add_html, html
-from emaviz.text.time_left import going_on
-
-_MOST_ADDED = 6
+from emaviz.page.explore.suggested_run import take_experiment
+from emaviz.page.explore.tab import ExploreTab
+from emaviz.page.tab import Shared, Tab
+from emaviz.session.data_folder import CHALLENGE_SUFFIX
+from emaviz.session.saved import Part
 
 
-class DiscoverPanel:
-    """The tab's controls.  `result` is the panel on the right."""
+class DiscoverTab(Tab):
+    """Takes sealed challenges from the browser; leads to Explore for the next experiment."""
 
-    def __init__(self, page: Page, discovering: Discovering, result: DiscoveryPanel, uploads: Uploads) -> None:
-        self._page, self._discovering, self._result = page, discovering, result
-        self._look: Look | None = None
-        self._opened: str | None = None
-        self._title = ""  # of the step that runs
-        self._pace = Pace()
-        gui = page.server.gui
-        self._entries = EntriesControl(page, discovering)
-        self._guide = Guide(page, discovering, lambda: self.source.choose_first())
-        self.source = SourceControls(page, discovering, uploads, self._chosen, self._source_shown)
-        self._start = gui.add_button("Start", icon=viser.Icon.PLAYER_PLAY)
-        self._stop = gui.add_button("Stop", icon=viser.Icon.PLAYER_STOP, color="red", visible=False)
-        self._bar = gui.add_progress_bar(100.0, animated=True, visible=False)
-        self._status = add_html(gui)
-        self._cards_folder = gui.add_folder("What may be missing", visible=False)
-        with self._cards_folder:
-            self._style = add_html(gui)
-            self._hint = add_html(gui)
-            self._worth = [self._slot() for _ in range(8)]
-        self._steps = gui.add_folder("The model so far", visible=False)
-        with self._steps:
-            self._model = add_html(gui)
-            self._removes = [
-                gui.add_button("Remove", icon=viser.Icon.X, color="gray", visible=False) for _ in range(_MOST_ADDED)
-            ]
-            self._undo = gui.add_button("Undo the last step", icon=viser.Icon.ARROW_BACK_UP, color="gray")
-            self._all = gui.add_button("Find all", icon=viser.Icon.WAND, hint="Adds what pays, step by step")
-        self._little_folder = gui.add_folder("Would change little", visible=False, expand_by_default=False)
-        with self._little_folder:
-            self._little = [self._slot() for _ in CATALOGUE]
-        self._never_folder = gui.add_folder("These recordings cannot show", visible=False, expand_by_default=False)
-        with self._never_folder:
-            self._never = [self._slot() for _ in CATALOGUE]
-        self._own = OwnEffect(page, discovering)
-        self._listen()
-        self.source.show(None)
+    workspace = WORKSPACE
 
-    def _listen(self) -> None:
-        discovering, post = self._discovering, self._page.screen.post
-        self._start.on_click(lambda _: self.ask(discovering.start))
-        self._stop.on_click(lambda _: post("stop", self._stopping))
-        self._undo.on_click(lambda _: self._page.screen.post("undo", self._step_back))
-        self._all.on_click(lambda _: self.ask(discovering.find_all))
-        for i, button in enumerate(self._removes):
-            button.on_click(lambda _, i=i: self._remove(i))
-        self._result.connect(self.ask, lambda: self._open(None))
-        self._own.connect(self.ask)
-        events = discovering.events
-        events.began.append(lambda title: post("discover began", lambda: self._began(title)))
-        events.waits.append(lambda text: post("discover progress", lambda: self._say_plain(text)))
-        events.progressed.append(lambda text, s: post("discover progress", lambda: self._say(text, s)))
-        events.looked.append(lambda look: post("looked", lambda: self._show(look)))
-        events.ended.append(lambda text: post("discover ended", lambda: self._ended(text)))
-
-    # --- what is asked ----------------------------------------------------------------------------------------------
-
-    def _chosen(self) -> None:
-        """Another source is chosen; on the screen's thread."""
-        self._opened = None
-        self._say_plain("")
-
-    def _source_shown(self) -> None:
-        self._start.disabled = self._discovering.running or not self._discovering.source.ready
-        self._guide.show(self._look, self._opened)
-
-    def ask(self, begin: Callable[[], bool]) -> None:
-        """Begins a step, or says why not."""
-
-        def tried() -> None:
-            if not self._discovering.session.ready.is_set():
-                self._page.notify("One moment", "The models are still being compiled.", "yellow")
-            elif not begin():
-                self._page.notify("One at a time", "A comparison or an identification is running.", "yellow")
-
-        self._page.checked(tried)
-
-    def _step_back(self) -> None:
-        self._page.checked(self._discovering.undo)
-
-    def _remove(self, index: int) -> None:
-        look = self._look
-        if look is not None and index < len(look.added):
-            self.ask(lambda: self._discovering.remove(look.added[index].key))
-
-    # --- the run ----------------------------------------------------------------------------------------------------
-
-    def _began(self, title: str) -> None:
-        self._title = title
-        self._pace.begin(title)
-        self._bar.value, self._bar.animated = 100.0, True
-        self._busy(True)
-        self._say(title, 0.0)
-
-    def _busy(self, busy: bool) -> None:
-        with self._page.server.atomic():
-            self._start.disabled = busy or not self._discovering.source.ready
-            self._start.visible = not busy
-            self._stop.visible = self._bar.visible = busy
-            self._stop.disabled = False
-            for control in (self._undo, self._all, *self._removes):
-                control.disabled = busy
-            self.source.busy(busy)
-            self._entries.busy(busy)
-            if self._look is not None and not busy:
-                self._undo.disabled = self._look.steps < 2
-            self._own.busy(busy)
-            self._result.busy(busy)
-
-    def _say(self, text: str, seconds: float) -> None:
-        if self._discovering.running or seconds == 0.0:
-            said = "" if text == self._title else f": {text}"
-            _, share = self._pace.at(text)
-            if share is not None:
-                self._bar.value, self._bar.animated = 100.0 * share, False
-            self._say_plain(f"{self._title}{said} … {going_on(seconds, share)}")
-
-    def _say_plain(self, text: str) -> None:
-        self._status.content = html("<div {}>{}</div>", cards.BOX, text)
-
-    def _stopping(self) -> None:
-        self._discovering.stop()
-        if self._discovering.running:
-            self._stop.disabled = True
-            self._say_plain("Stopping after the present simulation …")
-
-    def _ended(self, text: str) -> None:
-        self._busy(False)
-        if self._discovering.run.finished:
-            self._pace.end()
-        self._say_plain(text)
-        self._guide.show(self._look, self._opened)
-
-    # --- what is known ----------------------------------------------------------------------------------------------
-
-    def _show(self, look: Look | None) -> None:
-        self._look = look
-        if look is None or (self._opened is not None and look.candidate(self._opened) is None):
-            self._opened = None
-        with self._page.server.atomic():
-            for folder in (self._steps, self._cards_folder):
-                folder.visible = look is not None
-            self._draw_model(look)
-            self._draw_cards(look)
-            self._own.show(look)
-            self._result.show(look)
-            if self._opened is None:
-                self._result.open(None)
-            else:
-                self._open(self._opened)
-        self._entries.show()
-        self._start.label, self._start.color = ("Start", None) if look is None else ("Start again", "gray")
-        self.source.show(look)
-
-    def _draw_model(self, look: Look | None) -> None:
-        added = look.added if look is not None else ()
-        for i, button in enumerate(self._removes):
-            button.visible = i < len(added)
-            if i < len(added):
-                button.label = f"Remove {effect_title(added[i].key)}"
-        self._undo.disabled = look is None or look.steps < 2 or self._discovering.running
-        if look is not None:
-            last = look.found.ladder[-1]
-            held = "" if last.holdout_rmse is None else f", held out {number(last.holdout_rmse)} ×"
-            self._model.content = html(
-                "<div {}>Error: <b>{} × the floor</b>{}{}.</div>",
-                cards.BOX,
-                number(last.rmse),
-                held,
-                ", with " + str(len(added)) + " added" if added else ", calibrated",
+    def __init__(self, shared: Shared, right: viser.PanelHandle) -> None:
+        super().__init__(shared, right)
+        with right.add_tab("Discovery", viser.Icon.BULB):
+            self.result = DiscoveryPanel(
+                self.page,
+                shared.discovering,
+                shared.strip,
+                lambda: DiscoveryKeep(self.page, shared.discovering, shared.viewer),
+                lambda: leads(self.page, shared.discovering),
+                self._load_experiment,
             )
 
-    def _slot(self) -> Any:
-        button = self._page.server.gui.add_button("", visible=False)
-        button.on_click(lambda _: self._page.screen.post("card", lambda: self._click(button)))
-        return button
+    def build(self) -> None:
+        """Which recordings, the run, and the steps."""
+        self.panel = DiscoverPanel(self.page, self.shared.discovering, self.result, self.shared.uploads)
 
-    def _click(self, button: Any) -> None:
-        one = next((one for uuid, one in self._shown() if uuid == id_of(button)), None)
-        if one is not None:
-            self._open(None if one.name == self._opened else one.name)
+    def kept(self) -> dict[str, Part]:
+        """Every discovery, with the files that they need."""
+        discovering = self.shared.discovering
+        return {"discovery": Part(discovering.saved, discovering.restore, discovering.files)}
 
-    def _open(self, name: str | None) -> None:
-        self._opened = name
-        self._style.content = cards.style(self._look, self._shown(), name)
-        self._result.open(name)
-        self._guide.show(self._look, name)
+    def takes(self) -> dict[str, Callable[[Path], None]]:
+        """Sealed challenges."""
+        return {CHALLENGE_SUFFIX: self.panel.source.uploaded}
 
-    def _groups(self) -> list[tuple[Any, list[Any], list[Candidate]]]:
-        known = self._look.assessment.candidates if self._look and self._look.assessment else ()
-        worth = self._look.promising[: len(self._worth)] if self._look else []
-        never = [one for one in known if one.untestable_reason]
-        little = [one for one in known if one not in worth and one not in never]
-        return [
-            (self._cards_folder, self._worth, worth),
-            (self._little_folder, self._little, little),
-            (self._never_folder, self._never, never),
-        ]
-
-    def _shown(self) -> list[tuple[str, Candidate | None]]:
-        found: list[tuple[str, Candidate | None]] = []
-        for _, slots, ones in self._groups():
-            found += [(id_of(slot), one) for slot, one in zip(slots, ones)]
-        return found
-
-    def _draw_cards(self, look: Look | None) -> None:
-        for folder, slots, ones in self._groups():
-            if folder is not self._cards_folder:
-                folder.visible = bool(ones)
-            for i, slot in enumerate(slots):
-                slot.visible = i < len(ones)
-                if i < len(ones) and look is not None:
-                    slot.label = cards.label(look, ones[i])
-        self._style.content = cards.style(look, self._shown(), self._opened)
-        self._hint.content = cards.note(self._advice(look))
-
-    @staticmethod
-    def _advice(look: Look | None) -> str:
-        if look is None:
-            return ""
-        if look.assessment is None:
-            return "Analysing the residual and scoring the library's effects …"
-        if look.promising:
-            return "The bar is the share of the error that it would remove. Click a card to see why, and to add it."
-        if look.assessment.left.explanation is not None and look.rmse > AT_FLOOR:
-            return "No effect in the library explains the residual: try its curve, or an expression of your own, below."
-        return "No effect in the library would reduce the error significantly."
+    def _load_experiment(self, one: Experiment, client: viser.ClientHandle | None) -> None:
+        explore = self.shared.tab(ExploreTab)
+        take_experiment(explore.panel, one)
+        self.page.workspaces.go(explore.workspace.name, client)

@@ -23,8 +23,14 @@ class ChartsPanel:
     """Draws runs.  The signals are drawn at once, the rest, which nobody watches while dragging, a little later."""
 
     def __init__(
-        self, page: Page, slow: Worker, panel: viser.PanelHandle, strip: PlaybackStrip, export: Callable[[], object]
+        self,
+        page: Page,
+        slow: Worker,
+        panel: viser.PanelHandle,
+        strip: PlaybackStrip,
+        export: Callable[[ChartsPanel], object],
     ) -> None:
+        """export(charts): builds what is offered of them."""
         self._page, self._slow = page, slow
         self._simulation: Simulation | None = None
         self.ghost: Simulation | None = None
@@ -48,8 +54,8 @@ class ChartsPanel:
         with panel.add_tab("Metrics", viser.Icon.TABLE):
             self._table: Any = add_html(gui)
         with panel.add_tab("Export", viser.Icon.DOWNLOAD):
-            export()
-        strip.moves.append(self._moved)
+            export(self)
+        strip.moves.connect(self._moved)
         self._range.on_update(lambda _: page.screen.post("window", self._zoom))
         self._freeze.on_click(lambda _: page.screen.post("freeze", lambda: self._set_ghost(self._simulation)))
         self._melt.on_click(lambda _: page.screen.post("freeze", lambda: self._set_ghost(None)))

@@ -11,10 +11,10 @@ import viser
 
 from ema_model.recordings import write_measurement
 from emaviz.figures import run_signals
+from emaviz.page.explore.charts import ChartsPanel
 from emaviz.page.page import Page
+from emaviz.page.playback import PlaybackStrip
 from emaviz.page.style import WIDE_MODAL
-from emaviz.scene.actuator import ActuatorScene
-from emaviz.scene.playback import Playback
 from emaviz.session.session import Simulation
 from emaviz.text.html import add_html
 
@@ -25,14 +25,9 @@ _NAME = "emaviz-run"
 class ExportControls:
     """Buttons; what each makes is sent to the browser that has asked."""
 
-    def __init__(self, page: Page, scene: ActuatorScene, playback: Playback) -> None:
-        self._page, self._scene, self._playback = page, scene, playback
-        self._ghost: Callable[[], Simulation | None] = lambda: None
-        self._window_s: Callable[[], tuple[float, float]] = lambda: (0.0, 1.0)
-
-    def build(self) -> None:
-        """Adds them here."""
-        gui = self._page.server.gui
+    def __init__(self, page: Page, strip: PlaybackStrip, charts: ChartsPanel) -> None:
+        self._page, self._playback, self._charts = page, strip.playback, charts
+        gui = page.server.gui
         gui.add_markdown("The run as it stands, in the format that *Compare* reads.")
         self._whose = gui.add_dropdown("Signals of", ("plant", "monitor"), initial_value="plant")
         self._button("Data as CSV", viser.Icon.FILE_SPREADSHEET, lambda client: self._send_data(client, ".csv"))
@@ -41,10 +36,6 @@ class ExportControls:
         self._button("Plot (PNG)…", viser.Icon.PHOTO, self._show_plot)
         gui.add_markdown("The actuator with its motion, in one **HTML** file that opens offline.")
         self._button("Scene as HTML", viser.Icon.CUBE, self._send_scene)
-
-    def connect(self, ghost: Callable[[], Simulation | None], window_s: Callable[[], tuple[float, float]]) -> None:
-        """Where the frozen run and the charts' window are to be had."""
-        self._ghost, self._window_s = ghost, window_s
 
     def _button(self, label: str, icon: viser.IconName, act: Callable[[viser.ClientHandle], None]) -> None:
         button = self._page.server.gui.add_button(label, icon=icon, color="gray")
@@ -73,12 +64,12 @@ class ExportControls:
             client.send_file_download(path.name, path.read_bytes(), save_immediately=True)
 
     def _show_plot(self, client: viser.ClientHandle) -> None:
-        run, ghost = self._run(), self._ghost()
+        run, ghost = self._run(), self._charts.ghost
         figure = run_signals.figure(
             run.reference,
             run.monitor,
             ghost.reference if ghost is not None else None,
-            self._window_s(),
+            self._charts.window_s,
             axes=self._page.session.actuator.axes,
         )
         saved = {"format": "png", "filename": _NAME, "width": 1200, "height": 1000, "scale": 2}
@@ -98,7 +89,7 @@ class ExportControls:
                 return
             serializer = self._page.server.get_scene_serializer()
             for time_s in np.linspace(0.0, motion.duration_s, _FRAMES, endpoint=False):
-                motion.pose(self._scene, float(time_s))
+                motion.pose(self._playback.scene, float(time_s))
                 serializer.insert_sleep(_FRAME_S)
             page = serializer.as_html()
         client.send_file_download("emaviz-actuator.html", page.encode(), save_immediately=True)

@@ -33,8 +33,8 @@ class SealControls:
         self._status = add_html(gui)
         self._button.on_click(lambda event: self._ask(event.client))
         events = sealing.events
-        events.said.append(lambda text: page.screen.post("sealing", lambda: self._say(text)))
-        events.sealed.append(lambda path: page.screen.post("sealed", lambda: self._sealed(path)))
+        events.said.connect(lambda text: page.screen.post("sealing", lambda: self._say(text)))
+        events.sealed.connect(lambda path: page.screen.post("sealed", lambda: self._sealed(path)))
 
     def _ask(self, client: viser.ClientHandle | None) -> None:
         if client is None:

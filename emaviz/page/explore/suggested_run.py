@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ema_model.discovery.result import Experiment
 from ema_model.identification.next_experiment import Suggestion
-from emaviz.page.explore.tab import ExplorePanel
+from emaviz.page.explore.controls import ExplorePanel
 
 
 def take_experiment(explore: ExplorePanel, one: Experiment) -> None:

@@ -34,12 +34,19 @@ _MOST_ROWS = 200
 class IdentifyResult:
     """Drawn on the screen's thread, what changes slowly on the slow one's; strip: its clock, for what is identified."""
 
-    def __init__(self, page: Page, slow: Worker, panel: viser.PanelHandle, strip: PlaybackStrip) -> None:
-        self._page, self._slow, self._strip = page, slow, strip
+    def __init__(
+        self,
+        page: Page,
+        slow: Worker,
+        panel: viser.PanelHandle,
+        strip: PlaybackStrip,
+        to_explore: Callable[[Suggestion], None],
+    ) -> None:
+        """to_explore(run): sets a run there."""
+        self._page, self._slow, self._strip, self._to_explore = page, slow, strip, to_explore
         self._race: Race | None = None
         self._begun: Race | None = None  # of which something was drawn
         self._separating: Suggestion | None = None
-        self.to_explore: Callable[[Suggestion], None] = lambda run: None  # sets a run there
         self._drawn_at = 0.0
         self.rows: list[Row] = []
         gui = page.server.gui
@@ -66,7 +73,7 @@ class IdentifyResult:
         self._try.on_click(lambda event: page.screen.post("separating", lambda: self._try_separating(event.client)))
         self._whose.on_update(lambda _: slow.post("answer", self._draw_answer))
         clear.on_click(lambda _: page.screen.post("runs", self._clear))
-        page.workspaces.entered.append(lambda name: name == WORKSPACE.name and self.draw())
+        page.workspaces.entered.connect(lambda name: name == WORKSPACE.name and self.draw())
 
     # --- from the compute thread ------------------------------------------------------------------------------------
 
@@ -130,7 +137,7 @@ class IdentifyResult:
 
     def _try_separating(self, client: viser.ClientHandle | None) -> None:
         run = self._separating
-        if run is not None and self._page.checked(lambda: self.to_explore(run)):
+        if run is not None and self._page.checked(lambda: self._to_explore(run)):
             self._page.notify("Explore has the command", "On Identify, press Identify again.", "green")
             self._page.workspaces.go("explore", client)
 

@@ -1,267 +1,64 @@
-"""The Identify tab: what is identified, by which algorithms, and the race that one watches."""
+"""The Identify tab: the search for the faults, watched, and its answer."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
-from pathlib import Path
+from collections.abc import Mapping
+from dataclasses import asdict
+from functools import partial
 from typing import Any
 
-import numpy as np
 import viser
 
-from ema_model.identification.run import ALGORITHMS
-from ema_model.identification.words import verdict
-from ema_model.simulation.plant import FITNESSES
-from emaviz.figures.convergence import colour
+from ema_model.errors import InputError
+from emaviz.figures.identified_table import Row
+from emaviz.page.explore.suggested_run import take_separating
+from emaviz.page.explore.tab import ExploreTab
 from emaviz.page.identify import WORKSPACE
+from emaviz.page.identify.controls import IdentifyPanel
 from emaviz.page.identify.result import IdentifyResult
-from emaviz.page.page import Page
-from emaviz.recording.viewer import ViewerHost
-from emaviz.session.compare.comparing import Comparing
-from emaviz.session.race import Race
-from emaviz.session.settings import SLIDERS
-from emaviz.text.html import Html, add_html, html, joined
-from emaviz.text.time_left import time_left
-
-PLANT = "The plant of Explore's sliders"
+from emaviz.page.identify.to_discover import take_to_discover
+from emaviz.page.recordings.tab import RecordingsTab
+from emaviz.page.tab import Shared, Tab
+from emaviz.session.saved import Part
 
 
-class IdentifyPanel:
-    """The tab's controls.  `result` is the panel on the right."""
+class IdentifyTab(Tab):
+    """Leads to Explore for the next run, to Recordings for the viewer, to Discover where the model does not fit."""
 
-    def __init__(self, page: Page, comparing: Comparing, viewer: ViewerHost | None, result: IdentifyResult) -> None:
-        self._page, self._comparing, self._viewer, self._result = page, comparing, viewer, result
-        self._race: Race | None = None
-        self.open_viewer: Callable[[str, str], None] = lambda url, name: None  # on the right of Recordings
-        self.to_discover: Callable[[Race], None] = lambda race: None  # takes its recording there
-        gui, settings = page.server.gui, page.session.settings
-        self._source: Any = gui.add_dropdown(
-            "Identify", (PLANT,), hint="The sliders' plant, whose faults are known, or a recording of the data folder"
+    workspace = WORKSPACE
+
+    def __init__(self, shared: Shared, right: viser.PanelHandle) -> None:
+        super().__init__(shared, right)
+        self.result = IdentifyResult(
+            self.page,
+            shared.slow_screen,
+            right,
+            shared.strip,
+            lambda run: take_separating(shared.tab(ExploreTab).panel, run),
         )
-        with gui.add_folder("Algorithms, one or several at once"):
-            self._ticks = {
-                name: gui.add_checkbox(title, name in settings.algorithms) for name, title in ALGORITHMS.items()
-            }
-        self._population = gui.add_number("Population", settings.population, min=4, max=1000, step=1)
-        self._iterations = gui.add_number("Iterations", settings.iterations, min=1, max=5000, step=1)
-        self._fitness: Any = gui.add_dropdown("Fitness", FITNESSES, initial_value=settings.fitness)
-        self._seed = gui.add_number("Seed", settings.seed, min=0, step=1)
-        for entry, change in (
-            (self._population, settings.set_population),
-            (self._iterations, settings.set_iterations),
-            (self._fitness, settings.set_fitness),
-            (self._seed, settings.set_seed),
-        ):
-            self._listen(entry, change)
-        self._start = gui.add_button("Identify", icon=viser.Icon.SEARCH)
-        self._pause = gui.add_button("Pause the search", icon=viser.Icon.PLAYER_PAUSE, color="gray", disabled=True)
-        self._stop = gui.add_button("Stop", icon=viser.Icon.PLAYER_STOP, color="red", disabled=True)
-        self._progress = gui.add_progress_bar(0.0)
-        self._text = add_html(gui, _line("Finds the faults from the current alone."))
-        self._link = add_html(gui)
-        self._watch = gui.add_button(
-            "Watch it in Rerun, here",
-            icon=viser.Icon.EYE,
-            color="gray",
-            visible=False,
-            hint="The recording while it is written, on the right",
-        )
-        self._missing = gui.add_button(
-            "Look for the missing physics",
-            icon=viser.Icon.BULB,
-            color="orange",
-            visible=False,
-            hint="The model does not fit: takes the same recording to Discover",
-        )
-        self._source.on_update(lambda event: event.client and page.screen.post("identify source", self._take_source))
-        for tick in self._ticks.values():
-            tick.on_update(lambda event: event.client and page.screen.post("algorithms", self._take_algorithms))
-        self._start.on_click(lambda _: self._begin())
-        self._pause.on_click(lambda _: page.screen.post("pause", self._toggle))
-        self._stop.on_click(lambda _: page.session.stop())
-        self._watch.on_click(lambda event: page.screen.post("watch", lambda: self._watch_growing(event.client)))
-        self._missing.on_click(
-            lambda event: page.screen.post("to discover", lambda: self._look_for_missing(event.client))
-        )
-        page.workspaces.entered.append(lambda name: name == WORKSPACE.name and self.refresh_sources())
-        events = page.session.events
-        events.progressed.append(self._progressed)
-        events.identified.append(lambda race: page.screen.post("identification", lambda: self._draw_answer(race)))
-        events.ended.append(lambda: page.screen.post("search ended", self.free))
-        comparing.events.opened.append(lambda _: page.screen.post("sources", self.refresh_sources))
-        self.refresh_sources()
 
-    # --- what is asked ----------------------------------------------------------------------------------------------
-
-    def refresh_sources(self) -> None:
-        """Reads the data folder's list again; the chosen one stays as long as it exists."""
-        names = (PLANT, *self._comparing.folder.measurements())
-        if tuple(self._source.options) != names:
-            self._source.options = names
-        self._source.value = self._page.session.settings.source or PLANT
+    def build(self) -> None:
+        """What is identified, and how."""
+        shared = self.shared
+        self.panel = IdentifyPanel(
+            self.page,
+            shared.comparing,
+            shared.viewer,
+            self.result,
+            open_viewer=lambda url, name: shared.tab(RecordingsTab).result.open(url, name),
+            to_discover=partial(take_to_discover, self.page, shared.discovering),
+        )
 
     def show_settings(self) -> None:
-        """Sets the controls to what the session holds; on the screen's thread."""
-        settings = self._page.session.settings
-        self.refresh_sources()
-        for name, tick in self._ticks.items():
-            tick.value = name in settings.algorithms
-        self._population.value, self._iterations.value = settings.population, settings.iterations
-        self._fitness.value, self._seed.value = settings.fitness, settings.seed
+        """Of the search."""
+        self.panel.show_settings()
 
-    def _take_source(self) -> None:
-        name = str(self._source.value)
-        settings = self._page.session.settings
-        if not self._page.checked(lambda: settings.set_source(SLIDERS if name == PLANT else name)):
-            self.refresh_sources()
+    def kept(self) -> dict[str, Part]:
+        """The table of runs."""
+        return {"runs": Part(lambda: [asdict(row) for row in self.result.rows], self._restore)}
 
-    def _take_algorithms(self) -> None:
-        settings = self._page.session.settings
-        chosen = [name for name, tick in self._ticks.items() if tick.value]
-        if not self._page.checked(lambda: settings.set_algorithms(chosen)):
-            for name, tick in self._ticks.items():
-                tick.value = name in settings.algorithms
-
-    def _listen(self, entry: Any, setter: Callable[[Any], None]) -> None:
-        def changed(_: Any) -> None:
-            self._page.checked(lambda: setter(entry.value))
-
-        entry.on_update(changed)
-
-    # --- the race ---------------------------------------------------------------------------------------------------
-
-    def _begin(self) -> None:
-        session = self._page.session
-        if not session.ready.is_set():
-            self._page.notify("One moment", "The models are still being compiled.", "yellow")
-            return
-        if not session.identify():
-            self._page.notify("One at a time", "A long calculation is running; stop it first.", "yellow")
-            return
-        self._start.disabled, self._pause.disabled, self._stop.disabled = True, False, False
-        self._show_paused(False)
-        self._link.content = ""
-        self._missing.visible = False
-        self._text.content = _line("Starting…")
-
-    def _watch_growing(self, client: viser.ClientHandle | None) -> None:
-        race = self._race
-        if self._viewer is not None and race is not None and race.growing is not None:
-            self.open_viewer(self._viewer.url_of(race.growing.name), race.growing.name)
-            self._page.workspaces.go("recordings", client)
-
-    def _look_for_missing(self, client: viser.ClientHandle | None) -> None:
-        race = self._race
-        if race is not None and self._page.checked(lambda: self.to_discover(race)):
-            self._page.workspaces.go("discover", client)
-
-    def _toggle(self) -> None:
-        session = self._page.session
-        session.pause(not session.reins.paused)
-        self._show_paused(session.reins.paused)
-        self._result.draw()
-
-    def _show_paused(self, paused: bool) -> None:
-        self._pause.label = "Resume the search" if paused else "Pause the search"
-        self._pause.icon = viser.Icon.PLAYER_PLAY if paused else viser.Icon.PLAYER_PAUSE
-
-    def free(self) -> None:
-        """Gives the button back when no identification runs any more."""
-        self._start.disabled, self._pause.disabled, self._stop.disabled = False, True, True
-        self._show_paused(False)
-        self._watch.visible = False
-        if "Starting" in self._text.content:
-            self._text.content = _line("Ended without an answer.")
-
-    def _progressed(self, race: Race) -> None:
-        self._result.progressed(race)
-        self._page.screen.post("identification", lambda: self._draw(race))
-
-    def _draw(self, race: Race) -> None:
-        share = race.share
-        self._progress.value = 100.0 * share
-        left = time_left(time.monotonic() - race.began_s, share)
-        lines = [_line(html("<b>{:.0f} %</b>{}", 100.0 * share, f", {left}" if left else ""))]
-        for name, track in race.tracks.items():
-            if not track.rmse:
-                continue
-            at = f"iteration {len(track.rmse) - 1} of {track.iterations}"
-            if track.answer is not None:
-                at = "done"
-            elif track.fitting is not None:
-                at = f"searched; {track.fitting[0]}"
-            lines.append(_line(html("{} · {} · rmse {:.4f} A", _title(name), at, track.rmse[-1])))
-        if race.growing is not None and race is not self._race:
-            self._link.content = recording_link(self._viewer, race.growing, "Watch it live ↗")
-            self._watch.visible = self._viewer is not None
-        self._race = race
-        self._text.content = joined(lines)
-
-    def _draw_answer(self, race: Race) -> None:
-        self._progress.value = 100.0
-        best = race.best
-        lines = []
-        for answer in race.answers:
-            stopped = "stopped · " if answer.stopped else ""
-            error = "" if answer.error_percent is None else f"Err {answer.error_percent:.2f} % · "
-            star = "★ " if best is not None and len(race.tracks) > 1 and answer is best.answer else ""
-            corrected = "" if np.isnan(answer.corrected_rmse) else f", {answer.corrected_rmse:.4f} A corrected"
-            lines.append(
-                _line(
-                    html(
-                        "{}{} · {}{}rmse {:.4f} A{} · {} simulations in {:.2f} s · <b>{}</b>",
-                        star,
-                        _title(answer.algorithm),
-                        stopped,
-                        error,
-                        answer.rmse,
-                        corrected,
-                        answer.evaluations,
-                        answer.elapsed_s,
-                        verdict(answer),
-                    )
-                )
-            )
-        if best is not None and len(race.answers) > 1:
-            lines.append(_line(_why_best(race)))
-        self._text.content = joined(lines)
-        self._race = race
-        self._missing.visible = best is not None and best.answer is not None and not best.answer.uncertainty.adequate
-        self._result.finished(race)
-        if race.path is not None:
-            self._link.content = recording_link(self._viewer, race.path)
-
-
-def recording_link(viewer: ViewerHost | None, path: Path, text: str = "") -> Html:
-    """A link that opens a recording in the Rerun viewer, or its name where there is none."""
-    if viewer is None:
-        return html('<div style="padding:2px 10px;font-size:13px">{}</div>', path.name)
-    return html(
-        '<div style="padding:2px 10px;font-size:13px;overflow-wrap:anywhere"><a href="{}" target="_blank" '
-        'rel="noopener">{}</a></div>',
-        viewer.url_of(path.name),
-        text or f"Open {path.name} in Rerun ↗",
-    )
-
-
-def _why_best(race: Race) -> Html:
-    """What the star is for."""
-    best = race.best
-    assert best is not None and best.answer is not None, "the race is over"
-    if best.answer.polished and not all(answer.polished for answer in race.answers):
-        why = "its answer was fitted with the model's own bias taken out; the others are where their searches ended"
-    elif best.answer.polished:
-        why = "its fitted answer has the least rmse"
-    else:
-        why = "it has the least rmse"
-    told = "Corrected: the rmse with what the simplified model is known to lack added."
-    return html('<span style="opacity:.75">★ {}. {}</span>', why, told)
-
-
-def _title(name: str) -> Html:
-    return html('<b style="color:{}">{}</b>', colour(name), ALGORITHMS.get(name, name))
-
-
-def _line(inner: str) -> Html:
-    return html('<div style="padding:1px 10px;font-size:13px;line-height:1.4">{}</div>', inner)
+    def _restore(self, saved: Any, _: Mapping[str, str]) -> None:
+        try:
+            self.result.show_rows([Row(**row) for row in saved])
+        except TypeError:
+            raise InputError("the session's table of runs is damaged; save it anew") from None

@@ -1,176 +1,27 @@
-"""The Library tab: all effects, searchable, each with a picture of what it does; one opens on the right."""
+"""The Library tab: every effect, and what it does."""
 
 from __future__ import annotations
 
-from typing import Any
-
 import viser
 
-from ema_model.effects import CATALOGUE, Effect, find
-from ema_model.faults import HEALTHY
-from ema_model.simulation.with_effect import RUNS, WithEffect
-from emaviz.figures.effect_signature import EffectCharts, small_picture
-from emaviz.page.discover import cards
-from emaviz.page.discover.effect import about
 from emaviz.page.library import WORKSPACE
-from emaviz.page.page import Page
-from emaviz.page.playback import PlaybackStrip
-from emaviz.scene.motion import motion
-from emaviz.server.viser_private import selector_of
+from emaviz.page.library.controls import LibraryPanel
+from emaviz.page.library.effect import EffectPage
+from emaviz.page.tab import Shared, Tab
 from emaviz.session.library import Library
-from emaviz.text.html import add_html, html, unescaped
-
-_CARD = (
-    "height:auto!important;min-height:52px;padding:4px 130px 4px 9px;font-weight:400;font-size:12px;"
-    "background-color:rgba(134,142,150,.10)!important;color:inherit!important;"
-)
-_LABEL = "display:block;height:auto;overflow:visible;white-space:pre-line;text-align:left;line-height:1.3;width:100%"
 
 
-class LibraryPanel:
-    """Search and cards on the left."""
+class LibraryTab(Tab):
+    """Cards on the left, the opened effect on the right."""
 
-    def __init__(self, page: Page, library: Library, opened: EffectPage) -> None:
-        self._page, self._library, self._effect = page, library, opened
-        self._pictures: dict[str, str] = {}
-        gui = page.server.gui
-        self._search = gui.add_text("Search", "", hint="In names, equations and explanations")
-        self._draw = gui.add_button(
-            "Run them all for their pictures",
-            icon=viser.Icon.PHOTO,
-            hint="Each where it shows most; the first time, the library is compiled, which takes some seconds",
-        )
-        self._status = add_html(gui)
-        self._style = add_html(gui)
-        self._cards = {name: self._card(effect) for name, effect in CATALOGUE.items()}
-        self._none = add_html(gui, cards.note("No effect of the library has this."), visible=False)
-        self._draw_style()
-        self._search.on_update(lambda event: event.client and page.screen.post("search", self._filter))
-        self._draw.on_click(lambda _: self._run_all())
-        library.events.said.append(lambda text: page.screen.post("library says", lambda: self._say(text)))
-        library.events.drawn.append(lambda felt: page.screen.post(f"drawn {felt.name}", lambda: self._drawn(felt)))
-        library.events.felt.append(lambda felt: page.screen.post("felt", lambda: opened.show(felt)))
+    workspace = WORKSPACE
 
-    def _card(self, effect: Effect) -> Any:
-        button = self._page.server.gui.add_button(f"{effect.title}\n{effect.shows}")
-        button.on_click(lambda _: self._page.screen.post("open effect", lambda: self._effect.open(effect.name)))
-        return button
+    def __init__(self, shared: Shared, right: viser.PanelHandle) -> None:
+        super().__init__(shared, right)
+        self._library = Library(self.page.session)
+        with right.add_tab("Effect", viser.Icon.BOOK):
+            self._effect = EffectPage(self.page, self._library, shared.strip)
 
-    def _filter(self) -> None:
-        words = str(self._search.value)[:100].lower().split()
-        shown = 0
-        with self._page.server.atomic():
-            for name, button in self._cards.items():
-                fits = all(word in _text(CATALOGUE[name]) for word in words)
-                shown += fits
-                if button.visible != fits:
-                    button.visible = fits
-            self._none.visible = shown == 0
-
-    def _run_all(self) -> None:
-        if not self._library.session.ready.is_set():
-            self._page.notify("One moment", "The models are still being compiled.", "yellow")
-        elif not self._library.draw_all():
-            self._page.notify("One at a time", "Another long run goes on; stop it first.", "yellow")
-
-    def _say(self, text: str) -> None:
-        self._status.content = cards.note(text) if text else ""
-        self._effect.say(text)
-
-    def _drawn(self, felt: WithEffect) -> None:
-        self._pictures[felt.name] = small_picture(felt)
-        self._effect.best_runs[felt.name] = felt.run
-        self._draw.color = "gray"
-        self._draw_style()
-
-    def _draw_style(self) -> None:
-        rules = []
-        for name, button in self._cards.items():
-            one = selector_of(button)
-            picture = self._pictures.get(name, "")
-            if picture:
-                picture = f'background-image:url("{picture}")!important;background-repeat:no-repeat!important;'
-                picture += "background-position:right 6px center!important;background-size:120px 44px!important;"
-            rules.append(f"{one}{{{_CARD}{picture}}}{one} .mantine-Button-inner{{justify-content:flex-start}}")
-            rules.append(f"{one} .mantine-Button-label{{{_LABEL}}}{one} .mantine-Button-label::first-line")
-            rules.append("{font-weight:600;font-size:13.5px}")
-        self._style.content = unescaped(f"<style>{''.join(rules)}</style>")
-
-
-class EffectPage:
-    """An effect on the right: what it is, a slider for each parameter, the run with and without it."""
-
-    def __init__(self, page: Page, library: Library, strip: PlaybackStrip) -> None:
-        self._page, self._library, self._strip = page, library, strip
-        self._name = ""
-        self.best_runs: dict[str, str] = {}  # by effect, where it shows most
-        self._sliders: dict[str, Any] = {}
-        gui = page.server.gui
-        self._title = add_html(gui, cards.note("Choose an effect on the left."))
-        self._text = add_html(gui)
-        self._run = gui.add_dropdown("Run", tuple(RUNS))
-        self._place = gui.add_folder("What each parameter does")
-        self._status = add_html(gui)
-        self._charts = EffectCharts(gui, page.session.actuator.axes)
-        self._run.on_update(lambda event: event.client and self._ask())
-
-    def open(self, name: str) -> None:
-        """Shows an effect, and runs it; on the screen's thread."""
-        effect = find(name, self._page.session.actuator.axes)
-        self._name = name
-        self._title.content = html(
-            '<div {}><span style="font-size:17px;font-weight:600">{}</span>'
-            '<span style="font-family:serif;font-size:16px;float:right">{}</span></div>',
-            cards.BOX,
-            effect.title,
-            effect.equation,
-        )
-        self._text.content = about(effect, equation=False)
-        self._run.value = next(run for run in RUNS if run == self.best_runs.get(name, self._run.value))
-        for slider in self._sliders.values():
-            slider.remove()
-        with self._place:
-            self._sliders = {parameter.name: self._slider(effect, i) for i, parameter in enumerate(effect.parameters)}
-        self._ask()
-
-    def show(self, felt: WithEffect) -> None:
-        """A run of it; on the screen's thread."""
-        if felt.name == self._name:
-            with self._page.server.atomic():
-                self._charts.show(felt)
-            self._strip.put(motion(felt.with_it, HEALTHY, self._page.session.actuator), WORKSPACE.name)
-
-    def say(self, text: str) -> None:
-        """What goes on."""
-        self._status.content = cards.note(text) if text else ""
-
-    def _slider(self, effect: Effect, index: int) -> Any:
-        """From nothing to somewhat more than a strong case; whole numbers in steps."""
-        one = effect.parameters[index]
-        gui = self._page.server.gui
-        if index == 0:
-            middle, most = effect.severities[1], 1.25 * max(effect.severities)
-            low, high = max(one.low, 0.0), min(one.high, most)
-        elif one.name in ("phase_rad", "angle_rad"):
-            middle, low, high = one.default, one.low, one.high
-        else:
-            middle, most = one.default, 3.0 * max(abs(one.default), 0.01 * (one.high - one.low))
-            low, high = max(one.low, -most), min(one.high, most)
-        low, high = min(low, middle), max(high, middle)
-        if one.integer:
-            slider = gui.add_slider(one.label, int(one.low), int(min(one.high, 48)), 1, int(middle))
-        else:
-            step = float(f"{(high - low) / 400.0:.0e}")
-            slider = gui.add_slider(one.label, low, high, step, middle, hint=one.meaning)
-        slider.on_update(lambda event: event.client and self._ask())
-        return slider
-
-    def _ask(self) -> None:
-        if self._name:
-            settings = {name: float(slider.value) for name, slider in self._sliders.items()}
-            self._page.checked(lambda: self._library.feel(self._name, settings, str(self._run.value)))
-
-
-def _text(effect: Effect) -> str:
-    parts = (effect.title, effect.name, effect.equation, effect.explanation, effect.shows, effect.mistaken_for)
-    return " ".join(parts).lower()
+    def build(self) -> None:
+        """Search and cards."""
+        LibraryPanel(self.page, self._library, self._effect)

@@ -1,221 +1,48 @@
-"""The Recordings tab: past recordings with what they were and what they found; reopen, rename, delete, compare."""
+"""The Recordings tab: past runs, campaigns, and everything on the page as one file."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from pathlib import Path
 
 import viser
 
-from ema_model.errors import InputError
-from ema_model.identification.run import ALGORITHMS
-from emaviz.figures.convergence import colour
-from emaviz.page.identify.tab import recording_link
-from emaviz.page.page import Page
+from ema_model.faults import HEALTHY
+from ema_model.recordings import Measurement
+from emaviz.page.campaigns.controls import CampaignControls
+from emaviz.page.recordings import WORKSPACE
+from emaviz.page.recordings.controls import RecordingsPanel
 from emaviz.page.recordings.result import RecordingsResult
-from emaviz.recording.entry import Entry, as_text
-from emaviz.recording.viewer import ViewerHost
+from emaviz.page.recordings.sessions import SessionControls
+from emaviz.page.tab import Shared, Tab
+from emaviz.scene.motion import motion
 from emaviz.session.archive import Recorded
-from emaviz.session.worker import Worker
-from emaviz.text.html import Html, add_html, html, joined, said
-
-NONE = "–"
-_SHOWN = 25
-_BOX = Html('style="padding:2px 10px;font-size:12.5px;line-height:1.45"')
+from emaviz.session.data_folder import SESSION_SUFFIX
 
 
-class RecordingsPanel:
-    """The tab's controls.  `result` is the panel on the right; files are read on the worker `files`."""
+class RecordingsTab(Tab):
+    """Takes sessions from the browser."""
 
-    def __init__(
-        self, page: Page, viewer: ViewerHost | None, recorded: Recorded, files: Worker, result: RecordingsResult
-    ) -> None:
-        self._page, self._viewer, self._recorded = page, viewer, recorded
-        self._files, self._result = files, result
-        self._by_hand = False  # chosen; else the newest is shown
-        gui = page.server.gui
-        self._choice: Any = gui.add_dropdown("Recording", (NONE,))
-        self._card = add_html(gui, _empty("None yet: identify something, or record a comparison."))
-        self._open = gui.add_button("Open in Rerun, here", icon=viser.Icon.PLAYER_PLAY, disabled=True)
-        self._link = add_html(gui)
-        with gui.add_folder("Compare two"):
-            self._other: Any = gui.add_dropdown("With", (NONE,))
-            self._compare = gui.add_button("On the same axes", icon=viser.Icon.ARROWS_DIFF, disabled=True)
-        with gui.add_folder("Rename or delete", expand_by_default=False):
-            self._name = gui.add_text("New name", "")
-            self._rename = gui.add_button("Rename", icon=viser.Icon.PENCIL, color="gray", disabled=True)
-            self._delete = gui.add_button("Delete…", icon=viser.Icon.TRASH, color="red", disabled=True)
-        with gui.add_folder("All, newest first"):
-            self._list = add_html(gui)
-            again = gui.add_button("Read the folder again", icon=viser.Icon.REFRESH, color="gray")
-        self._choice.on_update(lambda event: event.client and self._post(self._take_choice))
-        self._open.on_click(lambda _: self._post(self._open_chosen))
-        self._compare.on_click(lambda _: self._post(self._compare_two))
-        self._rename.on_click(lambda _: self._post(self._rename_chosen))
-        self._delete.on_click(lambda event: event.client and self._ask(event.client))
-        again.on_click(lambda _: self._post(self.refresh))
-        page.session.events.identified.append(lambda _: self.refresh_soon())
-        self.refresh_soon()
+    workspace = WORKSPACE
 
-    def refresh_soon(self) -> None:
-        """Reads the folder again; from any thread."""
-        self._post(self.refresh)
+    def __init__(self, shared: Shared, right: viser.PanelHandle) -> None:
+        super().__init__(shared, right)
+        self.result = RecordingsResult(self.page, right)
 
-    # --- on the files' thread ---------------------------------------------------------------------------------------
+    def build(self) -> None:
+        """The recordings, sessions and campaigns."""
+        shared, page = self.shared, self.page
+        recorded = Recorded(shared.comparing.folder.recordings)
+        self.panel = RecordingsPanel(page, shared.viewer, recorded, shared.files, self.result)
+        self.sessions = SessionControls(page, shared.comparing, shared.files, shared.kept)
+        CampaignControls(page, shared.campaigns, shared.files, self.right, self._show)
+        shared.comparing.events.kept.connect(lambda _: self.panel.refresh_soon())
 
-    def choose(self, name: str) -> None:
-        """Shows a recording, and opens it."""
-        self._choice.options = self._recorded.names()
-        self._choice.value, self._by_hand = name, True
-        self.refresh()
-        self._open_chosen()
+    def takes(self) -> dict[str, Callable[[Path], None]]:
+        """Sessions."""
+        return {SESSION_SUFFIX: self.sessions.uploaded}
 
-    def refresh(self) -> None:
-        """Reads the folder again."""
-        names = self._recorded.names()
-        if not self._by_hand or self._choice.value not in names:
-            self._by_hand, chosen = False, (names or [NONE])[0]
-        else:
-            chosen = self._choice.value
-        others = [name for name in names if name != chosen] or [chosen]
-        other = self._other.value if self._other.value in others else others[0]
-        if list(self._choice.options) != (names or [NONE]):
-            self._choice.options = self._other.options = names or [NONE]
-        self._choice.value, self._other.value = chosen, other
-        entries = self._entries(names[:_SHOWN])
-        more = html("<div {}>… and {} more</div>", _BOX, len(names) - _SHOWN) if len(names) > _SHOWN else ""
-        self._list.content = _listed(entries) + more
-        self._show_chosen()
-
-    def _take_choice(self) -> None:
-        self._by_hand = True
-        self._show_chosen()
-
-    def _entries(self, names: list[str]) -> list[Entry]:
-        entries = []
-        for name in names:
-            try:
-                entries.append(self._recorded.entry(name))
-            except InputError:  # gone since it was listed
-                continue
-        return entries
-
-    def _show_chosen(self) -> None:
-        name = str(self._choice.value)
-        exists = name != NONE
-        self._open.disabled = not exists or self._viewer is None
-        self._compare.disabled = self._rename.disabled = self._delete.disabled = not exists
-        if not exists:
-            self._card.content, self._link.content = _empty("None yet."), ""
-            return
-        self._card.content = _card(self._recorded.entry(name))
-        self._link.content = recording_link(self._viewer, self._recorded.path(name))
-        self._name.value = name.removesuffix(".rrd")
-
-    def _open_chosen(self) -> None:
-        if self._viewer is not None:
-            name = self._recorded.path(str(self._choice.value)).name
-            try:
-                self._viewer.check()
-            except OSError as error:
-                raise InputError(str(error)) from None
-            self._result.open(self._viewer.url_of(name), name)
-
-    def _compare_two(self) -> None:
-        names = [str(entry.value) for entry in (self._choice, self._other)]
-        if names[0] == names[1]:
-            raise InputError("these are the same recording; choose another one below")
-        self._result.compare(*((self._recorded.entry(name), self._recorded.read(name)) for name in names))
-
-    def _rename_chosen(self) -> None:
-        new = self._recorded.rename(str(self._choice.value), self._name.value)
-        self._choice.options = self._recorded.names()
-        self._choice.value, self._by_hand = new, True
-        self.refresh()
-
-    def _ask(self, client: viser.ClientHandle) -> None:
-        name = str(self._choice.value)
-        modal = client.gui.add_modal("Delete this recording?")
-        with modal:
-            add_html(client.gui, said(html("<b>{}</b> is removed from the disk.", name)))
-            yes = client.gui.add_button("Delete it", icon=viser.Icon.TRASH, color="red")
-            no = client.gui.add_button("Keep it", color="gray")
-
-        @yes.on_click
-        def _(_: Any) -> None:
-            modal.close()
-            self._post(lambda: self._delete_named(name))
-
-        no.on_click(lambda _: modal.close())
-
-    def _delete_named(self, name: str) -> None:
-        self._recorded.delete(name)
-        self.refresh()
-
-    def _post(self, job: Callable[[], None]) -> None:
-        """On the files' thread; what is refused is told."""
-
-        def checked() -> None:
-            self._page.checked(job)
-
-        self._files.post(job.__qualname__, checked)
-
-
-def _card(entry: Entry) -> Html:
-    """Settings and results of one recording."""
-    size = f"{entry.at:%Y-%m-%d %H:%M:%S} · {entry.size_bytes / 1e6:.1f} MB"
-    if not entry.found:
-        return html("<div {}>{}<br>A recording without an identification's result.</div>", _BOX, size)
-    results = joined(
-        html(
-            '<div><b style="color:{}">{}</b> {}{}</div>',
-            colour(name),
-            ALGORITHMS.get(name, name),
-            _result(answer),
-            " ★" if name == entry.best and len(entry.found) > 1 else "",
-        )
-        for name, answer in entry.found.items()
-    )
-    settings = [
-        html("{} <b>{}</b>", name, as_text(value))
-        for name, value in entry.settings.items()
-        if value not in ("", "none", None)
-    ]
-    return html(
-        '<div {}>{}{}<div style="opacity:.75;font-size:11.5px">{}</div></div>',
-        _BOX,
-        size,
-        results,
-        joined(settings, " · "),
-    )
-
-
-def _result(answer: dict[str, Any]) -> str:
-    error = "" if answer.get("error_percent") is None else f"Err {answer['error_percent']:.2f} % · "
-    alarms = ", ".join(answer.get("alarms", ())) or "no single k stands out"
-    verdict = "healthy" if answer.get("healthy") else f"not healthy: {alarms}"
-    stopped = " · stopped" if answer.get("stopped") else ""
-    return f"{error}rmse {answer['rmse_A']:.4f} A · {answer['elapsed_s']:.1f} s · {verdict}{stopped}"
-
-
-def _listed(entries: list[Entry]) -> Html:
-    if not entries:
-        return _empty("None yet.")
-    rows = []
-    for entry in entries:
-        answer = entry.answer
-        error = "" if not answer or answer.get("error_percent") is None else f"{answer['error_percent']:.2f} %"
-        rmse = "" if not answer else f"{answer['rmse_A']:.3f} A"
-        cells = joined(html('<td style="text-align:right;padding-left:6px">{}</td>', cell) for cell in (error, rmse))
-        rows.append(html('<tr><td style="overflow-wrap:anywhere">{}</td>{}</tr>', entry.name, cells))
-    return html(
-        '<div {}><table style="width:100%;border-collapse:collapse;font-variant-numeric:tabular-nums">'
-        '<tr><td></td><th style="text-align:right">Err</th><th style="text-align:right">rmse</th></tr>{}'
-        "</table></div>",
-        _BOX,
-        joined(rows),
-    )
-
-
-def _empty(text: str) -> Html:
-    return html("<div {}>{}</div>", _BOX, text)
+    def _show(self, path: Path, run: Measurement) -> None:
+        """A campaign's row was simulated again, and recorded there."""
+        self.panel.choose(path.name)
+        self.shared.strip.put(motion(run, HEALTHY, self.page.session.actuator), WORKSPACE.name)

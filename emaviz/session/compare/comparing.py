@@ -28,10 +28,10 @@ from ema_model.recordings.side_file.read import SideFile
 from emaviz.session import actuators as actuator_files
 from emaviz.session.compare.keep import keep
 from emaviz.session.data_folder import DataFolder
-from emaviz.session.events import notify
 from emaviz.session.opened import Opened, guesses, measured, read_opened, side_file_of
 from emaviz.session.session import Session
 from emaviz.session.settings import number
+from emaviz.session.signal import Signal
 from emaviz.session.worker import Steps, Worker
 
 MOST_RECORDINGS = 20
@@ -45,13 +45,13 @@ _MOST_WEIGHT = 1e3
 class CompareEvents:
     """What the screen listens to; called on the threads that work, so listeners only hand over."""
 
-    opened: list[Callable[[Opened], None]] = field(default_factory=list)  # also when mapped or laid out anew
-    refused: list[Callable[[], None]] = field(default_factory=list)  # a layout that does not fit: all is as it was
-    removed: list[Callable[[], None]] = field(default_factory=list)
-    progressed: list[Callable[[str], None]] = field(default_factory=list)
-    compared: list[Callable[[Comparison, float], None]] = field(default_factory=list)  # and how long it took, s
-    ended: list[Callable[[str], None]] = field(default_factory=list)  # a comparison without a result: why
-    kept: list[Callable[[Path], None]] = field(default_factory=list)  # a report or a recording is written
+    opened: Signal[[Opened]] = field(default_factory=Signal)  # also when mapped or laid out anew
+    refused: Signal[[]] = field(default_factory=Signal)  # a layout that does not fit: all is as it was
+    removed: Signal[[]] = field(default_factory=Signal)
+    progressed: Signal[[str]] = field(default_factory=Signal)
+    compared: Signal[[Comparison, float]] = field(default_factory=Signal)  # and how long it took, s
+    ended: Signal[[str]] = field(default_factory=Signal)  # a comparison without a result: why
+    kept: Signal[[Path]] = field(default_factory=Signal)  # a report or a recording is written
 
 
 class Stopped(Exception):
@@ -98,13 +98,13 @@ class Comparing:
         path = self.folder.measurement(name)
         measurement = read(path, actuator, side=side_file_of(path, self.folder) or SideFile())
         if measurement.reading.told:
-            notify(self.session.events.told, "Columns were guessed", f"{path.name}: {measurement.reading.told}")
+            self.session.events.told("Columns were guessed", f"{path.name}: {measurement.reading.told}")
         return measurement
 
     def remove(self, name: str) -> None:
         """Takes a recording off the list; its file stays."""
         self.opened.pop(name, None)
-        notify(self.events.removed)
+        self.events.removed()
 
     def use_mapping(self, name: str, mapping: ColumnMapping) -> None:
         """Reads the file with this mapping soon, and remembers it in the side file."""
@@ -143,7 +143,7 @@ class Comparing:
             if found.problem:
                 raise refusal(name, found.problem)
         except InputError:
-            notify(self.events.refused)
+            self.events.refused()
             raise
         self._opened(found)
         write_side_file(side, self.folder.beside(opened.path))
@@ -155,7 +155,7 @@ class Comparing:
 
     def _opened(self, opened: Opened) -> None:
         self.opened[opened.name] = opened
-        notify(self.events.opened, opened)
+        self.events.opened(opened)
 
     def _take_actuator(self, side: SideFile) -> InputError | None:
         """Takes the actuator that a side file names, if the data folder holds it; else why not."""
@@ -271,7 +271,7 @@ class Comparing:
         def progress(text: str) -> None:
             if stop.is_set():
                 raise Stopped
-            notify(self.events.progressed, text)
+            self.events.progressed(text)
             self.session.worker.breathe()  # the sliders of the other tabs
 
         yield
@@ -280,16 +280,16 @@ class Comparing:
 
             comparison = compare(measurements, **asked, on_progress=progress)
         except Stopped:
-            self._end(lambda: notify(self.events.ended, "Stopped."))
+            self._end(lambda: self.events.ended("Stopped."))
             return
         except Exception as error:
-            self._end(lambda: notify(self.events.ended, ""))
+            self._end(lambda: self.events.ended(""))
             if isinstance(error, FloatingPointError):
                 raise InputError(f"{error}; check the actuator's file and the recording's units") from None
             raise
         elapsed_s = time.perf_counter() - started
         self.comparison = comparison
-        self._end(lambda: notify(self.events.compared, comparison, elapsed_s))
+        self._end(lambda: self.events.compared(comparison, elapsed_s))
 
     # --- what stays -------------------------------------------------------------------------------------------------
 
@@ -305,7 +305,7 @@ class Comparing:
         comparison = self.comparison
         if comparison is None:
             raise InputError("nothing is compared yet; press Compare first")
-        notify(self.events.kept, keep(comparison, self.folder, suffix))
+        self.events.kept(keep(comparison, self.folder, suffix))
 
     def _end(self, tell: Callable[[], None]) -> None:
         """Tells the end once the compute thread is free, so that a listener may start the next run."""
@@ -319,12 +319,10 @@ class Comparing:
     def _on_error(self, error: BaseException) -> None:
         if isinstance(error, InputError):
             line = str(error).replace(f"{self.folder.folder}/", "")  # the page knows its files by their names there
-            notify(self.session.events.told, "The comparison has failed", line)
+            self.session.events.told("The comparison has failed", line)
             return
         traceback.print_exception(error)
-        notify(
-            self.session.events.told, "Something failed; the app goes on", f"{type(error).__name__}: {quoted(error)}"
-        )
+        self.session.events.told("Something failed; the app goes on", f"{type(error).__name__}: {quoted(error)}")
 
 
 def _freed(actuator: Actuator) -> set[str]:

@@ -26,7 +26,6 @@ from emaviz.session.discover.refits import check_value, undecided
 from emaviz.session.discover.run import DiscoverEvents, DiscoveryRun, Tell
 from emaviz.session.discover.sealing import Sealing
 from emaviz.session.discover.source import NOTHING, DiscoverySource, files_of
-from emaviz.session.events import notify
 from emaviz.session.session import Session
 from emaviz.session.worker import Worker
 
@@ -67,7 +66,7 @@ class Discovering:
         """A challenge by its name, or Compare's recordings with ""; the story so far stays among the entries."""
         self._leave()
         self.source.choose(name)
-        notify(self.events.looked, None)
+        self.events.looked(None)
 
     def show(self, entry: Entry) -> None:
         """Another discovery, as it was left; InputError while a step runs."""
@@ -79,7 +78,7 @@ class Discovering:
             return
         self.source.recall(entry.recipe, entry.challenge, entry.revealed)
         self.entries.current, self._told, self.look = entry, entry.told, entry.look
-        notify(self.events.looked, self.look)
+        self.events.looked(self.look)
 
     def _leave(self) -> None:
         if self.running:
@@ -139,9 +138,9 @@ class Discovering:
             if told is None or look is None or look.steps != len(told.story.steps) or look.assessment is None:
                 return
             try:
-                notify(self.events.previewed, self._own.of(told.story, look, effect, settings))
+                self.events.previewed(self._own.of(told.story, look, effect, settings))
             except (InputError, FloatingPointError) as error:
-                notify(self.events.unpreviewed, str(error))
+                self.events.unpreviewed(str(error))
 
         self.session.worker.post("own torque", job)
 
@@ -221,7 +220,7 @@ class Discovering:
             told.experiment = next_experiment(base.data, trials[0].fit, trials[1].fit)
             self._show(told)
             if told.experiment is None:
-                notify(self.events.unsuggested)
+                self.events.unsuggested()
 
         return self.run.begin("Looking for the best next test", job)
 
@@ -263,7 +262,7 @@ class Discovering:
         self.look = told.look()
         if self.entries.current is not None:
             self.entries.current.look = self.look
-        notify(self.events.looked, self.look)
+        self.events.looked(self.look)
 
     def _seen(self) -> tuple[Telling, Look]:
         if self.running:
@@ -328,7 +327,7 @@ class Discovering:
         self.entries.current = entry
         self._told = self.look = None
         self._restoring = {**saved, "recipe": dict(recipe)}
-        notify(self.events.looked, None)
+        self.events.looked(None)
 
         def job(tell: Tell) -> None:
             try:
@@ -356,6 +355,6 @@ class Discovering:
             raise InputError("nothing is discovered yet; press Start first")
         found = self.look.found
         path = keep(self.look, self.folder, suffix)
-        notify(self.events.kept, path)
+        self.events.kept(path)
         if suffix == ".toml":
-            notify(self.events.verified, path, verification(found, verified(found, path)))
+            self.events.verified(path, verification(found, verified(found, path)))

@@ -12,8 +12,8 @@ from typing import Any
 from ema_model.discovery.snapshot import Look
 from ema_model.errors import InputError
 from emaviz.session.compare.comparing import Stopped
-from emaviz.session.events import notify
 from emaviz.session.session import Session
+from emaviz.session.signal import Signal
 from emaviz.session.worker import Steps
 
 _TICK_S = 0.5
@@ -27,17 +27,17 @@ Job = Callable[[Tell], None]
 class DiscoverEvents:
     """What the screen listens to; called on the threads that work, so listeners only hand over."""
 
-    began: list[Callable[[str], None]] = field(default_factory=list)  # a job, with its title
-    progressed: list[Callable[[str, float], None]] = field(default_factory=list)  # text, and seconds since it began
-    looked: list[Callable[[Look | None], None]] = field(default_factory=list)  # the story has changed
-    ended: list[Callable[[str], None]] = field(default_factory=list)  # a job: what came of it
-    waits: list[Callable[[str], None]] = field(default_factory=list)  # a job, for its turn
-    unsuggested: list[Callable[[], None]] = field(default_factory=list)  # no test tells the candidates apart
-    revealed: list[Callable[[], None]] = field(default_factory=list)
-    previewed: list[Callable[[Any], None]] = field(default_factory=list)  # `discovery_own.Preview`
-    unpreviewed: list[Callable[[str], None]] = field(default_factory=list)  # why a torque has no preview
-    kept: list[Callable[[Path], None]] = field(default_factory=list)  # a report, a recording, a model
-    verified: list[Callable[[Path, str], None]] = field(default_factory=list)  # a kept model, and how good it is
+    began: Signal[[str]] = field(default_factory=Signal)  # a job, with its title
+    progressed: Signal[[str, float]] = field(default_factory=Signal)  # text, and seconds since it began
+    looked: Signal[[Look | None]] = field(default_factory=Signal)  # the story has changed
+    ended: Signal[[str]] = field(default_factory=Signal)  # a job: what came of it
+    waits: Signal[[str]] = field(default_factory=Signal)  # a job, for its turn
+    unsuggested: Signal[[]] = field(default_factory=Signal)  # no test tells the candidates apart
+    revealed: Signal[[]] = field(default_factory=Signal)
+    previewed: Signal[[Any]] = field(default_factory=Signal)  # `discovery_own.Preview`
+    unpreviewed: Signal[[str]] = field(default_factory=Signal)  # why a torque has no preview
+    kept: Signal[[Path]] = field(default_factory=Signal)  # a report, a recording, a model
+    verified: Signal[[Path, str]] = field(default_factory=Signal)  # a kept model, and how good it is
 
 
 class DiscoveryRun:
@@ -57,14 +57,14 @@ class DiscoveryRun:
         if started:
             self._waits.set()
             self._stop, self.running, self.finished = stop, True, False
-            notify(self._events.began, title)
+            self._events.began(title)
         return started
 
     def begin_when_free(self, title: str, job: Job, ready: Callable[[], bool]) -> None:
         """Begins once ready() and no other long run goes on, unless another step begins first or it is stopped."""
         self._waits.set()
         self._waits = over = threading.Event()
-        notify(self._events.waits, f"{title}: waiting until nothing else runs …")
+        self._events.waits(f"{title}: waiting until nothing else runs …")
 
         def wait() -> None:
             rested, until = 0, time.perf_counter() + _MOST_WAIT_S
@@ -88,13 +88,13 @@ class DiscoveryRun:
 
         def tick() -> None:
             while not over.wait(_TICK_S):  # a compilation says nothing for seconds
-                notify(self._events.progressed, said[0], time.perf_counter() - began)
+                self._events.progressed(said[0], time.perf_counter() - began)
 
         def tell(text: str) -> None:
             if stop.is_set():
                 raise Stopped
             said[0] = text.replace("_", " ")
-            notify(self._events.progressed, said[0], time.perf_counter() - began)
+            self._events.progressed(said[0], time.perf_counter() - began)
             self._session.worker.breathe()  # the sliders of the other tabs
 
         yield
@@ -120,6 +120,6 @@ class DiscoveryRun:
 
         def ended() -> None:
             self.running = False
-            notify(self._events.ended, text)
+            self._events.ended(text)
 
         self._session.worker.post("discovery's end", ended)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import secrets
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -19,9 +18,9 @@ from ema_model.faults import NAMES, named
 from ema_model.quantities.titles import in_sentence
 from ema_model.simulation.sensors import Sensors
 from emaviz.session.data_folder import DataFolder, sanitised
-from emaviz.session.events import notify
 from emaviz.session.session import Session
 from emaviz.session.settings import Settings
+from emaviz.session.signal import Signal
 from emaviz.session.worker import Steps
 
 _MOST_SEED = 1_000_000
@@ -31,8 +30,8 @@ _MOST_SEED = 1_000_000
 class SealingEvents:
     """What the screen listens to; called on the compute thread, so listeners only hand over."""
 
-    said: list[Callable[[str], None]] = field(default_factory=list)  # what goes on; "" once it is over
-    sealed: list[Callable[[Path], None]] = field(default_factory=list)  # a challenge is in the data folder
+    said: Signal[[str]] = field(default_factory=Signal)  # what goes on; "" once it is over
+    sealed: Signal[[Path]] = field(default_factory=Signal)  # a challenge is in the data folder
 
 
 class Sealing:
@@ -57,7 +56,7 @@ class Sealing:
 
         def steps() -> Steps:
             def tell(text: str) -> None:
-                notify(self.events.said, f"Sealing: {text} …")
+                self.events.said(f"Sealing: {text} …")
                 self.session.worker.breathe()
 
             yield
@@ -65,8 +64,8 @@ class Sealing:
                 tell("simulating; a combination of effects is compiled on its first use")
                 seal(truth, path, title, story, actuator, sensors=sensors, load_torque_Nm=load, on_progress=tell)
             finally:
-                notify(self.events.said, "")
-            notify(self.events.sealed, path)
+                self.events.said("")
+            self.events.sealed(path)
 
         return self.session.worker.start(steps())
 

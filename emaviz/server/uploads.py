@@ -15,24 +15,28 @@ from pathlib import Path
 from typing import Any
 
 import viser
-from viser import _messages
 
 from ema_model.errors import InputError
 from ema_model.files.limits import FILE_BYTES, PAGE_BYTES, megabytes
 from ema_model.files.refusal import shown
 from ema_model.recordings.formats import FORMATS
+from emaviz.server.viser_private import Inside, TransferPart, TransferStart, id_of
 from emaviz.session.data_folder import DataFolder, sanitised
+from emaviz.text.html import Html, add_html
 
 _MOST_TRANSFERS = 20  # at once
 _SETTLE_S = 0.5  # after which the browser has drawn its own message, so that it can be taken away
 
-# A file dropped anywhere on the page goes the way of the upload button, one after another.
+_UNSEEN = Html(
+    '<div class="emaviz-drop"></div><style>div:has(> .emaviz-drop),div:has(> .emaviz-drop)+div{display:none}</style>'
+)
+# A file dropped anywhere on the page goes the way of that button, one after another.
 _DROP = """
 (() => {
   if (window.__emavizDrop) return;
   window.__emavizDrop = true;
   const input = () => {
-    const button = Array.from(document.querySelectorAll('button')).find(b => b.textContent === LABEL);
+    const button = Array.from(document.querySelectorAll('button')).find(b => b.textContent === 'Drop');
     return button?.parentElement?.querySelector('input[type=file]') ?? document.querySelector('input[type=file]');
   };
   const hasFiles = (event) => Array.from(event.dataTransfer?.types ?? []).includes('Files');
@@ -83,23 +87,26 @@ class Uploads:
         self._server, self._folder, self._done, self._told = server, folder, done, told
         self._buttons: set[str] = set()
         self._transfers: dict[str, _Transfer] = {}
-        self._interface = server.gui._websock_interface
-        for message in (_messages.FileTransferStartUpload, _messages.FileTransferPart):
-            self._interface.unregister_handler(message)
-        self._interface.register_handler(_messages.FileTransferStartUpload, self._start)
-        self._interface.register_handler(_messages.FileTransferPart, self._part)
+        self._inside = Inside(server)
+        self._inside.take_transfers(self._start, self._part)
         server.on_client_disconnect(lambda client: self._forget(client.client_id))
 
     def add_button(self, label: str, suffixes: str, **options: Any) -> None:
-        """An upload button at this place of the page; suffixes: ".csv,.mat".  Files may also be dropped anywhere."""
+        """An upload button at this place of the page; suffixes: ".csv,.mat"."""
         options.setdefault("hint", f"Up to {megabytes(self.most_bytes)}")
         button = self._server.gui.add_upload_button(label, mime_type=suffixes, **options)
-        self._buttons.add(button._impl.uuid)
-        if len(self._buttons) == 1:
-            script = _DROP.replace("LABEL", repr(label))
-            self._interface.queue_message(_messages.RunJavascriptMessage(source=script))
+        self._buttons.add(id_of(button))
 
-    def _start(self, client: int, message: _messages.FileTransferStartUpload) -> None:
+    def add_drop(self, suffixes: str) -> None:
+        """Lets files be dropped anywhere: through an unseen button here, which must stand outside of all tabs.
+
+        A tab's own button is there only once that tab was opened.
+        """
+        add_html(self._server.gui, _UNSEEN)
+        self.add_button("Drop", suffixes)
+        self._inside.run(_DROP)
+
+    def _start(self, client: int, message: TransferStart) -> None:
         if message.source_component_uuid not in self._buttons or message.transfer_uuid in self._transfers:
             return
         try:
@@ -111,10 +118,10 @@ class Uploads:
             return
         self._transfers[message.transfer_uuid] = transfer
         if transfer.parts == 0:
-            self._acknowledge(client, message.source_component_uuid, message.transfer_uuid, 0, 0)
+            self._inside.acknowledge(client, message.source_component_uuid, message.transfer_uuid, 0, 0)
             self._finish(message.transfer_uuid)
 
-    def _accepted(self, client: int, message: _messages.FileTransferStartUpload) -> _Transfer:
+    def _accepted(self, client: int, message: TransferStart) -> _Transfer:
         name = shown(sanitised(str(message.filename)), 100)
         size, parts = message.size_bytes, message.part_count
         if type(size) is not int or type(parts) is not int or not 0 <= parts <= max(size, 0):
@@ -131,7 +138,7 @@ class Uploads:
         self._folder.place(str(message.filename))  # refused early if the kind of file is wrong
         return _Transfer(client, str(message.filename), size, parts, self._folder.part())
 
-    def _part(self, client: int, message: _messages.FileTransferPart) -> None:
+    def _part(self, client: int, message: TransferPart) -> None:
         transfer = self._transfers.get(message.transfer_uuid)
         if transfer is None or transfer.client != client or message.part_index != transfer.next_part:
             return
@@ -155,7 +162,7 @@ class Uploads:
                 client, source, message.transfer_uuid, transfer.bytes, f"{shown(transfer.filename)}: {problem}"
             )
             return
-        self._acknowledge(client, source, message.transfer_uuid, transfer.written, transfer.bytes)
+        self._inside.acknowledge(client, source, message.transfer_uuid, transfer.written, transfer.bytes)
         if transfer.next_part == transfer.parts:
             self._finish(message.transfer_uuid)
 
@@ -179,23 +186,9 @@ class Uploads:
         for uuid in [uuid for uuid, transfer in list(self._transfers.items()) if transfer.client == client]:
             self._drop(uuid)
 
-    def _acknowledge(self, client: int, source: str | None, uuid: str, written: int, total: int) -> None:
-        self._send(
-            client,
-            _messages.FileTransferPartAck(
-                source_component_uuid=source, transfer_uuid=uuid, transferred_bytes=written, total_bytes=total
-            ),
-        )
-
     def _refuse(self, client: int, source: str | None, uuid: str, total: int, line: str) -> None:
         """Tells why, and gives the browser its button back, which waits for the whole file to be acknowledged."""
-        self._acknowledge(client, source, uuid, total, total)
+        self._inside.acknowledge(client, source, uuid, total, total)
         self._told(line)
-        taken_away = _messages.RemoveNotificationMessage(f"upload-{uuid}")  # it says that the upload succeeded
-        asyncio.get_running_loop().call_later(_SETTLE_S, self._send, client, taken_away)
-
-    def _send(self, client: int, message: _messages.Message) -> None:
-        """To the browser that uploads alone: what all are sent is repeated to every page that opens later."""
-        handle = self._server.get_clients().get(client)
-        if handle is not None:
-            handle._websock_connection.queue_message(message)
+        # the browser's own message says that the upload succeeded
+        asyncio.get_running_loop().call_later(_SETTLE_S, self._inside.take_away, client, f"upload-{uuid}")

@@ -1,0 +1,98 @@
+"""An effect opened: its text, its equation, and what each parameter does."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ema_model.effects import Effect, find
+from ema_model.faults import HEALTHY
+from ema_model.simulation.with_effect import RUNS, WithEffect
+from emaviz.figures.effect_signature import EffectCharts
+from emaviz.page.discover import cards
+from emaviz.page.discover.effect import about
+from emaviz.page.library import WORKSPACE
+from emaviz.page.page import Page
+from emaviz.page.playback import PlaybackStrip
+from emaviz.scene.motion import motion
+from emaviz.session.library import Library
+from emaviz.text.html import add_html, html
+
+_CARD = (
+    "height:auto!important;min-height:52px;padding:4px 130px 4px 9px;font-weight:400;font-size:12px;"
+    "background-color:rgba(134,142,150,.10)!important;color:inherit!important;"
+)
+_LABEL = "display:block;height:auto;overflow:visible;white-space:pre-line;text-align:left;line-height:1.3;width:100%"
+
+
+class EffectPage:
+    """An effect on the right: what it is, a slider for each parameter, the run with and without it."""
+
+    def __init__(self, page: Page, library: Library, strip: PlaybackStrip) -> None:
+        self._page, self._library, self._strip = page, library, strip
+        self._name = ""
+        self.best_runs: dict[str, str] = {}  # by effect, where it shows most
+        self._sliders: dict[str, Any] = {}
+        gui = page.server.gui
+        self._title = add_html(gui, cards.note("Choose an effect on the left."))
+        self._text = add_html(gui)
+        self._run = gui.add_dropdown("Run", tuple(RUNS))
+        self._place = gui.add_folder("What each parameter does")
+        self._status = add_html(gui)
+        self._charts = EffectCharts(gui, page.session.actuator.axes)
+        self._run.on_update(lambda event: event.client and self._ask())
+
+    def open(self, name: str) -> None:
+        """Shows an effect, and runs it; on the screen's thread."""
+        effect = find(name, self._page.session.actuator.axes)
+        self._name = name
+        self._title.content = html(
+            '<div {}><span style="font-size:17px;font-weight:600">{}</span>'
+            '<span style="font-family:serif;font-size:16px;float:right">{}</span></div>',
+            cards.BOX,
+            effect.title,
+            effect.equation,
+        )
+        self._text.content = about(effect, equation=False)
+        self._run.value = next(run for run in RUNS if run == self.best_runs.get(name, self._run.value))
+        for slider in self._sliders.values():
+            slider.remove()
+        with self._place:
+            self._sliders = {parameter.name: self._slider(effect, i) for i, parameter in enumerate(effect.parameters)}
+        self._ask()
+
+    def show(self, felt: WithEffect) -> None:
+        """A run of it; on the screen's thread."""
+        if felt.name == self._name:
+            with self._page.server.atomic():
+                self._charts.show(felt)
+            self._strip.put(motion(felt.with_it, HEALTHY, self._page.session.actuator), WORKSPACE.name)
+
+    def say(self, text: str) -> None:
+        """What goes on."""
+        self._status.content = cards.note(text) if text else ""
+
+    def _slider(self, effect: Effect, index: int) -> Any:
+        """From nothing to somewhat more than a strong case; whole numbers in steps."""
+        one = effect.parameters[index]
+        gui = self._page.server.gui
+        if index == 0:
+            middle, most = effect.severities[1], 1.25 * max(effect.severities)
+            low, high = max(one.low, 0.0), min(one.high, most)
+        elif one.name in ("phase_rad", "angle_rad"):
+            middle, low, high = one.default, one.low, one.high
+        else:
+            middle, most = one.default, 3.0 * max(abs(one.default), 0.01 * (one.high - one.low))
+            low, high = max(one.low, -most), min(one.high, most)
+        low, high = min(low, middle), max(high, middle)
+        if one.integer:
+            slider = gui.add_slider(one.label, int(one.low), int(min(one.high, 48)), 1, int(middle))
+        else:
+            step = float(f"{(high - low) / 400.0:.0e}")
+            slider = gui.add_slider(one.label, low, high, step, middle, hint=one.meaning)
+        slider.on_update(lambda event: event.client and self._ask())
+        return slider
+
+    def _ask(self) -> None:
+        if self._name:
+            settings = {name: float(slider.value) for name, slider in self._sliders.items()}
+            self._page.checked(lambda: self._library.feel(self._name, settings, str(self._run.value)))

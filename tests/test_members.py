@@ -1,0 +1,264 @@
+"""Adding a member of a family is adding one file: a copy of the program, one new file in each family, nothing else."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+PROJECT = Path(__file__).parents[1]
+NEW = {
+    "ema_model/effects/seal_drag.py": '''
+"""Seal drag: a viscous torque of the user's seal."""
+
+from __future__ import annotations
+
+from ema_model.effects.effect import USER, Effect, Parameter
+from ema_model.physics.jit import scalar
+
+
+@scalar
+def shaft_torque(torque, theta, omega, current, user, gear, load, drag):
+    """− τ² c ω, added."""
+    return torque - gear * gear * drag * omega
+
+
+EFFECT = Effect(
+    title="Seal drag",
+    equation="T = − τ² c ω",
+    source="a test",
+    explanation="The user's seal drags.",
+    parameters=(
+        Parameter("drag_Nms_rad", "drag c", 100.0, 0.0, 1e6, side=USER, linear=(1e3, 0.0, 1e9)),
+    ),
+    severities=(50.0, 100.0, 200.0),
+    places=(shaft_torque,),
+    shows="in the current, with the speed",
+    against="motor_speed",
+    mistaken_for="viscous friction",
+    family="mechanics",
+)
+''',
+    "ema_model/commands/square.py": '''
+"""Square command."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ema_model.commands.command import Array, Command
+
+
+@dataclass(frozen=True)
+class Square(Command):
+    """Back and forth between two places."""
+
+    name = "square"
+    title = "Square"
+    amplitude_rad: float = 1e-3
+    frequency_Hz: float = 5.0
+
+    def at(self, time_s: Array) -> Array:
+        return self.amplitude_rad * np.sign(np.sin(2.0 * np.pi * self.frequency_Hz * time_s))
+''',
+    "ema_model/recordings/formats/rows.py": '''
+"""Rows of JSON: names first."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+
+from ema_model.recordings.formats.format import Columns, Format
+
+
+def _header(path, max_bytes):
+    return json.loads(open(path).readline())
+
+
+def _read(path, names, max_bytes, strict):
+    with open(path) as file:
+        known, *rows = [json.loads(line) for line in file]
+    table = np.array(rows, dtype=float).T
+    return Columns({name: table[known.index(name)] for name in names}, lambda i: f"line {i + 2}")
+
+
+FORMAT = Format(".rows", "JSON rows", _header, _read)
+''',
+    "ema_model/identification/optimisers/lottery.py": '''
+"""Draws at random."""
+
+from __future__ import annotations
+
+from ema_model.identification.optimisers.sparrow_search import SparrowSearch
+
+
+class Lottery(SparrowSearch):
+    """As the sparrows, under another name."""
+
+    name = "lottery"
+''',
+    "emaviz/cli/verbs/hello.py": '''
+"""`emaviz hello`."""
+
+HELP = "say hello"
+PLACE = 99
+
+
+def add_arguments(parser):
+    parser.add_argument("--loud", action="store_true")
+
+
+def run(arguments):
+    print("HELLO" if arguments.loud else "hello")
+    return 0
+''',
+    "emaviz/figures/error_pie.py": '''
+"""A pie of the errors, which a section places."""
+
+from __future__ import annotations
+
+import plotly.graph_objects as go
+
+
+def figure(comparison):
+    names = [one.name for one in comparison.recordings]
+    return go.Figure(go.Pie(labels=names, values=[1.0] * len(names)))
+''',
+    "emaviz/report/comparison/pie.py": '''
+"""A section that shows the new figure, second in the report."""
+
+from __future__ import annotations
+
+from ema_model.comparison.result import Comparison
+from emaviz.figures import error_pie
+from emaviz.report.section import Figures, Section
+
+
+class Pie(Section[Comparison]):
+    """Placed behind the answer."""
+
+    title = "Shares of the error"
+    anchor = "pie"
+    place = 15
+
+    def body(self, subject: Comparison, figures: Figures) -> str:
+        """The figure alone."""
+        return figures.place(error_pie.figure(subject))
+''',
+    "emaviz/page/notes/__init__.py": '''
+"""The Notes tab."""
+
+import viser
+
+from emaviz.page.workspaces import Workspace
+
+WORKSPACE = Workspace("notes", "Notes", viser.Icon.NOTE, 7)
+''',
+    "emaviz/page/notes/tab.py": '''
+"""The Notes tab."""
+
+from __future__ import annotations
+
+import viser
+
+from emaviz.page.notes import WORKSPACE
+from emaviz.page.tab import Shared, Tab
+
+
+class NotesTab(Tab):
+    """Words on both sides."""
+
+    workspace = WORKSPACE
+
+    def __init__(self, shared: Shared, right: viser.PanelHandle) -> None:
+        super().__init__(shared, right)
+        with right.add_tab("Notes", viser.Icon.NOTE):
+            self.text = self.page.server.gui.add_markdown("What was seen.")
+
+    def build(self) -> None:
+        self.note = self.page.server.gui.add_text("Note", "")
+''',
+}
+PAGE = """
+from pathlib import Path
+from emaviz.page.app import App
+app = App("127.0.0.1", 0, Path("data"))
+print([kind.workspace.title for kind in app.shared.tabs])
+app.close()
+"""
+LISTS = """
+from ema_model.identification.optimisers import OPTIMISERS
+from ema_model.recordings.formats import FORMATS
+print(OPTIMISERS["lottery"].name, ".rows" in FORMATS)
+"""
+
+
+@pytest.fixture(scope="module")
+def copied(tmp_path_factory):
+    """Runs this program's copy with the new files, in a folder of its own; gives what it has said."""
+    folder = tmp_path_factory.mktemp("members")
+    for package in ("ema_model", "emaviz"):
+        shutil.copytree(PROJECT / package, folder / package, ignore=shutil.ignore_patterns("__pycache__"))
+    for path, text in NEW.items():
+        (folder / path).parent.mkdir(exist_ok=True)
+        (folder / path).write_text(text.lstrip())
+    (folder / "assets").symlink_to(PROJECT / "assets")
+    (folder / "data").mkdir()
+
+    def run(*arguments: str) -> str:
+        environment = {**os.environ, "PYTHONPATH": str(folder), "EMAVIZ_CACHE_DIR": str(folder / "cache")}
+        environment["EMAVIZ_COMPILE_AHEAD"] = "0"
+        done = subprocess.run([sys.executable, *arguments], cwd=folder, env=environment, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    run.folder = folder
+    return run
+
+
+def test_a_verb(copied):
+    assert copied("-m", "emaviz", "hello", "--loud") == "HELLO\n"
+    assert "say hello" in copied("-m", "emaviz", "--help")
+
+
+def test_an_effect_with_a_parameter_at_the_user(copied):
+    assert "N·s/m" in copied("-m", "emaviz", "effects", "seal_drag"), "on a linear axis it is converted"
+
+
+@pytest.mark.long
+def test_an_effect_acts_on_both_kinds_of_axes(copied):
+    common = ("-m", "emaviz", "simulate", "--duration", "0.1", "--model", "mm")
+    for actuator, drag in (("thesis", "drag_Nms_rad=4e4"), ("ball_screw", "drag_Ns_m=2e3")):
+        chosen = (*common, "--actuator", f"assets/actuators/{actuator}.toml")
+        copied(*chosen, "--out", "bare.csv")
+        copied(*chosen, "--out", "drag.csv", "--effect", f"seal_drag:{drag}")
+        assert (copied.folder / "bare.csv").read_text() != (copied.folder / "drag.csv").read_text()
+        for name in ("bare.csv", "drag.csv"):
+            (copied.folder / name).unlink()
+
+
+def test_a_command_a_format_and_a_section_with_its_figure(copied):
+    copied("-m", "emaviz", "simulate", "--command", "square", "--duration", "0.2", "--model", "mm", "--out", "run.csv")
+    header, *rows = (copied.folder / "run.csv").read_text().splitlines()
+    lines = [json.dumps(header.split(",")), *(json.dumps([float(cell) for cell in row.split(",")]) for row in rows)]
+    (copied.folder / "run.rows").write_text("\n".join(lines))
+    copied("-m", "emaviz", "compare", "run.rows", "--report", "report.html", "--no-calibrate")
+    report = (copied.folder / "report.html").read_text(encoding="utf-8")
+    assert report.index("The answer") < report.index("Shares of the error") < report.index("Data health")
+
+
+def test_an_optimiser(copied):
+    assert copied("-c", LISTS) == "lottery True\n"
+
+
+def test_a_tab(copied):
+    assert copied("-c", PAGE).count("'Recordings', 'Notes']") == 1

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -22,27 +21,22 @@ from ema_model.identification.objective import Objective
 from ema_model.identification.run import steps
 from ema_model.recordings import Measurement
 from emaviz.session.data_folder import DataFolder
+from emaviz.session.job import Job, Tell
 from emaviz.session.session import Session
 from emaviz.session.signal import Signal
-from emaviz.session.worker import Steps
 
 _HEADER = "campaign.json"
 _DEPTHS = ("*", "*/*")  # below the data folder
-
-
-@dataclass
-class CampaignEvents:
-    """What the screen listens to; called on the compute thread, so listeners only hand over."""
-
-    said: Signal[[str]] = field(default_factory=Signal)
-    opened: Signal[[Path, Measurement]] = field(default_factory=Signal)  # the recording, and its run
 
 
 class Campaigns:
     """The campaigns below the data folder, and those that the command line has named.  InputError as `Store`."""
 
     def __init__(self, session: Session, data: DataFolder, given: Sequence[Path] = ()) -> None:
-        self.events = CampaignEvents()
+        self.job = Job(session.worker)
+        self.opened: Signal[[Path, Measurement]] = Signal()  # a row's recording, and its run
+        self.said = ""  # of the row that was computed last
+        self._recorded: tuple[Path, Measurement, str] | None = None
         self._session, self._data = session, data
         self._given = [Store(path).folder for path in given]
 
@@ -63,8 +57,11 @@ class Campaigns:
         for kind in set(store.header.kinds.values()):
             for row in store.table(kind).to_pylist():
                 if row["name"] == row_name:
-                    return self._session.worker.start(self._steps(store.task(row)))
+                    return self._open(store.task(row))
         raise InputError(f"{shown(row_name)}: no such row; read the campaign again")
+
+    def _open(self, task: Task) -> bool:
+        return self.job.begin("Computing the row again", lambda tell: self._work(task, tell), self._done)
 
     def _folders(self) -> dict[str, Path]:
         found = {str(path): path for path in self._given}
@@ -74,29 +71,26 @@ class Campaigns:
                     found.setdefault(str(header.parent.relative_to(self._data.folder)), header.parent)
         return found
 
-    def _steps(self, task: Task) -> Steps:
-        try:
-            self._say(f"{task.group}, {task.case or 'one case'}, seed {task.seed}: making its recordings …")
-            yield
-            it = given(task)
-            path = self._path(task)
-            yield from _RECORDED[task.kind](task, it, path, self._tell)
-            self._say(f"{path.name}: {task.group}, {task.case or 'one case'}, seed {task.seed}")
-            self.events.opened(path, it.fitted[0])
-        except FloatingPointError as error:
-            raise InputError(str(error)) from None
+    def _work(self, task: Task, tell: Tell) -> None:
+        tell(f"{_named(task)}: making its recordings …")
+        it = given(task)
+        path = self._path(task)
+        _RECORDED[task.kind](task, it, path, tell)
+        self._recorded = path, it.fitted[0], f"{path.name}: {_named(task)}"
 
     def _path(self, task: Task) -> Path:
         from emaviz.recording.paths import free_name  # rerun takes a second to import
 
         return free_name(self._session.folder, f"{datetime.now():%Y%m%d-%H%M%S}-{task.kind}-{task.name[:8]}", ".rrd")
 
-    def _tell(self, text: str) -> None:
-        self._say(text)
-        self._session.worker.breathe()
+    def _done(self) -> None:
+        assert self._recorded is not None
+        path, run, self.said = self._recorded
+        self.opened(path, run)
 
-    def _say(self, text: str) -> None:
-        self.events.said(text)
+
+def _named(task: Task) -> str:
+    return f"{task.group}, {task.case or 'one case'}, seed {task.seed}"
 
 
 def _configuration(task: Task) -> dict[str, Any]:
@@ -104,7 +98,7 @@ def _configuration(task: Task) -> dict[str, Any]:
     return {"group": task.group, "case": task.case, "seed": task.seed, "task": task.name, **task.settings}
 
 
-def _identified(task: Task, it: Given, path: Path, tell: Callable[[str], None]) -> Steps:
+def _identified(task: Task, it: Given, path: Path, tell: Tell) -> None:
     from emaviz.recording.story import IdentificationStory
 
     own = msgspec.convert(task.settings, KINDS["identify"].settings)
@@ -126,7 +120,6 @@ def _identified(task: Task, it: Given, path: Path, tell: Callable[[str], None]) 
             at = next(search)
             story.iteration(at)
             tell(f"{at.algorithm} {at.iteration} of {at.iterations}: rmse {at.rmse:.4f} A")
-            yield
     except StopIteration as finished:
         story.finish(finished.value)
     finally:
@@ -135,16 +128,15 @@ def _identified(task: Task, it: Given, path: Path, tell: Callable[[str], None]) 
         raise InputError(story.failed)
 
 
-def _compared(task: Task, it: Given, path: Path, tell: Callable[[str], None]) -> Steps:
+def _compared(task: Task, it: Given, path: Path, tell: Tell) -> None:
     from emaviz.recording.comparison import write_comparison
 
     own = msgspec.convert(task.settings, KINDS["compare"].settings)
     found = compare(it.fitted, it.actuator, calibrate=own.calibrate, holdout=it.held, on_progress=tell)
-    yield
     write_comparison(found, path, _configuration(task))
 
 
-def _discovered(task: Task, it: Given, path: Path, tell: Callable[[str], None]) -> Steps:
+def _discovered(task: Task, it: Given, path: Path, tell: Tell) -> None:
     from emaviz.recording.discovery.write import write_discovery
 
     own = msgspec.convert(task.settings, KINDS["discover"].settings)
@@ -157,7 +149,6 @@ def _discovered(task: Task, it: Given, path: Path, tell: Callable[[str], None]) 
         most_effects=own.most_effects,
         on_progress=tell,
     )
-    yield
     write_discovery(found, path, _configuration(task))
 
 

@@ -9,9 +9,9 @@ from ema_model.effects import CATALOGUE, find
 from ema_model.errors import InputError, quoted
 from ema_model.quantities.titles import in_sentence
 from ema_model.simulation.with_effect import RUNS, EffectRuns, WithEffect
+from emaviz.session.job import Job, Tell
 from emaviz.session.session import Session
 from emaviz.session.signal import Signal
-from emaviz.session.worker import Steps
 
 
 @dataclass
@@ -29,6 +29,7 @@ class Library:
     def __init__(self, session: Session) -> None:
         self.session = session
         self.events = LibraryEvents()
+        self.job = Job(session.worker)
         self._runs = EffectRuns(session.actuator)
 
     def feel(self, name: str, settings: Mapping[str, float], run: str) -> None:
@@ -47,17 +48,15 @@ class Library:
 
     def draw_all(self) -> bool:
         """Runs every effect at its clear severity, where it shows most; False while another long run goes on."""
-        return self.session.worker.start(self._steps())
+        return self.job.begin("Running all effects", self._draw_all)
 
-    def _steps(self) -> Steps:
+    def _draw_all(self, tell: Tell) -> None:
         for i, name in enumerate(CATALOGUE):
             effect = find(name, self.session.actuator.axes)
-            self._say(f"Running {in_sentence(effect.title)} … {i + 1} of {len(CATALOGUE)}")
+            tell(f"{in_sentence(effect.title)}, {i + 1} of {len(CATALOGUE)}", i / len(CATALOGUE))
             best = self._runs.clearest(effect)
             if best is not None:
                 self.events.drawn(best)
-            yield
-        self._say("")
 
     def _say(self, text: str) -> None:
         self.events.said(text)

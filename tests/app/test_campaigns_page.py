@@ -91,7 +91,7 @@ def test_a_row_opens_as_a_run_with_its_recording(session, data, kind):
     campaigns = Campaigns(session, data)
     (row,) = campaigns.store("campaigns/first").table(kind).to_pylist()
     done, told = threading.Event(), []
-    campaigns.events.opened.connect(lambda *opened: (told.append(opened), done.set()))
+    campaigns.opened.connect(lambda *opened: (told.append(opened), done.set()))
     session.events.told.connect(lambda *line: (told.append(line), done.set()))
     assert campaigns.open_row("campaigns/first", row["name"])
     assert done.wait(120.0)

@@ -144,7 +144,7 @@ def test_a_comparison_is_stopped(page, app):
     resting(app)
     comparing.calibrate = True
     before = comparing.comparison
-    comparing.events.progressed.connect(lambda text: time.sleep(0.2))  # else it is over too soon
+    comparing.job.progressed.connect(lambda *_: time.sleep(0.2))  # else it is over too soon
     page.get_by_role("button", name="Compare", exact=True).click()
     wait_until(lambda: comparing.running)
     page.get_by_role("button", name="Stop", exact=True).click()

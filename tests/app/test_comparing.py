@@ -71,7 +71,7 @@ class Heard:
         self.compared, self.ended = [], []
         comparing.session.events.told.connect(lambda title, text: self.told.append(text))
         comparing.events.opened.connect(self.opened.append)
-        comparing.events.progressed.connect(self.progress.append)
+        comparing.job.progressed.connect(lambda text, *_: self.progress.append(text))
         comparing.events.compared.connect(lambda comparison, elapsed: self.compared.append(comparison))
         comparing.events.ended.connect(self.ended.append)
 
@@ -295,7 +295,7 @@ def test_stop_ends_it_soon_and_keeps_the_last_result(comparing, heard, recording
     comparing.add("uploads/run.csv")
     heard.wait(heard.opened)
     begun = threading.Event()
-    comparing.events.progressed.connect(lambda text: begun.set())
+    comparing.job.progressed.connect(lambda *_: begun.set())
     assert comparing.compare()
     assert begun.wait(30.0)
     comparing.stop()

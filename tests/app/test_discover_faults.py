@@ -25,7 +25,7 @@ def rig(tmp_path_factory):
     rig = Rig(tmp_path_factory.mktemp("worn"))
     rig.session.settings.set_fault(1, 0.2)
     sealed = []
-    rig.discovering.sealing.events.sealed.connect(sealed.append)
+    rig.discovering.sealing.sealed.connect(sealed.append)
     assert rig.discovering.sealing.seal("Worn", "It rattles.")
     wait_until(lambda: sealed)
     (name,) = rig.discovering.source.sealed

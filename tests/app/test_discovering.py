@@ -88,7 +88,7 @@ def test_a_signature_is_beside_the_residual_that_it_explains(fresh):
 def test_a_stopped_step_leaves_the_model_as_it_was(fresh):
     before = fresh.look
     told = []
-    fresh.events.ended.connect(told.append)
+    fresh.job.ended.connect(told.append)
     assert fresh.add("stribeck_friction")
     with pytest.raises(InputError, match="a step is running"):
         fresh.undo()

@@ -40,7 +40,7 @@ def solved(rigs):
         settings.set_effect("cogging_torque", name, value)
     settings.set_fault(0, 0.0)
     sealed = []
-    here.discovering.sealing.events.sealed.connect(sealed.append)
+    here.discovering.sealing.sealed.connect(sealed.append)
     with pytest.raises(InputError, match="no story yet"):
         here.discovering.sealing.seal("Mine", "  ")
     assert here.discovering.sealing.seal("../Mine & yours", "It hums.")

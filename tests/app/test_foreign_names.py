@@ -106,7 +106,7 @@ def test_discover(page, app):
     page.get_by_role("button", name="Start", exact=True).click()
     wait_until(lambda: not app.discovering.running)
     seen(page, IMAGE)
-    app.discovering.events.ended(f"{FRAME}.csv: cannot be used")
+    app.discovering.job.ended(f"{FRAME}.csv: cannot be used")
     seen(page, f"{FRAME}.csv: cannot be used")
 
 

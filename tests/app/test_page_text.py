@@ -106,7 +106,7 @@ def test_recordings_on_compare_and_what_is_said_of_them(app, name):
     wait_until(lambda: not app.comparing.running)  # whose end is said in the same place
     app.comparing.events.ended(f"{name}.csv: line 1, column {name}: is wrong")
     check(app, f"{name}.csv: line 1, column {name}: is wrong")
-    app.discovering.events.ended(f"{name}.csv: cannot be used")
+    app.discovering.job.ended(f"{name}.csv: cannot be used")
     check(app, f"{name}.csv: cannot be used")
     for kind in ("", "columns "):
         app.comparing.remove(f"uploads/{kind}{name}.csv")

@@ -23,7 +23,7 @@ class Rig:
         self.part = Part(self.discovering.saved, self.discovering.restore, self.discovering.files)
         self.told, self.ended = [], []
         self.session.events.told.connect(lambda *line: self.told.append(line))
-        self.discovering.events.ended.connect(self.ended.append)
+        self.discovering.job.ended.connect(self.ended.append)
 
     def close(self):
         self.discovering.close()

@@ -12,6 +12,7 @@ from ema_model.campaign.store import Store
 from ema_model.campaign.summary import summaries
 from ema_model.errors import InputError
 from ema_model.recordings import Measurement
+from emaviz.page.job_line import JobLine
 from emaviz.page.page import Page
 from emaviz.session.campaigns import Campaigns
 from emaviz.session.worker import Worker
@@ -43,6 +44,7 @@ class CampaignControls:
             self._row: Any = gui.add_dropdown("Row", (NONE,))
             self._open = gui.add_button("Open as a run", icon=viser.Icon.PLAYER_PLAY, disabled=True)
             self._status = add_html(gui, _box("None below the data folder; `emaviz gui --campaign DIR` opens one."))
+            JobLine(page, campaigns.job)
             again = gui.add_button("Look for campaigns again", icon=viser.Icon.REFRESH, color="gray")
         with panel.add_tab("Campaign", viser.Icon.TABLE):
             self._tables = add_html(gui, _box("Choose a campaign on the left."))
@@ -50,8 +52,7 @@ class CampaignControls:
         self._group.on_update(lambda event: event.client and self._post(self._show_rows))
         self._open.on_click(lambda _: self._post(self._open_chosen))
         again.on_click(lambda _: self._post(self.refresh))
-        campaigns.events.said.connect(lambda text: page.screen.post("campaign", lambda: self._say(text)))
-        campaigns.events.opened.connect(lambda path, run: self._post(lambda: opened(path, run)))
+        campaigns.opened.connect(lambda path, run: self._post(lambda: self._opened(path, run, opened)))
         self._post(self.refresh)
 
     # --- on the files' thread ---------------------------------------------------------------------------------------
@@ -91,6 +92,10 @@ class CampaignControls:
             raise InputError("there is no such row; choose another")
         if not self._campaigns.open_row(str(self._choice.value), self._rows[chosen]):
             raise InputError("another long run goes on; wait for its end, or stop it")
+
+    def _opened(self, path: Path, run: Measurement, opened: Callable[[Path, Measurement], None]) -> None:
+        opened(path, run)
+        self._say(self._campaigns.said)
 
     def _say(self, text: str) -> None:
         self._status.content = said(text)

@@ -63,9 +63,11 @@ class ComparePanel:
         events.opened.connect(lambda opened: page.screen.post(f"opened {opened.name}", lambda: self._opened(opened)))
         events.refused.connect(lambda: page.screen.post("columns", self._open_columns))
         events.removed.connect(lambda: page.screen.post("removed", self._removed))
-        events.progressed.connect(lambda text: page.screen.post("compare progress", lambda: self._progressed(text)))
-        events.compared.connect(lambda *found: page.screen.post("compared", lambda: self._compared(*found)))
         events.ended.connect(lambda why: page.screen.post("compare ended", lambda: self._ended(why)))
+        comparing.job.progressed.connect(
+            lambda text, *_: page.screen.post("compare progress", lambda: self._progressed(text))
+        )
+        events.compared.connect(lambda *found: page.screen.post("compared", lambda: self._compared(*found)))
         self.refresh_files()
 
     def refresh_files(self) -> None:

@@ -79,12 +79,12 @@ class DiscoverPanel:
             button.on_click(lambda _, i=i: self._remove(i))
         self._result.connect(self.ask, lambda: self._open(None))
         self._own.connect(self.ask)
-        events = discovering.events
-        events.began.connect(lambda title: post("discover began", lambda: self._began(title)))
-        events.waits.connect(lambda text: post("discover progress", lambda: self._say_plain(text)))
-        events.progressed.connect(lambda text, s: post("discover progress", lambda: self._say(text, s)))
+        events, job = discovering.events, discovering.job
+        job.began.connect(lambda title: post("discover began", lambda: self._began(title)))
+        job.waits.connect(lambda text: post("discover progress", lambda: self._say_plain(text)))
+        job.progressed.connect(lambda text, s, _: post("discover progress", lambda: self._say(text, s)))
         events.looked.connect(lambda look: post("looked", lambda: self._show(look)))
-        events.ended.connect(lambda text: post("discover ended", lambda: self._ended(text)))
+        job.ended.connect(lambda text: post("discover ended", lambda: self._ended(text)))
 
     # --- what is asked ----------------------------------------------------------------------------------------------
 
@@ -159,7 +159,7 @@ class DiscoverPanel:
 
     def _ended(self, text: str) -> None:
         self._busy(False)
-        if self._discovering.run.finished:
+        if self._discovering.job.finished:
             self._pace.end()
         self._say_plain(text)
         self._guide.show(self._look, self._opened)

@@ -72,7 +72,7 @@ class Guide:
         self._offer.on_click(lambda _: page.screen.post("guide", self._start))
         end.on_click(lambda _: page.screen.post("guide", self._end))
         discovering.events.revealed.connect(lambda: page.screen.post("guide", self.refresh))
-        discovering.events.began.connect(lambda _: page.screen.post("guide", self.refresh))
+        discovering.job.began.connect(lambda _: page.screen.post("guide", self.refresh))
 
     def show(self, look: Look | None, opened: str | None) -> None:
         """The story is here now; on the screen's thread."""

@@ -50,7 +50,7 @@ class SourceControls:
         self._held = gui.add_folder("Hold out, to judge by", visible=False, expand_by_default=False)
         self._boxes: list[Any] = []
         self._source.on_update(lambda event: event.client and post("source", self._take))
-        discovering.sealing.events.sealed.connect(lambda _: post("sealed listed", self._refresh))
+        discovering.sealing.sealed.connect(lambda _: post("sealed listed", self._refresh))
         compare = discovering.comparing.events
         compare.opened.connect(lambda _: post("discover source", lambda: self.show(self._look)))
         compare.removed.connect(lambda: post("discover source", lambda: self.show(self._look)))

@@ -7,10 +7,9 @@ from pathlib import Path
 
 import viser
 
-from emaviz.page.discover import cards
+from emaviz.page.job_line import JobLine
 from emaviz.page.page import Page
 from emaviz.session.discover.sealing import Sealing
-from emaviz.text.html import add_html
 
 _TEXT = (
     "The plant as it is set here, its hidden effects and faults, is recorded four times: a chirp, a small step, a slow "
@@ -30,11 +29,11 @@ class SealControls:
         self._button = gui.add_button(
             "Seal as a challenge…", icon=viser.Icon.LOCK, color="gray", hint="One file for a colleague to solve"
         )
-        self._status = add_html(gui)
+        self._line = JobLine(page, sealing.job)
         self._button.on_click(lambda event: self._ask(event.client))
-        events = sealing.events
-        events.said.connect(lambda text: page.screen.post("sealing", lambda: self._say(text)))
-        events.sealed.connect(lambda path: page.screen.post("sealed", lambda: self._sealed(path)))
+        sealing.job.began.connect(lambda _: page.screen.post("sealing", lambda: self._busy(True)))
+        sealing.job.ended.connect(lambda _: page.screen.post("sealing", lambda: self._busy(False)))
+        sealing.sealed.connect(lambda path: page.screen.post("sealed", lambda: self._sealed(path)))
 
     def _ask(self, client: viser.ClientHandle | None) -> None:
         if client is None:
@@ -64,12 +63,11 @@ class SealControls:
 
         self._page.checked(tried)
 
-    def _say(self, text: str) -> None:
-        self._button.disabled = bool(text)
-        self._status.content = cards.note(text) if text else ""
+    def _busy(self, busy: bool) -> None:
+        self._button.disabled = busy
 
     def _sealed(self, path: Path) -> None:
-        self._status.content = cards.note(f"Kept in the data folder: {self._sealing.folder.name_of(path)}")
+        self._line.say(f"Kept in the data folder: {self._sealing.folder.name_of(path)}")
         self._page.notify("Challenge sealed", f"{path.name}: Discover lists it among the recordings.", "green")
         if self._asked is not None:
             self._asked.send_file_download(path.name, path.read_bytes(), save_immediately=True)

@@ -10,6 +10,7 @@ from ema_model.effects import CATALOGUE, Effect
 from ema_model.simulation.with_effect import WithEffect
 from emaviz.figures.effect_signature import small_picture
 from emaviz.page.discover import cards
+from emaviz.page.job_line import JobLine
 from emaviz.page.library.effect import EffectPage
 from emaviz.page.page import Page
 from emaviz.server.viser_private import selector_of
@@ -36,14 +37,14 @@ class LibraryPanel:
             icon=viser.Icon.PHOTO,
             hint="Each where it shows most; the first time, the library is compiled, which takes some seconds",
         )
-        self._status = add_html(gui)
+        JobLine(page, library.job)
         self._style = add_html(gui)
         self._cards = {name: self._card(effect) for name, effect in CATALOGUE.items()}
         self._none = add_html(gui, cards.note("No effect of the library has this."), visible=False)
         self._draw_style()
         self._search.on_update(lambda event: event.client and page.screen.post("search", self._filter))
         self._draw.on_click(lambda _: self._run_all())
-        library.events.said.connect(lambda text: page.screen.post("library says", lambda: self._say(text)))
+        library.events.said.connect(lambda text: page.screen.post("library says", lambda: opened.say(text)))
         library.events.drawn.connect(lambda felt: page.screen.post(f"drawn {felt.name}", lambda: self._drawn(felt)))
         library.events.felt.connect(lambda felt: page.screen.post("felt", lambda: opened.show(felt)))
 
@@ -68,10 +69,6 @@ class LibraryPanel:
             self._page.notify("One moment", "The models are still being compiled.", "yellow")
         elif not self._library.draw_all():
             self._page.notify("One at a time", "Another long run goes on; stop it first.", "yellow")
-
-    def _say(self, text: str) -> None:
-        self._status.content = cards.note(text) if text else ""
-        self._effect.say(text)
 
     def _drawn(self, felt: WithEffect) -> None:
         self._pictures[felt.name] = small_picture(felt)

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import threading
 import time
 import traceback
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -28,11 +26,12 @@ from ema_model.recordings.side_file.read import SideFile
 from emaviz.session import actuators as actuator_files
 from emaviz.session.compare.keep import keep
 from emaviz.session.data_folder import DataFolder
+from emaviz.session.job import Job, Tell
 from emaviz.session.opened import Opened, guesses, measured, read_opened, side_file_of
 from emaviz.session.session import Session
 from emaviz.session.settings import number
 from emaviz.session.signal import Signal
-from emaviz.session.worker import Steps, Worker
+from emaviz.session.worker import Worker
 
 MOST_RECORDINGS = 20
 # By their names on a rotary axis.  The speed is mostly the position's difference, so it is not fitted unless asked for.
@@ -43,19 +42,14 @@ _MOST_WEIGHT = 1e3
 
 @dataclass
 class CompareEvents:
-    """What the screen listens to; called on the threads that work, so listeners only hand over."""
+    """What the screen listens to, besides the job; called on the threads that work, so listeners only hand over."""
 
     opened: Signal[[Opened]] = field(default_factory=Signal)  # also when mapped or laid out anew
     refused: Signal[[]] = field(default_factory=Signal)  # a layout that does not fit: all is as it was
     removed: Signal[[]] = field(default_factory=Signal)
-    progressed: Signal[[str]] = field(default_factory=Signal)
     compared: Signal[[Comparison, float]] = field(default_factory=Signal)  # and how long it took, s
     ended: Signal[[str]] = field(default_factory=Signal)  # a comparison without a result: why
     kept: Signal[[Path]] = field(default_factory=Signal)  # a report or a recording is written
-
-
-class Stopped(Exception):
-    """The user has stopped the comparison."""
 
 
 class Comparing:
@@ -73,16 +67,22 @@ class Comparing:
         self.free: set[str] = set()
         self.weights: dict[str, float] = dict(USUAL)  # of the signals to fit
         self.window_s: tuple[float, float] | None = None
-        self.running = False
-        self._stop = threading.Event()
+        advice = "check the actuator's file and the recording's units"
+        self.job = Job(session.worker, on_divergence=advice)
+        self.job.ended.connect(lambda text: None if self.job.finished else self.events.ended(text))
         # Reading a large file takes seconds, in which the sliders of the other tabs shall answer.
         self._files = Worker("emaviz-files", self._on_error)
         self._use(session.actuator)
 
     def close(self) -> None:
         """Ends the threads."""
-        self._stop.set()
+        self.job.stop()
         self._files.close()
+
+    @property
+    def running(self) -> bool:
+        """Whether a comparison goes on."""
+        return self.job.running
 
     # --- files ------------------------------------------------------------------------------------------------------
 
@@ -245,15 +245,25 @@ class Comparing:
             raise InputError("calibration is on, but no parameter may move; free one, or turn it off")
         if self.window_s is not None:
             measurements = [m.selected(self.window_s) for m in measurements]
-        stop = threading.Event()
-        started = self.session.worker.start(self._steps(measurements, self._asked(), stop))
-        if started:
-            self._stop, self.running = stop, True
-        return started
+        asked, elapsed_s = self._asked(), 0.0
+
+        def work(tell: Tell) -> None:
+            from ema_model.comparison import compare  # here, since it brings all of scipy's optimisers
+
+            nonlocal elapsed_s
+            began = time.perf_counter()
+            self.comparison = compare(measurements, **asked, on_progress=tell)
+            elapsed_s = time.perf_counter() - began
+
+        def done() -> None:
+            if self.comparison is not None:
+                self.events.compared(self.comparison, elapsed_s)
+
+        return self.job.begin("Comparing", work, done)
 
     def stop(self) -> None:
         """Ends the comparison soon, without a result."""
-        self._stop.set()
+        self.job.stop()
 
     def _asked(self) -> dict[str, Any]:
         """What `compare` is asked beside the recordings; None stands for what the actuator's file says."""
@@ -264,32 +274,6 @@ class Comparing:
             "free": None if self.free == _freed(self.actuator) else sorted(self.free),
             "signals": None if self.weights == USUAL else chosen,
         }
-
-    def _steps(self, measurements: Sequence[Measurement], asked: dict[str, Any], stop: threading.Event) -> Steps:
-        started = time.perf_counter()
-
-        def progress(text: str) -> None:
-            if stop.is_set():
-                raise Stopped
-            self.events.progressed(text)
-            self.session.worker.breathe()  # the sliders of the other tabs
-
-        yield
-        try:
-            from ema_model.comparison import compare  # here, since it brings all of scipy's optimisers
-
-            comparison = compare(measurements, **asked, on_progress=progress)
-        except Stopped:
-            self._end(lambda: self.events.ended("Stopped."))
-            return
-        except Exception as error:
-            self._end(lambda: self.events.ended(""))
-            if isinstance(error, FloatingPointError):
-                raise InputError(f"{error}; check the actuator's file and the recording's units") from None
-            raise
-        elapsed_s = time.perf_counter() - started
-        self.comparison = comparison
-        self._end(lambda: self.events.compared(comparison, elapsed_s))
 
     # --- what stays -------------------------------------------------------------------------------------------------
 
@@ -306,15 +290,6 @@ class Comparing:
         if comparison is None:
             raise InputError("nothing is compared yet; press Compare first")
         self.events.kept(keep(comparison, self.folder, suffix))
-
-    def _end(self, tell: Callable[[], None]) -> None:
-        """Tells the end once the compute thread is free, so that a listener may start the next run."""
-
-        def ended() -> None:
-            self.running = False
-            tell()
-
-        self.session.worker.post("comparison's end", ended)
 
     def _on_error(self, error: BaseException) -> None:
         if isinstance(error, InputError):

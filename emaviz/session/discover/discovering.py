@@ -18,14 +18,15 @@ from ema_model.errors import InputError, quoted
 from ema_model.quantities.titles import in_sentence
 from emaviz.session.compare.comparing import Comparing
 from emaviz.session.discover.entries import Entries, Entry
+from emaviz.session.discover.events import DiscoverEvents
 from emaviz.session.discover.keep import keep
 from emaviz.session.discover.own_effect import OwnPreview
 from emaviz.session.discover.progress import Telling
 from emaviz.session.discover.record import checked, experiment_of, take_again
 from emaviz.session.discover.refits import check_value, undecided
-from emaviz.session.discover.run import DiscoverEvents, DiscoveryRun, Tell
 from emaviz.session.discover.sealing import Sealing
 from emaviz.session.discover.source import NOTHING, DiscoverySource, files_of
+from emaviz.session.job import Job, Tell
 from emaviz.session.session import Session
 from emaviz.session.worker import Worker
 
@@ -43,7 +44,7 @@ class Discovering:
         self.source = DiscoverySource(comparing)
         self.sealing = Sealing(session, comparing.folder)
         self.look: Look | None = None
-        self.run = DiscoveryRun(session, self.events, self._stopped)
+        self.job = Job(session.worker, on_stop=self._stopped, on_divergence="the model stays as it was")
         self.entries = Entries(self.source)
         self._told: Telling | None = None
         self._restoring: dict[str, Any] | None = None  # what a session brought, until its steps are taken again
@@ -52,7 +53,7 @@ class Discovering:
 
     def close(self) -> None:
         """Ends the threads."""
-        self.run.stop()
+        self.job.stop()
         self._files.close()
 
     # --- what is asked ----------------------------------------------------------------------------------------------
@@ -60,7 +61,7 @@ class Discovering:
     @property
     def running(self) -> bool:
         """Whether a step runs."""
-        return self.run.running
+        return self.job.running
 
     def choose(self, name: str) -> None:
         """A challenge by its name, or Compare's recordings with ""; the story so far stays among the entries."""
@@ -83,7 +84,7 @@ class Discovering:
     def _leave(self) -> None:
         if self.running:
             raise InputError("a step is running; stop it first")
-        self.run.stop()  # one that waits to begin
+        self.job.stop()  # one that waits to begin
         self.entries.leave()
         self._told = self.look = self._restoring = None
 
@@ -101,7 +102,7 @@ class Discovering:
             while told.take_faults(tell):
                 self._assess(told, tell)
 
-        return self.run.begin("Calibrating the model", job)
+        return self.job.begin("Calibrating the model", job)
 
     def add(self, name: str) -> bool:
         """The best of that effect into the model, refitted; then looks again."""
@@ -128,7 +129,7 @@ class Discovering:
                 trial = told.trials.followed(told.story, trial, tell)
             self._take(told, trial, alike, tell)
 
-        return self.run.begin(f"Adding {in_sentence(find(candidate.name).title)}", job)
+        return self.job.begin(f"Adding {in_sentence(find(candidate.name).title)}", job)
 
     def preview_own(self, effect: UserEffect, settings: Mapping[str, float]) -> None:
         """Tells soon what a user's torque with these values would change; of several requests the last one counts."""
@@ -157,7 +158,7 @@ class Discovering:
                 raise InputError("a torque curve does not pay here: the error would not fall, or only by chance")
             self._take(told, trial, (), tell)
 
-        return self.run.begin("Adding the curve", job)
+        return self.job.begin("Adding the curve", job)
 
     def remove(self, key: str) -> bool:
         """One of the added effects out of the model again, refitted."""
@@ -172,7 +173,7 @@ class Discovering:
             told.story.remove(key, smaller)
             self._assess(told, tell)
 
-        return self.run.begin(f"Removing {in_sentence(find(key).title)}", job)
+        return self.job.begin(f"Removing {in_sentence(find(key).title)}", job)
 
     def find_all(self) -> bool:
         """Adds what pays, a step after another, as `emaviz discover` does."""
@@ -187,7 +188,7 @@ class Discovering:
             walk(told.story, say)
             self._assess(told, tell)
 
-        return self.run.begin("Finding all that is missing", job)
+        return self.job.begin("Finding all that is missing", job)
 
     def undo(self) -> None:
         """The last step back, at once."""
@@ -196,7 +197,7 @@ class Discovering:
             raise InputError("there is no step to take back")
         self._show(told)
         if not told.is_assessed:  # of a walk that went on at once
-            self.run.begin("Looking again", lambda tell: self._assess(told, tell))
+            self.job.begin("Looking again", lambda tell: self._assess(told, tell))
 
     @property
     def experiment(self) -> Experiment | None:
@@ -222,11 +223,11 @@ class Discovering:
             if told.experiment is None:
                 self.events.unsuggested()
 
-        return self.run.begin("Looking for the best next test", job)
+        return self.job.begin("Looking for the best next test", job)
 
     def stop(self) -> None:
         """Ends the step that runs, as soon as its present simulation is done; the story stays as it was."""
-        self.run.stop()
+        self.job.stop()
 
     # --- on the compute thread --------------------------------------------------------------------------------------
 
@@ -340,7 +341,7 @@ class Discovering:
             self._assess(told, tell)
 
         wanted = {*recipe.get("fitted", ()), *recipe.get("held", ())}
-        self.run.begin_when_free(
+        self.job.begin_when_free(
             "Taking the session's steps again", job, lambda: wanted <= self.comparing.opened.keys()
         )
 

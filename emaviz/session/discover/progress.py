@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -15,6 +15,7 @@ from ema_model.discovery.snapshot import Assessment, Look, assessed, known_of, l
 from ema_model.effects import CATALOGUE
 from emaviz.session.discover.record import experiment_saved, steps_of
 from emaviz.session.discover.refits import Trials
+from emaviz.session.job import Tell
 
 _SHARE, _MOST = 0.25, 3  # of the best effect's score, and how many effects are refitted to compare a fault with
 
@@ -40,7 +41,7 @@ class Telling:
         found = self.known[self.story.steps[-1]] = assessed(self.story)
         self.first = self.first or found.candidates
 
-    def take_faults(self, tell: Callable[[str], None]) -> bool:
+    def take_faults(self, tell: Tell) -> bool:
         """Takes the actuator's fault into the model that tells more than any effect would; False if there is none."""
         story, ranked = self.story, self.known[self.story.steps[-1]].candidates
         fault = story.fault(ranked, lambda: self._refitted(ranked, tell), tell)
@@ -49,7 +50,7 @@ class Telling:
             self.first = ()  # what was ranked was ranked without it
         return fault is not None
 
-    def _refitted(self, ranked: Sequence[Candidate], tell: Callable[[str], None]) -> list[Trial]:
+    def _refitted(self, ranked: Sequence[Candidate], tell: Tell) -> list[Trial]:
         """The most promising of the last model's candidates; what is added of them later is fitted already."""
         return [self.trials.of(self.story, one, tell) for one in promising(self.story.current, ranked, _SHARE, _MOST)]
 

@@ -14,7 +14,7 @@ from ema_model.discovery.snapshot import Assessment, Look, known_of
 from ema_model.effects import find
 from ema_model.errors import InputError
 from ema_model.quantities.titles import in_sentence
-from emaviz.session.discover.run import Tell
+from emaviz.session.job import Tell
 
 _MOST_FOLLOWED = 8  # times that a fit is begun anew where the one before has ended
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import secrets
-from dataclasses import dataclass, field
 from pathlib import Path
 
 from ema_model.actuator import Actuator
@@ -18,20 +17,12 @@ from ema_model.faults import NAMES, named
 from ema_model.quantities.titles import in_sentence
 from ema_model.simulation.sensors import Sensors
 from emaviz.session.data_folder import DataFolder, sanitised
+from emaviz.session.job import Job, Tell
 from emaviz.session.session import Session
 from emaviz.session.settings import Settings
 from emaviz.session.signal import Signal
-from emaviz.session.worker import Steps
 
 _MOST_SEED = 1_000_000
-
-
-@dataclass
-class SealingEvents:
-    """What the screen listens to; called on the compute thread, so listeners only hand over."""
-
-    said: Signal[[str]] = field(default_factory=Signal)  # what goes on; "" once it is over
-    sealed: Signal[[Path]] = field(default_factory=Signal)  # a challenge is in the data folder
 
 
 class Sealing:
@@ -39,7 +30,8 @@ class Sealing:
 
     def __init__(self, session: Session, folder: DataFolder) -> None:
         self.session, self.folder = session, folder
-        self.events = SealingEvents()
+        self.job = Job(session.worker)
+        self.sealed: Signal[[Path]] = Signal()  # a challenge is in the data folder
 
     def seal(self, title: str, story: str) -> bool:
         """Makes and writes the challenge soon; False, and nothing is begun, while another long run goes on.
@@ -54,20 +46,11 @@ class Sealing:
         path = self.folder.place(sanitised(title.strip() + SUFFIX))
         sensors, load = sensors_of(settings), settings.load_torque_Nm
 
-        def steps() -> Steps:
-            def tell(text: str) -> None:
-                self.events.said(f"Sealing: {text} …")
-                self.session.worker.breathe()
+        def work(tell: Tell) -> None:
+            tell("simulating; a combination of effects is compiled on its first use")
+            seal(truth, path, title, story, actuator, sensors=sensors, load_torque_Nm=load, on_progress=tell)
 
-            yield
-            try:
-                tell("simulating; a combination of effects is compiled on its first use")
-                seal(truth, path, title, story, actuator, sensors=sensors, load_torque_Nm=load, on_progress=tell)
-            finally:
-                self.events.said("")
-            self.events.sealed(path)
-
-        return self.session.worker.start(steps())
+        return self.job.begin("Sealing", work, lambda: self.sealed(path))
 
 
 def truth_of(settings: Settings, actuator: Actuator, seed: int) -> Truth:

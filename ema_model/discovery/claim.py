@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from ema_model.discovery.criteria import LARGEST_GROUP, SECOND, TIE
+from ema_model.discovery.criteria import ALIKE, FAR, LARGEST_GROUP, SECOND, TIE
 from ema_model.discovery.evidence import evidence
 from ema_model.discovery.harmonics import Further, further_orders
-from ema_model.discovery.objections import against
+from ema_model.discovery.objections import against, ratio
 from ema_model.discovery.path import Story
 from ema_model.discovery.refit import Trial
 from ema_model.effects import find
@@ -59,7 +59,14 @@ def _chosen(story: Story, accepted: Sequence[Trial]) -> tuple[Trial, list[Trial]
     Of what cannot be told apart, a parameter outside its tolerance comes after an effect.
     """
     first = accepted[0]
-    tied = [trial for trial in accepted if trial is first or evidence(story.data, trial.fit, first.fit) < TIE]
+    is_far = ratio(story.data, first.fit) > FAR
+    tied = [
+        trial
+        for trial in accepted
+        if trial is first
+        or evidence(story.data, trial.fit, first.fit) < TIE
+        or (is_far and trial.drop > ALIKE * first.drop)
+    ]
     best = next((trial for trial in tied if not find(trial.candidate.name).duplicates), tied[0])
     return best, [trial for trial in tied if trial is not best]
 

@@ -8,6 +8,10 @@ LEAST_BIC = 10.0
 # Of evidence, within which rivals cannot be told apart: the same.
 TIE = 10.0
 
+# Of the fall of χ² of the best effect, from which on another cannot be told from it where much more than the noise is
+# left (FAR): that rest, whose cause nobody knows, falls a little with the one or the other by chance.
+ALIKE = 0.95
+
 # So many rivals may stand beside an effect; more say that the recordings do not tell which it is (MODEL §6).
 LARGEST_GROUP = 3
 

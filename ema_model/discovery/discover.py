@@ -21,7 +21,7 @@ from ema_model.discovery.refit import Trial, pays
 from ema_model.discovery.remaining import at_floor
 from ema_model.discovery.repeated import repeated
 from ema_model.discovery.result import Candidate, Discovery, Experiment
-from ema_model.discovery.second_opinion import Opinion, compared, second_opinion, support_of, taken_over
+from ema_model.discovery.second_opinion import compared, second_opinion, support_of, taken_over
 from ema_model.discovery.sentences import as_well, held_back, masked, mismatch, untold
 from ema_model.discovery.uncertainty import with_intervals
 from ema_model.discovery.unknown import curve_instead, is_a_shape
@@ -79,22 +79,26 @@ def walk(
     """Goes on by itself from where a story stands: adds what pays, takes out what became idle, draws what is unknown.
 
     Where a closed loop is left unexplained, inverse dynamics is asked as well, and takes over if the controller is to
-    blame.  tell is told after each step, too, and may raise to stop; the story then stands at its last whole step.
+    blame, or if the loop names nothing.  tell is told after each step, too, and may raise to stop; the story then
+    stands at its last whole step.
     """
     own = _Walk(story, tell, candidates, most_effects)
     own.go()
     opinion, other = None, None
     if story.ladder[-1].rmse > HALF * story.ladder[0].rmse:  # a loop whose controller is another one is walked in vain
         opinion = second_opinion(story, tell)
-        other = _other(opinion, tell, candidates, most_effects)
+        if opinion is not None and opinion.blames_controller:
+            other = _Walk(opinion.story, tell, candidates, most_effects).ended()
     if opinion is not None and other is not None and opinion.settles(story) and not _bends(story, tell):
         taken_over(story, opinion)
         walked = other
     else:
         walked = own.ended()
         opinion = second_opinion(story, tell, opinion)
-        blamed = opinion is not None and opinion.blames_controller
-        other = (other or _other(opinion, tell, candidates, most_effects)) if blamed else None
+        if opinion is None or not (opinion.blames_controller or not _named(story)):
+            other = None
+        elif other is None:
+            other = _Walk(opinion.story, tell, candidates, most_effects).ended()
         if opinion is not None and other is not None and opinion.explains_better(story):
             taken_over(story, opinion)
             walked = other
@@ -110,15 +114,6 @@ def _bends(story: Story, tell: Progress) -> bool:
     if curve is None:
         return False
     return at_floor(story.data, curve.fit) or curve.fit.error() < HALF * story.current.error()
-
-
-def _other(
-    opinion: Opinion | None, tell: Progress, candidates: Sequence[str] | None, most_effects: int
-) -> Walked | None:
-    """Inverse dynamics walked to its end, where the controller is to blame."""
-    if opinion is None or not opinion.blames_controller:
-        return None
-    return _Walk(opinion.story, tell, candidates, most_effects).ended()
 
 
 class _Walk:

@@ -19,6 +19,7 @@ from ema_model.discovery.refit import pays
 from ema_model.discovery.remaining import at_floor
 from ema_model.discovery.repeatability import by_inverse_dynamics
 from ema_model.discovery.result import Added, Candidate, Change
+from ema_model.discovery.sentences import LOOP_UNTOLD
 from ema_model.discovery.uncertainty import with_intervals
 from ema_model.effects import CATALOGUE, find
 from ema_model.errors import InputError
@@ -97,12 +98,15 @@ def taken_over(story: Story, opinion: Opinion) -> None:
     alone = {one.name for one in story.added if one.name in CATALOGUE} - {one.name for one in opinion.story.added}
     story.support = {one.name: (INVERSE_DYNAMICS,) for one in opinion.story.added}
     story.support |= {name: (CLOSED_LOOP, INVERSE_DYNAMICS) for name in both}
-    reason = "only the loop of the file's controller asks for it, which is not the drive's"
+    reason = "only the closed loop asks for it, and not what the measured motion needs of the motor"
     story.refused |= dict.fromkeys(alone, reason)
     story.take_over(opinion.story)
     first = story.steps[0]
     story.steps[0] = replace(first, rung=replace(first.rung, change=Change("without_controller")))
-    story.controller_seen = opinion.seen
+    if opinion.blames_controller:
+        story.controller_seen = opinion.seen
+    else:
+        story.warnings.append(LOOP_UNTOLD)
 
 
 def compared(story: Story, opinion: Opinion, tell: Callable[[str], None]) -> None:

@@ -49,22 +49,27 @@ def headline(found: Discovery) -> str:
 def _answer(found: Discovery) -> str:
     faulty = _faulty(found)
     if found.verdict == "effects_found":
-        # Once, where two orders of one effect were added.
-        names = _listed(list(dict.fromkeys(in_sentence(effect_title(one.name)) for one in found.effects)))
-        return f"The model lacks {names}{f', and the actuator has {faulty}' if faulty else ''}."
+        return f"The model lacks {_named(found)}{f', and the actuator has {faulty}' if faulty else ''}."
     if found.verdict == "adequate" and faulty:
         return f"No physics is missing: the actuator has {faulty}."
     if found.verdict == "adequate" and found.parameters_outside_tolerance:
         return "No physics is missing, but not all parameters are within their tolerance."
     if found.verdict == "partly_explained":
-        names = _listed(
-            list(dict.fromkeys(in_sentence(effect_title(one.name)) for one in found.effects)) or ["a curve"]
-        )
-        return f"Found in part: {names}{f', and {faulty}' if faulty else ''}; {remains(found)}."
+        return f"Found in part: {_named(found) or 'a curve'}{f', and {faulty}' if faulty else ''}; {remains(found)}."
     if found.verdict == "unknown_effect" and found.curve is None:
         return f"Something is missing that none of the known effects explains: {remains(found)}."
     text = VERDICTS.get(found.verdict, found.verdict.replace("_", " "))
     return f"{text[:1].upper()}{text[1:]}."
+
+
+def _named(found: Discovery) -> str:
+    """'cogging torque and constant load or current sensor bias, which cannot be told apart'; "" where none is."""
+    # Once, where two orders of one effect were added.
+    groups = {one.name: [one.name, *one.same_as] for one in reversed(found.effects)}
+    names = [" or ".join(in_sentence(effect_title(name)) for name in groups[one]) for one in reversed(groups)]
+    if any(len(group) > 1 for group in groups.values()):
+        return f"{', and '.join(names)}, which cannot be told apart"
+    return _listed(names) if names else ""
 
 
 def remains(found: Discovery) -> str:
@@ -229,7 +234,8 @@ def _added(found: Discovery) -> Iterator[Lines]:
         if effect.family == "drive":
             lines.append(f"it belongs to {FAMILIES[effect.family]}")
         if one.same_as:
-            lines.append(f"these recordings cannot tell it from {', '.join(one.same_as)}")
+            rivals = _listed([in_sentence(effect_title(name)) for name in one.same_as])
+            lines.append(f"these recordings cannot tell it from {rivals}")
         yield Lines(lines, f"{effect.title}: {effect.equation}")
     if found.faults:
         yield Lines(list(faults(found).values()), "faults of the actuator")

@@ -19,6 +19,8 @@ from ema_model.physics.rows import LANES
 
 Array = NDArray[np.float64]
 
+_DIVERGED = 1e6  # floors, that a run which diverges counts as at most
+
 SIGNALS = ("current_A", "motor_torque_Nm", "motor_position_rad", "user_position_rad")  # that are fitted
 
 
@@ -128,7 +130,8 @@ class Problem:
             (shown[name] - measured[name] + added.get(name, 0.0)) * weight
             for name, weight in self.weights[window].items()
         ]
-        return np.nan_to_num(np.concatenate([np.zeros((len(x), 0)), *parts], axis=1), nan=1e6, posinf=1e6, neginf=-1e6)
+        found = np.concatenate([np.zeros((len(x), 0)), *parts], axis=1)
+        return np.clip(np.nan_to_num(found, nan=_DIVERGED), -_DIVERGED, _DIVERGED)
 
     def _places(self, window: int) -> dict[str, int]:
         """Of the kinds that are not all windows' alike: where a window's own stands."""

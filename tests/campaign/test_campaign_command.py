@@ -18,7 +18,8 @@ from ema_model.campaign import store as storing
 from ema_model.campaign.execute import execute
 from ema_model.campaign.version import version
 from ema_model.errors import InputError
-from emaviz.cli import campaign, main
+from emaviz.cli import main
+from emaviz.cli.verbs import campaign
 
 
 class Here:

@@ -18,7 +18,8 @@ from ema_model.campaign.thesis.deviations import DEVIATIONS
 from ema_model.commands import command
 from ema_model.faults import NAMES, error_percent
 from ema_model.simulation.run import Run
-from emaviz.cli import main, reproduce
+from emaviz.cli import main
+from emaviz.cli.verbs import reproduce
 from emaviz.recording import reproduce as recording
 from emaviz.recording.read import read
 from emaviz.report.reproduce import SECTIONS, severities

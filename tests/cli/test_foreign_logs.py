@@ -12,7 +12,8 @@ from support.foreign_files import FILES as WRITERS
 from ema_model.actuator import load_actuator, shipped
 from ema_model.commands import command
 from ema_model.simulation.run import Run, simulate_reference
-from emaviz.cli import compare, main
+from emaviz.cli import main
+from emaviz.cli.verbs import compare
 
 # Names and units as the maker's manual or a public log has them: signal → column, and SI of one of its units.
 ENGLISH = {

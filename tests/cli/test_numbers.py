@@ -5,8 +5,9 @@ from __future__ import annotations
 import pytest
 from options_of import needed, options_with_values
 
-from emaviz.cli import identify, main, simulate
+from emaviz.cli import main
 from emaviz.cli.numbers import Number
+from emaviz.cli.verbs import identify, simulate
 
 NUMBERS = [one for one in options_with_values() if isinstance(one[2].type, Number)]
 HOSTILE = ("nan", "inf", "-inf", "9" * 5000, "-" + "9" * 5000, "", "many", "1e999")

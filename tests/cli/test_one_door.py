@@ -15,7 +15,8 @@ from ema_model.commands import command
 from ema_model.quantities.numbers import amount
 from ema_model.recordings import Measurement, read, write_measurement
 from ema_model.simulation.run import Run, simulate_reference
-from emaviz.cli import compare, discover, identify, main, simulate
+from emaviz.cli import main
+from emaviz.cli.verbs import compare, discover, identify, simulate
 from emaviz.session.compare.comparing import Comparing
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.discover.source import DiscoverySource

@@ -53,7 +53,10 @@ def _section(path: Path, anchor: str) -> str:
 
 def test_verdict_stands_first_in_plain_words(report, found):
     text = _section(report, "verdict")
-    assert "The model lacks cogging torque." in text and "effects found" in text
+    assert (
+        "The model lacks cogging torque or torque ripple, which cannot be told apart." in text
+        and "effects found" in text
+    )
     first, last = found.ladder[0], found.ladder[-1]
     assert f"from {first.rmse:.2f} to {last.rmse:.3f} times the floor" in text
     assert "cannot tell cogging torque from torque ripple" in text and "Motor inertia" in text

@@ -14,12 +14,13 @@ SHOWABLE = 3.0  # `change_over_floor` of what a recording must tell; below 1 nob
 _HARDLY = 1.0
 _OWN_DELAY_SAMPLES = 2.0  # of the drive: a delay up to so many is its own
 _LARGEST_GROUP = 3  # with which a name is still an answer
-_PARAMETERS = {  # effects that are a wrong value of a parameter, by what the parameter's path has
-    "viscous_friction": "viscous",
-    "inertia_error": "inertia",
-    "demagnetisation": "torque_constant",
-    "winding_resistance": "resistance",
+_PARAMETERS = {  # effects that are a wrong value of a parameter, by what the parameter's path has, on both axes
+    "viscous_friction": ("viscous",),
+    "inertia_error": ("inertia", "mass"),
+    "demagnetisation": ("torque_constant", "force_constant"),
+    "winding_resistance": ("resistance",),
 }
+_BIAS_SHARE = 0.5  # of the current sensor's true bias, which every rig has, that a named one may be off by
 COLUMNS = ("right", "false", "silent", "hardly showable", "unknown with its variable", "contradicts", "at bound",
            "drive told")  # fmt: skip
 
@@ -35,9 +36,13 @@ def tally(row: Mapping[str, Any], truth: Mapping[str, Any]) -> Counter[str]:
     wrong = [
         name
         for name, group in zip(row["effects"], groups)
-        if not group & right and not _drives(name) and not _is_the_drives_delay(name, values, truth["drive"]["rate"])
+        if not group & right
+        and not _drives(name)
+        and not _is_the_drives_delay(name, values, truth["drive"]["rate"])
+        and not _is_the_sensors_bias(group, values, truth["drive"]["current_bias"])
     ]
-    outside = any(part in path for name, part in _PARAMETERS.items() if name in right for path in row["outside"])
+    parts = [part for name, each in _PARAMETERS.items() if name in right for part in each]
+    outside = any(part in path for part in parts for path in row["outside"])
     named = bool(groups) and bool(groups[0] & right) and len(groups[0]) <= _LARGEST_GROUP
     curve = bool(right & {"curve", "unknown"}) and not groups and bool(row["unknown"])
     above = row["ladder"][-1] is None or row["ladder"][-1] > BAND
@@ -76,3 +81,11 @@ def _drives(name: str) -> bool:
 
 def _is_the_drives_delay(name: str, values: Mapping[str, Mapping[str, float]], rate: float) -> bool:
     return name == "position_sensor_delay" and values[name].get("delay_s", 0.0) <= _OWN_DELAY_SAMPLES / rate
+
+
+def _is_the_sensors_bias(group: set[str], values: Mapping[str, Mapping[str, float]], true_A: float) -> bool:
+    """Whether a group has the current sensor's bias in it, and, where that one was fitted, its true size."""
+    if "current_sensor_bias" not in group:
+        return False
+    fitted_A = values.get("current_sensor_bias", {}).get("bias_A", true_A)
+    return abs(fitted_A - true_A) <= _BIAS_SHARE * abs(true_A)

@@ -20,11 +20,12 @@ _WIDTH, _HEIGHT = 120, 44  # of a small picture, pixels
 
 
 class EffectCharts:
-    """A chart for each signal, and one of what changes in it."""
+    """A chart for each signal, and one of what changes in it; unseen until there is a run."""
 
     def __init__(self, gui: viser.GuiApi, axes: Axes, height: int = 118) -> None:
         empty = np.array([0.0, 1.0])
-        add_html(gui, legend((REFERENCE, "without"), (MONITOR, "with the effect"), (DIFFERENCE, "difference, below")))
+        lines = legend((REFERENCE, "without"), (MONITOR, "with the effect"), (DIFFERENCE, "difference, below"))
+        self._legend = add_html(gui, lines, visible=False)
         self._charts: list[tuple[Any, Any, Any]] = []
         for chart in (one for one in charts(axes) if one.signal in SHOWN):
             both = gui.add_uplot(
@@ -46,9 +47,11 @@ class EffectCharts:
     def show(self, felt: WithEffect) -> None:
         """Draws a run."""
         time = felt.with_it.time_s
+        self._legend.visible = True
         for chart, both, change in self._charts:
             with_it, without = felt.with_it[chart.signal], felt.without[chart.signal]
             both.data = envelope(time, [chart.scale * without, chart.scale * with_it], _POINTS)
+            both.visible = change.visible = True
             change.data = envelope(time, [chart.difference_scale * (with_it - without)], _POINTS)
 
 
@@ -63,6 +66,7 @@ def _layout(height: int, above: int = 0) -> dict[str, Any]:
         "legend": {"show": False},
         "padding": (above, 8, 0, 0),
         "height": height,
+        "visible": False,
     }
 
 

@@ -12,6 +12,7 @@ from ema_model.effects import Effect, find
 from ema_model.effects.effect import STAGES
 from emaviz.colours import ALGORITHMS, MONITOR, TRUTH
 from emaviz.text.html import Html, html, joined
+from emaviz.text.mathml import mathml
 
 COLOURS = (MONITOR, ALGORITHMS["ssa"], ALGORITHMS["do"], TRUTH)
 # Where an effect acts, the equation of the base model that it stands in, in the order of the page.
@@ -51,11 +52,11 @@ def equation(found: Discovery, added: Sequence[Added]) -> Html:
         by_line.setdefault(_line(effect), []).append(
             html(
                 '<div style="padding-left:14px;color:{}"><b>{}:</b> '
-                '<span style="font-family:serif;font-size:15px">{}</span>'
+                '<span style="font-size:15px">{}</span>'
                 '<div style="font-size:12px;opacity:.85">{}</div></div>',
                 colour,
                 effect_title(one.name),
-                effect.equation,
+                mathml(effect.equation, "inline"),
                 values,
             )
         )
@@ -64,7 +65,8 @@ def equation(found: Discovery, added: Sequence[Added]) -> Html:
         if line in by_line or line == "motion":
             extra = joined(by_line.get(line, []))
             more = html(' <span style="opacity:.65">and</span>') if extra else ""
-            rows.append(html('<div style="font-family:serif;font-size:15px">{}{}</div>{}', base, more, extra))
+            shown = mathml(base, "inline")
+            rows.append(html('<div style="font-size:15px">{}{}</div>{}', shown, more, extra))
     return joined(rows if added else [])
 
 

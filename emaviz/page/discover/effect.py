@@ -20,6 +20,7 @@ from emaviz.page.discover import cards
 from emaviz.page.page import Page
 from emaviz.session.discover.discovering import Discovering
 from emaviz.text.html import Html, add_html, html, joined
+from emaviz.text.mathml import mathml
 
 CONFIG = {"displayModeBar": False, "responsive": False}
 
@@ -121,7 +122,7 @@ def about(effect: Effect, equation: bool = True) -> Html:
         )
         for title, text in rows
     )
-    written = html('<div style="font-family:serif;font-size:17px;padding:4px 0 6px">{}</div>', effect.equation)
+    written = html('<div style="font-size:17px;padding:4px 0 6px">{}</div>', mathml(effect.equation, "inline"))
     return html("<div {}>{}<table>{}</table></div>", cards.BOX, written if equation else "", table)
 
 

@@ -16,6 +16,7 @@ from emaviz.page.playback import PlaybackStrip
 from emaviz.scene.motion import motion
 from emaviz.session.library import Library
 from emaviz.text.html import add_html, html
+from emaviz.text.mathml import mathml
 
 _CARD = (
     "height:auto!important;min-height:52px;padding:4px 130px 4px 9px;font-weight:400;font-size:12px;"
@@ -35,8 +36,8 @@ class EffectPage:
         gui = page.server.gui
         self._title = add_html(gui, cards.note("Choose an effect on the left."))
         self._text = add_html(gui)
-        self._run = gui.add_dropdown("Run", tuple(RUNS))
-        self._place = gui.add_folder("What each parameter does")
+        self._run = gui.add_dropdown("Run", tuple(RUNS), visible=False)
+        self._place = gui.add_folder("What each parameter does", visible=False)
         self._status = add_html(gui)
         self._charts = EffectCharts(gui, page.session.actuator.axes)
         self._run.on_update(lambda event: event.client and self._ask())
@@ -47,13 +48,14 @@ class EffectPage:
         self._name = name
         self._title.content = html(
             '<div {}><span style="font-size:17px;font-weight:600">{}</span>'
-            '<span style="font-family:serif;font-size:16px;float:right">{}</span></div>',
+            '<span style="font-size:16px;float:right">{}</span></div>',
             cards.BOX,
             effect.title,
-            effect.equation,
+            mathml(effect.equation, "inline"),
         )
         self._text.content = about(effect, equation=False)
         self._run.value = next(run for run in RUNS if run == self.best_runs.get(name, self._run.value))
+        self._run.visible = self._place.visible = True
         for slider in self._sliders.values():
             slider.remove()
         with self._place:

@@ -11,6 +11,7 @@ from ema_model.quantities.titles import in_sentence
 from emaviz.report.discovery.subject import Told
 from emaviz.report.markup import escape, paragraph, table
 from emaviz.report.section import Figures, Section
+from emaviz.text.mathml import mathml
 
 
 class AddedEffects(Section[Told]):
@@ -30,7 +31,7 @@ def _card(told: Told, index: int, one: Added) -> str:
     rivals = ", ".join(in_sentence(effect_title(name)) for name in one.same_as)
     return (
         f'<div class="region" id="effect-{index}"><h3>{index}. {escape(effect.title)}</h3>'
-        + f'<p class="equation">{escape(effect.equation)}</p>'
+        + f'<p class="equation">{mathml(effect.equation, "inline")}</p>'
         + paragraph(effect.explanation)
         + _parameters(told, one)
         + paragraph(_fall(one))

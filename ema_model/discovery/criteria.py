@@ -76,7 +76,8 @@ MUCH_BETTER = 1.0 / 3.0
 # what takes away nineteen parts of twenty is not given up for a model that has no drive.
 LOOP_TOLD = 0.05
 
-# Of the closed loop's error, that its first step must leave before a model without the controller may take over early.
+# Of the closed loop's error, that its first step must leave before a model without the controller may take over early;
+# and of a model's error, below which one with an effect must stay for the effect to be needed.
 HALF = 0.5
 
 # Floors that inverse dynamics may leave before any effect, up to which it may contradict one; and how much of an effect

@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ema_model.discovery.criteria import LEAST_BIC
+from ema_model.discovery.criteria import HALF, LEAST_BIC
 from ema_model.discovery.evidence import evidence
 from ema_model.discovery.model_fit import Fit
-from ema_model.discovery.objections import against, still_against
+from ema_model.discovery.objections import against, ratio, still_against
 from ema_model.discovery.path import Story
 from ema_model.discovery.refit import fitted_count
 
@@ -38,8 +38,14 @@ def drop_doubtful(story: Story, tell: Progress) -> None:
         for one in reversed(later):  # each was claimed beside what is gone
             smaller = story.without(one.key, tell)
             reason = against(story.data, smaller, story.current, [one.key], lambda found: story.settled(found, tell))
-            if reason:
+            if reason and not _needed(story, smaller, tell):
                 _take_out(story, one.key, reason, tell, smaller)
+
+
+def _needed(story: Story, smaller: Fit, tell: Progress) -> bool:
+    """Whether the error doubles without an effect, the actuator's parameters keeping to their tolerances."""
+    with_it, without = (ratio(story.data, story.settled(one, tell)) for one in (story.current, smaller))
+    return with_it < HALF * without
 
 
 def _take_out(story: Story, key: str, reason: str, tell: Progress, found: Fit | None = None) -> None:

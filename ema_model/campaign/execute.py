@@ -50,11 +50,6 @@ def execute(task: Any, version: dict[str, str]) -> dict[str, Any]:
     }
 
 
-def execute_all(tasks: Any, version: dict[str, str]) -> list[dict[str, Any]]:
-    """The rows of some tasks, one after another; raises as `execute`."""
-    return [execute(task, version) for task in tasks]
-
-
 def common(task: Any) -> dict[str, Any]:
     """What a row says of its task."""
     from ema_model.faults import vector

@@ -9,12 +9,11 @@ from __future__ import annotations
 import logging
 import queue
 import time
-from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from typing import Any
 
-from ema_model.campaign.execute import OtherVersion, execute_all
+from ema_model.campaign.execute import OtherVersion, execute
 from ema_model.campaign.schedulers.scheduler import Died, Outcome
 from ema_model.campaign.task import Task
 from ema_model.campaign.version import differences
@@ -23,10 +22,7 @@ from ema_model.errors import InputError, quoted
 
 _CONNECT_S = 10.0
 _WORKERS_S = 60.0  # to wait for the first one
-_AHEAD = 2  # parcels for each that is computed at a time, so that no worker waits for the next
-# What a parcel of tasks shall take: one of Dask's own takes some hundredths of a second of scheduler and client, which
-# on one machine are the workers' too.  What a worker that dies has done of a parcel is computed again.
-_PARCEL_S, _LARGEST_PARCEL = 1.0, 8
+_AHEAD = 3  # tasks for each that is computed at a time, so that no worker waits for the next
 _LOOK_S = 5.0  # between looks at how many workers there are
 _POLL_S = 0.5
 
@@ -78,11 +74,11 @@ class Cluster:
             raise InputError(
                 f"--scheduler {self._address}: has no workers; begin some: `dask worker {self._address} --nthreads 1`"
             ) from None
-        from ema_model.campaign.schedulers.dask_worker import Unprofiled
+        from ema_model.campaign.schedulers.dask_worker import Steady
 
         try:
             theirs = self._client.run(own_version)
-            self._client.register_plugin(Unprofiled())
+            self._client.register_plugin(Steady())
         except Exception as error:
             raise InputError(
                 f"--scheduler {self._address}: its workers cannot run emaviz ({quoted(error, 200)}); install it there"
@@ -93,32 +89,20 @@ class Cluster:
 
     def _outcomes(self, tasks: Sequence[Task], version: dict[str, str]) -> Iterator[list[Outcome]]:
         done: queue.SimpleQueue[Any] = queue.SimpleQueue()
-        given: dict[str, tuple[list[Task], Any]] = {}
-        parcels: deque[list[Task]] = deque()  # to be given first: those of a parcel whose workers died, each alone
-        rest, size, left = deque(tasks), 1, len(tasks)
+        given: dict[str, tuple[Task, Any]] = {}
+        rest = iter(tasks)
+        left = len(tasks)
         while left:
-            for _ in range(max(2, _AHEAD * self.workers) - len(given)):
-                fair = max(1, len(rest) // (2 * max(1, self.workers)))  # at the end no worker waits for another
-                parcel = parcels.popleft() if parcels else [rest.popleft() for _ in range(min(size, fair, len(rest)))]
-                if not parcel:
-                    break
-                future = self._client.submit(execute_all, parcel, version, key=f"emaviz-{parcel[0].name}-{len(parcel)}")
-                given[future.key] = parcel, future
+            room = max(2, _AHEAD * self.workers) - len(given)
+            for _, task in zip(range(room), rest):  # in this order: it takes no task too many
+                future = self._client.submit(execute, task, version, key=f"emaviz-{task.name}")
+                given[future.key] = task, future
                 future.add_done_callback(done.put)
-            found: list[Outcome] = []
+            found = []
             for future in self._finished(done):
-                if future.key not in given:
-                    continue
-                parcel, _ = given.pop(future.key)
-                answer = self._answer(future)
-                if not isinstance(answer, Died):
-                    found += zip(parcel, answer)
-                    took_s = max(1e-3, sum(row["elapsed_s"] for row in answer) / len(answer))
-                    size = int(min(max(_PARCEL_S / took_s, 1), _LARGEST_PARCEL))
-                elif len(parcel) == 1:
-                    found.append((parcel[0], answer))
-                else:
-                    parcels += [[task] for task in parcel]
+                if future.key in given:
+                    task, _ = given.pop(future.key)
+                    found.append((task, self._answer(future)))
             left -= len(found)
             yield found
 
@@ -131,7 +115,7 @@ class Cluster:
         if self._client.status != "running":
             raise self._gone()
 
-    def _answer(self, future: Any) -> list[dict[str, Any]] | Died:
+    def _answer(self, future: Any) -> dict[str, Any] | Died:
         from distributed import KilledWorker
 
         if future.status not in ("finished", "error"):  # cancelled, lost: Dask gives up its tasks with its scheduler

@@ -15,6 +15,7 @@ from ema_model.discovery import Discovery
 from ema_model.discovery.result import Experiment
 from ema_model.errors import InputError
 from emaviz.report import write_discovery_report
+from emaviz.text.mathml import mathml
 
 HOSTILE = '</script><script>window.bad = 1</script><img src="x" onerror="window.bad = 2">&amp;'
 
@@ -64,7 +65,8 @@ def test_verdict_stands_first_in_plain_words(report, found):
 
 def test_each_effect_has_equation_cause_parameters_and_rivals(report, found):
     text = _section(report, "added")
-    assert "T = A sin(h θ + φ)" in text and "magnets pull" in text and "Could as well be: torque ripple" in text
+    assert mathml("T = A sin(h θ + φ)", "inline") in text
+    assert "magnets pull" in text and "Could as well be: torque ripple" in text
     low, high = found.calibration.parameters["effects.cogging_torque.amplitude_Nm"].interval90
     assert f"{low:.4f} … {high:.4f}" in text and "N·m" in text and ">12<" in text
 

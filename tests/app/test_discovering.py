@@ -199,12 +199,16 @@ WITHOUT_VALUE = [
 @pytest.mark.parametrize("text", WITHOUT_VALUE)
 def test_a_torque_without_value_fails_as_a_candidate_and_nothing_else(fresh, text):
     before, said = fresh.look, []
-    fresh.session.events.told.connect(lambda title, line: said.append(line))
+
+    def tell(title, line):
+        said.append(line)
+
+    fresh.session.events.told.connect(tell)
     line = previewed(fresh, text, {"c": 0.01})
     assert isinstance(line, str) and "has no value" in line and "\n" not in line
     assert fresh.add_own(user_torque(text), {"c": 0.01})
     wait_until(lambda: not fresh.running)
-    fresh.session.events.told.pop()
+    fresh.session.events.told.disconnect(tell)
     assert fresh.look.steps == before.steps and fresh.look.rmse == before.rmse
     assert len(said) == 1 and "has no value" in said[0] and len(said[0]) < 200 and "\n" not in said[0]
     assert previewed(fresh, "c*omega", {"c": 0.0}).rmse == pytest.approx(before.rmse, rel=0.03), "the thread lives"

@@ -89,6 +89,9 @@ class RecordingsPanel:
 
     def _take_choice(self) -> None:
         self._by_hand = True
+        others = [name for name in self._other.options if name != self._choice.value]
+        if self._other.value == self._choice.value and others:
+            self._other.value = others[0]  # a recording is compared with another one
         self._show_chosen()
 
     def _entries(self, names: list[str]) -> list[Entry]:

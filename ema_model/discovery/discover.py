@@ -95,15 +95,15 @@ def walk(
     else:
         walked = own.ended()
         opinion = second_opinion(story, tell, opinion)
-        if opinion is None or not (opinion.blames_controller or not _named(story)):
-            other = None
-        elif other is None:
-            other = _Walk(opinion.story, tell, candidates, most_effects).ended()
-        if opinion is not None and other is not None and opinion.explains_better(story):
-            taken_over(story, opinion)
-            walked = other
-        elif opinion is not None:
-            compared(story, opinion, tell)
+        if opinion is not None:
+            asked = opinion.blames_controller or not _named(story)
+            if asked and other is None:
+                other = _Walk(opinion.story, tell, candidates, most_effects).ended()
+            if asked and other is not None and opinion.explains_better(story):
+                taken_over(story, opinion)
+                walked = other
+            else:
+                compared(story, opinion, tell)
     story.disagreements = contradictions(story, tell)
     return walked
 
@@ -214,6 +214,7 @@ def result_of(
     faults = {name: calibration.parameters[name] for name in story.current.faults}
     outside = [name for name in calibration.outside_tolerance if "." in name and not name.startswith("effects.")]
     stand_ins = [path for one in story.added if (path := find(one.name).duplicates)]
+    told = {*names, *(rival for one in named for rival in one.same_as)}  # refused at an earlier step, or not
     return Discovery(
         verdict=verdict_of(story, named, unknown),
         calibration=calibration,
@@ -231,7 +232,7 @@ def result_of(
         unknown=unknown,
         curve=next((one for one in added if one.name not in CATALOGUE), None),
         next_experiment=experiment,
-        not_claimed={name: why for name, why in story.refused.items() if name not in names},
+        not_claimed={name: why for name, why in story.refused.items() if name not in told},
         warnings=[
             *story.warnings,
             *mismatch(story.controller_seen, calibration.actuator.axes),

@@ -14,9 +14,9 @@ from ema_model.quantities.numbers import amount, number, with_uncertainty
 from ema_model.quantities.titles import in_sentence
 
 LOOP_UNTOLD = (
-    "In the closed loop no effect explains the recordings, though the controller's law is the file's: how the drive "
-    "samples, filters or delays may differ. What the measured motion needs of the motor is told instead, without a "
-    "controller."
+    "In the closed loop no effect explains the recordings, and nothing shows another control law than the file's: how "
+    "the drive samples, filters or delays may differ. What the measured motion needs of the motor is told instead, "
+    "without a controller."
 )
 NOT_REPEATABLE = (
     "The closed loop is not repeatable (a change of 0.05 % in the inertia moves its signals by more than the noise): "

@@ -81,6 +81,17 @@ class _Named(NamedTuple, Generic[_Declared]):
     declared: _Declared
 
 
+def add_recordings(parser: argparse.ArgumentParser, done: str, nargs: str = "+") -> None:
+    """The recordings of one actuator that a command takes; done: "fitted"."""
+    parser.add_argument(
+        "files",
+        nargs=nargs,
+        type=RECORDINGS,
+        metavar="FILE",
+        help=f"recordings of one actuator, {done} together; folders and patterns too",
+    )
+
+
 def add_force(parser: argparse.ArgumentParser) -> None:
     """--force, for a command with an output that is kept"""
     parser.add_argument("--force", action="store_true", help="replace a recording or an actuator file that exists")

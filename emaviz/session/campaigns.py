@@ -18,7 +18,7 @@ from ema_model.discovery import discover
 from ema_model.errors import InputError
 from ema_model.files.refusal import shown
 from ema_model.identification.objective import Objective
-from ema_model.identification.run import steps
+from ema_model.identification.run import Progress, identify
 from ema_model.recordings import Measurement
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.job import Job, Tell
@@ -105,8 +105,13 @@ def _identified(task: Task, it: Given, path: Path, tell: Tell) -> None:
     objective = Objective(it.fitted, it.actuator, circuit=own.circuit, fitness=own.fitness)
     source = "measurement" if it.truth is None else "reference"
     story = IdentificationStory(path, objective, it.fitted[0], source, it.truth, _configuration(task), [own.algorithm])
+
+    def on_iteration(at: Progress) -> None:
+        story.iteration(at)
+        tell(f"{at.algorithm} {at.iteration} of {at.iterations}: rmse {at.rmse:.4f} A")
+
     try:
-        search = steps(
+        answer = identify(
             objective,
             own.algorithm,
             population=own.population,
@@ -115,13 +120,9 @@ def _identified(task: Task, it: Given, path: Path, tell: Tell) -> None:
             truth=it.truth,
             parameters_known=own.parameters_known,
             polish=own.polish,
+            on_iteration=on_iteration,
         )
-        while True:
-            at = next(search)
-            story.iteration(at)
-            tell(f"{at.algorithm} {at.iteration} of {at.iterations}: rmse {at.rmse:.4f} A")
-    except StopIteration as finished:
-        story.finish(finished.value)
+        story.finish(answer)
     finally:
         story.close()
     if story.failed:

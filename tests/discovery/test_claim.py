@@ -109,3 +109,18 @@ def test_what_rested_on_an_effect_that_is_taken_out_is_judged_again(monkeypatch,
     assert [one.name for one in story.added] == left
     assert judged == [(["hinge_moment"], "with viscous_drift", "with viscous_drift hinge_moment")]
     assert story.refused == bent | ({} if left == BOTH else {"hinge_moment": "it tells nothing by itself"})
+
+
+@pytest.mark.parametrize(
+    "ratio, share, names", [(2.5, 0.96, ["current_sensor_bias"]), (2.5, 0.94, []), (1.5, 0.96, []), (1.5, 0.99, [])]
+)
+def test_far_above_the_floor_what_tells_as_much_cannot_be_told_apart(monkeypatch, ratio, share, names):
+    """share: of what the best effect tells, that another tells; near the floor the evidence alone decides."""
+    monkeypatch.setattr(claim, "ratio", lambda data, found: ratio)
+    monkeypatch.setattr(claim, "evidence", lambda data, small, large: 15.0)
+    trials = [
+        Trial(Candidate(name, {}, drop), {name: {}}, SimpleNamespace(), drop)
+        for name, drop in (("asymmetric_friction", 1000.0), ("current_sensor_bias", 1000.0 * share))
+    ]
+    best, others = claim._chosen(SimpleNamespace(data=None), trials)
+    assert best is trials[0] and [one.candidate.name for one in others] == names

@@ -103,6 +103,14 @@ def test_what_is_not_claimed_is_told_with_the_reason(healthy):
     assert as_dict(found)["not_claimed"] == {"torsional_compliance": "the fit with it did not converge"}
 
 
+def test_what_stands_in_a_group_is_not_told_to_be_refused(lacking):
+    """An effect may be refused at one step and be a rival of the one that is named at the next."""
+    story = replace(lacking[1], steps=list(lacking[1].steps), refused={"constant_load": "no", "hinge_moment": "no"})
+    last = story.steps[-1]
+    story.steps[-1] = replace(last, added=tuple(replace(one, same_as=("constant_load",)) for one in last.added))
+    assert result_of(story).not_claimed == {"hinge_moment": "no"}
+
+
 def test_the_rungs_of_a_ladder_are_of_one_kind(lacking):
     """A settled model may leave more than the bent one before it, which would read as an effect that does harm."""
     story = sharper(lacking[1], 4.0)

@@ -132,3 +132,22 @@ def test_a_parameter_that_stays_where_the_file_puts_its_bound_was_driven_nowhere
     found = calibrated(problem, x, np.eye(problem.count))
     delay, inertia = found["sensors.delay_s"], found["motor.inertia_kgm2"]
     assert problem.low[0] == 0.0 == delay.initial and not delay.at_bound and inertia.at_bound
+
+
+@pytest.mark.parametrize("value", [1e200, -1e200, np.inf, np.nan])
+def test_a_run_that_diverges_is_a_very_great_error_that_a_descent_can_count(recording, value):
+    """A spring that pushes makes a loop unstable: its signals are finite for long, but their squares are not."""
+    problem = problem_for(recording, ACTUATOR, FREE)
+    start = np.zeros((1, problem.count))
+    before = problem.residuals(start)[0]
+
+    def diverged(x, window, simulated=problem.simulate):
+        return {
+            name: np.where(np.arange(values.shape[1]) > 20, value, values)
+            for name, values in simulated(x, window).items()
+        }
+
+    problem.simulate = diverged
+    after = problem.residuals(start)[0]
+    assert np.isfinite(after @ after) and after @ after > 1e6 * (before @ before)
+    np.testing.assert_array_equal(after[:20], before[:20])

@@ -15,13 +15,7 @@ PLACE = 4
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of INTERFACES, with the signals to fit."""
-    parser.add_argument(
-        "files",
-        nargs="+",
-        type=files.RECORDINGS,
-        metavar="FILE",
-        help="recordings of one actuator, compared together; folders and patterns too",
-    )
+    files.add_recordings(parser, "compared")
     options.add_fit(parser, "the comparison")
     parser.add_argument(
         "--calibrate", action=argparse.BooleanOptionalAction, default=True, help="fit the actuator within tolerances"

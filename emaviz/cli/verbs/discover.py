@@ -18,13 +18,7 @@ _CURRENT_ONLY = ("current_A",)
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of INTERFACES."""
-    parser.add_argument(
-        "files",
-        nargs="+",
-        type=files.RECORDINGS,
-        metavar="FILE",
-        help="recordings of one actuator, fitted together; folders and patterns too",
-    )
+    files.add_recordings(parser, "fitted")
     options.add_fit(parser, "the discovery")
     parser.add_argument("--signals", choices=("current", "all"), default="all", help="what is fitted")
     parser.add_argument("--max-effects", type=whole(0, 100), default=3, metavar="N", help="at most so many are added")

@@ -29,13 +29,7 @@ PLACE = 3
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of INTERFACES, and those of the run that is simulated when no file is given."""
-    parser.add_argument(
-        "files",
-        nargs="*",
-        type=files.RECORDINGS,
-        metavar="FILE",
-        help="recordings of one actuator, fitted together; folders and patterns too",
-    )
+    files.add_recordings(parser, "fitted", nargs="*")
     parser.add_argument(
         "--algorithm", choices=tuple(ALGORITHMS), default=ROBUST, help="robust, or one of the thesis's as published"
     )

@@ -18,12 +18,6 @@ from emaviz.session.library import Library
 from emaviz.text.html import add_html, html
 from emaviz.text.mathml import mathml
 
-_CARD = (
-    "height:auto!important;min-height:52px;padding:4px 130px 4px 9px;font-weight:400;font-size:12px;"
-    "background-color:rgba(134,142,150,.10)!important;color:inherit!important;"
-)
-_LABEL = "display:block;height:auto;overflow:visible;white-space:pre-line;text-align:left;line-height:1.3;width:100%"
-
 
 class EffectPage:
     """An effect on the right: what it is, a slider for each parameter, the run with and without it."""

@@ -20,7 +20,7 @@ _LEAST_FALL = 0.004  # of the error: what is less is immaterial
 _FALL = 0.01  # below which the data must be twice as sure
 _LEAST_T = 2.4  # of the mean gain over blocks of time: 1 % of chance
 _HELD = 0.01  # of the held-out error: at the floor chance may raise it so much, above the floor it must fall so much
-_AGREES = 0.8  # of the held-out error: so great a fall there needs no test over time
+_AGREES = 0.8  # of the held-out error: so great a fall there, and of the fitted one, needs no other test
 _FLOOR = 1.1  # of the floor, up to which an error counts as at it
 _CORRELATED = 50  # values of a signal that may share their error
 _SCORE = 0.4  # of what a refit gives, that a score may have fallen short of predicting
@@ -68,15 +68,15 @@ def worth(data: Data, current: Fit, trial: Trial) -> float:
 def pays(current: Fit, trial: Trial, data: Data, held: Data | None) -> bool:
     """Whether the data pay for the parameters: most of the time, materially, and where they were not fitted."""
     fall = 1.0 - trial.fit.error() / current.error()
-    if fall < _LEAST_FALL or worth(data, current, trial) < (LEAST_BIC if fall > _FALL else 2.0 * LEAST_BIC):
+    if fall < _LEAST_FALL:
         return False
-    if held is not None:
+    tells = worth(data, current, trial) >= (LEAST_BIC if fall > _FALL else 2.0 * LEAST_BIC)
+    if held is not None and (tells or fall > 1.0 - _AGREES):
         before, after = holdout_error(held, current), holdout_error(held, trial.fit)
         if after < _AGREES * before:
             return True  # no chance repeats itself where it was not fitted
-        if not _holds(before, after):
-            return False
-    return _lasts(data, current, trial.fit)
+        tells = tells and _holds(before, after)
+    return tells and _lasts(data, current, trial.fit)
 
 
 def _lasts(data: Data, before: Fit, after: Fit) -> bool:

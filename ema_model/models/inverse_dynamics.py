@@ -41,6 +41,7 @@ Array = NDArray[np.float64]
 _BLOCKS_PER_FILTER = 6  # compared values in a half width of the motion's filter
 _CHUNK = 100_000  # samples that are computed at once
 _STILL_STEPS = 3.0  # of the encoder within the filter, under which the motor counts as standing
+_SLIDES = 0.03  # of a stroke's highest speed, below which bristles may still bend
 _SHORT = 4.0  # times that the speed's own filter is shorter, so that what depends on it is filtered once
 _LEAST_KEPT = 0.3  # of the moving blocks, which must be left when those about reversals are left out
 _NOISE_SAMPLES = (
@@ -282,6 +283,9 @@ def _moving(speed: Array, still: float, reach: int, size: int) -> NDArray[np.int
         return moving
     turns = np.concatenate([np.diff(np.sign(speed)) != 0.0, [True]])
     turns[0] = True  # beyond the ends nothing was recorded that the filter would need
+    begins = np.flatnonzero(np.concatenate([[True], turns[:-1]]))
+    fastest = np.repeat(np.maximum.reduceat(np.abs(speed), begins), np.diff([*begins, speed.size]))
+    slow |= np.abs(speed) < _SLIDES * fastest
     near = maximum_filter1d((slow | turns).astype(np.int8), 2 * reach + 1).astype(bool)
     away = np.flatnonzero(~near[: blocks * size].reshape(blocks, size).any(axis=1))
     return away if away.size >= max(10, _LEAST_KEPT * moving.size) else moving

@@ -13,7 +13,7 @@ from ema_model.actuator import Actuator, load_actuator
 from ema_model.comparison.explain import Explanation
 from ema_model.discovery.claim import claimed
 from ema_model.discovery.contradiction import contradictions
-from ema_model.discovery.criteria import HALF
+from ema_model.discovery.criteria import FAR, HALF
 from ema_model.discovery.dropped import drop_doubtful, drop_idle
 from ema_model.discovery.next_experiment import next_experiment
 from ema_model.discovery.path import Story, begun, refreshed, with_drops
@@ -79,8 +79,8 @@ def walk(
     """Goes on by itself from where a story stands: adds what pays, takes out what became idle, draws what is unknown.
 
     Where a closed loop is left unexplained, inverse dynamics is asked as well, and takes over if the controller is to
-    blame, or if the loop names nothing.  tell is told after each step, too, and may raise to stop; the story then
-    stands at its last whole step.
+    blame, or if the loop names nothing, or little of what is left.  tell is told after each step, too, and may raise
+    to stop; the story then stands at its last whole step.
     """
     own = _Walk(story, tell, candidates, most_effects)
     own.go()
@@ -90,17 +90,17 @@ def walk(
         if opinion is not None and opinion.blames_controller:
             other = _Walk(opinion.story, tell, candidates, most_effects).ended()
     if opinion is not None and other is not None and opinion.settles(story) and not _bends(story, tell):
-        taken_over(story, opinion)
+        taken_over(story, opinion.again(story))
         walked = other
     else:
         walked = own.ended()
         opinion = second_opinion(story, tell, opinion)
         if opinion is not None:
-            asked = opinion.blames_controller or not _named(story)
+            asked = opinion.blames_controller or not _named(story) or story.ladder[-1].rmse > FAR
             if asked and other is None:
                 other = _Walk(opinion.story, tell, candidates, most_effects).ended()
             if asked and other is not None and opinion.explains_better(story):
-                taken_over(story, opinion)
+                taken_over(story, opinion.again(story))
                 walked = other
             else:
                 compared(story, opinion, tell)

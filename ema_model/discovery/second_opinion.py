@@ -42,6 +42,10 @@ class Opinion:
         """Whether the drive's current is not what the file's controller makes of the measured motion."""
         return self.seen is not None and self.seen.differs
 
+    def again(self, closed: Story) -> Opinion:
+        """With the controller that both models, as they stand now, show."""
+        return Opinion(self.story, _seen(closed, self.story))
+
     def explains_better(self, closed: Story) -> bool:
         """Whether it explains what flowed: to its floor, or far better than the closed loop does.
 
@@ -72,7 +76,7 @@ def second_opinion(story: Story, tell: Callable[[str], None], before: Opinion | 
     if not story.repeatable or not story.current.plant.simulates_commands or at_floor(story.data, story.current):
         return None
     if before is not None:
-        return Opinion(before.story, _seen(story, before.story))
+        return before.again(story)
     without = by_inverse_dynamics(story.data, story.base.actuator)
     if without is None:
         return None
@@ -86,7 +90,7 @@ def second_opinion(story: Story, tell: Callable[[str], None], before: Opinion | 
 
 
 def _seen(story: Story, other: Story) -> ControllerSeen | None:
-    late = other.base.calibration.actuator.sensors.delay_s
+    late = other.current.calibration.actuator.sensors.delay_s
     return controller_seen(story.current.plant, story.current.calibration.actuator, late)
 
 

@@ -14,7 +14,7 @@ from ema_model.quantities.numbers import amount, number, with_uncertainty
 from ema_model.quantities.titles import in_sentence
 
 LOOP_UNTOLD = (
-    "In the closed loop no effect explains the recordings, and nothing shows another control law than the file's: how "
+    "In the closed loop no effect explains the whole error, and nothing shows another control law than the file's: how "
     "the drive samples, filters or delays may differ. What the measured motion needs of the motor is told instead, "
     "without a controller."
 )

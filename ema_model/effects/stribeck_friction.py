@@ -8,10 +8,14 @@ from ema_model.physics.jit import scalar
 
 
 @scalar
-def moving_friction(level, static, omega, motor_torque, load, gear, speed):
-    """T_d + (T_s − T_d) e^{−(ω/ω_s)²}, of which nothing is left beyond T_d where ω_s = 0."""
+def moving_friction(level, static, omega, motor_torque, load, gear, speed, breakaway):
+    """T_d + (T_s − T_d) e^{−(ω/ω_s)²}, of which nothing is left beyond T_d where ω_s = 0.
+
+    T_s is the actuator's static friction, or breakaway · T_d where that is more: few data sheets tell it.
+    """
     ratio = omega / speed
-    return level + (static - level) * (decay(ratio * ratio) if speed > 0.0 else 0.0)
+    begins = max(static, breakaway * level)
+    return level + (begins - level) * (decay(ratio * ratio) if speed > 0.0 else 0.0)
 
 
 EFFECT = Effect(
@@ -21,12 +25,14 @@ EFFECT = Effect(
     explanation=(
         "A lubricated contact at rest touches metal to metal. As it begins to slide, oil is drawn in and carries "
         "more and more of the load, so friction falls from its static to its sliding value over a band of speeds. "
-        "The base model lets it fall at once. The difference is felt just after each reversal, while the motor is slow."
+        "The base model lets it fall at once. The difference is felt after each reversal, while the motor is slow. "
+        "Where the actuator states no static friction, or one below the ratio's, the ratio says where it begins."
     ),
     parameters=(
         Parameter(
             "speed_rad_s", "speed ω_s over which friction falls", 10.0, 0.1, 200.0, side=MOTOR, linear=(5e-3, 1e-5, 1.0)
         ),
+        Parameter("breakaway_ratio", "least ratio of friction at breakaway to that in motion, T_s/T_d", 1.5, 1.0, 4.0),
     ),
     severities=(3.0, 10.0, 25.0),
     places=(moving_friction,),

@@ -9,8 +9,8 @@ Array = NDArray[np.float64]
 
 HIGHEST_ORDER = 96  # per revolution
 _KNOTS = (6, 16)
-_LEAST_SEEN = 0.5  # of an order's amplitude that blocks must keep
-_LEAST_CYCLES = 1.5  # of an order within the angles covered; fewer are a smooth curve of the position
+LEAST_SEEN = 0.5  # of an order's amplitude that blocks must keep
+LEAST_CYCLES = 1.5  # of an order within the angles covered; fewer are a smooth curve of the position
 
 
 def families(values: Array) -> list[Array]:
@@ -63,6 +63,6 @@ def orders_in(turns: float, advance: Array | None = None) -> NDArray[np.intp]:
     if advance is not None:
         typical = float(np.sqrt(np.mean(advance**2)))
         kept = np.abs(np.sinc(np.arange(1, HIGHEST_ORDER + 1) * typical / (2.0 * np.pi)))
-        highest = int(np.argmax(kept < _LEAST_SEEN)) if np.any(kept < _LEAST_SEEN) else HIGHEST_ORDER
-    lowest = 1 if turns >= _LEAST_CYCLES else int(np.ceil(_LEAST_CYCLES / max(turns, 1e-9)))
+        highest = int(np.argmax(kept < LEAST_SEEN)) if np.any(kept < LEAST_SEEN) else HIGHEST_ORDER
+    lowest = 1 if turns >= LEAST_CYCLES else int(np.ceil(LEAST_CYCLES / max(turns, 1e-9)))
     return np.arange(lowest, highest + 1) if lowest <= highest else np.zeros(0, np.intp)

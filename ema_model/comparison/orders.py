@@ -28,7 +28,7 @@ _LEVEL = 0.01  # of recordings in which noise would show an order
 class Order:
     """A sin(order·θ + phase), θ the motor's angle."""
 
-    order: int  # periods in each turn
+    order: float  # periods in each turn, whole; in 2π m of a linear axis, any number
     amplitude: float  # in the signal's unit
     phase: float  # rad
     significance: float  # χ² of 2 degrees of freedom that noise of the same colour would give 2 of, on average

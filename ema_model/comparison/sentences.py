@@ -21,9 +21,9 @@ def explanation_sentence(signal: str, variable: str, modulator: str, r2: float) 
     return f"{share} is explained by {cause_of(variable, modulator)} (cross-validated)."
 
 
-def order_sentence(order: int, amplitude: float, of: Quantity) -> str:
+def order_sentence(order: float, amplitude: float, of: Quantity) -> str:
     """One line on an order of the residual, with its amplitude in SI units."""
-    times = "once" if order == 1 else f"{order} times"
+    times = "once" if order == 1 else f"{order:g} times"
     return f"What is missing repeats {times} a turn with an amplitude of {of.scaled(amplitude).text(amplitude)}."
 
 

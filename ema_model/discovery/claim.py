@@ -39,8 +39,9 @@ def claimed(story: Story, accepted: Sequence[Trial], tell: Progress) -> Claim | 
             reason = f"{len(apart)} others tell as much"
         elif further is not None and not further.stands_out:
             reason = f"its order {best.candidate.settings['order']:g} tells no more than its neighbours"
-        # Without a controller there is no twin, whose floor would tell a further order from what is left.
-        for whole in () if reason else (best, more) if story.data.guarded else (more, best):
+        # Without a controller there is no twin, whose floor would tell a faint further order from what is left.
+        alone_first = story.data.guarded and ratio(story.data, best.fit) <= FAR
+        for whole in () if reason else (best, more) if alone_first else (more, best):
             if whole is None:
                 continue
             keys = [*best.effects, *(whole.effects if whole is more else ())]

@@ -21,7 +21,7 @@ def drop_idle(story: Story, tell: Progress) -> None:
     for one in story.added[:-1]:
         tell(f"trying without {one.name}")
         smaller = story.without(one.key, tell)
-        needed = fitted_count(one.key) * np.log(len(smaller.residual)) + LEAST_BIC
+        needed = fitted_count(one.key, smaller.actuator.axes) * np.log(len(smaller.residual)) + LEAST_BIC
         if evidence(story.data, smaller, story.current) < needed:
             story.remove(one.key, smaller)
 

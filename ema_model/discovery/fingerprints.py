@@ -35,7 +35,7 @@ class Fingerprint:
     columns: Array
 
 
-def variants(effect: Effect, orders: Sequence[int]) -> list[list[dict[str, float]]]:
+def variants(effect: Effect, orders: Sequence[float]) -> list[list[dict[str, float]]]:
     """Settings to try; those of one entry are columns of one fingerprint."""
     names = [parameter.name for parameter in effect.parameters]
     first = effect.parameters[0].name
@@ -50,7 +50,7 @@ def variants(effect: Effect, orders: Sequence[int]) -> list[list[dict[str, float
     return [[{first: severity}] for severity in effect.severities]
 
 
-def fingerprints(data: Data, found: Fit, names: Iterable[str], orders: Sequence[int]) -> list[Fingerprint]:
+def fingerprints(data: Data, found: Fit, names: Iterable[str], orders: Sequence[float]) -> list[Fingerprint]:
     """Those of all effects that are not yet in the model, at the model's calibrated parameters."""
     effects = [find(name, found.actuator.axes) for name in names if name not in found.effects]
     tried = [(effect, settings) for effect in effects for settings in variants(effect, orders)]

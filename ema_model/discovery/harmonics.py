@@ -12,11 +12,13 @@ from ema_model.discovery.criteria import LEAST_BIC
 from ema_model.discovery.fingerprints import fingerprints
 from ema_model.discovery.model_fit import Data
 from ema_model.discovery.refit import Trial, pays, tried
+from ema_model.discovery.remaining import left_by
 from ema_model.discovery.result import Candidate
 from ema_model.discovery.score import scored_beside, scored_together
 from ema_model.effects import catalogue_name, find
 
 _MOST = 5  # further orders
+_APART = 0.5  # orders, closer than which two are one
 _SHARE = 0.05  # of the strongest one's predicted drop
 
 
@@ -35,10 +37,11 @@ def further_orders(data: Data, held: Data | None, best: Trial, tell: Callable[[s
     """
     name, current = best.candidate.name, best.fit
     present = current.actuator.effects.items()
-    known = {values.get("order") for effect, values in present if catalogue_name(effect) == name}
-    order = next(parameter for parameter in find(name).parameters if parameter.name == "order")
+    known = {values["order"] for effect, values in present if catalogue_name(effect) == name}
     tell(f"scoring further orders of {name}")
-    left = [h for h in range(int(order.low), int(order.high) + 1) if h not in known]
+    left = [h for h in _orders(data, best) if all(abs(h - other) >= _APART for other in known)]
+    if not left:
+        return Further(True, None)
     prints = fingerprints(data, current, [f"{name}_2"], left)
     found = scored_together(current, prints, _MOST)
     drops = np.array([one.predicted_drop for one in scored_beside(current, prints, found)])
@@ -55,10 +58,18 @@ def further_orders(data: Data, held: Data | None, best: Trial, tell: Callable[[s
     return Further(_stands_out(best.candidate.settings["order"], best.drop, around), None)
 
 
-def _stands_out(order: float, drop: float, around: Mapping[int, float]) -> bool:
+def _orders(data: Data, best: Trial) -> list[float]:
+    """All that a turn can have, or of a linear motor those that what is left shows."""
+    order = next(one for one in find(best.candidate.name, best.fit.actuator.axes).parameters if one.name == "order")
+    if not order.integer:
+        return left_by(data, best.fit).orders
+    return [float(h) for h in range(int(order.low), int(order.high) + 1)]
+
+
+def _stands_out(order: float, drop: float, around: Mapping[float, float]) -> bool:
     """Whether a fall of χ² at an order is significant; around: how strong noise is at the others."""
     near = min(around, key=lambda other: abs(other - order))
-    return Order(int(order), 0.0, 0.0, drop / around[near]).is_significant(len(around))
+    return Order(order, 0.0, 0.0, drop / around[near]).is_significant(len(around))
 
 
 def _together(name: str, chosen: Sequence[Candidate]) -> Candidate:

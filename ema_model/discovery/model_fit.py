@@ -19,6 +19,7 @@ from ema_model.recordings import Measurement
 Array = NDArray[np.float64]
 
 _SHARE = 0.5  # 1 σ of an effect's parameter, of the value that its fingerprint suggests
+_ORDER_SHARE = 1e-3  # of an order along a linear axis: it was found as exactly as the travel tells it
 _ANGLE_SIGMA = 0.7  # rad
 _ALIKE = 0.02  # of a floor, that two may differ by
 
@@ -114,7 +115,8 @@ def with_effect(actuator: Actuator, name: str, settings: Mapping[str, float]) ->
     for parameter in effect.parameters:
         if not parameter.integer:
             value = full[parameter.name]
-            sigma = _ANGLE_SIGMA if parameter.name == "phase_rad" else _SHARE * abs(value)
+            share = _ORDER_SHARE if parameter.name == "order" else _SHARE
+            sigma = _ANGLE_SIGMA if parameter.name == "phase_rad" else share * abs(value)
             sigma = sigma or _SHARE * abs(parameter.default) or 0.01 * (parameter.high - parameter.low)
             tolerances[f"effects.{name}.{parameter.name}"] = Tolerance(sigma, True)
     return replace(actuator, effects={**actuator.effects, name: full}, tolerances=tolerances)

@@ -13,6 +13,7 @@ from ema_model.discovery.evidence import colour_of, effective_values, evidence
 from ema_model.discovery.model_fit import Data, Fit, fit, holdout_error, with_effect
 from ema_model.discovery.result import Candidate
 from ema_model.effects import Effect, find
+from ema_model.quantities.axes import Axes
 
 Progress = Callable[[str], None]
 
@@ -59,7 +60,7 @@ def tried(
 
 def worth(data: Data, current: Fit, trial: Trial) -> float:
     """How much a trial tells beyond what its parameters must (BIC), relative to what it leaves."""
-    count = sum(fitted_count(name) for name in trial.effects) + len(trial.faults)
+    count = sum(fitted_count(name, current.actuator.axes) for name in trial.effects) + len(trial.faults)
     return evidence(data, current, trial.fit) - count * math.log(
         min(len(current.residual), effective_values(data, trial.fit))
     )
@@ -135,7 +136,7 @@ def promising(
     told = {c.name: c.predicted_drop for c in ranked} | dict(expected or {})
     values = len(current.residual)
     material = (1.0 - (1.0 - _LEAST_FALL) ** 2) * current.chi2
-    needed = {c.name: fitted_count(c.name) * np.log(values) + LEAST_BIC for c in ranked}
+    needed = {c.name: fitted_count(c.name, current.actuator.axes) * np.log(values) + LEAST_BIC for c in ranked}
     chosen = [
         c
         for c in ranked
@@ -146,6 +147,6 @@ def promising(
     return [c for c in chosen if c.predicted_drop >= share * chosen[0].predicted_drop][:most]
 
 
-def fitted_count(name: str) -> int:
+def fitted_count(name: str, axes: Axes) -> int:
     """Number of an effect's parameters that are fitted."""
-    return sum(not parameter.integer for parameter in find(name).parameters)
+    return sum(not parameter.integer for parameter in find(name, axes).parameters)

@@ -8,12 +8,14 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from ema_model.actuator import Actuator
 from ema_model.comparison.assemble import residuals_of
 from ema_model.comparison.criteria import BAND
 from ema_model.comparison.curves import orders_in
 from ema_model.comparison.explain import Explanation, advance_of, explain, used_blocks, without_spikes
 from ema_model.comparison.orders import Order
 from ema_model.comparison.orders import orders as orders_of
+from ema_model.comparison.pitches import pitches
 from ema_model.comparison.residuals import Residuals
 from ema_model.comparison.verdict import ORDER_OF_PRIMARY, lasting
 from ema_model.discovery.model_fit import Data, Fit, floor_ratio
@@ -27,7 +29,7 @@ class Left:
     """Of the residual that `comparison` would explain: the current's, where it is measured."""
 
     explained: list[Explanation]  # all that was tried
-    orders: list[int]  # that the recordings can show, the strongest first
+    orders: list[float]  # that the recordings can show, the strongest first
 
     @property
     def explanation(self) -> Explanation | None:
@@ -54,7 +56,7 @@ def left_by(data: Data, found: Fit) -> Left:
     """What a fit leaves."""
     residuals = residuals_left(data, found)
     primary = next(name for name in ORDER_OF_PRIMARY if name in residuals.values)
-    orders = sorted(_orders(residuals, primary), key=lambda one: -one.significance)
+    orders = _orders(residuals, primary, found.actuator)
     return Left(explain(residuals, primary, found.actuator.axes), [one.order for one in orders])
 
 
@@ -80,12 +82,17 @@ def residuals_left(data: Data, found: Fit) -> Residuals:
     )
 
 
-def _orders(residuals: Residuals, primary: str) -> list[Order]:
+def _orders(residuals: Residuals, primary: str, actuator: Actuator) -> list[Order]:
+    """Of the motor's position, the most significant first."""
     used = used_blocks(residuals, primary)
-    angle = residuals.variables.get("motor_angle")
-    if used is None or angle is None:
+    if used is None:
         return []
     advance = advance_of(residuals, used)
-    if not len(orders_in(residuals.turns, advance)):
+    if actuator.axes.motor == "linear":
+        position = residuals.variables["user_position"][used.chosen] / actuator.transmission.gear_ratio
+        return pitches(position, used.values, advance)
+    angle = residuals.variables.get("motor_angle")
+    if angle is None or not len(orders_in(residuals.turns, advance)):
         return []
-    return orders_of(angle[used.chosen], used.values, residuals.turns, advance)
+    found = orders_of(angle[used.chosen], used.values, residuals.turns, advance)
+    return sorted(found, key=lambda one: -one.significance)

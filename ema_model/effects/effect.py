@@ -72,7 +72,7 @@ class Parameter:
     default: float
     low: float
     high: float
-    integer: bool = False
+    integer: bool = False  # tried, not fitted; where its axis is linear, periods in 2π m are any number, and fitted
     side: Side | None = None  # of the transmission, or NEITHER for an angle that is of no axis
     per: Side | None = None  # of a number without a unit that is rad/rad: the side whose angle it is counted by
     linear: tuple[float, float, float] | None = None  # default, low and high where the side's axis is linear
@@ -96,6 +96,7 @@ class Parameter:
             default=default,
             low=low,
             high=high,
+            integer=self.integer and not axes.is_linear(self.per),
             unit=axes.unit(self.unit, self.side, self.per),
             shown=axes.name(self.name, self.side),
         )

@@ -36,7 +36,7 @@ EFFECT = Effect(
             96.0,
             integer=True,
             per=MOTOR,
-            linear=(200.0, 1.0, 2000.0),
+            linear=(200.0, 1.0, 20000.0),
         ),
         Parameter("phase_rad", "phase φ", 0.0, -math.pi, math.pi, side=NEITHER),
     ),

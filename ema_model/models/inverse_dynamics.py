@@ -284,7 +284,7 @@ def _moving(speed: Array, still: float, reach: int, size: int) -> NDArray[np.int
     turns = np.concatenate([np.diff(np.sign(speed)) != 0.0, [True]])
     turns[0] = True  # beyond the ends nothing was recorded that the filter would need
     begins = np.flatnonzero(np.concatenate([[True], turns[:-1]]))
-    fastest = np.repeat(np.maximum.reduceat(np.abs(speed), begins), np.diff([*begins, speed.size]))
+    fastest = np.repeat(np.maximum.reduceat(np.abs(speed), begins), np.diff(begins, append=speed.size))
     slow |= np.abs(speed) < _SLIDES * fastest
     near = maximum_filter1d((slow | turns).astype(np.int8), 2 * reach + 1).astype(bool)
     away = np.flatnonzero(~near[: blocks * size].reshape(blocks, size).any(axis=1))

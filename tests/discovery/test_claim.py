@@ -29,8 +29,9 @@ def of_cogging(monkeypatch):
     monkeypatch.setattr(claim, "further_orders", lambda *args: Further(True, together))
     asked: list[int] = []
 
-    def ask(guarded: bool, outdone: int):
+    def ask(guarded: bool, outdone: int, left: float = 1.0):
         asked.clear()
+        monkeypatch.setattr(claim, "ratio", lambda data, fit: left)
 
         def spoken(data, before, after, keys, settled):
             asked.append(1 if after is alone.fit else 3)
@@ -47,6 +48,7 @@ def test_in_inverse_dynamics_further_orders_count_where_one_alone_is_outdone(of_
     ask, alone, together = of_cogging
     assert ask(guarded=True, outdone=1) == ((alone, [], together), {}, [1, 3])
     assert ask(guarded=True, outdone=0) == ((alone, [], None), {}, [1]), "one order that is enough needs no more"
+    assert ask(guarded=True, outdone=0, left=20.0) == ((alone, [], together), {}, [3]), "here it is not enough"
 
 
 def test_in_a_closed_loop_all_orders_are_judged_before_one(of_cogging):

@@ -14,7 +14,7 @@ from ema_model.discovery.contradiction import contradictions
 from ema_model.discovery.controller_seen import controller_seen
 from ema_model.discovery.path import begun, calibrated_story
 from ema_model.discovery.second_opinion import delayed, second_opinion
-from ema_model.models.inverse_dynamics import InverseDynamics
+from ema_model.models.inverse_dynamics import InverseDynamics, _moving
 
 GAIN = "controller.speed_gain_Nms_rad"
 MOTION = ("multisine", {"amplitude_rad": 0.012, "frequencies_Hz": (2, 5, 9)}, 1.2)
@@ -78,6 +78,18 @@ def test_a_later_current_is_found_to_be_later(healthy):
     stories = [calibrated_story([m], delayed(unknown), (), None, quiet, guarded=True) for m in (one, late)]
     first, second = (story.current.calibration.parameters["sensors.delay_s"].value for story in stories)
     assert second - first == pytest.approx(steps * one.sample_period_s, rel=0.3)
+
+
+def test_what_creeps_before_it_slides_is_left_out():
+    """Bristles bend before they let go: a stroke's first and last millimetres are no sliding friction's."""
+    creep, slide = np.full(200, 0.01), np.linspace(0.05, 1.0, 300)
+    stroke = np.concatenate([creep, slide, slide[::-1]])
+    speed = np.concatenate([stroke, -0.2 * stroke])
+    kept = _moving(speed, still=1e-3, reach=5, size=1)
+    all_of_it = _moving(speed, still=1e-3, reach=0, size=1)
+    assert set(all_of_it) == set(range(speed.size))
+    assert np.all(np.abs(speed[kept[kept < 800]]) >= 0.03) and np.all(np.abs(speed[kept[kept >= 800]]) >= 0.006)
+    assert kept.size > 0.6 * speed.size
 
 
 def test_a_stated_noise_passes_the_filter(healthy):

@@ -69,6 +69,17 @@ def test_stribeck_friction_of_a_vanishing_speed_is_nearly_no_effect():
     assert 0.0 < moved[0] < moved[1] < moved[2] and moved[0] < 0.1 * moved[2]
 
 
+def test_breakaway_counts_where_the_actuator_states_less():
+    def current(static_Nm: float, ratio: float):
+        actuator = ACTUATOR.with_values({"motor.static_friction_Nm": static_Nm})
+        effects = {"stribeck_friction": {"speed_rad_s": 20.0, "breakaway_ratio": ratio}}
+        return simulate_monitor(RUN, actuator, effects=effects)["current_A"]
+
+    stated = ACTUATOR.value("motor.static_friction_Nm")  # twice the friction in motion
+    assert np.array_equal(current(stated, 1.0), current(stated, 1.9))
+    assert not np.allclose(current(0.0, 1.0), current(0.0, 2.0), atol=1e-3)
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("circuit", CIRCUITS)
 def test_order_and_repetition_of_effects_do_not_matter(circuit):

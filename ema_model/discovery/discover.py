@@ -23,6 +23,7 @@ from ema_model.discovery.repeated import repeated
 from ema_model.discovery.result import Candidate, Discovery, Experiment
 from ema_model.discovery.second_opinion import compared, second_opinion, support_of, taken_over
 from ema_model.discovery.sentences import as_well, held_back, masked, mismatch, untold
+from ema_model.discovery.transmission_seen import transmission_seen
 from ema_model.discovery.uncertainty import with_intervals
 from ema_model.discovery.unknown import curve_instead, is_a_shape
 from ema_model.discovery.verdict import verdict_of
@@ -104,6 +105,8 @@ def walk(
                 walked = other
             else:
                 compared(story, opinion, tell)
+    if not story.current.plant.simulates_commands:
+        story.transmission_seen = transmission_seen(story.data.measurements, story.current.calibration.actuator)
     story.disagreements = contradictions(story, tell)
     return walked
 
@@ -236,12 +239,14 @@ def result_of(
         warnings=[
             *story.warnings,
             *mismatch(story.controller_seen, calibration.actuator.axes),
+            *(story.transmission_seen.sentences(calibration.actuator) if story.transmission_seen else ()),
             *(one.sentence for one in story.disagreements),
             *held_back(story.current.held, calibration.actuator.axes),
             *masked(story.added, calibration.actuator.axes),
             *as_well(story.ties, story.added, story.current.faults),
         ],
         controller_seen=story.controller_seen,
+        transmission_seen=story.transmission_seen,
         disagreements=story.disagreements,
         repeated=repeated(story.data, story.held, calibration.actuator),
     )

@@ -37,6 +37,7 @@ from ema_model.discovery.repeatability import by_inverse_dynamics, is_lost, with
 from ema_model.discovery.result import Added, Candidate, Change, Contradiction, Rung, StoodIn
 from ema_model.discovery.score import scored, signatures
 from ema_model.discovery.sentences import NOT_REPEATABLE
+from ema_model.discovery.transmission_seen import TransmissionSeen
 from ema_model.discovery.uncertainty import settled
 from ema_model.discovery.unknown import curve_for
 from ema_model.effects import CATALOGUE, catalogue_name, find
@@ -79,6 +80,7 @@ class Story:
     refused: dict[str, str] = field(default_factory=dict)  # effects that are not claimed, and what speaks against each
     support: dict[str, tuple[str, ...]] = field(default_factory=dict)  # models that bear out an effect, by its name
     controller_seen: ControllerSeen | None = None  # where it is not the file's
+    transmission_seen: TransmissionSeen | None = None  # where the user's position leaves the motor's
     disagreements: list[Contradiction] = field(default_factory=list)  # of held-out recordings
     _calm: dict[Fit, Fit] = field(default_factory=dict)  # fits by those that they were settled from
     _prints: list[Fingerprint] = field(default_factory=list)

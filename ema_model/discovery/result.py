@@ -13,6 +13,7 @@ from ema_model.comparison.explain import Explanation
 from ema_model.discovery.controller_seen import ControllerSeen
 from ema_model.discovery.model_fit import Data
 from ema_model.discovery.repeated import Repeated
+from ema_model.discovery.transmission_seen import TransmissionSeen
 from ema_model.estimation import Calibrated, Calibration, Floor
 from ema_model.models import Model
 from ema_model.text import InWords
@@ -139,6 +140,7 @@ class Discovery(InWords):
     not_claimed: Mapping[str, str] = field(default_factory=dict)  # effects that the data would pay for, and why not
     warnings: Sequence[str] = field(default_factory=tuple)
     controller_seen: ControllerSeen | None = None  # where the drive's controller is not the file's
+    transmission_seen: TransmissionSeen | None = None  # where no model covers it and it is not the file's
     disagreements: Sequence[Contradiction] = field(default_factory=tuple)  # held-out recordings at odds with the fitted
     repeated: Repeated | None = None  # where a command was recorded twice
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -64,6 +65,7 @@ def as_dict(found: Discovery) -> dict[str, Any]:
             "next_experiment": _experiment(found.next_experiment),
             "controller_mismatch": found.controller_seen is not None,
             "controller_seen": _seen(found.controller_seen, axes),
+            "transmission_seen": None if found.transmission_seen is None else asdict(found.transmission_seen),
             "disagreements": [
                 {
                     "recording": one.recording,

@@ -14,7 +14,7 @@ def verdict_of(story: Story, named: Sequence[Added], unknown: Explanation | None
     """One of `VERDICTS`; named: the library's effects in the last model; unknown: what the last model leaves."""
     if not story.repeatable:
         return "not_repeatable"
-    done = at_floor(story.data, story.current)
+    done = at_floor(story.data, story.current) and story.transmission_seen is None
     if named:
         return "effects_found" if done else "partly_explained"
     if not story.base.calibration.converged and not story.added:

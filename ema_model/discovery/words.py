@@ -74,6 +74,8 @@ def _named(found: Discovery) -> str:
 
 def remains(found: Discovery) -> str:
     """'4.0 times the floor remains, cause unknown, varies with the load'."""
+    if found.at_floor and found.transmission_seen is not None:
+        return "motion and current are explained, the user's position beyond the motor's is not"
     if found.at_floor and found.unknown is None:
         return "what remains is as small as the floor, but lasts longer than noise"
     goes = "" if found.unknown is None else f", varies with {cause_of(found.unknown.variable, found.unknown.modulator)}"

@@ -1,10 +1,15 @@
-"""An identification in words: the faults, whether they are, and how sure that is."""
+"""An identification in words: the faults, whether they are, how sure that is, and the cost around the answer."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
 from ema_model import faults
 from ema_model.actuator.readings import sentences
-from ema_model.identification.run import Identification
+from ema_model.identification.landscape import Landscape, Way
+from ema_model.identification.run import ALGORITHMS, Identification
 from ema_model.quantities.numbers import amount
 from ema_model.text import Document, Lines, Table
 
@@ -49,3 +54,33 @@ def _told(answer: Identification) -> list[str]:
         f"({answer.algorithm}), compiled in {answer.compile_s:.1f} s"
     )
     return lines
+
+
+def landscape_words(found: Landscape) -> str:
+    """How far a landscape was drawn, what was held, and from where to where the error goes."""
+    stopped = "" if found.share == 1.0 else f"Stopped at {100.0 * found.share:.0f} %. "
+    others = [i for i in range(len(faults.NAMES)) if i not in (found.x, found.y)]
+    held = ", ".join(f"{faults.NAMES[i]} {found.through[i]:.3f}" for i in others)
+    known = found.rmse_A[np.isfinite(found.rmse_A)]
+    reach = f" From {amount(known.min(), 'A')} to {amount(known.max(), 'A')}." if len(known) else ""
+    return f"{stopped}Held: {held}.{reach}"
+
+
+def way_sentences(found: Mapping[str, Way]) -> Sequence[str]:
+    """What became of each search that is not the answer, in words."""
+    said = []
+    for name, way in found.items():
+        title = ALGORITHMS.get(name, name)
+        end, answer, highest = (amount(rmse, "A") for rmse in (way.rmse_A, way.answer_A, way.highest_A))
+        if way.is_trap:
+            said.append(
+                f"{title} ended in a trap: its rmse is {end} there, and on the straight way to the answer ({answer}) "
+                f"it rises to {highest} first."
+            )
+        elif way.is_worse:
+            said.append(
+                f"{title} had not settled: from its end ({end}) the error falls all the way to the answer ({answer})."
+            )
+        else:
+            said.append(f"{title} ended at the answer: {end}.")
+    return said

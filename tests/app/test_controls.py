@@ -59,7 +59,7 @@ def page(tab, app):
     app.tab(IdentifyTab).panel.show_settings()
     wait_until(lambda: app.session.simulation is not before and app.tab(ExploreTab).right.visible)
     yield tab
-    app.session.stop()
+    app.session.identifying.job.stop()
     wait_until(lambda: not app.session.worker.busy)
 
 
@@ -85,10 +85,10 @@ def raced(app, page, seconds=60.0):
         races.append(race)
         done.set()
 
-    app.session.events.identified.connect(keep)
+    app.session.identifying.identified.connect(keep)
     page.get_by_role("button", name="Identify", exact=True).click()
     assert done.wait(seconds)
-    app.session.events.identified.disconnect(keep)
+    app.session.identifying.identified.disconnect(keep)
     wait_until(lambda: not app.session.worker.busy)
     return races[0]
 
@@ -203,7 +203,7 @@ def test_stop_ends_several_searches_at_once_even_while_they_rest(page, app):
     page.get_by_role("button", name="Identify", exact=True).click()
     page.get_by_text("of 5000").first.wait_for()
     page.get_by_role("button", name="Pause the search").click()
-    wait_until(lambda: app.session.reins.paused)
+    wait_until(lambda: app.session.identifying.job.paused)
     page.get_by_role("button", name="Stop", exact=True).first.click()
     wait_until(lambda: not app.session.worker.busy)
     page.get_by_role("link", name="in Rerun").wait_for()

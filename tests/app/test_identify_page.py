@@ -21,7 +21,7 @@ from ema_model.simulation.sensors import Sensors
 from emaviz.figures import swarm
 from emaviz.figures.identified_table import Row, table
 from emaviz.page.identify.swarm import at_iteration, telling
-from emaviz.session.race import MOST_FRAMES, Reins, Track
+from emaviz.session.identify.race import MOST_FRAMES, Track
 from emaviz.session.session import Session
 from emaviz.session.settings import Settings
 
@@ -49,12 +49,12 @@ def raced(session, algorithms, seconds=120.0):
         races.append(race)
         done.set()
 
-    session.events.identified.connect(keep)
+    session.identifying.identified.connect(keep)
     try:
         assert session.identify()
         assert done.wait(seconds)
     finally:
-        session.events.identified.disconnect(keep)
+        session.identifying.identified.disconnect(keep)
     wait_until(lambda: not session.worker.busy)
     return races[0]
 
@@ -94,25 +94,25 @@ def test_a_pause_stops_the_search_while_sliders_are_answered(session):
     session.settings.set_iterations(400)
     session.settings.set_algorithms(["hba"])
     races, drawn = [], []
-    session.events.progressed.connect(races.append)
+    session.identifying.progressed.connect(races.append)
     session.events.simulated.connect(drawn.append)
     try:
         assert session.identify()
         wait_until(lambda: races)
-        session.pause(True)
+        session.identifying.job.pause(True)
         time.sleep(0.4)
         at, seen = len(races), len(drawn)
         session.refresh()
         wait_until(lambda: len(drawn) > seen)
-        assert len(races) == at and session.worker.busy and session.reins.paused
-        session.pause(False)
+        assert len(races) == at and session.worker.busy and session.identifying.job.paused
+        session.identifying.job.pause(False)
         wait_until(lambda: len(races) > at)
-        session.pause(True)
-        session.stop()  # also ends one that rests
+        session.identifying.job.pause(True)
+        session.identifying.job.stop()  # also ends one that rests
         wait_until(lambda: not session.worker.busy)
         assert races[0].answers[0].stopped
     finally:
-        session.events.progressed.disconnect(races.append)
+        session.identifying.progressed.disconnect(races.append)
         session.events.simulated.disconnect(drawn.append)
 
 
@@ -172,16 +172,6 @@ def test_a_swarm_is_drawn_where_it_is():
     assert lines.count("<path") == 8 + 3 and "M44 286.0" in lines
 
 
-def test_reins_wait_only_while_they_are_held():
-    reins = Reins()
-    assert list(reins.wait()) == [] and not reins.paused
-    reins.pause(True)
-    waiting = reins.wait()
-    next(waiting)
-    reins.stop()
-    assert list(waiting) == [] and reins.stopping and not reins.paused
-
-
 def test_the_table_escapes_names_and_shows_what_is_unknown():
     row = Row(1, "<b>x</b>.csv", "hba", 50, 150, "filtered", 0, None, 0.5, 7500, 2.0, None, True)
     shown = table([row])
@@ -215,7 +205,7 @@ def test_a_race_is_watched_paused_and_looked_back_at(page, app):
     page.get_by_role("button", name="Identify", exact=True).click()
     page.get_by_text("of 60").first.wait_for(timeout=60_000)
     page.get_by_role("button", name="Pause the search").click()
-    wait_until(lambda: app.session.reins.paused)
+    wait_until(lambda: app.session.identifying.job.paused)
     page.wait_for_timeout(600)
     before = page.evaluate(CHART, "Convergence")
     page.wait_for_timeout(600)

@@ -28,10 +28,10 @@ def identify(session, seconds=60.0):
         races.append(race)
         done.set()
 
-    session.events.identified.connect(keep)
+    session.identifying.identified.connect(keep)
     assert session.identify()
     assert done.wait(seconds)
-    session.events.identified.disconnect(keep)
+    session.identifying.identified.disconnect(keep)
     wait_until(lambda: not session.worker.busy)
     return races[0]
 

@@ -56,7 +56,7 @@ def soak(browser, folder, capfd, rounds, iterations, seconds):
         app.session.settings.set_population(20)
         app.session.settings.set_iterations(iterations)
         done = threading.Event()
-        app.session.events.identified.connect(lambda race: done.set())
+        app.session.identifying.identified.connect(lambda race: done.set())
         process, end = psutil.Process(), time.monotonic() + seconds
         for number in range(rounds):
             one_round(app, page, number, done)

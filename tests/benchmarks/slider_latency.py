@@ -99,7 +99,7 @@ def main() -> None:
                 f"dragging, {what}: {redraws / elapsed:.1f} redraws/s, {frames / elapsed:.0f} frames/s; processor time "
                 f"each: app {1e3 * ours / max(redraws, 1):.0f} ms, browser {1e3 * its / max(redraws, 1):.0f} ms"
             )
-            app.session.stop()
+            app.session.identifying.job.stop()
         print(f"load of this machine: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
         chromium.close()
         app.close()

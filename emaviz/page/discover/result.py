@@ -16,7 +16,6 @@ from ema_model.quantities.numbers import number
 from ema_model.recordings import SIGNALS
 from emaviz.figures import error_ladder, explained_steps, missing_curve, residual_steps
 from emaviz.figures.model_equation import equation
-from emaviz.page.discover import cards
 from emaviz.page.discover.actuator import ActuatorSwitch
 from emaviz.page.discover.effect import CONFIG, EffectView
 from emaviz.page.discover.next_experiment import NextTest
@@ -26,6 +25,7 @@ from emaviz.page.page import Page
 from emaviz.page.playback import PlaybackStrip
 from emaviz.session.discover.discovering import Discovering
 from emaviz.text.html import Html, add_html, html, joined, table_of
+from emaviz.text.notes import BOX, boxed
 
 _RESTING = Html(
     "Choose recordings on the left, and press <b>Start</b>: the model is calibrated, and what it leaves is held "
@@ -53,7 +53,7 @@ class DiscoveryPanel:
         self._look: Look | None = None
         self._titles: dict[str, str] = {}
         gui = page.server.gui
-        self._headline = add_html(gui, html("<div {}>{}</div>", cards.BOX, _RESTING))
+        self._headline = add_html(gui, boxed(_RESTING))
         self._ladder: Any = gui.add_plotly(go.Figure(), config=CONFIG, aspect=0.5, visible=False)
         self._effect = EffectView(page, discovering)
         self._truth_folder = gui.add_folder("The challenge's truth", visible=False)
@@ -111,13 +111,13 @@ class DiscoveryPanel:
         if not self._discovering.source.revealed:
             self._truth.content = ""
         if look is None:
-            self._headline.content = html("<div {}>{}</div>", cards.BOX, _RESTING)
+            self._headline.content = boxed(_RESTING)
             self._actuator.refresh()
             return
         found = look.found
         self._headline.content = answer(look)
         self._ladder.figure = error_ladder.figure(found)
-        self._equation.content = html("<div {}>{}</div>", cards.BOX, equation(found, look.added))
+        self._equation.content = boxed(equation(found, look.added))
         named = all(one.name in CATALOGUE for one in look.added)
         self._left_folder.label = "What is left" if named else "What had no name"
         if self._left_folder.visible:
@@ -183,7 +183,7 @@ def answer(look: Look) -> Html:
         "{}</div>{}{}"
         '<div style="opacity:.65;font-size:12px" title="{}">The floor is what noise and the model\'s own limits '
         "leave: 1 on the ladder.</div>{}</div>",
-        cards.BOX,
+        BOX,
         colour,
         first,
         joined(html("<div>{}</div>", text) for text in others),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -16,13 +15,13 @@ from ema_model.simulation.plant import FITNESSES
 from emaviz.figures.convergence import colour
 from emaviz.page.identify import WORKSPACE
 from emaviz.page.identify.result import IdentifyResult
+from emaviz.page.job_line import JobLine
 from emaviz.page.page import Page
 from emaviz.recording.viewer import ViewerHost
 from emaviz.session.compare.comparing import Comparing
-from emaviz.session.race import Race
+from emaviz.session.identify.race import Race
 from emaviz.session.settings import SLIDERS
 from emaviz.text.html import Html, add_html, html, joined
-from emaviz.text.time_left import time_left
 
 PLANT = "The plant of Explore's sliders"
 
@@ -64,10 +63,9 @@ class IdentifyPanel:
         ):
             self._listen(entry, change)
         self._start = gui.add_button("Identify", icon=viser.Icon.SEARCH)
-        self._pause = gui.add_button("Pause the search", icon=viser.Icon.PLAYER_PAUSE, color="gray", disabled=True)
-        self._stop = gui.add_button("Stop", icon=viser.Icon.PLAYER_STOP, color="red", disabled=True)
-        self._progress = gui.add_progress_bar(0.0)
-        self._text = add_html(gui, _line("Finds the faults from the current alone."))
+        self._line = JobLine(page, page.session.identifying.job, pauses="the search")
+        self._line.say("Finds the faults from the current alone.")
+        self._text = add_html(gui)
         self._link = add_html(gui)
         self._watch = gui.add_button(
             "Watch it in Rerun, here",
@@ -87,17 +85,17 @@ class IdentifyPanel:
         for tick in self._ticks.values():
             tick.on_update(lambda event: event.client and page.screen.post("algorithms", self._take_algorithms))
         self._start.on_click(lambda _: self._begin())
-        self._pause.on_click(lambda _: page.screen.post("pause", self._toggle))
-        self._stop.on_click(lambda _: page.session.stop())
         self._watch.on_click(lambda event: page.screen.post("watch", lambda: self._watch_growing(event.client)))
         self._missing.on_click(
             lambda event: page.screen.post("to discover", lambda: self._look_for_missing(event.client))
         )
         page.workspaces.entered.connect(lambda name: name == WORKSPACE.name and self.refresh_sources())
-        events = page.session.events
-        events.progressed.connect(self._progressed)
-        events.identified.connect(lambda race: page.screen.post("identification", lambda: self._draw_answer(race)))
-        events.ended.connect(lambda: page.screen.post("search ended", self.free))
+        identifying, post = page.session.identifying, page.screen.post
+        identifying.progressed.connect(self._progressed)
+        identifying.identified.connect(lambda race: post("identification", lambda: self._draw_answer(race)))
+        identifying.job.began.connect(lambda _: post("search began", self._began))
+        identifying.job.rests.connect(lambda _: post("search rests", result.draw))
+        identifying.job.ended.connect(lambda _: post("search ended", self._ended))
         comparing.events.opened.connect(lambda _: page.screen.post("sources", self.refresh_sources))
         self.refresh_sources()
 
@@ -141,18 +139,15 @@ class IdentifyPanel:
     # --- the race ---------------------------------------------------------------------------------------------------
 
     def _begin(self) -> None:
-        session = self._page.session
-        if not session.ready.is_set():
-            self._page.notify("One moment", "The models are still being compiled.", "yellow")
-            return
-        if not session.identify():
-            self._page.notify("One at a time", "A long calculation is running; stop it first.", "yellow")
-            return
-        self._start.disabled, self._pause.disabled, self._stop.disabled = True, False, False
-        self._show_paused(False)
-        self._link.content = ""
+        self._page.begins(self._page.session.identify)
+
+    def _began(self) -> None:
+        self._start.disabled = True
+        self._text.content = self._link.content = ""
         self._missing.visible = False
-        self._text.content = _line("Starting…")
+
+    def _ended(self) -> None:
+        self._start.disabled = self._watch.visible = False
 
     def _watch_growing(self, client: viser.ClientHandle | None) -> None:
         race = self._race
@@ -165,33 +160,12 @@ class IdentifyPanel:
         if race is not None and self._page.checked(lambda: self._to_discover(race)):
             self._page.workspaces.go("discover", client)
 
-    def _toggle(self) -> None:
-        session = self._page.session
-        session.pause(not session.reins.paused)
-        self._show_paused(session.reins.paused)
-        self._result.draw()
-
-    def _show_paused(self, paused: bool) -> None:
-        self._pause.label = "Resume the search" if paused else "Pause the search"
-        self._pause.icon = viser.Icon.PLAYER_PLAY if paused else viser.Icon.PLAYER_PAUSE
-
-    def free(self) -> None:
-        """Gives the button back when no identification runs any more."""
-        self._start.disabled, self._pause.disabled, self._stop.disabled = False, True, True
-        self._show_paused(False)
-        self._watch.visible = False
-        if "Starting" in self._text.content:
-            self._text.content = _line("Ended without an answer.")
-
     def _progressed(self, race: Race) -> None:
         self._result.progressed(race)
         self._page.screen.post("identification", lambda: self._draw(race))
 
     def _draw(self, race: Race) -> None:
-        share = race.share
-        self._progress.value = 100.0 * share
-        left = time_left(time.monotonic() - race.began_s, share)
-        lines = [_line(html("<b>{:.0f} %</b>{}", 100.0 * share, f", {left}" if left else ""))]
+        lines = []
         for name, track in race.tracks.items():
             if not track.rmse:
                 continue
@@ -208,7 +182,6 @@ class IdentifyPanel:
         self._text.content = joined(lines)
 
     def _draw_answer(self, race: Race) -> None:
-        self._progress.value = 100.0
         best = race.best
         lines = []
         for answer in race.answers:

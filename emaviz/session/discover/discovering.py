@@ -225,10 +225,6 @@ class Discovering:
 
         return self.job.begin("Looking for the best next test", job)
 
-    def stop(self) -> None:
-        """Ends the step that runs, as soon as its present simulation is done; the story stays as it was."""
-        self.job.stop()
-
     # --- on the compute thread --------------------------------------------------------------------------------------
 
     def _stopped(self) -> str:

@@ -42,7 +42,7 @@ def session(tmp_path_factory):
 
 
 def raced(session, algorithms, seconds=120.0):
-    session.settings.set_algorithms(algorithms)
+    session.settings.set("algorithms", algorithms)
     done, races = threading.Event(), []
 
     def keep(race):
@@ -66,7 +66,7 @@ def raced(session, algorithms, seconds=120.0):
 def test_a_race_gives_each_optimiser_the_answer_that_it_finds_alone(session):
     session.settings.restore(Settings().saved())
     session.settings.set_fault(0, 0.3)
-    session.settings.set_iterations(40)
+    session.settings.set("iterations", 40)
     race = raced(session, ["hba", "do"])
     assert list(race.tracks) == ["do", "hba"] and len(race.answers) == 2
     for name in ("do", "hba"):
@@ -81,7 +81,7 @@ def test_a_race_gives_each_optimiser_the_answer_that_it_finds_alone(session):
 
 
 def test_the_overlay_is_the_answers_own_current(session):
-    session.settings.set_iterations(30)
+    session.settings.set("iterations", 30)
     race = raced(session, ["do"])
     track = race.tracks["do"]
     assert track.current_A.shape == race.measured_A.shape == race.time_s.shape
@@ -91,8 +91,8 @@ def test_the_overlay_is_the_answers_own_current(session):
 
 
 def test_a_pause_stops_the_search_while_sliders_are_answered(session):
-    session.settings.set_iterations(400)
-    session.settings.set_algorithms(["hba"])
+    session.settings.set("iterations", 400)
+    session.settings.set("algorithms", ["hba"])
     races, drawn = [], []
     session.identifying.progressed.connect(races.append)
     session.events.simulated.connect(drawn.append)
@@ -122,23 +122,23 @@ def test_a_file_is_identified_without_a_truth(session, tmp_path):
     write_measurement(Sensors(0.05, 0).record(plant, 1), path)
     session.open_file = lambda name: read_measurement(tmp_path / name)
     session.settings.restore(Settings().saved())
-    session.settings.set_source("bench.csv")
+    session.settings.set("source", "bench.csv")
     monitor = session.settings.monitor
     race = raced(session, ["robust"])
     answer = race.best.answer
     assert race.truth is None and answer.error_percent is None and race.source == "bench.csv"
     assert answer.k[0] == pytest.approx(0.4, abs=0.05)
     assert session.settings.monitor == monitor, "a file's faults are not those of the sliders' plant"
-    session.settings.set_source("")
+    session.settings.set("source", "")
 
 
 def test_what_cannot_be_chosen_is_refused():
     settings = Settings()
     for value in ([], ["none"], "hba", None, [7]):
         with pytest.raises(InputError):
-            settings.set_algorithms(value)
+            settings.set("algorithms", value)
     assert settings.algorithms == Settings().algorithms
-    settings.set_algorithms(list(ALGORITHMS)[::-1])
+    settings.set("algorithms", list(ALGORITHMS)[::-1])
     assert settings.algorithms == tuple(ALGORITHMS)
 
 

@@ -66,8 +66,8 @@ def test_a_session_of_either_starts_and_tells_no_failure(name, tmp_path):
     try:
         assert session.ready.wait(120.0)
         session.settings.set_fault(0, 0.5)
-        session.settings.set_iterations(3)
-        session.settings.set_population(8)
+        session.settings.set("iterations", 3)
+        session.settings.set("population", 8)
         session.refresh()
         if name == SERVO:
             wait_until(lambda: len(shown) > 1)

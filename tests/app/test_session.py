@@ -36,7 +36,7 @@ def identified(session, seconds=60.0):
 
 def test_an_identification_is_recorded_and_drawn(session):
     session.settings.set_fault(2, 0.3)
-    session.settings.set_algorithm("do")
+    session.settings.set("algorithms", ["do"])
     answer, path = identified(session)
     assert answer.error_percent < 1.0
     recording = read(path)
@@ -64,8 +64,8 @@ def test_only_one_identification_runs_however_often_it_is_asked(session):
 
 
 def test_stop_keeps_the_best_so_far(session):
-    session.settings.set_iterations(5000)
-    session.settings.set_algorithm("hba")
+    session.settings.set("iterations", 5000)
+    session.settings.set("algorithms", ["hba"])
     done, result = threading.Event(), []
     session.identifying.identified.connect(lambda race: (result.append(race.best.answer), done.set()))
     begun = threading.Event()

@@ -131,7 +131,7 @@ def test_compare_leads_on_to_identify_and_discover(tab, app, compared):
     tab.get_by_role("button", name="Identify faults").click()
     tab.get_by_role("tab", name="Search", exact=True).wait_for()
     assert app.session.settings.source == next(iter(app.comparing.opened))
-    app.session.settings.set_source("")
+    app.session.settings.set("source", "")
     go(tab, "Compare")
     tab.get_by_role("button", name="Find what is missing").click()
     tab.get_by_role("tab", name="Discovery", exact=True).wait_for()
@@ -172,8 +172,8 @@ def test_explore_says_its_model_and_keeps_it(tab, app):
     tab.get_by_text("model: healthy").wait_for()
     session = app.session
     session.choose_plant(next(iter(session.plants)))
-    session.settings.set_algorithms(["robust"])
-    session.settings.set_iterations(30)
+    session.settings.set("algorithms", ["robust"])
+    session.settings.set("iterations", 30)
     went_on = []
     session.identifying.progressed.connect(
         lambda race: went_on.extend(t.fitting for t in race.tracks.values() if t.fitting)
@@ -184,7 +184,7 @@ def test_explore_says_its_model_and_keeps_it(tab, app):
     tab.get_by_text("model: healthy").wait_for()
     shares = [share for _, share in went_on]
     assert any("model bias" in text for text, _ in went_on) and shares == sorted(shares) and shares[-1] == 1.0
-    session.settings.set_monitor("identified")
+    session.settings.set("monitor", "identified")
     session.refresh()
     tab.get_by_text(f"model: identified {session.identifying.answered_at:%H:%M}").wait_for()
 

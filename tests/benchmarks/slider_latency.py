@@ -81,8 +81,8 @@ def main() -> None:
         me, browser = [psutil.Process()], psutil.Process().children(recursive=True)
         for what, busy in (("idle", False), ("with an identification running", True)):
             if busy:
-                app.session.settings.set_iterations(5000)
-                app.session.settings.set_algorithms(["hba"])
+                app.session.settings.set("iterations", 5000)
+                app.session.settings.set("algorithms", ["hba"])
                 app.session.identify()
             times = []
             for _ in range(PRESSES):

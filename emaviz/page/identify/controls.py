@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +20,9 @@ from emaviz.page.job_line import JobLine
 from emaviz.page.page import Page
 from emaviz.recording.viewer import ViewerHost
 from emaviz.session.compare.comparing import Comparing
+from emaviz.session.described import limits
 from emaviz.session.identify.race import Race
-from emaviz.session.settings import SLIDERS
+from emaviz.session.settings import SLIDERS, Settings
 from emaviz.text.html import Html, add_html, html, joined
 
 PLANT = "The plant of Explore's sliders"
@@ -43,7 +45,7 @@ class IdentifyPanel:
         self._page, self._comparing, self._viewer, self._result = page, comparing, viewer, result
         self._race: Race | None = None
         self._open_viewer, self._to_discover = open_viewer, to_discover
-        gui, settings = page.server.gui, page.session.settings
+        gui, settings, of = page.server.gui, page.session.settings, partial(limits, Settings)
         self._source: Any = gui.add_dropdown(
             "Identify", (PLANT,), hint="The sliders' plant, whose faults are known, or a recording of the data folder"
         )
@@ -51,17 +53,17 @@ class IdentifyPanel:
             self._ticks = {
                 name: gui.add_checkbox(title, name in settings.algorithms) for name, title in ALGORITHMS.items()
             }
-        self._population = gui.add_number("Population", settings.population, min=4, max=1000, step=1)
-        self._iterations = gui.add_number("Iterations", settings.iterations, min=1, max=5000, step=1)
+        self._population = gui.add_number("Population", settings.population, **of("population"), step=1)
+        self._iterations = gui.add_number("Iterations", settings.iterations, **of("iterations"), step=1)
         self._fitness: Any = gui.add_dropdown("Fitness", FITNESSES, initial_value=settings.fitness)
-        self._seed = gui.add_number("Seed", settings.seed, min=0, step=1)
-        for entry, change in (
-            (self._population, settings.set_population),
-            (self._iterations, settings.set_iterations),
-            (self._fitness, settings.set_fitness),
-            (self._seed, settings.set_seed),
+        self._seed = gui.add_number("Seed", settings.seed, **of("seed"), step=1)
+        for entry, name in (
+            (self._population, "population"),
+            (self._iterations, "iterations"),
+            (self._fitness, "fitness"),
+            (self._seed, "seed"),
         ):
-            self._listen(entry, change)
+            self._listen(entry, partial(settings.set, name))
         self._start = gui.add_button("Identify", icon=viser.Icon.SEARCH)
         self._line = JobLine(page, page.session.identifying.job, pauses="the search")
         self._line.say("Finds the faults from the current alone.")
@@ -120,13 +122,13 @@ class IdentifyPanel:
     def _take_source(self) -> None:
         name = str(self._source.value)
         settings = self._page.session.settings
-        if not self._page.checked(lambda: settings.set_source(SLIDERS if name == PLANT else name)):
+        if not self._page.checked(lambda: settings.set("source", SLIDERS if name == PLANT else name)):
             self.refresh_sources()
 
     def _take_algorithms(self) -> None:
         settings = self._page.session.settings
         chosen = [name for name, tick in self._ticks.items() if tick.value]
-        if not self._page.checked(lambda: settings.set_algorithms(chosen)):
+        if not self._page.checked(lambda: settings.set("algorithms", chosen)):
             for name, tick in self._ticks.items():
                 tick.value = name in settings.algorithms
 

@@ -26,10 +26,10 @@ from ema_model.recordings.side_file.read import SideFile
 from emaviz.session import actuators as actuator_files
 from emaviz.session.compare.keep import keep
 from emaviz.session.data_folder import DataFolder
+from emaviz.session.described import number
 from emaviz.session.job import Job, Tell
 from emaviz.session.opened import Opened, guesses, measured, read_opened, side_file_of
 from emaviz.session.session import Session
-from emaviz.session.settings import number
 from emaviz.session.signal import Signal
 from emaviz.session.worker import Worker
 

@@ -111,8 +111,8 @@ def readable(settings: Settings) -> dict[str, Any]:
         **{name: value for name, value in settings.run().command.settings().items()},
         "duration_s": settings.duration_s,
         "load_torque_Nm": settings.load_torque_Nm,
-        "current_noise_A": settings.sensors.current_noise_A,
-        "encoder_bits": settings.sensors.encoder_bits,
+        "current_noise_A": settings.current_noise_A,
+        "encoder_bits": settings.encoder_bits,
         "hidden_effects": "; ".join(
             f"{name} " + ", ".join(f"{parameter}={value:g}" for parameter, value in given.items())
             for name, given in settings.effects.items()

@@ -149,4 +149,5 @@ def test_what_cannot_be_told_apart_is_named_with_what_would():
     assert "a step with final 0.005 rad" in said
     assert "Healthy" in sure_words(answer(healthy=True)) and sure_words(None) == ""
     misfit = sure_words(answer(adequate=False, warnings=("The model <b>does not</b> fit.",)))
+    assert "The model does not fit" in misfit
     assert "does not fit" in misfit and "<b>does not</b>" not in misfit

@@ -9,9 +9,8 @@ import viser
 
 from ema_model.discovery import Candidate
 from ema_model.discovery.snapshot import AT_FLOOR, Look
-from ema_model.discovery.words import effect_title
+from ema_model.discovery.words import effect_title, sentences
 from ema_model.effects import CATALOGUE
-from ema_model.quantities.numbers import number
 from emaviz.page.discover import cards
 from emaviz.page.discover.entries import EntriesControl
 from emaviz.page.discover.guide import Guide
@@ -23,8 +22,8 @@ from emaviz.page.page import Page
 from emaviz.server.uploads import Uploads
 from emaviz.server.viser_private import id_of
 from emaviz.session.discover.discovering import Discovering
-from emaviz.text.html import add_html, html
-from emaviz.text.notes import BOX, note
+from emaviz.text.html import add_html
+from emaviz.text.notes import boxed, note
 
 _MOST_ADDED = 6
 
@@ -151,15 +150,7 @@ class DiscoverPanel:
                 button.label = f"Remove {effect_title(added[i].key)}"
         self._undo.disabled = look is None or look.steps < 2 or self._discovering.running
         if look is not None:
-            last = look.found.ladder[-1]
-            held = "" if last.holdout_rmse is None else f", held out {number(last.holdout_rmse)} ×"
-            self._model.content = html(
-                "<div {}>Error: <b>{} × the floor</b>{}{}.</div>",
-                BOX,
-                number(last.rmse),
-                held,
-                ", with " + str(len(added)) + " added" if added else ", calibrated",
-            )
+            self._model.content = boxed(sentences(look.found)[0])
 
     def _slot(self) -> Any:
         button = self._page.server.gui.add_button("", visible=False)

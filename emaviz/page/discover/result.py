@@ -12,7 +12,6 @@ from ema_model.discovery.snapshot import AT_FLOOR, Look
 from ema_model.discovery.tracks import Track, tracks
 from ema_model.discovery.words import FLOOR_NOTE, headline, per_recording, sentences
 from ema_model.effects import CATALOGUE
-from ema_model.quantities.numbers import number
 from ema_model.recordings import SIGNALS
 from emaviz.figures import error_ladder, explained_steps, missing_curve, residual_steps
 from emaviz.figures.model_equation import equation
@@ -169,11 +168,11 @@ def answer(look: Look) -> Html:
     found = look.found
     done = look.rmse <= AT_FLOOR
     if look.assessment is None:
-        first, others = f"The error is {number(look.rmse)} times the floor.", ["What is left is being looked at …"]
-    elif not look.added and look.promising:
-        first = f"Calibrated, the error is {number(look.rmse)} × the floor: physics is missing."
+        first, others = sentences(found)[0], ["What is left is being looked at …"]
+    elif not look.added and look.promising:  # before anything was added, of which a verdict could speak
         left = look.assessment.left.explanation
-        others = [left.sentence] if left is not None else []
+        first = "Physics is missing."
+        others = [sentences(found)[0], *([left.sentence] if left is not None else [])]
     else:
         first, others = headline(found), sentences(found)
     colour = "#2b8a3e" if done else "#e03131"

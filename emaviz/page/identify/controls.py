@@ -7,11 +7,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import viser
 
 from ema_model.identification.run import ALGORITHMS
-from ema_model.identification.words import verdict
+from ema_model.identification.words import facts, verdict, why_best
 from ema_model.simulation.plant import FITNESSES
 from emaviz.figures.convergence import colour
 from emaviz.page.identify import WORKSPACE
@@ -187,28 +186,12 @@ class IdentifyPanel:
         best = race.best
         lines = []
         for answer in race.answers:
-            stopped = "stopped · " if answer.stopped else ""
-            error = "" if answer.error_percent is None else f"Err {answer.error_percent:.2f} % · "
             star = "★ " if best is not None and len(race.tracks) > 1 and answer is best.answer else ""
-            corrected = "" if np.isnan(answer.corrected_rmse) else f", {answer.corrected_rmse:.4f} A corrected"
-            lines.append(
-                _line(
-                    html(
-                        "{}{} · {}{}rmse {:.4f} A{} · {} simulations in {:.2f} s · <b>{}</b>",
-                        star,
-                        _title(answer.algorithm),
-                        stopped,
-                        error,
-                        answer.rmse,
-                        corrected,
-                        answer.evaluations,
-                        answer.elapsed_s,
-                        verdict(answer),
-                    )
-                )
-            )
-        if best is not None and len(race.answers) > 1:
-            lines.append(_line(_why_best(race)))
+            told = " · ".join(facts(answer))
+            lines.append(_line(html("{}{} · {} · <b>{}</b>", star, _title(answer.algorithm), told, verdict(answer))))
+        if best is not None and best.answer is not None and len(race.answers) > 1:
+            others = [answer for answer in race.answers if answer is not best.answer]
+            lines.append(_line(html('<span style="opacity:.75">★ {}</span>', why_best(best.answer, others))))
         self._text.content = joined(lines)
         self._race = race
         self._missing.visible = best is not None and best.answer is not None and not best.answer.uncertainty.adequate
@@ -227,20 +210,6 @@ def recording_link(viewer: ViewerHost | None, path: Path, text: str = "") -> Htm
         viewer.url_of(path.name),
         text or f"Open {path.name} in Rerun ↗",
     )
-
-
-def _why_best(race: Race) -> Html:
-    """What the star is for."""
-    best = race.best
-    assert best is not None and best.answer is not None, "the race is over"
-    if best.answer.polished and not all(answer.polished for answer in race.answers):
-        why = "its answer was fitted with the model's own bias taken out; the others are where their searches ended"
-    elif best.answer.polished:
-        why = "its fitted answer has the least rmse"
-    else:
-        why = "it has the least rmse"
-    told = "Corrected: the rmse with what the simplified model is known to lack added."
-    return html('<span style="opacity:.75">★ {}. {}</span>', why, told)
 
 
 def _title(name: str) -> Html:

@@ -1,4 +1,4 @@
-"""What a result says, as data: lines, notes, remarks and tables; a terminal and a notebook each show it in their way."""
+"""What a result says, as data: lines, notes, remarks and tables; a terminal and a notebook each show them."""
 
 from __future__ import annotations
 

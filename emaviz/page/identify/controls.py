@@ -55,7 +55,7 @@ class IdentifyPanel:
         self._population = gui.add_number("Population", settings.population, **of("population"), step=1)
         self._iterations = gui.add_number("Iterations", settings.iterations, **of("iterations"), step=1)
         self._fitness: Any = gui.add_dropdown("Fitness", FITNESSES, initial_value=settings.fitness)
-        self._seed = gui.add_number("Seed", settings.seed, **of("seed"), step=1)
+        self._seed = gui.add_number("Seed", settings.seed, min=0, step=1)  # a maximum would be put in silently
         for entry, name in (
             (self._population, "population"),
             (self._iterations, "iterations"),

@@ -1,12 +1,19 @@
-"""An identification in words: the faults, whether they are, and how sure that is."""
+"""An identification in words: the faults, whether they are, how sure that is, and the cost around the answer."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
 from ema_model import faults
 from ema_model.actuator.readings import sentences
-from ema_model.identification.run import Identification
+from ema_model.identification.landscape import Landscape, Way
+from ema_model.identification.run import ALGORITHMS, Identification
 from ema_model.quantities.numbers import amount
-from ema_model.text import Document, Lines, Table
+from ema_model.quantities.titles import in_sentence
+from ema_model.simulation.words import run_in_words
+from ema_model.text import Document, Lines, Remark, Remarks, Table
 
 
 def verdict(answer: Identification) -> str:
@@ -19,7 +26,8 @@ def verdict(answer: Identification) -> str:
 
 def document_of(answer: Identification) -> Document:
     """All that the terminal and a notebook show."""
-    return Document([_faults(answer), Lines(_told(answer))])
+    ran = f"{'; '.join(facts(answer))} ({answer.algorithm}, compiled in {answer.compile_s:.1f} s)"
+    return Document([_faults(answer), Remarks(remarks(answer)), Lines([ran])])
 
 
 def _faults(answer: Identification) -> Table:
@@ -33,19 +41,88 @@ def _faults(answer: Identification) -> Table:
     return Table(("value", "90 % interval", *(["truth"] if known else [])), rows, remarks=remarks, unit="meaning")
 
 
-def _told(answer: Identification) -> list[str]:
+def remarks(answer: Identification) -> list[Remark]:
+    """Health first, then what these recordings leave open, and what would tell it."""
     sure = answer.uncertainty
-    lines = [verdict(answer)]
-    if sure.ambiguous:
-        lines.append("cannot be told apart here: " + "; ".join(" / ".join(group) for group in sure.ambiguous))
+    told = [_health(answer)]
+    told += [Remark("caution", warning, "warning") for warning in sure.warnings]
+    for group in sure.ambiguous:
+        names = " and ".join(_named(name) for name in group)
+        told.append(Remark("cannot be told apart", f"{names} do the same to this recording", "warning"))
     if sure.hardly_known:
-        lines.append(f"hardly known: {', '.join(sure.hardly_known)}; the other intervals rest on them")
-    if sure.separated_by:
-        lines.append(f"would tell more: {sure.separated_by.options}")
-    lines += sure.warnings
-    error = "" if answer.truth is None else f", Err {answer.error_percent:.2f} %"
-    lines.append(
-        f"rmse {amount(answer.rmse, 'A')}{error}; {answer.evaluations} simulations in {answer.elapsed_s:.2f} s "
-        f"({answer.algorithm}), compiled in {answer.compile_s:.1f} s"
-    )
-    return lines
+        names = ", ".join(_named(name) for name in sure.hardly_known)
+        line = f"this recording says hardly anything of {names}, and the other intervals rest on them"
+        told.append(Remark("hardly known", line, "warning"))
+    if run := sure.separated_by:
+        asked = run_in_words(run.command, run.settings, run.duration_s)
+        told.append(Remark("what would tell more", f"{asked} ({run.options})", "warning"))
+    if not answer.polished:
+        line = "those of a fit from here; the answer of the search alone may lie at their edge"
+        told.append(Remark("the intervals", line))
+    return told
+
+
+def _health(answer: Identification) -> Remark:
+    sure = answer.uncertainty
+    if not sure.adequate:
+        return Remark("the model does not fit", "no fault can be told", "bad")
+    if sure.healthy:
+        return Remark("healthy", "no k is surely off (joint test at 1 %)", "good")
+    named = ", ".join(faults.BY_NAME[name].label for name in sure.alarms)
+    return Remark("not healthy", named or "all k together, though no single one stands out", "bad")
+
+
+def facts(answer: Identification) -> list[str]:
+    """What it came to and took: error, simulations, time."""
+    corrected = "" if np.isnan(answer.corrected_rmse) else f", {amount(answer.corrected_rmse, 'A')} corrected"
+    return [
+        *(["stopped"] if answer.stopped else []),
+        *([] if answer.error_percent is None else [f"Err {answer.error_percent:.2f} %"]),
+        f"rmse {amount(answer.rmse, 'A')}{corrected}",
+        f"{answer.evaluations} simulations in {answer.elapsed_s:.2f} s",
+    ]
+
+
+def why_best(best: Identification, others: Sequence[Identification]) -> str:
+    """Why one answer of several to the same recording is the one to believe."""
+    if best.polished and not all(answer.polished for answer in others):
+        why = "its answer was fitted with the model's own bias taken out; the others are where their searches ended"
+    elif best.polished:
+        why = "its fitted answer has the least rmse"
+    else:
+        why = "it has the least rmse"
+    return f"{why}. Corrected: the rmse with what the simplified model is known to lack added."
+
+
+def _named(name: str) -> str:
+    return f"{name} ({in_sentence(faults.BY_NAME[name].title)})"
+
+
+def landscape_words(found: Landscape) -> str:
+    """How far a landscape was drawn, what was held, and from where to where the error goes."""
+    stopped = "" if found.share == 1.0 else f"Stopped at {100.0 * found.share:.0f} %. "
+    others = [i for i in range(len(faults.NAMES)) if i not in (found.x, found.y)]
+    held = ", ".join(f"{faults.NAMES[i]} {found.through[i]:.3f}" for i in others)
+    known = found.rmse_A[np.isfinite(found.rmse_A)]
+    reach = f" From {amount(known.min(), 'A')} to {amount(known.max(), 'A')}." if len(known) else ""
+    return f"{stopped}Held: {held}.{reach}"
+
+
+def way_sentences(found: Mapping[str, Way]) -> Sequence[str]:
+    """What became of each search that is not the answer, in words."""
+    said = []
+    for name, way in found.items():
+        title = ALGORITHMS.get(name, name)
+        end, answer, highest = (amount(rmse, "A") for rmse in (way.rmse_A, way.answer_A, way.highest_A))
+        if way.is_trap:
+            said.append(
+                f"{title} ended in a trap: its rmse is {end} there, and on the straight way to the answer ({answer}) "
+                f"it rises to {highest} first."
+            )
+        elif way.is_worse:
+            said.append(
+                f"{title} had not settled: from its end ({end}) the error falls all the way to the answer ({answer})."
+            )
+        else:
+            said.append(f"{title} ended at the answer: {end}.")
+    return said

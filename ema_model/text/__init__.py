@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from ema_model.text.document import Document, InWords, Lines, Note, Table
+from ema_model.text.document import COLOURS, Document, InWords, Lines, Note, Remark, Remarks, Table
 
-__all__ = ["Document", "InWords", "Lines", "Note", "Table"]
+__all__ = ["COLOURS", "Document", "InWords", "Lines", "Note", "Remark", "Remarks", "Table"]

@@ -1,4 +1,4 @@
-"""What a result says, as data: lines, notes and tables, which a terminal and a notebook each show in their way."""
+"""What a result says, as data: lines, notes, remarks and tables; a terminal and a notebook each show them."""
 
 from __future__ import annotations
 
@@ -6,7 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 from importlib import import_module
+from typing import Literal
 
+Severity = Literal["good", "bad", "warning", "note"]
+COLOURS: dict[Severity, str] = {"good": "#2b8a3e", "bad": "#e03131", "warning": "#e8590c", "note": "#868e96"}
 _GAP = 3  # characters between the columns of plain text
 _STYLE = "border-collapse:collapse;margin:.6em 0"
 _CELL = "padding:1px 12px 1px 0;text-align:right;border:0"
@@ -46,7 +49,40 @@ class Note:
     @property
     def html(self) -> str:
         """Escaped, with a mark before it."""
-        return f'<p style="border-left:3px solid #e8590c;padding-left:8px">{escape(self.line)}</p>'
+        return f'<p style="border-left:3px solid {COLOURS["warning"]};padding-left:8px">{escape(self.line)}</p>'
+
+
+@dataclass(frozen=True)
+class Remark:
+    """What stands out of a result, in a word or two, and what there is to say of it."""
+
+    head: str
+    line: str
+    severity: Severity = "note"
+
+    @property
+    def text(self) -> str:
+        """'not healthy: k1 friction'."""
+        return f"{self.head}: {self.line}"
+
+
+@dataclass(frozen=True)
+class Remarks:
+    """Those of a result, the one that matters first."""
+
+    remarks: Sequence[Remark]
+
+    @property
+    def text(self) -> str:
+        """A line for each."""
+        return "\n".join(one.text for one in self.remarks)
+
+    @property
+    def html(self) -> str:
+        """Escaped, a mark of its colour before each."""
+        style = "border-left:3px solid {};padding-left:8px"
+        lines = ((style.format(COLOURS[one.severity]), escape(one.text)) for one in self.remarks)
+        return "".join(f'<p style="{style}">{line}</p>' for style, line in lines)
 
 
 @dataclass(frozen=True)
@@ -87,7 +123,7 @@ class Table:
         return f'<table style="{_STYLE}">{"".join(rows)}</table>'
 
 
-Block = Lines | Note | Table
+Block = Lines | Note | Remarks | Table
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,9 +10,8 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 
 from ema_model.faults import FAULTS
-from ema_model.identification.landscape import Landscape, Way
+from ema_model.identification.landscape import Landscape
 from ema_model.identification.run import ALGORITHMS as TITLES
-from ema_model.quantities.numbers import amount
 from emaviz.colours import TRUTH
 from emaviz.figures import theme
 from emaviz.figures.convergence import colour
@@ -65,26 +64,6 @@ def figure(landscape: Landscape, marks: Marks, *, dark: bool = False) -> go.Figu
     drawn.update_yaxes(range=[landscape.upwards[0], landscape.upwards[-1]])
     drawn.update_layout(margin={"b": 74, "r": 8, "t": 34})
     return drawn
-
-
-def sentences(found: Mapping[str, Way]) -> Sequence[str]:
-    """What became of each search that is not the answer, in words."""
-    said = []
-    for name, way in found.items():
-        title = TITLES.get(name, name)
-        end, answer, highest = (amount(rmse, "A") for rmse in (way.rmse_A, way.answer_A, way.highest_A))
-        if way.is_trap:
-            said.append(
-                f"{title} ended in a trap: its rmse is {end} there, and on the straight way to the answer ({answer}) "
-                f"it rises to {highest} first."
-            )
-        elif way.is_worse:
-            said.append(
-                f"{title} had not settled: from its end ({end}) the error falls all the way to the answer ({answer})."
-            )
-        else:
-            said.append(f"{title} ended at the answer: {end}.")
-    return said
 
 
 def axis_title(k: int) -> str:

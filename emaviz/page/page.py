@@ -36,3 +36,20 @@ class Page:
             self.notify("Input refused", str(error))
             return False
         return True
+
+    def begins(self, begin: Callable[[], bool]) -> bool:
+        """Begins a long run, or says why not.  begin(): whether nothing else runs; InputError: what is missing."""
+        started = False
+
+        def tried() -> None:
+            nonlocal started
+            if not self.session.ready.is_set():
+                self.notify("One moment", "The models are still being compiled.", "yellow")
+            elif not (started := begin()):
+                self.one_at_a_time()
+
+        return self.checked(tried) and started
+
+    def one_at_a_time(self) -> None:
+        """Says that another long run goes on."""
+        self.notify("One at a time", "Another long run goes on; stop it first.", "yellow")

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Annotated, Any
 
+import msgspec
 import viser
 
 from ema_model.actuator import Actuator
@@ -14,10 +15,20 @@ from emaviz.page.style import page as style
 from emaviz.scene.actuator import ActuatorScene
 from emaviz.scene.motion import Motion
 from emaviz.scene.playback import SPEEDS, Playback
+from emaviz.session.described import checked, limits, setting, taken
 from emaviz.session.signal import Signal
 from emaviz.text.html import add_html
 
 _SLOWEST_STEP_S = 1e-4
+
+
+class Looks(msgspec.Struct, frozen=True):
+    """How the actuator and the page look; as a session's file has it."""
+
+    speed: Annotated[str, setting("the speed", one_of=SPEEDS)] = "1 : 10"
+    opacity: Annotated[float, setting("the housing", 0.0, 1.0)] = 0.35
+    labels: Annotated[bool, setting("labels")] = True
+    dark: Annotated[bool, setting("dark")] = False
 
 
 class PlaybackStrip:
@@ -32,16 +43,18 @@ class PlaybackStrip:
         self._span_s = (0.0, 0.5)
         self.moves: Signal[[str, float, tuple[float, float]]] = Signal()
         self.playback = Playback(scene, actuator, self._moved)
-        gui = page.server.gui
+        gui, usual = page.server.gui, Looks()
         self._panel = gui.add_panel()
         with self._panel.add_tab("Playback", viser.Icon.PLAYER_PLAY):
             add_html(gui, STRIP + style())
             self._play = gui.add_button("Pause", icon=viser.Icon.PLAYER_PAUSE)
-            self._speed = gui.add_dropdown("Speed", tuple(SPEEDS), initial_value="1 : 10")
+            self._speed = gui.add_dropdown("Speed", tuple(SPEEDS), initial_value=usual.speed)
             self._moment = gui.add_slider("Moment [s]", *self._span_s, _SLOWEST_STEP_S, 0.0)
-            self._opacity = gui.add_slider("Housing", 0.0, 1.0, 0.05, 0.35)
-            self._labels = gui.add_checkbox("Labels", True)
-            self._dark = gui.add_checkbox("Dark", False)
+            self._opacity = gui.add_slider(
+                "Housing", **limits(Looks, "opacity"), step=0.05, initial_value=usual.opacity
+            )
+            self._labels = gui.add_checkbox("Labels", usual.labels)
+            self._dark = gui.add_checkbox("Dark", usual.dark)
             self._view = gui.add_button("Reset view", icon=viser.Icon.FOCUS_CENTERED, color="gray")
             self._figures = add_html(gui)
             self._caption = add_html(gui)
@@ -90,20 +103,20 @@ class PlaybackStrip:
             self.play(False)
         self.playback.seek(time_s - (shown.start_s if shown is not None else 0.0), on)
 
-    def saved(self) -> dict[str, object]:
+    def saved(self) -> dict[str, Any]:
         """How the actuator and the page look, for a session's file."""
         return {name: entry.value for name, entry in self._looks().items()}
 
-    def restore(self, saved: object) -> None:
-        """Takes what `saved` gave, as far as it makes sense; on the screen's thread."""
+    def restore(self, saved: Any) -> None:
+        """Takes what `saved` gave, InputError if it makes no sense; on the screen's thread."""
+        looks = taken(Looks, saved, "look")
+        values = {name: checked(Looks, name, getattr(looks, name)) for name in Looks.__struct_fields__}
         for name, entry in self._looks().items():
-            value = saved.get(name) if isinstance(saved, dict) else None
-            if type(value) is type(entry.value) and (name != "speed" or value in SPEEDS):
-                entry.value = value
+            entry.value = values[name]
 
     def _looks(self) -> dict[str, Any]:
-        looks = {"speed": self._speed, "opacity": self._opacity, "labels": self._labels, "dark": self._dark}
-        return dict(looks)
+        controls = (self._speed, self._opacity, self._labels, self._dark)
+        return dict(zip(Looks.__struct_fields__, controls, strict=True))
 
     def say(self) -> None:
         """The small print: what of the picture is not to scale."""

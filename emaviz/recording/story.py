@@ -14,6 +14,7 @@ from ema_model.actuator.readings import sentences
 from ema_model.commands import Recorded
 from ema_model.identification.objective import Objective
 from ema_model.identification.run import Identification, Progress
+from ema_model.identification.words import verdict
 from ema_model.quantities.numbers import amount
 from ema_model.recordings import Measurement
 from ema_model.simulation.run import Run, simulate_monitor
@@ -131,7 +132,7 @@ def _result(answer: Identification, objective: Objective) -> dict[str, Any]:
         for i, (name, phrase) in enumerate(zip(faults.NAMES, sentences(answer.k, objective.actuator)))
     }
     result |= {
-        "verdict": "healthy" if sure.healthy else "not healthy: " + ", ".join(sure.alarms),
+        "verdict": verdict(answer),
         "rmse": amount(answer.rmse, "A"),
         "evaluations": answer.evaluations,
         "time": f"{answer.elapsed_s:.2f} s" + (" (stopped)" if answer.stopped else ""),

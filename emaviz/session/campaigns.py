@@ -35,7 +35,6 @@ class Campaigns:
     def __init__(self, session: Session, data: DataFolder, given: Sequence[Path] = ()) -> None:
         self.job = Job(session.worker)
         self.opened: Signal[[Path, Measurement]] = Signal()  # a row's recording, and its run
-        self.said = ""  # of the row that was computed last
         self._recorded: tuple[Path, Measurement, str] | None = None
         self._session, self._data = session, data
         self._given = [Store(path).folder for path in given]
@@ -72,7 +71,7 @@ class Campaigns:
         return found
 
     def _work(self, task: Task, tell: Tell) -> None:
-        tell(f"{_named(task)}: making its recordings …")
+        tell(f"{_named(task)}: making its recordings")
         it = given(task)
         path = self._path(task)
         _RECORDED[task.kind](task, it, path, tell)
@@ -83,10 +82,11 @@ class Campaigns:
 
         return free_name(self._session.folder, f"{datetime.now():%Y%m%d-%H%M%S}-{task.kind}-{task.name[:8]}", ".rrd")
 
-    def _done(self) -> None:
+    def _done(self) -> str:
         assert self._recorded is not None
-        path, run, self.said = self._recorded
+        path, run, said = self._recorded
         self.opened(path, run)
+        return said
 
 
 def _named(task: Task) -> str:

@@ -1,17 +1,19 @@
-"""A long run on the compute thread: a title, what goes on, a stop, and an end; one goes on at a time."""
+"""A long run on the compute thread: a title, what goes on, a pause, a stop, and an end; one goes on at a time."""
 
 from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from typing import Protocol
 
 from ema_model.errors import InputError
+from emaviz.session.pace import Pace
 from emaviz.session.signal import Signal
 from emaviz.session.worker import Steps, Worker
 
 _TICK_S = 0.5
+_PAUSE_S = 0.01  # between two looks whether to go on; sliders are answered in between
 _RESTED = 2  # looks, a quarter of a second apart, at a compute thread that is free
 _MOST_WAIT_S = 20.0  # for what may never be ready
 
@@ -22,15 +24,88 @@ class Tell(Protocol):
     def __call__(self, text: str, share: float | None = None) -> None: ...
 
 
-Work = Callable[[Tell], object]
-
-
 class Stopped(Exception):
     """A person has stopped the run."""
 
 
+class Run:
+    """One run of a job, as its work sees it: a `Tell`, and whether a person wants it to end."""
+
+    def __init__(self, title: str, told: Callable[[str, float, float | None], object], worker: Worker) -> None:
+        """told: what is said, for how long it goes on, s, and the share that is done; on the compute thread."""
+        self.title = title
+        self._told, self._worker = told, worker
+        self._stop, self._go, self.over = threading.Event(), threading.Event(), threading.Event()
+        self._go.set()
+        self._began = time.perf_counter()
+        self._paused_s = 0.0
+        self._said: tuple[str, float | None] = (title, None)
+
+    def __call__(self, text: str, share: float | None = None) -> None:
+        """Says what goes on; raises `Stopped`."""
+        self._end_if_stopping()
+        self.say(text, share)
+        self._end_if_stopping()  # while it rested
+
+    def say(self, text: str, share: float | None = None) -> None:
+        """The same for work that asks for `stopping` itself, since it ends with what it has; rests while paused."""
+        self._said = text.replace("_", " "), share
+        self._told(self._said[0], self.elapsed_s, share)
+        self._worker.breathe()  # the sliders of the other tabs
+        began = time.perf_counter()
+        while self.paused and not self._go.wait(_PAUSE_S):
+            self._worker.breathe()
+        self._paused_s += time.perf_counter() - began
+
+    @property
+    def stopping(self) -> bool:
+        """Whether it was asked to end."""
+        return self._stop.is_set() or self._worker.closing
+
+    @property
+    def paused(self) -> bool:
+        """Whether it rests, or will at the next thing that it says."""
+        return not self._go.is_set() and not self.stopping
+
+    @property
+    def elapsed_s(self) -> float:
+        """For how long it has gone on, without its pauses."""
+        return time.perf_counter() - self._began - self._paused_s
+
+    def stop(self) -> None:
+        """Asks it to end; also one that rests."""
+        self._stop.set()
+        self._go.set()
+
+    def pause(self, paused: bool) -> None:
+        """Lets it rest, or go on."""
+        (self._go.clear if paused else self._go.set)()
+
+    def begin(self) -> None:
+        """Its turn has come: says how long it goes on even while it says nothing, as a compilation does."""
+        self._began = time.perf_counter()
+
+        def tick() -> None:
+            while not self.over.wait(_TICK_S):
+                if not self.paused:
+                    text, share = self._said
+                    self._told(text, self.elapsed_s, share)
+
+        threading.Thread(target=tick, name="emaviz-job-clock", daemon=True).start()
+
+    def _end_if_stopping(self) -> None:
+        if self.stopping:
+            raise Stopped
+
+
+Work = Callable[[Run], object]
+
+
 class Job:
-    """Runs work(tell), where tell(text) says what goes on, lets the sliders be answered, and ends it once stopped.
+    """Runs work(run), where run(text) says what goes on, lets the sliders be answered, and ends it once stopped.
+
+    Work that returns a generator is done in its steps, between which the compute thread makes room for a slider that
+    is dragged.
 
     Its signals are called on the threads that work, so that listeners only hand over.  `ended` comes once the compute
     thread is free, so that a listener may start the next run; its text is empty where an error is told elsewhere.
@@ -44,22 +119,30 @@ class Job:
         self.finished = False  # the last one, and was not stopped
         self.began: Signal[[str]] = Signal()  # with its title
         self.progressed: Signal[[str, float, float | None]] = Signal()  # text, seconds since it began, share
+        self.rests: Signal[[bool]] = Signal()  # it was paused, or goes on
         self.waits: Signal[[str]] = Signal()  # for its turn
         self.ended: Signal[[str]] = Signal()  # what came of it
         self._worker, self._on_stop, self._on_divergence = worker, on_stop, on_divergence
-        self._stop = threading.Event()
+        self._run: Run | None = None
+        self._pace = Pace()
         self._waits = threading.Event()  # set: whoever waits to begin shall not any more
 
-    def begin(self, title: str, work: Work, done: Callable[[], None] | None = None) -> bool:
+    @property
+    def paused(self) -> bool:
+        """Whether it rests."""
+        return self.running and self._run is not None and self._run.paused
+
+    def begin(self, title: str, work: Work, done: Callable[[], str | None] | None = None) -> bool:
         """Runs it soon; False, and nothing is begun, while another long run goes on.
 
-        done(): called just before its `ended`, if it came to its end.
+        done(): called just before its `ended`, if it came to its end; returns what came of it, if that says more than
+        how long it took.
         """
-        stop = threading.Event()
-        started = self._worker.start(self._steps(title, work, done, stop))
+        run = Run(title, self._tells, self._worker)
+        started = self._worker.start(self._steps(run, work, done))
         if started:
             self._waits.set()
-            self._stop, self.running, self.finished = stop, True, False
+            self._run, self.running, self.finished = run, True, False
             self.began(title)
         return started
 
@@ -82,29 +165,27 @@ class Job:
     def stop(self) -> None:
         """Ends what runs, as soon as its present simulation is done, or the wait for its turn."""
         self._waits.set()
-        self._stop.set()
+        if self._run is not None:
+            self._run.stop()
 
-    def _steps(self, title: str, work: Work, done: Callable[[], None] | None, stop: threading.Event) -> Steps:
-        began = time.perf_counter()
-        said: tuple[str, float | None] = (title, None)
-        over = threading.Event()
+    def pause(self, paused: bool) -> None:
+        """Lets what runs rest after its present simulation, or go on."""
+        if self.running and self._run is not None:
+            self._run.pause(paused)
+            self.rests(self.paused)
 
-        def tick() -> None:
-            while not over.wait(_TICK_S):  # a compilation says nothing for seconds
-                self.progressed(said[0], time.perf_counter() - began, said[1])
+    def _tells(self, text: str, elapsed_s: float, share: float | None) -> None:
+        known = self._pace.at(text, elapsed_s)
+        self.progressed(text, elapsed_s, known if share is None else share)
 
-        def tell(text: str, share: float | None = None) -> None:
-            nonlocal said
-            if stop.is_set():
-                raise Stopped
-            said = text.replace("_", " "), share
-            self.progressed(said[0], time.perf_counter() - began, share)
-            self._worker.breathe()  # the sliders of the other tabs
-
+    def _steps(self, run: Run, work: Work, done: Callable[[], str | None] | None) -> Steps:
         yield
-        threading.Thread(target=tick, name="emaviz-job-clock", daemon=True).start()
+        run.begin()
+        self._pace.begin(run.title)
         try:
-            work(tell)
+            steps = work(run)
+            if isinstance(steps, Generator):
+                yield from steps
         except Stopped:
             self._end(self._on_stop())
             return
@@ -115,15 +196,15 @@ class Job:
             self._end("")
             raise
         finally:
-            over.set()
+            run.over.set()
+        if not run.stopping:
+            self._pace.end(run.elapsed_s)
         self.finished = True
-        self._end(f"{title}: done in {time.perf_counter() - began:.1f} s.", done)
+        self._end(f"{run.title}: done in {run.elapsed_s:.1f} s.", done)
 
-    def _end(self, text: str, done: Callable[[], None] | None = None) -> None:
+    def _end(self, text: str, done: Callable[[], str | None] | None = None) -> None:
         def ended() -> None:
             self.running = False
-            if done is not None:
-                done()
-            self.ended(text)
+            self.ended((done() if done is not None else None) or text)
 
         self._worker.post(f"end of {id(self)}", ended)

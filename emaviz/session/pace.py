@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import time
 
 _NUMBERS = re.compile(r"\d+([.,]\d+)?")
 
@@ -13,24 +12,23 @@ class Pace:
 
     def __init__(self) -> None:
         self._known: dict[str, tuple[dict[str, float], float]] = {}  # when each text was said first, and the whole, s
-        self._title, self._began, self._said = "", 0.0, dict[str, float]()
+        self._title, self._said = "", dict[str, float]()
 
     def begin(self, title: str) -> None:
-        """A job begins."""
-        self._title, self._began, self._said = title, time.monotonic(), {}
+        """A run begins."""
+        self._title, self._said = title, {}
 
-    def at(self, text: str) -> tuple[float, float | None]:
-        """It says this now; returns the time that it took, s, and its share that is done, 0 … 1, if that is known."""
-        elapsed = time.monotonic() - self._began
+    def at(self, text: str, elapsed_s: float) -> float | None:
+        """It says this after that time; returns its share that is done, 0 … 1, if that is known."""
         step = _NUMBERS.sub("#", text)
-        self._said.setdefault(step, elapsed)
+        self._said.setdefault(step, elapsed_s)
         times, whole = self._known.get(self._title, ({}, 0.0))
         if step not in times or not whole > 0.0:
-            return elapsed, None
-        since = elapsed - self._said[step]
+            return None
+        since = elapsed_s - self._said[step]
         later = min((one for one in times.values() if one > times[step]), default=whole)
-        return elapsed, min(min(times[step] + since, later) / whole, 0.99)
+        return min(min(times[step] + since, later) / whole, 0.99)
 
-    def end(self) -> None:
-        """It is done, and is what the next one is measured by."""
-        self._known[self._title] = self._said, time.monotonic() - self._began
+    def end(self, elapsed_s: float) -> None:
+        """It came to its end, and is what the next one is measured by."""
+        self._known[self._title] = self._said, elapsed_s

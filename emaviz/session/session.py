@@ -8,9 +8,8 @@ import time
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,18 +18,14 @@ from ema_model.actuator import Actuator
 from ema_model.errors import InputError, quoted
 from ema_model.faults import HEALTHY
 from ema_model.identification.objective import Objective
-from ema_model.identification.run import Identification, Progress, warm_up
+from ema_model.identification.run import warm_up
 from ema_model.recordings import Measurement
 from ema_model.simulation import plant
 from ema_model.simulation.run import simulate_monitor
-from emaviz.session.race import Race, Reins, begin, run, target
+from emaviz.session.identify.identifying import Identifying
 from emaviz.session.settings import Settings
 from emaviz.session.signal import Signal
-from emaviz.session.worker import Steps, Worker
-
-if TYPE_CHECKING:  # rerun may be missing or broken, and takes a second to import
-    from emaviz.recording.story import IdentificationStory
-
+from emaviz.session.worker import Worker
 
 OWN_PLANT = "the actuator's file"
 
@@ -53,9 +48,6 @@ class Events:
     """What the screen listens to; called on the compute thread, so listeners only hand over."""
 
     simulated: Signal[[Simulation]] = field(default_factory=Signal)
-    progressed: Signal[[Race]] = field(default_factory=Signal)
-    identified: Signal[[Race]] = field(default_factory=Signal)
-    ended: Signal[[]] = field(default_factory=Signal)  # an identification, with an answer or without
     told: Signal[[str, str]] = field(default_factory=Signal)  # title, one line
     status: Signal[[str]] = field(default_factory=Signal)
     plants: Signal[[]] = field(default_factory=Signal)  # the plant is another model's
@@ -69,15 +61,14 @@ class Session:
         self.folder = folder
         self.settings = Settings(axes=actuator.axes, k=actuator.k)  # the plant, as its file knows this unit
         self.events = Events()
-        self.identified: Identification | None = None
-        self.identified_at: datetime | None = None
         self.plants: dict[str, Actuator] = {OWN_PLANT: actuator}  # that may play the plant, by what they are
         self.plant = OWN_PLANT
         self.simulation: Simulation | None = None
         self.ready = threading.Event()
-        self.reins = Reins()  # of the identification that runs, or ran last
         self.open_file: Callable[[str], Measurement] = _no_files  # by the name of a file in the data folder
         self.worker = Worker("emaviz-compute", self._on_error)
+        self.identifying = Identifying(self.worker, actuator, folder, self.events.told)
+        self.identifying.identified.connect(lambda _: self._show_identified())
 
     def start(self) -> None:
         """Compiles what the page needs, visibly, and shows the first picture."""
@@ -85,7 +76,6 @@ class Session:
 
     def close(self) -> None:
         """Ends the compute thread."""
-        self.reins.stop()
         self.worker.close()
 
     # --- the plant's model ------------------------------------------------------------------------------------------
@@ -113,7 +103,8 @@ class Session:
         """'healthy', 'same faults', 'identified 16:09'."""
         if monitor != "identified":
             return monitor
-        return "identified: nothing yet" if self.identified_at is None else f"identified {self.identified_at:%H:%M}"
+        at = self.identifying.answered_at
+        return "identified: nothing yet" if at is None else f"identified {at:%H:%M}"
 
     # --- simulation -------------------------------------------------------------------------------------------------
 
@@ -131,7 +122,7 @@ class Session:
             self.events.status("Compiling the plant with the library of effects…")
         started = time.perf_counter()
         run, start = settings.run(), settings.start_rad()
-        fitted = self.identified.k if self.identified is not None else HEALTHY
+        fitted = self.identifying.answer.k if self.identifying.answer is not None else HEALTHY
         shown = {"healthy": HEALTHY, "same faults": settings.k, "identified": fitted}[settings.monitor]
         try:
             reference = plant.simulate(
@@ -177,75 +168,13 @@ class Session:
     # --- identification ---------------------------------------------------------------------------------------------
 
     def identify(self) -> bool:
-        """Begins an identification as the settings say; False while a long job runs."""
-        reins = Reins()
-        started = self.worker.start(self._identification(copy.deepcopy(self.settings), reins))
-        if started:
-            self.reins = reins
-        return started
+        """Begins an identification as the settings say; False while another long run goes on."""
+        known = self.plant == OWN_PLANT
+        return self.identifying.begin(self.settings, self.plants[self.plant], self.open_file, known)
 
-    def stop(self) -> None:
-        """Ends the identification after its current iteration, keeping what it has."""
-        self.reins.stop()
-
-    def pause(self, paused: bool) -> None:
-        """Lets the identification rest, or go on."""
-        self.reins.pause(paused)
-
-    def _identification(self, settings: Settings, reins: Reins) -> Steps:
-        story = None
-        try:
-            measurement, truth = yield from target(settings, self.plants[self.plant], self.open_file)
-            objective = Objective([measurement], self.actuator, fitness=settings.fitness)
-            race = begin(settings, objective, truth, known=truth is not None and self.plant == OWN_PLANT)
-            story = self._story(race, objective, measurement)
-            race.growing = None if story is None else story.path
-
-            def tell(race: Race, progress: Progress | None) -> None:
-                if story is not None and progress is not None:
-                    story.iteration(progress)
-                self.events.progressed(race)
-                if progress is None:
-                    self.worker.breathe()  # the sliders, while the answer is fitted
-
-            yield from run(race, objective, reins, tell)
-            self._keep(race, story)
-        except FloatingPointError as error:
-            raise InputError(str(error)) from None
-        finally:
-            if story is not None:
-                story.close()
-            self.events.ended()
-
-    def _keep(self, race: Race, story: IdentificationStory | None) -> None:
-        best = race.best
-        assert best is not None and best.answer is not None, "the race is over"
-        self.identified, self.identified_at = best.answer, datetime.now()
-        if story is not None:
-            others = [answer for answer in race.answers if answer is not best.answer]
-            story.finish(best.answer, *others)
-            race.path = None if story.failed else story.path
-            if story.failed:
-                self.events.told("The recording could not be written", story.failed)
-        self.events.identified(race)
+    def _show_identified(self) -> None:
         if self.settings.monitor == "identified":
             self.refresh()
-
-    def _story(self, race: Race, objective: Objective, measurement: Measurement) -> IdentificationStory | None:
-        settings = race.settings
-        stem = f"{datetime.now():%Y%m%d-%H%M%S}-{'-'.join(settings.algorithms)}"
-        source = "reference" if race.truth is not None else "measurement"
-        try:
-            from emaviz.recording.paths import free_name
-            from emaviz.recording.story import IdentificationStory
-
-            path = free_name(self.folder, stem, ".rrd")
-            return IdentificationStory(
-                path, objective, measurement, source, race.truth, readable(settings), settings.algorithms
-            )
-        except (OSError, ImportError) as error:  # a run without its recording is still a run
-            self.events.told("The recording cannot be written", " ".join(str(error).split()))
-            return None
 
     def _on_error(self, error: BaseException) -> None:
         if isinstance(error, InputError):
@@ -253,38 +182,6 @@ class Session:
             return
         traceback.print_exception(error)
         self.events.told("Something failed; the app goes on", f"{type(error).__name__}: {quoted(error)}")
-
-
-def readable(settings: Settings) -> dict[str, Any]:
-    """The settings of an identification by name, as a recording keeps them."""
-    if settings.source:
-        return {"source": settings.source, **_search(settings)}
-    return {
-        "source": "the sliders' plant",
-        "k": " ".join(f"{value:g}" for value in settings.k),
-        "command": settings.command,
-        **{name: value for name, value in settings.run().command.settings().items()},
-        "duration_s": settings.duration_s,
-        "load_torque_Nm": settings.load_torque_Nm,
-        "current_noise_A": settings.sensors.current_noise_A,
-        "encoder_bits": settings.sensors.encoder_bits,
-        "hidden_effects": "; ".join(
-            f"{name} " + ", ".join(f"{parameter}={value:g}" for parameter, value in given.items())
-            for name, given in settings.effects.items()
-        )
-        or "none",
-        **_search(settings),
-    }
-
-
-def _search(settings: Settings) -> dict[str, Any]:
-    return {
-        "algorithms": ", ".join(settings.algorithms),
-        "population": settings.population,
-        "iterations": settings.iterations,
-        "fitness": settings.fitness,
-        "seed": settings.seed,
-    }
 
 
 def _no_files(name: str) -> Measurement:

@@ -65,6 +65,12 @@ class Worker:
             if job is None:
                 return
             self._guarded(job)
+            self._attended = time.monotonic()
+
+    @property
+    def closing(self) -> bool:
+        """Whether the thread is to end."""
+        return self._closing
 
     @property
     def busy(self) -> bool:

@@ -72,8 +72,8 @@ class Heard:
         comparing.session.events.told.connect(lambda title, text: self.told.append(text))
         comparing.events.opened.connect(self.opened.append)
         comparing.job.progressed.connect(lambda text, *_: self.progress.append(text))
-        comparing.events.compared.connect(lambda comparison, elapsed: self.compared.append(comparison))
-        comparing.events.ended.connect(self.ended.append)
+        comparing.events.compared.connect(lambda comparison: self.compared.append(comparison))
+        comparing.job.ended.connect(lambda text: None if comparing.job.finished else self.ended.append(text))
 
     @staticmethod
     def wait(what, count=1, seconds=60.0):
@@ -298,11 +298,11 @@ def test_stop_ends_it_soon_and_keeps_the_last_result(comparing, heard, recording
     comparing.job.progressed.connect(lambda *_: begun.set())
     assert comparing.compare()
     assert begun.wait(30.0)
-    comparing.stop()
+    comparing.job.stop()
     assert heard.wait(heard.ended, seconds=20.0) == "Stopped."
     assert not heard.told and not comparing.session.worker.busy
     assert comparing.compare()
-    comparing.stop()
+    comparing.job.stop()
     heard.wait(heard.ended, 2)
 
 

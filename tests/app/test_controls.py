@@ -59,7 +59,7 @@ def page(tab, app):
     app.tab(IdentifyTab).panel.show_settings()
     wait_until(lambda: app.session.simulation is not before and app.tab(ExploreTab).right.visible)
     yield tab
-    app.session.stop()
+    app.session.identifying.job.stop()
     wait_until(lambda: not app.session.worker.busy)
 
 
@@ -85,10 +85,10 @@ def raced(app, page, seconds=60.0):
         races.append(race)
         done.set()
 
-    app.session.events.identified.connect(keep)
+    app.session.identifying.identified.connect(keep)
     page.get_by_role("button", name="Identify", exact=True).click()
     assert done.wait(seconds)
-    app.session.events.identified.disconnect(keep)
+    app.session.identifying.identified.disconnect(keep)
     wait_until(lambda: not app.session.worker.busy)
     return races[0]
 
@@ -101,8 +101,8 @@ def test_what_the_plant_hides_is_set(page, app):
     for folder, label, value, read_back in (
         (None, "Duration [s]", 0.4, lambda s: s.duration_s),
         (None, "Load torque [N·m]", 3, lambda s: s.load_torque_Nm),
-        ("Sensor noise", "Current noise [A]", 0.2, lambda s: s.sensors.current_noise_A),
-        ("Sensor noise", "Encoder [bit per turn]", 14, lambda s: s.sensors.encoder_bits),
+        ("Sensor noise", "Current noise [A]", 0.2, lambda s: s.current_noise_A),
+        ("Sensor noise", "Encoder [bit per turn]", 14, lambda s: s.encoder_bits),
         ("State at the start", "Angle off the command [mrad]", 2, lambda s: 1e3 * s.start_offset_rad),
         ("State at the start", "Motor speed [rad/s]", 20, lambda s: s.start_speed_rad_s),
         ("State at the start", "Position in the backlash", 0.5, lambda s: s.start_side),
@@ -191,8 +191,8 @@ def test_the_strip_plays_scrubs_and_changes_the_look(page, app):
 
 
 def test_stop_ends_several_searches_at_once_even_while_they_rest(page, app):
-    app.session.settings.set_algorithms(["do", "hba", "ssa"])
-    app.session.settings.set_iterations(5000)
+    app.session.settings.set("algorithms", ["do", "hba", "ssa"])
+    app.session.settings.set("iterations", 5000)
     app.session.settings.set_fault(0, 0.3)
     app.tab(IdentifyTab).panel.show_settings()
     show(page, "Identify")
@@ -203,7 +203,7 @@ def test_stop_ends_several_searches_at_once_even_while_they_rest(page, app):
     page.get_by_role("button", name="Identify", exact=True).click()
     page.get_by_text("of 5000").first.wait_for()
     page.get_by_role("button", name="Pause the search").click()
-    wait_until(lambda: app.session.reins.paused)
+    wait_until(lambda: app.session.identifying.job.paused)
     page.get_by_role("button", name="Stop", exact=True).first.click()
     wait_until(lambda: not app.session.worker.busy)
     page.get_by_role("link", name="in Rerun").wait_for()
@@ -214,9 +214,9 @@ def test_stop_ends_several_searches_at_once_even_while_they_rest(page, app):
 
 
 def test_the_search_is_looked_at_from_all_sides_and_its_landscape_drawn(page, app):
-    app.session.settings.set_algorithms(["robust", "do"])
-    app.session.settings.set_population(20)
-    app.session.settings.set_iterations(12)
+    app.session.settings.set("algorithms", ["robust", "do"])
+    app.session.settings.set("population", 20)
+    app.session.settings.set("iterations", 12)
     app.session.settings.set_fault(0, 0.3)
     app.session.settings.set_fault(5, 0.4)
     app.tab(IdentifyTab).panel.show_settings()
@@ -277,9 +277,9 @@ def test_a_landscape_is_stopped(page, app, monkeypatch):
 def test_what_does_not_fit_is_taken_to_discover(page, app):
     settings = app.session.settings
     settings.set_effect("cogging_torque", "amplitude_Nm", 0.02)
-    settings.set_algorithms(["robust"])
-    settings.set_population(10)
-    settings.set_iterations(10)
+    settings.set("algorithms", ["robust"])
+    settings.set("population", 10)
+    settings.set("iterations", 10)
     app.tab(IdentifyTab).panel.show_settings()
     show(page, "Identify")
     race = raced(app, page)
@@ -337,8 +337,8 @@ def test_a_recording_is_chosen_and_watched_while_it_grows(page, app):
         "[...document.querySelectorAll('.js-plotly-plot')].some(p => JSON.stringify(p.layout).includes('rad/s'))"
     )
 
-    session.settings.set_algorithms(["hba"])
-    session.settings.set_iterations(5000)
+    session.settings.set("algorithms", ["hba"])
+    session.settings.set("iterations", 5000)
     app.tab(IdentifyTab).panel.show_settings()
     show(page, "Identify")
     page.get_by_role("button", name="Identify", exact=True).click()

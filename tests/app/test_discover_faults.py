@@ -16,7 +16,7 @@ from ema_model.discovery.words import faults, headline, sentences
 from ema_model.errors import InputError
 from emaviz.page.discover.result import answer
 from emaviz.page.discover.reveal import agrees, reveal
-from emaviz.session.discover.record import checked
+from emaviz.session.discover.saved_story import story_of
 
 
 @pytest.fixture(scope="module")
@@ -96,4 +96,4 @@ def test_a_session_keeps_the_fault_and_undo_takes_it_back(rig, worn):
 @pytest.mark.parametrize("bad", [7, ["k9"], ["k2", "k2"], [["k2"]], "k2"])
 def test_damaged_faults_of_a_session_are_refused(bad):
     with pytest.raises(InputError, match="damaged"):
-        checked([{"model": "", "starts": {}, "faults": bad}])
+        story_of({"recipe": {}, "steps": [{"model": "", "starts": {}, "faults": bad}]})

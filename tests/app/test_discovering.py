@@ -92,12 +92,12 @@ def test_a_stopped_step_leaves_the_model_as_it_was(fresh):
     assert fresh.add("stribeck_friction")
     with pytest.raises(InputError, match="a step is running"):
         fresh.undo()
-    fresh.stop()
+    fresh.job.stop()
     wait_until(lambda: told)
     assert told[-1].startswith("Stopped") and not fresh.running
     assert fresh.look is before
     assert fresh.start(), "another step can begin"
-    fresh.stop()
+    fresh.job.stop()
     wait_until(lambda: not fresh.running)
 
 

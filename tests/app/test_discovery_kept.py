@@ -78,7 +78,7 @@ def test_what_was_sealed_in_explore_is_found_and_revealed(solved):
 @pytest.mark.long
 def test_a_session_keeps_the_ladder(rigs, solved):
     there = rigs[1]
-    solved.discovering._told.experiment = Experiment(
+    solved.discovering._shown.told.experiment = Experiment(
         "sine", {"frequency_Hz": 2.0}, 1.0, 5.0, None, ("cogging_torque", "torque_ripple"), 80.0
     )
     solved.discovering.source.reveal()
@@ -92,7 +92,7 @@ def test_a_session_keeps_the_ladder(rigs, solved):
     assert not there.told
     then = solved.discovering.saved()
     assert kept["steps"] == then["steps"] and kept["revealed"]
-    assert there.discovering.saved()["revealed"] and there.discovering._restoring is None
+    assert there.discovering.saved()["revealed"] and there.discovering._stories._again is None
     after = there.discovering.look
     for (label, rmse, held), (again, same, same_held) in zip(ladder(solved), ladder(there), strict=True):
         assert again == label
@@ -200,6 +200,6 @@ def test_faults_are_part_of_what_is_hidden():
     assert truth.faults == {"k2": 0.25, "k3": 0.1} and np.allclose(truth.k, settings.k)
     assert "backlash" in truth.answer and "phase A" in truth.answer
     assert sensors_of(settings).current_noise_A == 0.45, "no rig is perfect"
-    settings.set_noise(0.1)
+    settings.set("current_noise_A", 0.1)
     assert sensors_of(settings).current_noise_A == 0.1 and sensors_of(settings).encoder_bits == 12
     assert "Nothing is hidden" in truth_of(Settings(), load_actuator(), 3).answer

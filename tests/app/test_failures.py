@@ -24,8 +24,8 @@ LOST = "rerun was hidden by this test"
 @pytest.fixture
 def session(tmp_path):
     session = Session(load_actuator(), tmp_path)
-    session.settings.set_algorithm("do")
-    session.settings.set_iterations(5)
+    session.settings.set("algorithms", ["do"])
+    session.settings.set("iterations", 5)
     session.start()
     assert session.ready.wait(120.0)
     yield session
@@ -35,7 +35,7 @@ def session(tmp_path):
 def identified(session, seconds=60.0):
     done, races, told = threading.Event(), [], []
     session.events.told.connect(lambda title, text: told.append((title, text)))
-    session.events.identified.connect(lambda race: (races.append(race), done.set()))
+    session.identifying.identified.connect(lambda race: (races.append(race), done.set()))
     assert session.identify()
     assert done.wait(seconds)
     return races[-1], told
@@ -78,8 +78,8 @@ def test_a_disk_that_fills_while_recording_is_told_and_the_answer_stays(session,
             begun.set()
             monkeypatch.setattr(paths.shutil, "disk_usage", lambda _: Usage(10**9, 10**9, 10**6))
 
-    session.settings.set_iterations(150)
-    session.events.progressed.connect(fill)
+    session.settings.set("iterations", 150)
+    session.identifying.progressed.connect(fill)
     race, told = identified(session)
     assert race.path is None and race.best.answer.error_percent < 5.0
     assert len(told) == 1 and "1 MB free; free some space" in told[0][1] and "\n" not in told[0][1]
@@ -97,15 +97,15 @@ def test_a_disk_that_is_full_at_the_start_is_told(session, monkeypatch):
 def test_a_source_that_is_gone_is_told_and_frees_the_worker(session):
     told, ended = [], threading.Event()
     session.events.told.connect(lambda title, text: told.append(text))
-    session.events.ended.connect(ended.set)
-    session.settings.set_source("uploads/none.csv")
+    session.identifying.job.ended.connect(lambda _: ended.set())
+    session.settings.set("source", "uploads/none.csv")
     assert session.identify()
     assert ended.wait(10.0)
     end = time.monotonic() + 5.0
     while not told and time.monotonic() < end:
         time.sleep(0.01)
     assert "none.csv" in told[0] and not session.worker.busy
-    session.settings.set_source("")
+    session.settings.set("source", "")
     assert identified(session)[0].best is not None
 
 
@@ -127,10 +127,10 @@ def test_a_viewer_without_a_port_is_told_and_a_browser_that_leaves_ends_nothing(
         page = browser.new_page(viewport={"width": 1400, "height": 900})
         page.goto(app.address)
         page.get_by_text("The Rerun viewer cannot be shown").wait_for(timeout=60_000)
-        app.session.settings.set_algorithm("hba")
-        app.session.settings.set_iterations(100)
+        app.session.settings.set("algorithms", ["hba"])
+        app.session.settings.set("iterations", 100)
         done = threading.Event()
-        app.session.events.identified.connect(lambda race: done.set())
+        app.session.identifying.identified.connect(lambda race: done.set())
         page.get_by_role("tab", name="Identify").click()
         page.get_by_role("button", name="Identify", exact=True).click()
         end = time.monotonic() + 30.0

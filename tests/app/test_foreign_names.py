@@ -70,7 +70,7 @@ def test_compare(page, app, name):
     wait_until(lambda: MARKDOWN in app.comparing.actuator_name)
     page.get_by_role("button", name="Remove", exact=True).click()
     wait_until(lambda: not app.comparing.opened)
-    app.comparing.events.ended(f"{name}.csv: has no current")
+    app.comparing.job.ended(f"{name}.csv: has no current")
     seen(page, f"{name}.csv: has no current")
 
 

@@ -251,7 +251,7 @@ def test_ten_thousand_random_messages_from_five_pages_and_as_many_handshakes(app
         with RawPage(app.server.get_port(), camera=False) as page:
             handshakes += page.drawn.wait(30.0)
     assert sent["control"] >= 10_000 and sent["pages that stayed"] == 5 and handshakes == 60
-    app.session.stop()
+    app.session.identifying.job.stop()
     lives(app, controls, raw, marker)
     error = capfd.readouterr().err
     with capfd.disabled():

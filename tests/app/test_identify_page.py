@@ -21,7 +21,7 @@ from ema_model.simulation.sensors import Sensors
 from emaviz.figures import swarm
 from emaviz.figures.identified_table import Row, table
 from emaviz.page.identify.swarm import at_iteration, telling
-from emaviz.session.race import MOST_FRAMES, Reins, Track
+from emaviz.session.identify.race import MOST_FRAMES, Track
 from emaviz.session.session import Session
 from emaviz.session.settings import Settings
 
@@ -42,19 +42,19 @@ def session(tmp_path_factory):
 
 
 def raced(session, algorithms, seconds=120.0):
-    session.settings.set_algorithms(algorithms)
+    session.settings.set("algorithms", algorithms)
     done, races = threading.Event(), []
 
     def keep(race):
         races.append(race)
         done.set()
 
-    session.events.identified.connect(keep)
+    session.identifying.identified.connect(keep)
     try:
         assert session.identify()
         assert done.wait(seconds)
     finally:
-        session.events.identified.disconnect(keep)
+        session.identifying.identified.disconnect(keep)
     wait_until(lambda: not session.worker.busy)
     return races[0]
 
@@ -66,7 +66,7 @@ def raced(session, algorithms, seconds=120.0):
 def test_a_race_gives_each_optimiser_the_answer_that_it_finds_alone(session):
     session.settings.restore(Settings().saved())
     session.settings.set_fault(0, 0.3)
-    session.settings.set_iterations(40)
+    session.settings.set("iterations", 40)
     race = raced(session, ["hba", "do"])
     assert list(race.tracks) == ["do", "hba"] and len(race.answers) == 2
     for name in ("do", "hba"):
@@ -81,7 +81,7 @@ def test_a_race_gives_each_optimiser_the_answer_that_it_finds_alone(session):
 
 
 def test_the_overlay_is_the_answers_own_current(session):
-    session.settings.set_iterations(30)
+    session.settings.set("iterations", 30)
     race = raced(session, ["do"])
     track = race.tracks["do"]
     assert track.current_A.shape == race.measured_A.shape == race.time_s.shape
@@ -91,28 +91,28 @@ def test_the_overlay_is_the_answers_own_current(session):
 
 
 def test_a_pause_stops_the_search_while_sliders_are_answered(session):
-    session.settings.set_iterations(400)
-    session.settings.set_algorithms(["hba"])
+    session.settings.set("iterations", 400)
+    session.settings.set("algorithms", ["hba"])
     races, drawn = [], []
-    session.events.progressed.connect(races.append)
+    session.identifying.progressed.connect(races.append)
     session.events.simulated.connect(drawn.append)
     try:
         assert session.identify()
         wait_until(lambda: races)
-        session.pause(True)
+        session.identifying.job.pause(True)
         time.sleep(0.4)
         at, seen = len(races), len(drawn)
         session.refresh()
         wait_until(lambda: len(drawn) > seen)
-        assert len(races) == at and session.worker.busy and session.reins.paused
-        session.pause(False)
+        assert len(races) == at and session.worker.busy and session.identifying.job.paused
+        session.identifying.job.pause(False)
         wait_until(lambda: len(races) > at)
-        session.pause(True)
-        session.stop()  # also ends one that rests
+        session.identifying.job.pause(True)
+        session.identifying.job.stop()  # also ends one that rests
         wait_until(lambda: not session.worker.busy)
         assert races[0].answers[0].stopped
     finally:
-        session.events.progressed.disconnect(races.append)
+        session.identifying.progressed.disconnect(races.append)
         session.events.simulated.disconnect(drawn.append)
 
 
@@ -122,23 +122,23 @@ def test_a_file_is_identified_without_a_truth(session, tmp_path):
     write_measurement(Sensors(0.05, 0).record(plant, 1), path)
     session.open_file = lambda name: read_measurement(tmp_path / name)
     session.settings.restore(Settings().saved())
-    session.settings.set_source("bench.csv")
+    session.settings.set("source", "bench.csv")
     monitor = session.settings.monitor
     race = raced(session, ["robust"])
     answer = race.best.answer
     assert race.truth is None and answer.error_percent is None and race.source == "bench.csv"
     assert answer.k[0] == pytest.approx(0.4, abs=0.05)
     assert session.settings.monitor == monitor, "a file's faults are not those of the sliders' plant"
-    session.settings.set_source("")
+    session.settings.set("source", "")
 
 
 def test_what_cannot_be_chosen_is_refused():
     settings = Settings()
     for value in ([], ["none"], "hba", None, [7]):
         with pytest.raises(InputError):
-            settings.set_algorithms(value)
+            settings.set("algorithms", value)
     assert settings.algorithms == Settings().algorithms
-    settings.set_algorithms(list(ALGORITHMS)[::-1])
+    settings.set("algorithms", list(ALGORITHMS)[::-1])
     assert settings.algorithms == tuple(ALGORITHMS)
 
 
@@ -170,16 +170,6 @@ def test_a_swarm_is_drawn_where_it_is():
     assert "M44.0 294.0h0M446.0 10.0h0" in plane and 'cx="245.0" cy="152.0"' in plane and "<polyline" in plane
     lines = swarm.lines([one], np.full(8, 0.25))
     assert lines.count("<path") == 8 + 3 and "M44 286.0" in lines
-
-
-def test_reins_wait_only_while_they_are_held():
-    reins = Reins()
-    assert list(reins.wait()) == [] and not reins.paused
-    reins.pause(True)
-    waiting = reins.wait()
-    next(waiting)
-    reins.stop()
-    assert list(waiting) == [] and reins.stopping and not reins.paused
 
 
 def test_the_table_escapes_names_and_shows_what_is_unknown():
@@ -215,7 +205,7 @@ def test_a_race_is_watched_paused_and_looked_back_at(page, app):
     page.get_by_role("button", name="Identify", exact=True).click()
     page.get_by_text("of 60").first.wait_for(timeout=60_000)
     page.get_by_role("button", name="Pause the search").click()
-    wait_until(lambda: app.session.reins.paused)
+    wait_until(lambda: app.session.identifying.job.paused)
     page.wait_for_timeout(600)
     before = page.evaluate(CHART, "Convergence")
     page.wait_for_timeout(600)

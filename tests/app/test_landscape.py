@@ -12,6 +12,7 @@ from ema_model.errors import InputError
 from ema_model.faults import HEALTHY, vector
 from ema_model.identification.landscape import Landscape, Way, extent, slices, ways
 from ema_model.identification.next_experiment import Suggestion
+from ema_model.identification.words import landscape_words, way_sentences
 from ema_model.simulation.words import run_in_words
 from emaviz.figures import landscape as figures
 from emaviz.text.identification import sure_words
@@ -74,7 +75,7 @@ def test_a_trap_has_a_ridge_before_the_answer():
     far[1], near[0] = 0.9, 0.8
     found = ways(bowl, {"ssa": far, "do": near, "hba": TRUTH}, TRUTH)
     assert found["ssa"].is_trap and not found["do"].is_trap and found["do"].is_worse and not found["hba"].is_worse
-    first, second, third = figures.sentences(found)
+    first, second, third = way_sentences(found)
     assert "trap" in first and "had not settled" in second and "ended at the answer" in third
 
 
@@ -100,6 +101,9 @@ def test_the_map_has_units_marks_and_a_box():
     assert [trace.name for trace in drawn.data[1:]] == ["Dandelion ended", "truth", "answer, 90 %"]
     (box,) = drawn.layout.shapes
     assert (box.x0, box.x1, box.y0, box.y1) == pytest.approx((0.25, 0.35, 0.35, 0.45))
+    assert landscape_words(found).startswith("Held: k2 0.000, k3 0.000, k4 0.000, k5 0.000, k7 0.500, k8 0.500. From ")
+    half = whole(TRUTH, 0, 5, points=9)[1]
+    assert landscape_words(half).startswith("Stopped at 44 %. Held: k2")
     empty = Landscape(0, 5, TRUTH, np.linspace(0, 1, 3), np.linspace(0, 1, 3), np.full((3, 3), np.nan), 0)
     figures.figure(empty, figures.Marks(TRUTH))
 
@@ -145,4 +149,5 @@ def test_what_cannot_be_told_apart_is_named_with_what_would():
     assert "a step with final 0.005 rad" in said
     assert "Healthy" in sure_words(answer(healthy=True)) and sure_words(None) == ""
     misfit = sure_words(answer(adequate=False, warnings=("The model <b>does not</b> fit.",)))
+    assert "The model does not fit" in misfit
     assert "does not fit" in misfit and "<b>does not</b>" not in misfit

@@ -106,7 +106,7 @@ def test_identify_runs_ends_and_is_recorded(new_page, app):
     assert len(recordings) == 1
     recording = read(recordings[0])
     found = recording.identification["do"]
-    assert np.allclose(found.best[-1], app.session.identified.k)
+    assert np.allclose(found.best[-1], app.session.identifying.answer.k)
     assert abs(found.best[-1][0] - 0.25) < 0.02
     assert recording.truth[0] == pytest.approx(0.25)
 
@@ -123,9 +123,9 @@ def test_stop_is_quick_and_keeps_the_result(page, app):
     wait_until(lambda: app.session.worker.busy)
     page.get_by_text("of 5000").wait_for(timeout=30_000)
     page.get_by_role("button", name="Stop").click()
-    page.get_by_text("stopped").wait_for(timeout=30_000)
+    page.get_by_text("stopped ·").wait_for(timeout=30_000)
     assert not app.session.worker.busy
-    assert app.session.identified.stopped
+    assert app.session.identifying.answer.stopped
     page.get_by_label("Iterations", exact=True).fill("150")
     page.get_by_label("Iterations", exact=True).press("Enter")
     wait_until(lambda: app.session.settings.iterations == 150)
@@ -143,7 +143,7 @@ def test_sliders_answer_while_an_identification_runs(page, app):
     set_slider(page, "k3", 0.6)
     wait_until(lambda: not np.array_equal(chart(page, "Equivalent current"), before))
     assert app.session.worker.busy
-    app.session.stop()
+    app.session.identifying.job.stop()
     wait_until(lambda: not app.session.worker.busy)
 
 

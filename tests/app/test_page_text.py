@@ -104,7 +104,7 @@ def test_recordings_on_compare_and_what_is_said_of_them(app, name):
         check(app, f"{kind}{name}.csv")
     check(app, f"{name} of a column")
     wait_until(lambda: not app.comparing.running)  # whose end is said in the same place
-    app.comparing.events.ended(f"{name}.csv: line 1, column {name}: is wrong")
+    app.comparing.job.ended(f"{name}.csv: line 1, column {name}: is wrong")
     check(app, f"{name}.csv: line 1, column {name}: is wrong")
     app.discovering.job.ended(f"{name}.csv: cannot be used")
     check(app, f"{name}.csv: cannot be used")

@@ -61,13 +61,13 @@ def test_a_session_of_either_starts_and_tells_no_failure(name, tmp_path):
     told, shown, ended = [], [], threading.Event()
     session.events.told.connect(lambda title, text: told.append(f"{title}: {text}"))
     session.events.simulated.connect(shown.append)
-    session.events.ended.connect(ended.set)
+    session.identifying.job.ended.connect(lambda _: ended.set())
     session.start()
     try:
         assert session.ready.wait(120.0)
         session.settings.set_fault(0, 0.5)
-        session.settings.set_iterations(3)
-        session.settings.set_population(8)
+        session.settings.set("iterations", 3)
+        session.settings.set("population", 8)
         session.refresh()
         if name == SERVO:
             wait_until(lambda: len(shown) > 1)
@@ -75,7 +75,7 @@ def test_a_session_of_either_starts_and_tells_no_failure(name, tmp_path):
         assert session.identify() and ended.wait(60.0)
         wait_until(lambda: not session.worker.busy)
         if name == SERVO:
-            assert told == [] and session.identified is not None
+            assert told == [] and session.identifying.answer is not None
         else:
             wait_until(lambda: told)
             assert len(told) == 1 and "cannot be explored" in told[0] and not shown

@@ -28,10 +28,10 @@ def identify(session, seconds=60.0):
         races.append(race)
         done.set()
 
-    session.events.identified.connect(keep)
+    session.identifying.identified.connect(keep)
     assert session.identify()
     assert done.wait(seconds)
-    session.events.identified.disconnect(keep)
+    session.identifying.identified.disconnect(keep)
     wait_until(lambda: not session.worker.busy)
     return races[0]
 
@@ -42,12 +42,12 @@ def races(tmp_path_factory):
     session = Session(load_actuator(), tmp_path_factory.mktemp("recordings"))
     session.start()
     assert session.ready.wait(120.0)
-    session.settings.set_iterations(12)
+    session.settings.set("iterations", 12)
     session.settings.set_fault(0, 0.2)
-    session.settings.set_algorithms(["do", "hba"])
+    session.settings.set("algorithms", ["do", "hba"])
     first = identify(session)
     session.settings.set_fault(0, 0.6)
-    session.settings.set_algorithms(["do"])
+    session.settings.set("algorithms", ["do"])
     second = identify(session)
     yield first, second
     session.close()
@@ -194,8 +194,8 @@ def test_closing_the_host_ends_what_follows_a_recording(tmp_path):
 @pytest.mark.browser
 def test_recordings_are_opened_compared_renamed_and_deleted(watched, app):
     page, session = watched, app.session
-    session.settings.set_iterations(8)
-    session.settings.set_algorithms(["do"])
+    session.settings.set("iterations", 8)
+    session.settings.set("algorithms", ["do"])
     first = identify(session).path
     session.settings.set_fault(1, 0.5)
     second = identify(session).path

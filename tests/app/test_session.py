@@ -28,7 +28,7 @@ def session(tmp_path):
 def identified(session, seconds=60.0):
     """Starts an identification and waits for its answer and path."""
     done, result = threading.Event(), []
-    session.events.identified.connect(lambda race: (result.append((race.best.answer, race.path)), done.set()))
+    session.identifying.identified.connect(lambda race: (result.append((race.best.answer, race.path)), done.set()))
     assert session.identify()
     assert done.wait(seconds)
     return result[-1]
@@ -36,7 +36,7 @@ def identified(session, seconds=60.0):
 
 def test_an_identification_is_recorded_and_drawn(session):
     session.settings.set_fault(2, 0.3)
-    session.settings.set_algorithm("do")
+    session.settings.set("algorithms", ["do"])
     answer, path = identified(session)
     assert answer.error_percent < 1.0
     recording = read(path)
@@ -60,20 +60,20 @@ def test_only_one_identification_runs_however_often_it_is_asked(session):
     for thread in threads:
         thread.join()
     assert sum(started) == 1
-    session.stop()
+    session.identifying.job.stop()
 
 
 def test_stop_keeps_the_best_so_far(session):
-    session.settings.set_iterations(5000)
-    session.settings.set_algorithm("hba")
+    session.settings.set("iterations", 5000)
+    session.settings.set("algorithms", ["hba"])
     done, result = threading.Event(), []
-    session.events.identified.connect(lambda race: (result.append(race.best.answer), done.set()))
+    session.identifying.identified.connect(lambda race: (result.append(race.best.answer), done.set()))
     begun = threading.Event()
-    session.events.progressed.connect(lambda race: begun.set())
+    session.identifying.progressed.connect(lambda race: begun.set())
     assert session.identify()
     assert begun.wait(30.0)
     asked = time.perf_counter()
-    session.stop()
+    session.identifying.job.stop()
     assert done.wait(10.0)
     print(f"stop took {1e3 * (time.perf_counter() - asked):.0f} ms")
     assert result[0].stopped and len(result[0].rmse_history) < 5001

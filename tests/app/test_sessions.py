@@ -16,8 +16,13 @@ from ema_model.errors import InputError
 from ema_model.faults import HEALTHY
 from ema_model.recordings import write_measurement
 from ema_model.simulation.run import Run, simulate_reference
+from emaviz.figures.identified_table import Row
+from emaviz.page.compare.kept import Asked
+from emaviz.page.playback import Looks
 from emaviz.session import saved as session_file
 from emaviz.session.data_folder import DataFolder
+from emaviz.session.described import taken
+from emaviz.session.discover.saved_story import SavedStory
 from emaviz.session.saved import Part
 from emaviz.session.settings import Settings
 
@@ -26,36 +31,35 @@ def changed_settings():
     settings = Settings()
     for index, value in enumerate((0.1, 0.2, 0.3, 0.0, 0.05, 0.4, 0.6, 0.7)):
         settings.set_fault(index, value)
-    settings.set_command("multisine")
+    settings.set("command", "multisine")
     settings.set_command_setting("multisine", "frequencies_Hz", "1+3")
     settings.set_command_setting("chirp", "end_Hz", 20.0)
-    settings.set_duration(0.3)
-    settings.set_load(4.0)
-    settings.set_noise(0.25)
-    settings.set_encoder(12)
-    settings.set_start_offset(0.01)
-    settings.set_start_speed(5.0)
-    settings.set_start_side(-0.5)
+    settings.set("duration_s", 0.3)
+    settings.set("load_torque_Nm", 4.0)
+    settings.set("current_noise_A", 0.25)
+    settings.set("encoder_bits", 12)
+    settings.set("start_offset_rad", 0.01)
+    settings.set("start_speed_rad_s", 5.0)
+    settings.set("start_side", -0.5)
     settings.set_effect("cogging_torque", "amplitude_Nm", 0.012)
-    settings.set_monitor("same faults")
-    settings.set_source("uploads/a.csv")
-    settings.set_algorithms(["do", "robust"])
-    settings.set_population(20)
-    settings.set_iterations(33)
-    settings.set_fitness("raw")
-    settings.set_seed(9)
+    settings.set("monitor", "same faults")
+    settings.set("source", "uploads/a.csv")
+    settings.set("algorithms", ["do", "robust"])
+    settings.set("population", 20)
+    settings.set("iterations", 33)
+    settings.set("fitness", "raw")
+    settings.set("seed", 9)
     return settings
 
 
 def test_settings_survive_json_and_nothing_is_left_out():
     settings, fresh = changed_settings(), Settings()
-    unchanged = [name for name in vars(fresh) if np.all(getattr(settings, name) == getattr(fresh, name))]
-    unchanged.remove("axes")  # the actuator's
+    unchanged = [name for name, value in fresh.saved().items() if settings.saved()[name] == value]
     assert not unchanged, "the test changes every setting"
     back = Settings()
     back.restore(json.loads(json.dumps(settings.saved())))
-    assert np.array_equal(back.k, settings.k)
-    assert {n: v for n, v in vars(back).items() if n != "k"} == {n: v for n, v in vars(settings).items() if n != "k"}
+    assert np.array_equal(back.k, settings.k) and back.algorithms == settings.algorithms
+    assert back.saved() == settings.saved() and set(back.saved()) == {*Settings.__struct_fields__} - {"axes"}
 
 
 @pytest.mark.parametrize(
@@ -84,6 +88,45 @@ def test_damaged_settings_are_refused_and_change_nothing(damage):
     with pytest.raises(InputError) as told:
         settings.restore(damage)
     assert "\n" not in str(told.value) and json.dumps(settings.saved()) == before
+
+
+@pytest.mark.parametrize(
+    ("kind", "saved", "line"),
+    [
+        (
+            Asked,
+            {"files": "a.csv"},
+            "Expected `array`, got `str` - at `$.files`",
+        ),
+        (Asked, {}, "Object missing required field `files`"),
+        (
+            Looks,
+            {"opacity": "dark"},
+            "Expected `float`, got `str` - at `$.opacity`",
+        ),
+        (
+            Looks,
+            {"opacity": 2.0},
+            "Expected `float` <= 1.0 - at `$.opacity`",
+        ),
+        (
+            list[Row],
+            [{"race": "x"}],
+            "Expected `int`, got `str` - at `$[0].race`",
+        ),
+        (
+            SavedStory,
+            {"recipe": {"window_s": [0.0, math.inf]}, "steps": []},
+            "a window has",
+        ),
+        (SavedStory, {"recipe": {}, "steps": [{"model": "", "starts": {"x": 1e9}}]}, ""),
+    ],
+)
+def test_what_a_part_of_a_session_lacks_is_said_in_one_line_with_its_place(kind, saved, line):
+    with pytest.raises(InputError) as told:
+        taken(kind, saved, "part")
+    said = str(told.value)
+    assert said.startswith(f"the session's part is damaged ({line}") and said.endswith("); save it anew")
 
 
 @pytest.fixture

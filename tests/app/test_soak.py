@@ -27,7 +27,7 @@ def one_round(app, page, number, done):
         session.settings.set_fault(int(rng.integers(8)), rng.random())
         session.refresh()
         time.sleep(0.02)
-    session.settings.set_seed(number)
+    session.settings.set("seed", number)
     done.clear()
     assert session.identify()
     assert done.wait(60.0), "an identification did not end"
@@ -52,11 +52,11 @@ def soak(browser, folder, capfd, rounds, iterations, seconds):
         page.on("pageerror", lambda error: faults.append(str(error)))
         page.goto(app.address)
         page.get_by_role("tab", name="Explore").wait_for(timeout=60_000)
-        app.session.settings.set_algorithms(["do", "hba"])
-        app.session.settings.set_population(20)
-        app.session.settings.set_iterations(iterations)
+        app.session.settings.set("algorithms", ["do", "hba"])
+        app.session.settings.set("population", 20)
+        app.session.settings.set("iterations", iterations)
         done = threading.Event()
-        app.session.events.identified.connect(lambda race: done.set())
+        app.session.identifying.identified.connect(lambda race: done.set())
         process, end = psutil.Process(), time.monotonic() + seconds
         for number in range(rounds):
             one_round(app, page, number, done)

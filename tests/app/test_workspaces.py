@@ -131,7 +131,7 @@ def test_compare_leads_on_to_identify_and_discover(tab, app, compared):
     tab.get_by_role("button", name="Identify faults").click()
     tab.get_by_role("tab", name="Search", exact=True).wait_for()
     assert app.session.settings.source == next(iter(app.comparing.opened))
-    app.session.settings.set_source("")
+    app.session.settings.set("source", "")
     go(tab, "Compare")
     tab.get_by_role("button", name="Find what is missing").click()
     tab.get_by_role("tab", name="Discovery", exact=True).wait_for()
@@ -172,19 +172,21 @@ def test_explore_says_its_model_and_keeps_it(tab, app):
     tab.get_by_text("model: healthy").wait_for()
     session = app.session
     session.choose_plant(next(iter(session.plants)))
-    session.settings.set_algorithms(["robust"])
-    session.settings.set_iterations(30)
+    session.settings.set("algorithms", ["robust"])
+    session.settings.set("iterations", 30)
     went_on = []
-    session.events.progressed.connect(lambda race: went_on.extend(t.fitting for t in race.tracks.values() if t.fitting))
+    session.identifying.progressed.connect(
+        lambda race: went_on.extend(t.fitting for t in race.tracks.values() if t.fitting)
+    )
     assert session.identify()
-    wait_until(lambda: session.identified is not None and not session.worker.busy)
+    wait_until(lambda: session.identifying.answer is not None and not session.worker.busy)
     assert session.settings.monitor == "healthy" and session.simulation.model == "healthy"
     tab.get_by_text("model: healthy").wait_for()
     shares = [share for _, share in went_on]
     assert any("model bias" in text for text, _ in went_on) and shares == sorted(shares) and shares[-1] == 1.0
-    session.settings.set_monitor("identified")
+    session.settings.set("monitor", "identified")
     session.refresh()
-    tab.get_by_text(f"model: identified {session.identified_at:%H:%M}").wait_for()
+    tab.get_by_text(f"model: identified {session.identifying.answered_at:%H:%M}").wait_for()
 
 
 @pytest.mark.long
@@ -194,7 +196,7 @@ def test_identify_answers_in_physical_units(tab, app):
     tab.get_by_text("no fault seen (k3 <").wait_for()
     tab.get_by_text("no fault seen (gain ×").wait_for()
     assert tab.locator("[data-dock-region=right]").get_by_text("of turns").count() == 0
-    limits = app.session.identified.uncertainty.detectable
+    limits = app.session.identifying.answer.uncertainty.detectable
     assert np.all(limits[[0, 2, 7]] > 0.0) and np.isnan(limits[6])
 
 

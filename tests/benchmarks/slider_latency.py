@@ -81,8 +81,8 @@ def main() -> None:
         me, browser = [psutil.Process()], psutil.Process().children(recursive=True)
         for what, busy in (("idle", False), ("with an identification running", True)):
             if busy:
-                app.session.settings.set_iterations(5000)
-                app.session.settings.set_algorithms(["hba"])
+                app.session.settings.set("iterations", 5000)
+                app.session.settings.set("algorithms", ["hba"])
                 app.session.identify()
             times = []
             for _ in range(PRESSES):
@@ -99,7 +99,7 @@ def main() -> None:
                 f"dragging, {what}: {redraws / elapsed:.1f} redraws/s, {frames / elapsed:.0f} frames/s; processor time "
                 f"each: app {1e3 * ours / max(redraws, 1):.0f} ms, browser {1e3 * its / max(redraws, 1):.0f} ms"
             )
-            app.session.stop()
+            app.session.identifying.job.stop()
         print(f"load of this machine: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
         chromium.close()
         app.close()

@@ -149,9 +149,9 @@ def test_names_that_the_model_does_not_know(text):
 def test_what_a_browser_and_a_session_send(tmp_path, text):
     settings, folder = Settings(), DataFolder(tmp_path)
     for change in (
-        lambda: settings.set_duration(text),
-        lambda: settings.set_monitor(text),
-        lambda: settings.set_algorithms([text]),
+        lambda: settings.set("duration_s", text),
+        lambda: settings.set("monitor", text),
+        lambda: settings.set("algorithms", [text]),
         lambda: settings.set_effect(text, text, 1.0),
         lambda: settings.restore({"effects": {text: {text: text}}}),
         lambda: settings.restore({"command_settings": {"chirp": {text: 1}}}),

@@ -26,7 +26,7 @@ from ema_model.recordings.health.card import health
 from ema_model.recordings.prepared import prepared
 from ema_model.simulation.run import Run, _finite
 from ema_model.simulation.words import run_in_words
-from emaviz.cli.options import effects_of
+from emaviz.cli.given import effects_of
 from emaviz.figures.signals import charts
 
 PROJECT = Path(__file__).parents[2]

@@ -1,6 +1,6 @@
 """CSV: a header line, then numbers; commas, semicolons or tabs between them.
 
-A file of another layout, as instruments write it, is read by `text_table`.  A plain one is read at full speed.  Only
+A file of another layout, as instruments write it, is read by `text_columns`.  A plain one is read at full speed.  Only
 when that fails it is read again in blocks, and the one that fails is walked line by line, to name the bad cell.
 """
 
@@ -21,8 +21,9 @@ from ema_model.errors import quoted
 from ema_model.files.limits import LINE_BYTES, megabytes
 from ema_model.files.refusal import listed, refusal, shown
 from ema_model.recordings.formats.format import Array, Columns, Format, check_size
+from ema_model.recordings.formats.text_columns import read_leaving_out, read_table
 from ema_model.recordings.formats.text_layout import Head, Hints, find_layout, read_head, split
-from ema_model.recordings.formats.text_table import TextTable, read_leaving_out, read_table, table_of
+from ema_model.recordings.formats.text_table import TextTable, table_of
 
 _HEAD_BYTES = 65_536
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)(e[+-]?[0-9]+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE)

@@ -7,7 +7,7 @@ import argparse
 from ema_model.actuator import save_actuator
 from ema_model.comparison import Comparison, as_dict, compare
 from ema_model.errors import InputError
-from emaviz.cli import files, options, output
+from emaviz.cli import files, given, options, output
 
 HELP = "show where the model fails beside recordings"
 PLACE = 4
@@ -38,20 +38,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Reads, compares, writes and prints."""
-    actuator = options.actuator_of(arguments)
+    actuator = given.actuator_of(arguments)
     if arguments.save_actuator and not arguments.calibrate:
         raise InputError("--save-actuator writes what the calibration found; leave --no-calibrate out")
     progress = output.Progress()
     try:
-        measurements, held = options.read_set(arguments, actuator, progress)
+        measurements, held = given.read_set(arguments, actuator, progress)
         result = compare(
             measurements,
             actuator,
-            k=options.faults_of(arguments, actuator.faults),
-            effects=options.effects_of(arguments, actuator.axes),
+            k=given.faults_of(arguments, actuator.faults),
+            effects=given.effects_of(arguments, actuator.axes),
             calibrate=arguments.calibrate,
             free=arguments.free,
-            signals=options.weights_of(arguments.signals),
+            signals=given.weights_of(arguments.signals),
             holdout=held,
             on_progress=progress.show,
         )

@@ -8,7 +8,7 @@ from ema_model.actuator import save_actuator
 from ema_model.comparison.summary import plain
 from ema_model.discovery import Discovery, as_dict, discover, verified
 from ema_model.discovery.words import verification
-from emaviz.cli import files, options, output
+from emaviz.cli import files, given, options, output
 from emaviz.cli.numbers import whole
 
 HELP = "find the physical effects that the model lacks, and add them"
@@ -28,10 +28,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Reads, discovers, writes and prints."""
-    actuator = options.actuator_of(arguments)
+    actuator = given.actuator_of(arguments)
     progress = output.Progress()
     try:
-        fitted, held = options.read_set(arguments, actuator, progress)
+        fitted, held = given.read_set(arguments, actuator, progress)
         found = discover(
             fitted,
             actuator,

@@ -20,7 +20,7 @@ from ema_model.quantities.numbers import amount
 from ema_model.recordings import Measurement
 from ema_model.simulation.plant import FITNESSES, simulated
 from ema_model.simulation.sensors import Sensors
-from emaviz.cli import files, options, output
+from emaviz.cli import files, given, options, output
 from emaviz.cli.numbers import whole
 
 HELP = "find the faults k1 … k8 of recordings, or of a simulated actuator"
@@ -48,10 +48,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Fits, records and prints."""
-    actuator = options.actuator_of(arguments)
-    for name, settings in options.effects_of(arguments, actuator.axes).items():
+    actuator = given.actuator_of(arguments)
+    for name, settings in given.effects_of(arguments, actuator.axes).items():
         actuator = with_effect(actuator, name, settings)
-    truth = options.faults_of(arguments) if arguments.fault or not arguments.files else None
+    truth = given.faults_of(arguments) if arguments.fault or not arguments.files else None
     progress = output.Progress()
     try:
         measurements, unseen = _recordings(arguments, actuator, truth, progress)
@@ -144,13 +144,13 @@ def _recordings(
     arguments: argparse.Namespace, actuator: Actuator, truth: np.ndarray | None, progress: output.Progress
 ) -> tuple[list[Measurement], list[Measurement]]:
     """Those to fit, and those held out."""
-    fitted, held = options.read_set(arguments, actuator, progress)
+    fitted, held = given.read_set(arguments, actuator, progress)
     if fitted:
         return fitted, held
     assert truth is not None
     sensors = Sensors(arguments.noise_current, arguments.encoder_bits)
     try:
-        clean = simulated(options.run_of(arguments, actuator), actuator, truth, arguments.fitness)
+        clean = simulated(given.run_of(arguments, actuator), actuator, truth, arguments.fitness)
     except FloatingPointError as error:
         raise InputError(str(error)) from None
     return [sensors.record(clean, arguments.seed)], held

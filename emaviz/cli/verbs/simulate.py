@@ -14,7 +14,7 @@ from ema_model.models.open_loop import simulate_open_loop
 from ema_model.recordings import Measurement, write_measurement
 from ema_model.simulation.run import simulate_monitor, simulate_reference
 from ema_model.simulation.sensors import Sensors
-from emaviz.cli import files, options, output
+from emaviz.cli import files, given, options, output
 from emaviz.cli.numbers import FINITE
 
 HELP = "simulate one run of the reference or the monitor model and write it as a recording"
@@ -47,8 +47,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Simulates, records with the sensors' accuracy, writes."""
-    actuator = options.actuator_of(arguments)
-    k, effects = options.faults_of(arguments, actuator.faults), options.effects_of(arguments, actuator.axes)
+    actuator = given.actuator_of(arguments)
+    k, effects = given.faults_of(arguments, actuator.faults), given.effects_of(arguments, actuator.axes)
     sensors = Sensors(arguments.noise_current, arguments.encoder_bits)
     try:
         signals = _simulated(arguments, actuator, k, effects)
@@ -77,8 +77,8 @@ def _simulated(
     arguments: argparse.Namespace, actuator: Actuator, k: np.ndarray, effects: dict[str, dict[str, float]]
 ) -> Measurement:
     if arguments.input:
-        return simulate_open_loop(options.input_of(arguments, actuator), actuator, k, effects)
-    asked = options.run_of(arguments, actuator, arguments.sample_rate)
+        return simulate_open_loop(given.input_of(arguments, actuator), actuator, k, effects)
+    asked = given.run_of(arguments, actuator, arguments.sample_rate)
     if arguments.model == "rm":
         return simulate_reference(asked, actuator, k, effects)
     return simulate_monitor(asked, actuator, k, effects, arguments.circuit)

@@ -11,7 +11,7 @@ from ema_model.tracking.identify import identify_all
 from ema_model.tracking.order import check_order, flights_in
 from ema_model.tracking.summary import as_dict
 from ema_model.tracking.track import check_thresholds, track
-from emaviz.cli import files, options, output
+from emaviz.cli import files, given, options, output
 
 HELP = "follow k over the flights of one unit: what drifts, and what life remains"
 PLACE = 6
@@ -47,13 +47,13 @@ def run(arguments: argparse.Namespace) -> int:
     """Identifies each flight, follows k, writes and prints."""
     thresholds = _thresholds(arguments.threshold)
     paths = _paths(arguments.files)
-    actuator = options.actuator_of(arguments)
+    actuator = given.actuator_of(arguments)
     progress = output.Progress()
     try:
         flights = list(
             identify_all(
                 paths,
-                lambda path: options.read_one(str(path), arguments, actuator, progress),
+                lambda path: given.read_one(str(path), arguments, actuator, progress),
                 actuator,
                 arguments.seed,
                 lambda number, name: progress.show(f"flight {number + 1} of {len(paths)}: {name}"),
@@ -78,7 +78,7 @@ def run(arguments: argparse.Namespace) -> int:
 def _thresholds(texts: list[str]) -> dict[str, float]:
     found: dict[str, float] = {}
     for text in texts:
-        name, value = options.pair(text, "--threshold")
+        name, value = given.pair(text, "--threshold")
         if name in found:
             raise InputError(f"--threshold {name}: given twice; write it once")
         found[name] = value
@@ -87,11 +87,11 @@ def _thresholds(texts: list[str]) -> dict[str, float]:
 
 
 def _paths(names: list[str]) -> list[Path]:
-    given = [Path(name) for name in names]
-    folders = [path for path in given if path.is_dir()]
-    if folders and len(given) > 1:
+    named = [Path(name) for name in names]
+    folders = [path for path in named if path.is_dir()]
+    if folders and len(named) > 1:
         raise InputError(f"{quoted(folders[0])}: is a folder; name one folder alone, or files")
-    paths = flights_in(folders[0]) if folders else given
+    paths = flights_in(folders[0]) if folders else named
     check_order(paths)
     if len(paths) < LEAST_FLIGHTS:
         flights = "1 flight" if len(paths) == 1 else f"{len(paths)} flights"

@@ -52,7 +52,7 @@ class CampaignControls:
         self._group.on_update(lambda event: event.client and self._post(self._show_rows))
         self._open.on_click(lambda _: self._post(self._open_chosen))
         again.on_click(lambda _: self._post(self.refresh))
-        campaigns.opened.connect(lambda path, run: self._post(lambda: self._opened(path, run, opened)))
+        campaigns.opened.connect(lambda path, run: self._post(lambda: opened(path, run)))
         self._post(self.refresh)
 
     # --- on the files' thread ---------------------------------------------------------------------------------------
@@ -90,12 +90,7 @@ class CampaignControls:
         chosen = str(self._row.value)
         if chosen not in self._rows:
             raise InputError("there is no such row; choose another")
-        if not self._campaigns.open_row(str(self._choice.value), self._rows[chosen]):
-            raise InputError("another long run goes on; wait for its end, or stop it")
-
-    def _opened(self, path: Path, run: Measurement, opened: Callable[[Path, Measurement], None]) -> None:
-        opened(path, run)
-        self._say(self._campaigns.said)
+        self._page.begins(lambda: self._campaigns.open_row(str(self._choice.value), self._rows[chosen]))
 
     def _say(self, text: str) -> None:
         self._status.content = said(text)

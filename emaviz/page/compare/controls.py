@@ -6,22 +6,20 @@ from pathlib import Path
 
 import viser
 
-from ema_model.comparison.result import Comparison
 from ema_model.errors import InputError
 from ema_model.recordings.formats import FORMATS
 from emaviz.page.compare.cards import health_card, recordings_list
 from emaviz.page.compare.mapping import MappingStep
 from emaviz.page.compare.options import AskedControls
 from emaviz.page.compare.result import ResultPanel
+from emaviz.page.job_line import JobLine
 from emaviz.page.page import Page
 from emaviz.server.uploads import Uploads
 from emaviz.session.actuators import UPLOADED
 from emaviz.session.compare.comparing import Comparing
 from emaviz.session.data_folder import ACTUATOR_SUFFIX
 from emaviz.session.opened import Opened
-from emaviz.session.pace import Pace
-from emaviz.text.html import Html, add_html, said
-from emaviz.text.time_left import going_on
+from emaviz.text.html import Html, add_html
 
 _NONE = "–"
 
@@ -33,7 +31,6 @@ class ComparePanel:
         self._page, self._comparing, self._result = page, comparing, result
         self._shown: str | None = None
         self._again = False
-        self._pace = Pace()
         gui = page.server.gui
         gui.add_markdown("Upload a recording of a test bench, or **drop it anywhere** on the page.")
         uploads.add_button("Upload a recording", ",".join(FORMATS), icon=viser.Icon.UPLOAD)
@@ -46,9 +43,7 @@ class ComparePanel:
             self._remove = gui.add_button("Remove", icon=viser.Icon.X, color="gray", visible=False)
         self._mapping = MappingStep(page, comparing, result.preview)
         self._start = gui.add_button("Compare", icon=viser.Icon.ARROWS_DIFF, disabled=True)
-        self._stop = gui.add_button("Stop", icon=viser.Icon.PLAYER_STOP, color="red", disabled=True)
-        self._bar = gui.add_progress_bar(0.0, visible=False)
-        self._status = add_html(gui)
+        self._line = JobLine(page, comparing.job)
         self._health_folder = gui.add_folder("Data health", visible=False)
         with self._health_folder:
             self._health = add_html(gui)
@@ -58,16 +53,13 @@ class ComparePanel:
         self._columns.on_click(lambda _: page.screen.post("columns", self._open_columns))
         self._remove.on_click(lambda _: self._remove_shown())
         self._start.on_click(lambda _: self._begin())
-        self._stop.on_click(lambda _: comparing.stop())
         events = comparing.events
         events.opened.connect(lambda opened: page.screen.post(f"opened {opened.name}", lambda: self._opened(opened)))
         events.refused.connect(lambda: page.screen.post("columns", self._open_columns))
         events.removed.connect(lambda: page.screen.post("removed", self._removed))
-        events.ended.connect(lambda why: page.screen.post("compare ended", lambda: self._ended(why)))
-        comparing.job.progressed.connect(
-            lambda text, *_: page.screen.post("compare progress", lambda: self._progressed(text))
-        )
-        events.compared.connect(lambda *found: page.screen.post("compared", lambda: self._compared(*found)))
+        events.compared.connect(lambda found: page.screen.post("compared", lambda: result.show(found)))
+        comparing.job.began.connect(lambda _: page.screen.post("compare began", self._began))
+        comparing.job.ended.connect(lambda _: page.screen.post("compare ended", self._ended))
         self.refresh_files()
 
     def refresh_files(self) -> None:
@@ -100,7 +92,7 @@ class ComparePanel:
         self._show(opened.name)
         if opened.measurement is None:
             todo = Html("Check which column is which signal, then press <b>Use these columns</b>.")
-            self._say(Html("Click the line with the columns' names, on the right.") if opened.problem else todo)
+            self._line.say(Html("Click the line with the columns' names, on the right.") if opened.problem else todo)
             return
         if self._comparing.comparison is None:
             self._result.preview(opened)
@@ -150,47 +142,19 @@ class ComparePanel:
             if told:
                 self._page.notify("The comparison cannot start", str(error))
             else:
-                self._say(str(error))
+                self._line.say(str(error))
             return
         if started:
             self._again = False
-            self._pace.begin("compare, calibrated" if self._comparing.calibrate else "compare")
-            self._bar.value, self._bar.visible = 0.0, True
-            self._start.disabled, self._stop.disabled = True, False
-            ready = self._comparing.session.ready.is_set()
-            self._say("Comparing…" if ready else "Waiting for the models to be compiled…")
         elif self._comparing.running:
             self._again = True
         else:
-            self._page.notify("One at a time", "An identification is running; stop it first.", "yellow")
+            self._page.one_at_a_time()
 
-    def _say(self, text: str) -> None:
-        self._status.content = said(text)
+    def _began(self) -> None:
+        self._start.disabled = True
 
-    def _progressed(self, text: str) -> None:
-        if not self._comparing.running:
-            return
-        elapsed, share = self._pace.at(text)
-        self._bar.value, self._bar.animated = (100.0, True) if share is None else (100.0 * share, False)
-        self._say(f"{text[:1].upper()}{text[1:]} … {going_on(elapsed, share)}")
-
-    def _compared(self, comparison: Comparison, elapsed_s: float) -> None:
-        self._pace.end()
-        self._free()
-        fitted = "" if comparison.calibration is None else f", calibrated in {comparison.calibration.evaluations} steps"
-        self._say(f"Compared in {elapsed_s:.1f} s{fitted}.")
-        self._result.show(comparison)
-        self._follow()
-
-    def _ended(self, why: str) -> None:
-        self._free()
-        self._say(why)
-        self._follow()
-
-    def _free(self) -> None:
-        self._bar.visible = False
-        self._start.disabled, self._stop.disabled = not self._comparing.opened, True
-
-    def _follow(self) -> None:
+    def _ended(self) -> None:
+        self._start.disabled = not self._comparing.opened
         if self._again:
             self._begin(told=False)

@@ -23,7 +23,7 @@ def leads(page: Page, discovering: Discovering) -> Leads:
                 f"Identify knows {session.actuator.name}, the actuator that the app was started with; start it with "
                 f"--actuator to identify faults of {comparing.actuator.name}"
             )
-        session.settings.set_source(names[0])
+        session.settings.set("source", names[0])
 
     return Leads(
         page,

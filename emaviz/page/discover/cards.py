@@ -10,10 +10,8 @@ from ema_model.discovery.words import effect_title
 from ema_model.effects import find
 from ema_model.quantities.numbers import amount, number, with_uncertainty
 from ema_model.quantities.titles import in_sentence
-from emaviz.text.html import Html, html, unescaped
+from emaviz.text.html import Html, unescaped
 
-BOX = Html('style="padding:2px 12px 6px;font-size:13px;line-height:1.45"')
-DIM = Html('style="opacity:.65"')
 _CARD = (
     "height:auto!important;min-height:2em;padding:5px 9px;font-weight:400;font-size:12.5px;"
     "background-color:rgba(134,142,150,.10)!important;color:inherit!important;"
@@ -75,8 +73,3 @@ def style(look: Look | None, shown: Sequence[tuple[str, Candidate | None]], open
         rules.append(f"{button} .mantine-Button-label{{{_LABEL}}}{button} .mantine-Button-label::first-line")
         rules.append("{font-weight:600;font-size:13.5px}")
     return unescaped(f"<style>{''.join(rules)}</style>")
-
-
-def note(text: str) -> Html:
-    """A line of small print."""
-    return html("<div {}><span {}>{}</span></div>", BOX, DIM, text)

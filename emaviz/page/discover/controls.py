@@ -9,22 +9,21 @@ import viser
 
 from ema_model.discovery import Candidate
 from ema_model.discovery.snapshot import AT_FLOOR, Look
-from ema_model.discovery.words import effect_title
+from ema_model.discovery.words import effect_title, sentences
 from ema_model.effects import CATALOGUE
-from ema_model.quantities.numbers import number
 from emaviz.page.discover import cards
 from emaviz.page.discover.entries import EntriesControl
 from emaviz.page.discover.guide import Guide
 from emaviz.page.discover.own_effect import OwnEffect
 from emaviz.page.discover.result import DiscoveryPanel
 from emaviz.page.discover.source import SourceControls
+from emaviz.page.job_line import JobLine
 from emaviz.page.page import Page
 from emaviz.server.uploads import Uploads
 from emaviz.server.viser_private import id_of
 from emaviz.session.discover.discovering import Discovering
-from emaviz.session.pace import Pace
-from emaviz.text.html import add_html, html
-from emaviz.text.time_left import going_on
+from emaviz.text.html import add_html
+from emaviz.text.notes import boxed, note
 
 _MOST_ADDED = 6
 
@@ -36,16 +35,12 @@ class DiscoverPanel:
         self._page, self._discovering, self._result = page, discovering, result
         self._look: Look | None = None
         self._opened: str | None = None
-        self._title = ""  # of the step that runs
-        self._pace = Pace()
         gui = page.server.gui
         self._entries = EntriesControl(page, discovering)
         self._guide = Guide(page, discovering, lambda: self.source.choose_first())
         self.source = SourceControls(page, discovering, uploads, self._chosen, self._source_shown)
         self._start = gui.add_button("Start", icon=viser.Icon.PLAYER_PLAY)
-        self._stop = gui.add_button("Stop", icon=viser.Icon.PLAYER_STOP, color="red", visible=False)
-        self._bar = gui.add_progress_bar(100.0, animated=True, visible=False)
-        self._status = add_html(gui)
+        self._line = JobLine(page, discovering.job)
         self._cards_folder = gui.add_folder("What may be missing", visible=False)
         with self._cards_folder:
             self._style = add_html(gui)
@@ -72,7 +67,6 @@ class DiscoverPanel:
     def _listen(self) -> None:
         discovering, post = self._discovering, self._page.screen.post
         self._start.on_click(lambda _: self.ask(discovering.start))
-        self._stop.on_click(lambda _: post("stop", self._stopping))
         self._undo.on_click(lambda _: self._page.screen.post("undo", self._step_back))
         self._all.on_click(lambda _: self.ask(discovering.find_all))
         for i, button in enumerate(self._removes):
@@ -80,18 +74,16 @@ class DiscoverPanel:
         self._result.connect(self.ask, lambda: self._open(None))
         self._own.connect(self.ask)
         events, job = discovering.events, discovering.job
-        job.began.connect(lambda title: post("discover began", lambda: self._began(title)))
-        job.waits.connect(lambda text: post("discover progress", lambda: self._say_plain(text)))
-        job.progressed.connect(lambda text, s, _: post("discover progress", lambda: self._say(text, s)))
+        job.began.connect(lambda _: post("discover began", lambda: self._busy(True)))
         events.looked.connect(lambda look: post("looked", lambda: self._show(look)))
-        job.ended.connect(lambda text: post("discover ended", lambda: self._ended(text)))
+        job.ended.connect(lambda _: post("discover ended", self._ended))
 
     # --- what is asked ----------------------------------------------------------------------------------------------
 
     def _chosen(self) -> None:
         """Another source is chosen; on the screen's thread."""
         self._opened = None
-        self._say_plain("")
+        self._line.say("")
 
     def _source_shown(self) -> None:
         self._start.disabled = self._discovering.running or not self._discovering.source.ready
@@ -100,13 +92,7 @@ class DiscoverPanel:
     def ask(self, begin: Callable[[], bool]) -> None:
         """Begins a step, or says why not."""
 
-        def tried() -> None:
-            if not self._discovering.session.ready.is_set():
-                self._page.notify("One moment", "The models are still being compiled.", "yellow")
-            elif not begin():
-                self._page.notify("One at a time", "A comparison or an identification is running.", "yellow")
-
-        self._page.checked(tried)
+        self._page.begins(begin)
 
     def _step_back(self) -> None:
         self._page.checked(self._discovering.undo)
@@ -118,19 +104,10 @@ class DiscoverPanel:
 
     # --- the run ----------------------------------------------------------------------------------------------------
 
-    def _began(self, title: str) -> None:
-        self._title = title
-        self._pace.begin(title)
-        self._bar.value, self._bar.animated = 100.0, True
-        self._busy(True)
-        self._say(title, 0.0)
-
     def _busy(self, busy: bool) -> None:
         with self._page.server.atomic():
             self._start.disabled = busy or not self._discovering.source.ready
             self._start.visible = not busy
-            self._stop.visible = self._bar.visible = busy
-            self._stop.disabled = False
             for control in (self._undo, self._all, *self._removes):
                 control.disabled = busy
             self.source.busy(busy)
@@ -140,28 +117,8 @@ class DiscoverPanel:
             self._own.busy(busy)
             self._result.busy(busy)
 
-    def _say(self, text: str, seconds: float) -> None:
-        if self._discovering.running or seconds == 0.0:
-            said = "" if text == self._title else f": {text}"
-            _, share = self._pace.at(text)
-            if share is not None:
-                self._bar.value, self._bar.animated = 100.0 * share, False
-            self._say_plain(f"{self._title}{said} … {going_on(seconds, share)}")
-
-    def _say_plain(self, text: str) -> None:
-        self._status.content = html("<div {}>{}</div>", cards.BOX, text)
-
-    def _stopping(self) -> None:
-        self._discovering.stop()
-        if self._discovering.running:
-            self._stop.disabled = True
-            self._say_plain("Stopping after the present simulation …")
-
-    def _ended(self, text: str) -> None:
+    def _ended(self) -> None:
         self._busy(False)
-        if self._discovering.job.finished:
-            self._pace.end()
-        self._say_plain(text)
         self._guide.show(self._look, self._opened)
 
     # --- what is known ----------------------------------------------------------------------------------------------
@@ -193,15 +150,7 @@ class DiscoverPanel:
                 button.label = f"Remove {effect_title(added[i].key)}"
         self._undo.disabled = look is None or look.steps < 2 or self._discovering.running
         if look is not None:
-            last = look.found.ladder[-1]
-            held = "" if last.holdout_rmse is None else f", held out {number(last.holdout_rmse)} ×"
-            self._model.content = html(
-                "<div {}>Error: <b>{} × the floor</b>{}{}.</div>",
-                cards.BOX,
-                number(last.rmse),
-                held,
-                ", with " + str(len(added)) + " added" if added else ", calibrated",
-            )
+            self._model.content = boxed(sentences(look.found)[0])
 
     def _slot(self) -> Any:
         button = self._page.server.gui.add_button("", visible=False)
@@ -245,7 +194,7 @@ class DiscoverPanel:
                 if i < len(ones) and look is not None:
                     slot.label = cards.label(look, ones[i])
         self._style.content = cards.style(look, self._shown(), self._opened)
-        self._hint.content = cards.note(self._advice(look))
+        self._hint.content = note(self._advice(look))
 
     @staticmethod
     def _advice(look: Look | None) -> str:

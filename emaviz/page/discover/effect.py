@@ -21,6 +21,7 @@ from emaviz.page.page import Page
 from emaviz.session.discover.discovering import Discovering
 from emaviz.text.html import Html, add_html, html, joined
 from emaviz.text.mathml import mathml
+from emaviz.text.notes import BOX, boxed
 
 CONFIG = {"displayModeBar": False, "responsive": False}
 
@@ -83,9 +84,9 @@ def head(look: Look, one: Candidate) -> Html:
     """What adding it is expected to do."""
     if one.untestable_reason:
         why = one.untestable_reason[:1].upper() + one.untestable_reason[1:]
-        return html('<div {}><span style="color:#e8590c">▲ {}.</span></div>', cards.BOX, why)
+        return html('<div {}><span style="color:#e8590c">▲ {}.</span></div>', BOX, why)
     if not look.is_worth(one):
-        return html("<div {}>No evidence for it: adding it would not reduce the error significantly.</div>", cards.BOX)
+        return html("<div {}>No evidence for it: adding it would not reduce the error significantly.</div>", BOX)
     lines: list[str] = [
         html(
             "The error would fall from <b>{}</b> to about <b>{} times the floor</b> ({:.0f} % of it).",
@@ -99,7 +100,7 @@ def head(look: Look, one: Candidate) -> Html:
     if same:
         names = ", ".join(in_sentence(effect_title(name)) for name in same)
         lines.append(html('<span style="color:#e8590c">▲ These recordings cannot tell it from {}.</span>', names))
-    return html("<div {}>{}</div>", cards.BOX, joined(lines, "<br>"))
+    return boxed(joined(lines, "<br>"))
 
 
 def about(effect: Effect, equation: bool = True) -> Html:
@@ -123,7 +124,7 @@ def about(effect: Effect, equation: bool = True) -> Html:
         for title, text in rows
     )
     written = html('<div style="font-size:17px;padding:4px 0 6px">{}</div>', mathml(effect.equation, "inline"))
-    return html("<div {}>{}<table>{}</table></div>", cards.BOX, written if equation else "", table)
+    return html("<div {}>{}<table>{}</table></div>", BOX, written if equation else "", table)
 
 
 def typical(effect: Effect) -> str:

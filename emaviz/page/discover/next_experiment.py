@@ -13,10 +13,10 @@ from ema_model.commands import command
 from ema_model.discovery.result import Experiment
 from ema_model.discovery.snapshot import Look
 from ema_model.discovery.words import next_experiment
-from emaviz.page.discover import cards
 from emaviz.page.page import Page
 from emaviz.session.discover.discovering import Discovering
 from emaviz.text.html import add_html, html, joined
+from emaviz.text.notes import BOX, note
 
 _RATE_HZ = 10_000.0
 _ASK = "Of all tests that the actuator can follow, the one that would tell the two best candidates apart."
@@ -32,7 +32,7 @@ class NextTest:
         gui = page.server.gui
         self._folder = gui.add_folder("Try this test next", visible=False)
         with self._folder:
-            self._text = add_html(gui, cards.note(_ASK))
+            self._text = add_html(gui, note(_ASK))
             self._find = gui.add_button("Find the best test", icon=viser.Icon.FLASK)
             self._load = gui.add_button("Load it into Explore", icon=viser.Icon.ADJUSTMENTS, visible=False)
             self._csv = gui.add_button(
@@ -60,12 +60,12 @@ class NextTest:
         self._find.color = "gray" if told else None
         if told:
             more = joined(html("<div>{}</div>", text) for text in told[1:])
-            self._text.content = html("<div {}><b>{}</b>{}</div>", cards.BOX, told[0], more)
+            self._text.content = html("<div {}><b>{}</b>{}</div>", BOX, told[0], more)
         else:
-            self._text.content = cards.note(_ASK)
+            self._text.content = note(_ASK)
 
     def _nothing(self) -> None:
-        self._text.content = cards.note("No test that the actuator can follow would tell the two apart.")
+        self._text.content = note("No test that the actuator can follow would tell the two apart.")
 
     def _with(self, act: Callable[[Experiment], Any]) -> None:
         one = self._discovering.experiment

@@ -15,12 +15,12 @@ from ema_model.effects.user.expression import FUNCTIONS, VARIABLES
 from ema_model.errors import InputError
 from ema_model.quantities.numbers import number as shown
 from emaviz.figures import signature
-from emaviz.page.discover import cards
 from emaviz.page.discover.sliders import ParameterSliders
 from emaviz.page.page import Page
 from emaviz.session.discover.discovering import Discovering
 from emaviz.session.discover.own_effect import Preview, Typed, typed
 from emaviz.text.html import Html, add_html, html, joined
+from emaviz.text.notes import BOX, note
 
 _EXAMPLE = "-c*sign(omega)*sqrt(abs(omega))"
 _TYPED_S = 0.7  # after the last key, from which a text is taken for whole: its torque is compiled then
@@ -92,9 +92,7 @@ class OwnEffect:
         """Reads the text as it stands; on the screen's thread."""
         self._typed = typed(str(self._text.value))
         colour = "#2b8a3e" if self._typed.expression else "#e03131"
-        self._checked.content = html(
-            '<div {}><span style="color:{}">{}</span></div>', cards.BOX, colour, self._typed.line
-        )
+        self._checked.content = html('<div {}><span style="color:{}">{}</span></div>', BOX, colour, self._typed.line)
         self._sliders.list(self._typed.expression.parameters if self._typed.expression else ())
         self._hide("")
         self._enable()
@@ -117,7 +115,7 @@ class OwnEffect:
         if self._typed.expression is None or self._look is None or self._is_in(self._look):
             return
         if not self._plot.visible:
-            self._said.content = cards.note("Simulating; a new expression is compiled first, for some seconds …")
+            self._said.content = note("Simulating; a new expression is compiled first, for some seconds …")
         try:
             self._discovering.preview_own(self._effect(), self._sliders.values)
         except InputError as error:
@@ -132,11 +130,11 @@ class OwnEffect:
             self._plot.figure = signature.figure(found.look, found.candidate)
             self._plot.visible = True
             change = f"{shown(found.look.rmse)} → ≈ {shown(found.rmse)} × floor"
-            self._said.content = html("<div {}>With these values, before any fit: error {}.</div>", cards.BOX, change)
+            self._said.content = html("<div {}>With these values, before any fit: error {}.</div>", BOX, change)
 
     def _hide(self, why: str) -> None:
         self._plot.visible = False
-        self._said.content = html('<div {}><span style="color:#e8590c">{}</span></div>', cards.BOX, why) if why else ""
+        self._said.content = html('<div {}><span style="color:#e8590c">{}</span></div>', BOX, why) if why else ""
 
     def _begin(self) -> bool:
         return self._discovering.add_own(self._effect(), self._sliders.values)
@@ -149,7 +147,7 @@ def _help() -> Html:
         "<div {}>A torque at the motor's shaft, in N·m; positive drives it on. Every other name is a "
         'parameter, and is fitted.<details><summary style="cursor:pointer">What can be used</summary>{}'
         "<div><code>pi</code>, + − * / ** and {}</div></details></div>",
-        cards.BOX,
+        BOX,
         rows,
         functions,
     )

@@ -12,11 +12,9 @@ from ema_model.discovery.snapshot import AT_FLOOR, Look
 from ema_model.discovery.tracks import Track, tracks
 from ema_model.discovery.words import FLOOR_NOTE, headline, per_recording, sentences
 from ema_model.effects import CATALOGUE
-from ema_model.quantities.numbers import number
 from ema_model.recordings import SIGNALS
 from emaviz.figures import error_ladder, explained_steps, missing_curve, residual_steps
 from emaviz.figures.model_equation import equation
-from emaviz.page.discover import cards
 from emaviz.page.discover.actuator import ActuatorSwitch
 from emaviz.page.discover.effect import CONFIG, EffectView
 from emaviz.page.discover.next_experiment import NextTest
@@ -26,6 +24,7 @@ from emaviz.page.page import Page
 from emaviz.page.playback import PlaybackStrip
 from emaviz.session.discover.discovering import Discovering
 from emaviz.text.html import Html, add_html, html, joined, table_of
+from emaviz.text.notes import BOX, boxed
 
 _RESTING = Html(
     "Choose recordings on the left, and press <b>Start</b>: the model is calibrated, and what it leaves is held "
@@ -53,7 +52,7 @@ class DiscoveryPanel:
         self._look: Look | None = None
         self._titles: dict[str, str] = {}
         gui = page.server.gui
-        self._headline = add_html(gui, html("<div {}>{}</div>", cards.BOX, _RESTING))
+        self._headline = add_html(gui, boxed(_RESTING))
         self._ladder: Any = gui.add_plotly(go.Figure(), config=CONFIG, aspect=0.5, visible=False)
         self._effect = EffectView(page, discovering)
         self._truth_folder = gui.add_folder("The challenge's truth", visible=False)
@@ -111,13 +110,13 @@ class DiscoveryPanel:
         if not self._discovering.source.revealed:
             self._truth.content = ""
         if look is None:
-            self._headline.content = html("<div {}>{}</div>", cards.BOX, _RESTING)
+            self._headline.content = boxed(_RESTING)
             self._actuator.refresh()
             return
         found = look.found
         self._headline.content = answer(look)
         self._ladder.figure = error_ladder.figure(found)
-        self._equation.content = html("<div {}>{}</div>", cards.BOX, equation(found, look.added))
+        self._equation.content = boxed(equation(found, look.added))
         named = all(one.name in CATALOGUE for one in look.added)
         self._left_folder.label = "What is left" if named else "What had no name"
         if self._left_folder.visible:
@@ -169,11 +168,11 @@ def answer(look: Look) -> Html:
     found = look.found
     done = look.rmse <= AT_FLOOR
     if look.assessment is None:
-        first, others = f"The error is {number(look.rmse)} times the floor.", ["What is left is being looked at …"]
-    elif not look.added and look.promising:
-        first = f"Calibrated, the error is {number(look.rmse)} × the floor: physics is missing."
+        first, others = sentences(found)[0], ["What is left is being looked at …"]
+    elif not look.added and look.promising:  # before anything was added, of which a verdict could speak
         left = look.assessment.left.explanation
-        others = [left.sentence] if left is not None else []
+        first = "Physics is missing."
+        others = [sentences(found)[0], *([left.sentence] if left is not None else [])]
     else:
         first, others = headline(found), sentences(found)
     colour = "#2b8a3e" if done else "#e03131"
@@ -183,7 +182,7 @@ def answer(look: Look) -> Html:
         "{}</div>{}{}"
         '<div style="opacity:.65;font-size:12px" title="{}">The floor is what noise and the model\'s own limits '
         "leave: 1 on the ladder.</div>{}</div>",
-        cards.BOX,
+        BOX,
         colour,
         first,
         joined(html("<div>{}</div>", text) for text in others),

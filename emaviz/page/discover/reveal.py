@@ -14,8 +14,8 @@ from ema_model.effects import CATALOGUE, find
 from ema_model.faults import BY_NAME, NAMES
 from ema_model.quantities.numbers import amount
 from ema_model.quantities.titles import in_sentence
-from emaviz.page.discover.cards import BOX
 from emaviz.text.html import Html, html, joined
+from emaviz.text.notes import BOX
 
 _GOOD, _BAD = "#2b8a3e", "#e03131"
 _NEAR = 0.25  # of the true value, within which a strength counts as found where its interval misses it

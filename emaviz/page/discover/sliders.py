@@ -8,7 +8,7 @@ from typing import Any
 from ema_model.effects.user.torque import RANGE
 from ema_model.errors import InputError
 from emaviz.page.page import Page
-from emaviz.session.settings import number
+from emaviz.session.described import number
 
 _START = 1e-3  # N·m and the like: a torque at the motor is some thousandths
 _USUAL = 0.05  # a slider's reach, as long as nobody has set another

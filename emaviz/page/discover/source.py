@@ -10,13 +10,13 @@ import viser
 
 from ema_model.challenges import Challenge
 from ema_model.discovery.snapshot import Look
-from emaviz.page.discover import cards
 from emaviz.page.page import Page
 from emaviz.server.uploads import Uploads
 from emaviz.session.data_folder import CHALLENGE_SUFFIX
 from emaviz.session.discover.discovering import Discovering
 from emaviz.session.discover.source import COMPARED
 from emaviz.text.html import Html, add_html, html
+from emaviz.text.notes import DIM, boxed, note
 
 _STARS = "●○"
 _SEALED = "Sealed: "  # before the names of such files
@@ -113,7 +113,7 @@ class SourceControls:
         if challenge is not None:
             self._about.content = about(challenge, folded=look is not None)
         else:
-            self._about.content = cards.note(
+            self._about.content = note(
                 "The recordings and the actuator that Compare has."
                 if opened
                 else "Open recordings on Compare first, or choose a challenge."
@@ -139,9 +139,9 @@ def about(challenge: Challenge, folded: bool) -> Html:
     """Title, story and recordings; folded once they are read, as the cards want their place."""
     files = f"Fitted: {', '.join(p.stem for p in challenge.training)}. "
     files += f"Held out: {', '.join(p.stem for p in challenge.holdout)}."
-    told = html("<b>{}.</b> {}<div {}>{}</div>", challenge.title, challenge.story, cards.DIM, files)
+    told = html("<b>{}.</b> {}<div {}>{}</div>", challenge.title, challenge.story, DIM, files)
     if folded:
         told = html(
             '<details><summary style="cursor:pointer"><b>{}</b>: the story</summary>{}</details>', challenge.title, told
         )
-    return html("<div {}>{}</div>", cards.BOX, told)
+    return boxed(told)

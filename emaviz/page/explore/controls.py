@@ -21,8 +21,9 @@ from emaviz.page.explore.plant import PlantControls
 from emaviz.page.explore.presets import CUSTOM, PRESETS, name_of
 from emaviz.page.page import Page
 from emaviz.page.style import LONG_LABELS
+from emaviz.session.described import limits
 from emaviz.session.session import Simulation
-from emaviz.session.settings import MONITORS
+from emaviz.session.settings import MONITORS, Settings
 from emaviz.text.html import add_html, html, said
 
 _DECIMALS = 6  # that a command's settings may have
@@ -52,9 +53,12 @@ class ExplorePanel:
             )
             self._groups = {name: self._command_settings(name) for name in COMMANDS}
             self._show_group()
-            duration = gui.add_number("Duration [s]", 0.5, min=0.01, max=5.0, step=0.01)
+            duration = gui.add_number("Duration [s]", 0.5, **limits(Settings, "duration_s"), step=0.01)
             load = gui.add_number(
-                of_signal("load_torque_Nm", page.session.actuator.axes).label, 0.0, min=-1000.0, max=1000.0, step=1.0
+                of_signal("load_torque_Nm", page.session.actuator.axes).label,
+                0.0,
+                **limits(Settings, "load_torque_Nm"),
+                step=1.0,
             )
         self._plant = PlantControls(page)
         self._own = gui.add_dropdown(
@@ -67,15 +71,15 @@ class ExplorePanel:
         settings = page.session.settings
         self._preset.on_update(lambda event: event.client and page.screen.post("preset", self._take_preset))
         self._command.on_update(lambda _: self._choose_command())
-        self._listen(duration, settings.set_duration, lambda: settings.duration_s)
-        self._listen(load, settings.set_load, lambda: settings.load_torque_Nm)
+        self._listen(duration, partial(settings.set, "duration_s"), lambda: settings.duration_s)
+        self._listen(load, partial(settings.set, "load_torque_Nm"), lambda: settings.load_torque_Nm)
         # Set by the session as well, after which nothing is to be simulated again.
         self.monitor.on_update(lambda event: event.client and self._take_monitor())
         self._own.on_update(lambda event: event.client and page.screen.post("plant's model", self._take_plant))
         page.session.events.plants.connect(lambda: page.screen.post("plants", self._plant_taken))
 
     def _take_monitor(self) -> None:
-        self._change(lambda: self._page.session.settings.set_monitor(self.monitor.value))
+        self._change(lambda: self._page.session.settings.set("monitor", self.monitor.value))
 
     def note(self, text: str) -> None:
         """What is to be read once, and stays: below the status."""
@@ -135,14 +139,12 @@ class ExplorePanel:
         makes no sense.
         """
         tried = copy.deepcopy(self._page.session.settings)
-        if command is not None:
-            tried.set_command(command)
+        given = {"command": command, "duration_s": duration_s, "load_torque_Nm": load_torque_Nm}
+        for name, value in given.items():
+            if value is not None:
+                tried.set(name, value)
         for name, value in (settings or {}).items():
             tried.set_command_setting(tried.command, name, value)
-        if duration_s is not None:
-            tried.set_duration(duration_s)
-        if load_torque_Nm is not None:
-            tried.set_load(load_torque_Nm)
         self._page.session.settings.restore(tried.saved())
         self.show_settings()
 
@@ -211,7 +213,7 @@ class ExplorePanel:
 
     def _choose_command(self) -> None:
         name = next((n for n, cls in COMMANDS.items() if cls.title == self._command.value), None)
-        if self._change(lambda: self._page.session.settings.set_command(name)):
+        if self._change(lambda: self._page.session.settings.set("command", name)):
             self._show_group()
 
     def _show_group(self) -> None:

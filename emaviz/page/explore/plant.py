@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import viser
@@ -11,6 +12,8 @@ from ema_model.effects import CATALOGUE, find
 from ema_model.quantities.shown import of_signal
 from ema_model.quantities.sides import USER
 from emaviz.page.page import Page
+from emaviz.session.described import limits
+from emaviz.session.settings import Settings
 from emaviz.text.html import Html, add_html, html, said
 
 _NONE = "–"
@@ -23,37 +26,38 @@ class PlantControls:
         self._page = page
         self._reads: list[tuple[Any, Callable[[], Any]]] = []  # controls, and what the session holds for them
         gui, settings, axes = page.server.gui, page.session.settings, page.session.actuator.axes
+        of = partial(limits, Settings)
         away = "Distance" if axes.is_linear(USER) else "Angle"
         with gui.add_folder("Sensor noise", expand_by_default=False):
             self._listen(
                 gui.add_number("Current noise [A]", 0.0, min=0.0, max=50.0, step=0.05, hint="White, rms"),
-                settings.set_noise,
-                lambda: settings.sensors.current_noise_A,
+                partial(settings.set, "current_noise_A"),
+                lambda: settings.current_noise_A,
             )
             self._listen(
-                gui.add_number("Encoder [bit per turn]", 0, min=0, max=32, step=1, hint="0 is a perfect encoder"),
-                settings.set_encoder,
-                lambda: settings.sensors.encoder_bits,
+                gui.add_number("Encoder [bit per turn]", 0, **of("encoder_bits"), step=1, hint="0: a perfect encoder"),
+                partial(settings.set, "encoder_bits"),
+                lambda: settings.encoder_bits,
             )
         with gui.add_folder("State at the start", expand_by_default=False):
             self._listen(
                 gui.add_number(
                     f"{away} off the command [m{axes.unit('rad', USER)}]", 0.0, min=-500.0, max=500.0, step=1.0
                 ),
-                lambda value: settings.set_start_offset(1e-3 * float(value)),
+                lambda value: settings.set("start_offset_rad", 1e-3 * float(value)),
                 lambda: 1e3 * settings.start_offset_rad,
             )
             hint = "Of the plant; the monitor starts at rest.  An identification starts at rest, too."
             self._listen(
                 gui.add_number(
-                    of_signal("motor_speed_rad_s", axes).label, 0.0, min=-1000.0, max=1000.0, step=10.0, hint=hint
+                    of_signal("motor_speed_rad_s", axes).label, 0.0, **of("start_speed_rad_s"), step=10.0, hint=hint
                 ),
-                settings.set_start_speed,
+                partial(settings.set, "start_speed_rad_s"),
                 lambda: settings.start_speed_rad_s,
             )
             self._listen(
                 gui.add_slider("Position in the backlash", -1.0, 1.0, 0.1, 0.0, hint="−1 and 1: at one of its walls"),
-                settings.set_start_side,
+                partial(settings.set, "start_side"),
                 lambda: settings.start_side,
             )
         self._folder = gui.add_folder("Hidden effects", expand_by_default=False)

@@ -29,7 +29,7 @@ class SealControls:
         self._button = gui.add_button(
             "Seal as a challenge…", icon=viser.Icon.LOCK, color="gray", hint="One file for a colleague to solve"
         )
-        self._line = JobLine(page, sealing.job)
+        JobLine(page, sealing.job)
         self._button.on_click(lambda event: self._ask(event.client))
         sealing.job.began.connect(lambda _: page.screen.post("sealing", lambda: self._busy(True)))
         sealing.job.ended.connect(lambda _: page.screen.post("sealing", lambda: self._busy(False)))
@@ -52,22 +52,14 @@ class SealControls:
         seal.on_click(lambda _: self._page.screen.post("seal", begin))
 
     def _begin(self, client: viser.ClientHandle, title: str, story: str, close: Callable[[], None]) -> None:
-        def tried() -> None:
-            if not self._sealing.session.ready.is_set():
-                self._page.notify("One moment", "The models are still being compiled.", "yellow")
-            elif not self._sealing.seal(title, story):
-                self._page.notify("One at a time", "Another long run goes on; stop it first.", "yellow")
-            else:
-                self._asked = client
-                close()
-
-        self._page.checked(tried)
+        if self._page.begins(lambda: self._sealing.seal(title, story)):
+            self._asked = client
+            close()
 
     def _busy(self, busy: bool) -> None:
         self._button.disabled = busy
 
     def _sealed(self, path: Path) -> None:
-        self._line.say(f"Kept in the data folder: {self._sealing.folder.name_of(path)}")
         self._page.notify("Challenge sealed", f"{path.name}: Discover lists it among the recordings.", "green")
         if self._asked is not None:
             self._asked.send_file_download(path.name, path.read_bytes(), save_immediately=True)

@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import viser
 
 from ema_model.identification.run import ALGORITHMS
-from ema_model.identification.words import verdict
+from ema_model.identification.words import facts, verdict, why_best
 from ema_model.simulation.plant import FITNESSES
 from emaviz.figures.convergence import colour
 from emaviz.page.identify import WORKSPACE
 from emaviz.page.identify.result import IdentifyResult
+from emaviz.page.job_line import JobLine
 from emaviz.page.page import Page
 from emaviz.recording.viewer import ViewerHost
 from emaviz.session.compare.comparing import Comparing
-from emaviz.session.race import Race
-from emaviz.session.settings import SLIDERS
+from emaviz.session.described import limits
+from emaviz.session.identify.race import Race
+from emaviz.session.settings import SLIDERS, Settings
 from emaviz.text.html import Html, add_html, html, joined
-from emaviz.text.time_left import time_left
 
 PLANT = "The plant of Explore's sliders"
 
@@ -44,7 +44,7 @@ class IdentifyPanel:
         self._page, self._comparing, self._viewer, self._result = page, comparing, viewer, result
         self._race: Race | None = None
         self._open_viewer, self._to_discover = open_viewer, to_discover
-        gui, settings = page.server.gui, page.session.settings
+        gui, settings, of = page.server.gui, page.session.settings, partial(limits, Settings)
         self._source: Any = gui.add_dropdown(
             "Identify", (PLANT,), hint="The sliders' plant, whose faults are known, or a recording of the data folder"
         )
@@ -52,22 +52,21 @@ class IdentifyPanel:
             self._ticks = {
                 name: gui.add_checkbox(title, name in settings.algorithms) for name, title in ALGORITHMS.items()
             }
-        self._population = gui.add_number("Population", settings.population, min=4, max=1000, step=1)
-        self._iterations = gui.add_number("Iterations", settings.iterations, min=1, max=5000, step=1)
+        self._population = gui.add_number("Population", settings.population, **of("population"), step=1)
+        self._iterations = gui.add_number("Iterations", settings.iterations, **of("iterations"), step=1)
         self._fitness: Any = gui.add_dropdown("Fitness", FITNESSES, initial_value=settings.fitness)
-        self._seed = gui.add_number("Seed", settings.seed, min=0, step=1)
-        for entry, change in (
-            (self._population, settings.set_population),
-            (self._iterations, settings.set_iterations),
-            (self._fitness, settings.set_fitness),
-            (self._seed, settings.set_seed),
+        self._seed = gui.add_number("Seed", settings.seed, min=0, step=1)  # a maximum would be put in silently
+        for entry, name in (
+            (self._population, "population"),
+            (self._iterations, "iterations"),
+            (self._fitness, "fitness"),
+            (self._seed, "seed"),
         ):
-            self._listen(entry, change)
+            self._listen(entry, partial(settings.set, name))
         self._start = gui.add_button("Identify", icon=viser.Icon.SEARCH)
-        self._pause = gui.add_button("Pause the search", icon=viser.Icon.PLAYER_PAUSE, color="gray", disabled=True)
-        self._stop = gui.add_button("Stop", icon=viser.Icon.PLAYER_STOP, color="red", disabled=True)
-        self._progress = gui.add_progress_bar(0.0)
-        self._text = add_html(gui, _line("Finds the faults from the current alone."))
+        self._line = JobLine(page, page.session.identifying.job, pauses="the search")
+        self._line.say("Finds the faults from the current alone.")
+        self._text = add_html(gui)
         self._link = add_html(gui)
         self._watch = gui.add_button(
             "Watch it in Rerun, here",
@@ -87,17 +86,17 @@ class IdentifyPanel:
         for tick in self._ticks.values():
             tick.on_update(lambda event: event.client and page.screen.post("algorithms", self._take_algorithms))
         self._start.on_click(lambda _: self._begin())
-        self._pause.on_click(lambda _: page.screen.post("pause", self._toggle))
-        self._stop.on_click(lambda _: page.session.stop())
         self._watch.on_click(lambda event: page.screen.post("watch", lambda: self._watch_growing(event.client)))
         self._missing.on_click(
             lambda event: page.screen.post("to discover", lambda: self._look_for_missing(event.client))
         )
         page.workspaces.entered.connect(lambda name: name == WORKSPACE.name and self.refresh_sources())
-        events = page.session.events
-        events.progressed.connect(self._progressed)
-        events.identified.connect(lambda race: page.screen.post("identification", lambda: self._draw_answer(race)))
-        events.ended.connect(lambda: page.screen.post("search ended", self.free))
+        identifying, post = page.session.identifying, page.screen.post
+        identifying.progressed.connect(self._progressed)
+        identifying.identified.connect(lambda race: post("identification", lambda: self._draw_answer(race)))
+        identifying.job.began.connect(lambda _: post("search began", self._began))
+        identifying.job.rests.connect(lambda _: post("search rests", result.draw))
+        identifying.job.ended.connect(lambda _: post("search ended", self._ended))
         comparing.events.opened.connect(lambda _: page.screen.post("sources", self.refresh_sources))
         self.refresh_sources()
 
@@ -122,13 +121,13 @@ class IdentifyPanel:
     def _take_source(self) -> None:
         name = str(self._source.value)
         settings = self._page.session.settings
-        if not self._page.checked(lambda: settings.set_source(SLIDERS if name == PLANT else name)):
+        if not self._page.checked(lambda: settings.set("source", SLIDERS if name == PLANT else name)):
             self.refresh_sources()
 
     def _take_algorithms(self) -> None:
         settings = self._page.session.settings
         chosen = [name for name, tick in self._ticks.items() if tick.value]
-        if not self._page.checked(lambda: settings.set_algorithms(chosen)):
+        if not self._page.checked(lambda: settings.set("algorithms", chosen)):
             for name, tick in self._ticks.items():
                 tick.value = name in settings.algorithms
 
@@ -141,18 +140,15 @@ class IdentifyPanel:
     # --- the race ---------------------------------------------------------------------------------------------------
 
     def _begin(self) -> None:
-        session = self._page.session
-        if not session.ready.is_set():
-            self._page.notify("One moment", "The models are still being compiled.", "yellow")
-            return
-        if not session.identify():
-            self._page.notify("One at a time", "A long calculation is running; stop it first.", "yellow")
-            return
-        self._start.disabled, self._pause.disabled, self._stop.disabled = True, False, False
-        self._show_paused(False)
-        self._link.content = ""
+        self._page.begins(self._page.session.identify)
+
+    def _began(self) -> None:
+        self._start.disabled = True
+        self._text.content = self._link.content = ""
         self._missing.visible = False
-        self._text.content = _line("Starting…")
+
+    def _ended(self) -> None:
+        self._start.disabled = self._watch.visible = False
 
     def _watch_growing(self, client: viser.ClientHandle | None) -> None:
         race = self._race
@@ -165,33 +161,12 @@ class IdentifyPanel:
         if race is not None and self._page.checked(lambda: self._to_discover(race)):
             self._page.workspaces.go("discover", client)
 
-    def _toggle(self) -> None:
-        session = self._page.session
-        session.pause(not session.reins.paused)
-        self._show_paused(session.reins.paused)
-        self._result.draw()
-
-    def _show_paused(self, paused: bool) -> None:
-        self._pause.label = "Resume the search" if paused else "Pause the search"
-        self._pause.icon = viser.Icon.PLAYER_PLAY if paused else viser.Icon.PLAYER_PAUSE
-
-    def free(self) -> None:
-        """Gives the button back when no identification runs any more."""
-        self._start.disabled, self._pause.disabled, self._stop.disabled = False, True, True
-        self._show_paused(False)
-        self._watch.visible = False
-        if "Starting" in self._text.content:
-            self._text.content = _line("Ended without an answer.")
-
     def _progressed(self, race: Race) -> None:
         self._result.progressed(race)
         self._page.screen.post("identification", lambda: self._draw(race))
 
     def _draw(self, race: Race) -> None:
-        share = race.share
-        self._progress.value = 100.0 * share
-        left = time_left(time.monotonic() - race.began_s, share)
-        lines = [_line(html("<b>{:.0f} %</b>{}", 100.0 * share, f", {left}" if left else ""))]
+        lines = []
         for name, track in race.tracks.items():
             if not track.rmse:
                 continue
@@ -208,32 +183,15 @@ class IdentifyPanel:
         self._text.content = joined(lines)
 
     def _draw_answer(self, race: Race) -> None:
-        self._progress.value = 100.0
         best = race.best
         lines = []
         for answer in race.answers:
-            stopped = "stopped · " if answer.stopped else ""
-            error = "" if answer.error_percent is None else f"Err {answer.error_percent:.2f} % · "
             star = "★ " if best is not None and len(race.tracks) > 1 and answer is best.answer else ""
-            corrected = "" if np.isnan(answer.corrected_rmse) else f", {answer.corrected_rmse:.4f} A corrected"
-            lines.append(
-                _line(
-                    html(
-                        "{}{} · {}{}rmse {:.4f} A{} · {} simulations in {:.2f} s · <b>{}</b>",
-                        star,
-                        _title(answer.algorithm),
-                        stopped,
-                        error,
-                        answer.rmse,
-                        corrected,
-                        answer.evaluations,
-                        answer.elapsed_s,
-                        verdict(answer),
-                    )
-                )
-            )
-        if best is not None and len(race.answers) > 1:
-            lines.append(_line(_why_best(race)))
+            told = " · ".join(facts(answer))
+            lines.append(_line(html("{}{} · {} · <b>{}</b>", star, _title(answer.algorithm), told, verdict(answer))))
+        if best is not None and best.answer is not None and len(race.answers) > 1:
+            others = [answer for answer in race.answers if answer is not best.answer]
+            lines.append(_line(html('<span style="opacity:.75">★ {}</span>', why_best(best.answer, others))))
         self._text.content = joined(lines)
         self._race = race
         self._missing.visible = best is not None and best.answer is not None and not best.answer.uncertainty.adequate
@@ -252,20 +210,6 @@ def recording_link(viewer: ViewerHost | None, path: Path, text: str = "") -> Htm
         viewer.url_of(path.name),
         text or f"Open {path.name} in Rerun ↗",
     )
-
-
-def _why_best(race: Race) -> Html:
-    """What the star is for."""
-    best = race.best
-    assert best is not None and best.answer is not None, "the race is over"
-    if best.answer.polished and not all(answer.polished for answer in race.answers):
-        why = "its answer was fitted with the model's own bias taken out; the others are where their searches ended"
-    elif best.answer.polished:
-        why = "its fitted answer has the least rmse"
-    else:
-        why = "it has the least rmse"
-    told = "Corrected: the rmse with what the simplified model is known to lack added."
-    return html('<span style="opacity:.75">★ {}. {}</span>', why, told)
 
 
 def _title(name: str) -> Html:

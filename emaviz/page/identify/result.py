@@ -21,7 +21,7 @@ from emaviz.page.identify.swarm import SwarmView
 from emaviz.page.page import Page
 from emaviz.page.playback import PlaybackStrip
 from emaviz.scene.motion import PLAYED, motion
-from emaviz.session.race import Race
+from emaviz.session.identify.race import Race
 from emaviz.session.worker import Worker
 from emaviz.text.html import add_html
 from emaviz.text.identification import sure_words

@@ -8,7 +8,7 @@ from ema_model.faults import FAULTS, HEALTHY
 from emaviz.figures import swarm
 from emaviz.figures.convergence import colour
 from emaviz.page.page import Page
-from emaviz.session.race import Frame, Race, Track
+from emaviz.session.identify.race import Frame, Race, Track
 from emaviz.text.html import add_html
 
 _PLANE, _LINES = "points over two k", "lines across all k"

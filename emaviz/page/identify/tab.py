@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict
 from functools import partial
 from typing import Any
 
+import msgspec
 import viser
 
-from ema_model.errors import InputError
 from emaviz.figures.identified_table import Row
 from emaviz.page.explore.suggested_run import take_separating
 from emaviz.page.explore.tab import ExploreTab
@@ -19,6 +18,7 @@ from emaviz.page.identify.result import IdentifyResult
 from emaviz.page.identify.to_discover import take_to_discover
 from emaviz.page.recordings.tab import RecordingsTab
 from emaviz.page.tab import Shared, Tab
+from emaviz.session.described import taken
 from emaviz.session.saved import Part
 
 
@@ -55,10 +55,7 @@ class IdentifyTab(Tab):
 
     def kept(self) -> dict[str, Part]:
         """The table of runs."""
-        return {"runs": Part(lambda: [asdict(row) for row in self.result.rows], self._restore)}
+        return {"runs": Part(lambda: msgspec.to_builtins(self.result.rows), self._restore)}
 
     def _restore(self, saved: Any, _: Mapping[str, str]) -> None:
-        try:
-            self.result.show_rows([Row(**row) for row in saved])
-        except TypeError:
-            raise InputError("the session's table of runs is damaged; save it anew") from None
+        self.result.show_rows(taken(list[Row], saved, "table of runs"))

@@ -6,7 +6,7 @@ from ema_model.errors import InputError
 from ema_model.recordings import write_measurement
 from emaviz.page.page import Page
 from emaviz.session.discover.discovering import Discovering
-from emaviz.session.race import Race
+from emaviz.session.identify.race import Race
 
 _NAME = "identified plant.csv"  # of the sliders' plant, which has no file yet
 

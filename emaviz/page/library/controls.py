@@ -9,13 +9,13 @@ import viser
 from ema_model.effects import CATALOGUE, Effect
 from ema_model.simulation.with_effect import WithEffect
 from emaviz.figures.effect_signature import small_picture
-from emaviz.page.discover import cards
 from emaviz.page.job_line import JobLine
 from emaviz.page.library.effect import EffectPage
 from emaviz.page.page import Page
 from emaviz.server.viser_private import selector_of
 from emaviz.session.library import Library
 from emaviz.text.html import add_html, unescaped
+from emaviz.text.notes import note
 
 _CARD = (
     "height:auto!important;min-height:52px;padding:4px 130px 4px 9px;font-weight:400;font-size:12px;"
@@ -40,7 +40,7 @@ class LibraryPanel:
         JobLine(page, library.job)
         self._style = add_html(gui)
         self._cards = {name: self._card(effect) for name, effect in CATALOGUE.items()}
-        self._none = add_html(gui, cards.note("No effect of the library has this."), visible=False)
+        self._none = add_html(gui, note("No effect of the library has this."), visible=False)
         self._draw_style()
         self._search.on_update(lambda event: event.client and page.screen.post("search", self._filter))
         self._draw.on_click(lambda _: self._run_all())
@@ -65,10 +65,7 @@ class LibraryPanel:
             self._none.visible = shown == 0
 
     def _run_all(self) -> None:
-        if not self._library.session.ready.is_set():
-            self._page.notify("One moment", "The models are still being compiled.", "yellow")
-        elif not self._library.draw_all():
-            self._page.notify("One at a time", "Another long run goes on; stop it first.", "yellow")
+        self._page.begins(self._library.draw_all)
 
     def _drawn(self, felt: WithEffect) -> None:
         self._pictures[felt.name] = small_picture(felt)

@@ -8,7 +8,6 @@ from ema_model.effects import Effect, find
 from ema_model.faults import HEALTHY
 from ema_model.simulation.with_effect import RUNS, WithEffect
 from emaviz.figures.effect_signature import EffectCharts
-from emaviz.page.discover import cards
 from emaviz.page.discover.effect import about
 from emaviz.page.library import WORKSPACE
 from emaviz.page.page import Page
@@ -17,6 +16,7 @@ from emaviz.scene.motion import motion
 from emaviz.session.library import Library
 from emaviz.text.html import add_html, html
 from emaviz.text.mathml import mathml
+from emaviz.text.notes import BOX, note
 
 
 class EffectPage:
@@ -28,7 +28,7 @@ class EffectPage:
         self.best_runs: dict[str, str] = {}  # by effect, where it shows most
         self._sliders: dict[str, Any] = {}
         gui = page.server.gui
-        self._title = add_html(gui, cards.note("Choose an effect on the left."))
+        self._title = add_html(gui, note("Choose an effect on the left."))
         self._text = add_html(gui)
         self._run = gui.add_dropdown("Run", tuple(RUNS), visible=False)
         self._place = gui.add_folder("What each parameter does", visible=False)
@@ -43,7 +43,7 @@ class EffectPage:
         self._title.content = html(
             '<div {}><span style="font-size:17px;font-weight:600">{}</span>'
             '<span style="font-size:16px;float:right">{}</span></div>',
-            cards.BOX,
+            BOX,
             effect.title,
             mathml(effect.equation, "inline"),
         )
@@ -65,7 +65,7 @@ class EffectPage:
 
     def say(self, text: str) -> None:
         """What goes on."""
-        self._status.content = cards.note(text) if text else ""
+        self._status.content = note(text) if text else ""
 
     def _slider(self, effect: Effect, index: int) -> Any:
         """From nothing to somewhat more than a strong case; whole numbers in steps."""

@@ -54,7 +54,7 @@ class RecordingsPanel:
         self._rename.on_click(lambda _: self._post(self._rename_chosen))
         self._delete.on_click(lambda event: event.client and self._ask(event.client))
         again.on_click(lambda _: self._post(self.refresh))
-        page.session.events.identified.connect(lambda _: self.refresh_soon())
+        page.session.identifying.identified.connect(lambda _: self.refresh_soon())
         self.refresh_soon()
 
     def refresh_soon(self) -> None:

@@ -26,10 +26,10 @@ from ema_model.recordings.side_file.read import SideFile
 from emaviz.session import actuators as actuator_files
 from emaviz.session.compare.keep import keep
 from emaviz.session.data_folder import DataFolder
+from emaviz.session.described import number
 from emaviz.session.job import Job, Tell
 from emaviz.session.opened import Opened, guesses, measured, read_opened, side_file_of
 from emaviz.session.session import Session
-from emaviz.session.settings import number
 from emaviz.session.signal import Signal
 from emaviz.session.worker import Worker
 
@@ -47,8 +47,7 @@ class CompareEvents:
     opened: Signal[[Opened]] = field(default_factory=Signal)  # also when mapped or laid out anew
     refused: Signal[[]] = field(default_factory=Signal)  # a layout that does not fit: all is as it was
     removed: Signal[[]] = field(default_factory=Signal)
-    compared: Signal[[Comparison, float]] = field(default_factory=Signal)  # and how long it took, s
-    ended: Signal[[str]] = field(default_factory=Signal)  # a comparison without a result: why
+    compared: Signal[[Comparison]] = field(default_factory=Signal)
     kept: Signal[[Path]] = field(default_factory=Signal)  # a report or a recording is written
 
 
@@ -69,7 +68,6 @@ class Comparing:
         self.window_s: tuple[float, float] | None = None
         advice = "check the actuator's file and the recording's units"
         self.job = Job(session.worker, on_divergence=advice)
-        self.job.ended.connect(lambda text: None if self.job.finished else self.events.ended(text))
         # Reading a large file takes seconds, in which the sliders of the other tabs shall answer.
         self._files = Worker("emaviz-files", self._on_error)
         self._use(session.actuator)
@@ -255,15 +253,14 @@ class Comparing:
             self.comparison = compare(measurements, **asked, on_progress=tell)
             elapsed_s = time.perf_counter() - began
 
-        def done() -> None:
-            if self.comparison is not None:
-                self.events.compared(self.comparison, elapsed_s)
+        def done() -> str:
+            found = self.comparison
+            assert found is not None, "it came to its end"
+            self.events.compared(found)
+            fitted = "" if found.calibration is None else f", calibrated in {found.calibration.evaluations} steps"
+            return f"Compared in {elapsed_s:.1f} s{fitted}."
 
-        return self.job.begin("Comparing", work, done)
-
-    def stop(self) -> None:
-        """Ends the comparison soon, without a result."""
-        self.job.stop()
+        return self.job.begin("Calibrating and comparing" if self.calibrate else "Comparing", work, done)
 
     def _asked(self) -> dict[str, Any]:
         """What `compare` is asked beside the recordings; None stands for what the actuator's file says."""

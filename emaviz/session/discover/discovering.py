@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
-from ema_model.discovery import Candidate, begun, verified, walk
+from ema_model.discovery import Candidate, verified, walk
 from ema_model.discovery.next_experiment import next_experiment
 from ema_model.discovery.refit import Trial
 from ema_model.discovery.result import Experiment
@@ -22,16 +22,14 @@ from emaviz.session.discover.events import DiscoverEvents
 from emaviz.session.discover.keep import keep
 from emaviz.session.discover.own_effect import OwnPreview
 from emaviz.session.discover.progress import Telling
-from emaviz.session.discover.record import checked, experiment_of, take_again
-from emaviz.session.discover.refits import check_value, undecided
+from emaviz.session.discover.refits import undecided
+from emaviz.session.discover.saved_stories import SavedStories
 from emaviz.session.discover.sealing import Sealing
-from emaviz.session.discover.source import NOTHING, DiscoverySource, files_of
+from emaviz.session.discover.shown import Shown
+from emaviz.session.discover.source import NOTHING, DiscoverySource
 from emaviz.session.job import Job, Tell
 from emaviz.session.session import Session
 from emaviz.session.worker import Worker
-
-_MOST_BROUGHT = 50  # discoveries beside the shown one, of a session's file
-_KEPT = ("recipe", "steps", "experiment", "revealed", "says")
 
 
 class Discovering:
@@ -43,11 +41,10 @@ class Discovering:
         self.events = DiscoverEvents()
         self.source = DiscoverySource(comparing)
         self.sealing = Sealing(session, comparing.folder)
-        self.look: Look | None = None
         self.job = Job(session.worker, on_stop=self._stopped, on_divergence="the model stays as it was")
         self.entries = Entries(self.source)
-        self._told: Telling | None = None
-        self._restoring: dict[str, Any] | None = None  # what a session brought, until its steps are taken again
+        self._shown = Shown(self.source, self.entries, self.events.looked)
+        self._stories = SavedStories(self.job, self.source, self.entries, self._shown, lambda: comparing.opened)
         self._own = OwnPreview()
         self._files = Worker("emaviz-discovery-files", comparing._on_error)
 
@@ -57,6 +54,11 @@ class Discovering:
         self._files.close()
 
     # --- what is asked ----------------------------------------------------------------------------------------------
+
+    @property
+    def look(self) -> Look | None:
+        """The last picture of the story; None while there is none."""
+        return self._shown.look
 
     @property
     def running(self) -> bool:
@@ -78,15 +80,14 @@ class Discovering:
             self._take_again(entry)
             return
         self.source.recall(entry.recipe, entry.challenge, entry.revealed)
-        self.entries.current, self._told, self.look = entry, entry.told, entry.look
-        self.events.looked(self.look)
+        self._shown.recall(entry)
 
     def _leave(self) -> None:
         if self.running:
             raise InputError("a step is running; stop it first")
         self.job.stop()  # one that waits to begin
-        self.entries.leave()
-        self._told = self.look = self._restoring = None
+        self._shown.leave()
+        self._stories.forget()
 
     # --- steps ------------------------------------------------------------------------------------------------------
 
@@ -96,11 +97,11 @@ class Discovering:
             raise InputError(NOTHING)
 
         def job(tell: Tell) -> None:
-            told = self._begin(self.source.recipe(), tell)
-            self._restoring = None  # what a session brought is put away
-            self._assess(told, tell)
+            told = self._shown.begin(self.source.recipe(), tell)
+            self._stories.forget()
+            self._shown.assess(told, tell)
             while told.take_faults(tell):
-                self._assess(told, tell)
+                self._shown.assess(told, tell)
 
         return self.job.begin("Calibrating the model", job)
 
@@ -127,7 +128,7 @@ class Discovering:
             trial = told.trials.of(told.story, candidate, tell)
             if candidate.name not in CATALOGUE:
                 trial = told.trials.followed(told.story, trial, tell)
-            self._take(told, trial, alike, tell)
+            self._shown.take(told, trial, alike, tell)
 
         return self.job.begin(f"Adding {in_sentence(find(candidate.name).title)}", job)
 
@@ -135,7 +136,7 @@ class Discovering:
         """Tells soon what a user's torque with these values would change; of several requests the last one counts."""
 
         def job() -> None:
-            told, look = self._told, self.look
+            told, look = self._shown.told, self.look
             if told is None or look is None or look.steps != len(told.story.steps) or look.assessment is None:
                 return
             try:
@@ -156,7 +157,7 @@ class Discovering:
             trial = curve_for(story.data, story.held, story.current, left, tell)
             if trial is None:
                 raise InputError("a torque curve does not pay here: the error would not fall, or only by chance")
-            self._take(told, trial, (), tell)
+            self._shown.take(told, trial, (), tell)
 
         return self.job.begin("Adding the curve", job)
 
@@ -171,7 +172,7 @@ class Discovering:
             smaller = told.story.without(key, tell)
             tell("measuring the new model's error")
             told.story.remove(key, smaller)
-            self._assess(told, tell)
+            self._shown.assess(told, tell)
 
         return self.job.begin(f"Removing {in_sentence(find(key).title)}", job)
 
@@ -182,11 +183,11 @@ class Discovering:
         def job(tell: Tell) -> None:
             def say(text: str) -> None:
                 tell(text)
-                if self.look is None or self.look.steps != len(told.story.steps):
-                    self._show(told)  # a step further: the ladder grows
+                if self._shown.is_behind:
+                    self._shown.show(told)  # a step further: the ladder grows
 
             walk(told.story, say)
-            self._assess(told, tell)
+            self._shown.assess(told, tell)
 
         return self.job.begin("Finding all that is missing", job)
 
@@ -195,14 +196,14 @@ class Discovering:
         told, _ = self._seen()
         if not told.story.undo():
             raise InputError("there is no step to take back")
-        self._show(told)
+        self._shown.show(told)
         if not told.is_assessed:  # of a walk that went on at once
-            self.job.begin("Looking again", lambda tell: self._assess(told, tell))
+            self.job.begin("Looking again", lambda tell: self._shown.assess(told, tell))
 
     @property
     def experiment(self) -> Experiment | None:
         """The test that was suggested last."""
-        return None if self._told is None else self._told.experiment
+        return None if self._shown.told is None else self._shown.told.experiment
 
     def suggest(self) -> bool:
         """Looks for the test that tells the best candidates apart."""
@@ -219,84 +220,37 @@ class Discovering:
                 trials.append(told.trials.of(base, one, tell))
             tell("simulating the tests that the actuator allows")
             told.experiment = next_experiment(base.data, trials[0].fit, trials[1].fit)
-            self._show(told)
+            self._shown.show(told)
             if told.experiment is None:
                 self.events.unsuggested()
 
         return self.job.begin("Looking for the best next test", job)
 
-    def stop(self) -> None:
-        """Ends the step that runs, as soon as its present simulation is done; the story stays as it was."""
-        self.job.stop()
-
     # --- on the compute thread --------------------------------------------------------------------------------------
 
     def _stopped(self) -> str:
-        told, look = self._told, self.look
-        if told is not None and (look is None or look.steps != len(told.story.steps)):
-            self._show(told)  # what was added before it was stopped
+        told = self._shown.told
+        if told is not None and self._shown.is_behind:
+            self._shown.show(told)  # what was added before it was stopped
         return "Stopped; the model is as the ladder shows it." if told else "Stopped."
-
-    def _begin(self, recipe: Mapping[str, Any], tell: Tell) -> Telling:
-        tell("reading")
-        given = self.source.read(recipe)
-        told = Telling(begun(given.fitted, given.actuator, given.held, given.signals, tell), recipe)
-        self.entries.begin(told)
-        self._told, self.look, self.source.revealed = told, None, False
-        return told
-
-    def _take(self, told: Telling, trial: Trial, alike: Sequence[str], tell: Tell) -> None:
-        check_value(trial)
-        tell("measuring the new model's error")  # the last moment to stop
-        told.add(trial, alike)
-        self._assess(told, tell)
-
-    def _assess(self, told: Telling, tell: Tell) -> None:
-        """Shows the model as it is now, then what may be missing from it."""
-        self._show(told)
-        if not told.is_assessed:
-            tell("analysing the residual; the library of effects is compiled on its first use")
-            told.assess()
-            self._show(told)
-
-    def _show(self, told: Telling) -> None:
-        self.look = told.look()
-        if self.entries.current is not None:
-            self.entries.current.look = self.look
-        self.events.looked(self.look)
 
     def _seen(self) -> tuple[Telling, Look]:
         if self.running:
             raise InputError("a step is running; wait for it, or stop it")
-        if self.look is None or self._told is None:
+        if self.look is None or self._shown.told is None:
             raise InputError("there is no calibrated model yet; press Start")
-        return self._told, self.look
+        return self._shown.told, self.look
 
     # --- a session --------------------------------------------------------------------------------------------------
 
     def saved(self) -> dict[str, Any] | None:
-        """Every discovery, the one that is shown (else the last) first and the rest as its "others"; None without one.
-
-        In what JSON can hold.
-        """
-        current = self.entries.current or (self.entries.all[-1] if self.entries.all else None)
-        others = [one.saved() for one in self.entries.all if one is not current]
-        if self._restoring is not None:
-            first = self._restoring
-        elif current is None:
-            return None
-        else:
-            if current is self.entries.current:
-                current.revealed = self.source.revealed
-            first = current.saved()
-        return {**first, "others": others} if others else first
+        """Every discovery, in what JSON can hold; None without one."""
+        saved = self._stories.saved()
+        return None if saved is None else saved.saved()
 
     def files(self) -> list[str]:
         """Names in the data folder of what the saved stories are of."""
-        saved = self.saved()
-        return [] if saved is None else [
-            name for one in (saved, *saved.get("others", ())) for name in files_of(one["recipe"])
-        ]  # fmt: skip
+        return self._stories.files()
 
     def restore(self, saved: Any, names: Mapping[str, str]) -> None:
         """Takes the steps of a session's story again, once no other long run goes on; InputError if it is none.
@@ -307,43 +261,13 @@ class Discovering:
             raise InputError("a step of Discover is running; stop it, and load the session again")
         if saved is None:
             return self.choose("")
-        stories = [saved, *(saved.get("others") or () if isinstance(saved, dict) else ())]
-        for one in stories:
-            if not isinstance(one, dict) or not isinstance(one.get("recipe"), dict):
-                raise InputError("the session's part of Discover is damaged; save it anew")
-            checked(one.get("steps"))
-            experiment_of(one.get("experiment"))
-            self.source.checked(one["recipe"], names)
+        entry = self._stories.bring(saved, names)
         self._leave()
-        for one in stories[1:][:_MOST_BROUGHT]:
-            self.entries.bring({key: one.get(key) for key in _KEPT if key in one}, names)
-        first = {key: value for key, value in saved.items() if key != "others"}
-        self._take_again(self.entries.bring(first, names))
+        self._take_again(entry)
 
     def _take_again(self, entry: Entry) -> None:
-        """The steps of one that a session's file brought; its fits begin where they ended then."""
-        saved = entry.brought or {}
-        steps, experiment = checked(saved.get("steps")), experiment_of(saved.get("experiment"))
-        recipe = self.source.take(saved["recipe"], entry.names)
-        self.entries.current = entry
-        self._told = self.look = None
-        self._restoring = {**saved, "recipe": dict(recipe)}
+        self._stories.take_again(entry)
         self.events.looked(None)
-
-        def job(tell: Tell) -> None:
-            try:
-                told = self._begin(recipe, tell)
-                self._assess(told, tell)  # the first step's cards are what the report ranks
-                take_again(told.story, steps, tell, lambda: self._show(told))
-                told.experiment, self.source.revealed = experiment, bool(saved.get("revealed"))
-            finally:
-                self._restoring = None
-            self._assess(told, tell)
-
-        wanted = {*recipe.get("fitted", ()), *recipe.get("held", ())}
-        self.job.begin_when_free(
-            "Taking the session's steps again", job, lambda: wanted <= self.comparing.opened.keys()
-        )
 
     # --- what stays -------------------------------------------------------------------------------------------------
 

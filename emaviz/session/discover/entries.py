@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
-from typing import Any
+
+import msgspec
 
 from ema_model.challenges import Challenge
 from ema_model.discovery.snapshot import Look
 from ema_model.quantities.numbers import number
 from emaviz.session.discover.progress import Telling
+from emaviz.session.discover.saved_story import Recipe, SavedStory
 from emaviz.session.discover.source import DiscoverySource
 
 _MOST_NAMES = 2  # of recordings, in an entry's words
@@ -21,35 +22,35 @@ class Entry:
     """One discovery.  One that a session's file brought has no story until its steps are taken again."""
 
     number: int
-    recipe: Mapping[str, Any]
+    recipe: Recipe
     told: Telling | None = None
     look: Look | None = None
     challenge: Challenge | None = None
     revealed: bool = False
     at: datetime = field(default_factory=datetime.now)
-    brought: dict[str, Any] | None = None  # what the file says, while there is no story
-    names: Mapping[str, str] = field(default_factory=dict)  # of files, now by then, for what was brought
+    brought: SavedStory | None = None  # what the file says, while there is no story
 
-    def saved(self) -> dict[str, Any]:
-        """In what JSON can hold."""
+    def saved(self) -> SavedStory:
+        """As a session's file has it."""
         if self.told is None:
-            return dict(self.brought or {})
-        return {**self.told.saved(), "revealed": self.revealed, "says": self.result}
+            assert self.brought is not None, "it was told here, or brought"
+            return self.brought
+        return msgspec.structs.replace(self.told.saved(), revealed=self.revealed, says=self.result)
 
     @property
     def subject(self) -> str:
         """What was recorded."""
         if self.challenge is not None:
             return self.challenge.title
-        names = [str(name).rpartition("/")[2] for name in self.recipe.get("fitted", ())]
+        names = [name.rpartition("/")[2] for name in self.recipe.fitted]
         more = f" and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else ""
-        return (", ".join(names[:_MOST_NAMES]) + more) or str(self.recipe.get("challenge", "")) or "recordings"
+        return (", ".join(names[:_MOST_NAMES]) + more) or self.recipe.challenge or "recordings"
 
     @property
     def result(self) -> str:
         """Steps and error: '2 added, 1.02 × floor'."""
         if self.look is None:
-            return str((self.brought or {}).get("says", "not opened yet"))[:80]
+            return self.brought.says[:80] if self.brought is not None else "not opened yet"
         added = len(self.look.added)
         return f"{f'{added} added' if added else 'calibrated'}, {number(self.look.rmse)} × floor"
 
@@ -78,10 +79,10 @@ class Entries:
         self.current = entry
         return entry
 
-    def bring(self, saved: Mapping[str, Any], names: Mapping[str, str]) -> Entry:
+    def bring(self, saved: SavedStory) -> Entry:
         """One of a session's file."""
-        entry = self._new(saved["recipe"])
-        entry.brought, entry.names = dict(saved), names
+        entry = self._new(saved.recipe)
+        entry.brought = saved
         return entry
 
     def leave(self) -> None:
@@ -90,7 +91,7 @@ class Entries:
             self.current.revealed = self._source.revealed
         self.current = None
 
-    def _new(self, recipe: Mapping[str, Any]) -> Entry:
+    def _new(self, recipe: Recipe) -> Entry:
         entry = Entry(1 + max((one.number for one in self.all), default=0), recipe)
         self.all.append(entry)
         return entry

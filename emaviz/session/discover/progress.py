@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 from ema_model.comparison.explain import Explanation
 from ema_model.discovery import Candidate, Story, result_of
@@ -13,8 +12,9 @@ from ema_model.discovery.refit import Trial, promising
 from ema_model.discovery.result import Experiment
 from ema_model.discovery.snapshot import Assessment, Look, assessed, known_of, look_at
 from ema_model.effects import CATALOGUE
-from emaviz.session.discover.record import experiment_saved, steps_of
+from emaviz.session.discover.record import steps_of
 from emaviz.session.discover.refits import Trials
+from emaviz.session.discover.saved_story import Recipe, SavedStory
 from emaviz.session.job import Tell
 
 _SHARE, _MOST = 0.25, 3  # of the best effect's score, and how many effects are refitted to compare a fault with
@@ -25,7 +25,7 @@ class Telling:
     """One story as it is told on the page."""
 
     story: Story
-    recipe: Mapping[str, Any]  # of its recordings: see `DiscoverySource.read`
+    recipe: Recipe  # of its recordings
     known: dict[Step, Assessment] = field(default_factory=dict)  # so that a step back is at once
     trials: Trials = field(default_factory=Trials)  # so that nothing is fitted twice
     first: Sequence[Candidate] = ()  # of the first search, with what their refits gave
@@ -73,7 +73,6 @@ class Telling:
         known = known_of(steps[next(nameless, len(steps)) - 1], self.known)
         return known.left.explanation if known is not None else None
 
-    def saved(self) -> dict[str, Any]:
-        """The steps, and what they were made from, in what JSON can hold."""
-        experiment = experiment_saved(self.experiment)
-        return {"recipe": dict(self.recipe), "steps": steps_of(self.story), "experiment": experiment}
+    def saved(self) -> SavedStory:
+        """The steps, and what they were made from."""
+        return SavedStory(self.recipe, steps_of(self.story), self.experiment)

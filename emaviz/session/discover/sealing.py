@@ -50,7 +50,11 @@ class Sealing:
             tell("simulating; a combination of effects is compiled on its first use")
             seal(truth, path, title, story, actuator, sensors=sensors, load_torque_Nm=load, on_progress=tell)
 
-        return self.job.begin("Sealing", work, lambda: self.sealed(path))
+        def done() -> str:
+            self.sealed(path)
+            return f"Kept in the data folder: {self.folder.name_of(path)}"
+
+        return self.job.begin("Sealing", work, done)
 
 
 def truth_of(settings: Settings, actuator: Actuator, seed: int) -> Truth:

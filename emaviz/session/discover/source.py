@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from ema_model.actuator import Actuator, load_actuator
 from ema_model.actuator.write import as_toml
@@ -17,11 +16,10 @@ from ema_model.errors import InputError
 from ema_model.files.limits import CHALLENGE_RECORDING_BYTES
 from ema_model.recordings import Measurement, read
 from emaviz.session.compare.comparing import USUAL, Comparing
-from emaviz.session.settings import number
+from emaviz.session.discover.saved_story import Recipe
 
 COMPARED = "The recordings of Compare"
 NOTHING = "no recording to fit is chosen; open one on Compare, or choose a challenge"
-_DAMAGED = "the session's part of Discover is damaged; save it anew"
 
 
 @dataclass(frozen=True)
@@ -32,7 +30,6 @@ class Material:
     held: Sequence[Measurement]
     actuator: Actuator
     signals: Sequence[str] | None
-    recipe: Mapping[str, Any] = field(default_factory=dict)  # gives the same again: see `DiscoverySource.read`
 
 
 class DiscoverySource:
@@ -75,52 +72,41 @@ class DiscoverySource:
         """Whether there is something to start with."""
         return self.challenge is not None or any(name not in self.held_out for name in self.compared)
 
-    def recipe(self) -> dict[str, Any]:
-        """What is chosen now, in what JSON can hold; InputError where nothing is left to fit."""
+    def recipe(self) -> Recipe:
+        """What is chosen now; InputError where nothing is left to fit."""
         if self.challenge is not None:
-            return {"challenge": self.chosen}
+            return Recipe(self.chosen)
         comparing, known = self._comparing, self.compared
         fitted = [name for name in known if name not in self.held_out]
         if not fitted:
             raise InputError(NOTHING)
         actuator, weights = comparing.actuator, comparing.weights
         freed = {path: replace(one, free=path in comparing.free) for path, one in actuator.tolerances.items()}
-        return {
-            "challenge": "",
-            "fitted": fitted,
-            "held": [name for name in known if name in self.held_out],
-            "window_s": comparing.window_s,
-            "signals": None if weights == USUAL else [actuator.axes.signal(name) for name in weights],
-            "actuator": as_toml(replace(actuator, tolerances=freed)),
-        }
+        return Recipe(
+            fitted=tuple(fitted),
+            held=tuple(name for name in known if name in self.held_out),
+            window_s=comparing.window_s,
+            signals=None if weights == USUAL else tuple(actuator.axes.signal(name) for name in weights),
+            actuator=as_toml(replace(actuator, tolerances=freed)),
+        )
 
-    def checked(self, recipe: Mapping[str, Any], names: Mapping[str, str]) -> dict[str, Any]:
-        """A saved recipe with the files' names of now, by those of then in `names`; InputError if it is none."""
-        try:
-            named = str(recipe["challenge"])
-            given = {**recipe, "challenge": names.get(named, named)}
-            if not given["challenge"]:
-                for which in ("fitted", "held"):
-                    given[which] = [names.get(str(name), str(name)) for name in recipe[which]]
-        except (KeyError, TypeError, AttributeError):
-            raise InputError(_DAMAGED) from None
-        self._challenge(given["challenge"])
-        return given
+    def checked(self, recipe: Recipe) -> Recipe:
+        """The same; InputError for a challenge that is not there."""
+        self._challenge(recipe.challenge)
+        return recipe
 
-    def take(self, recipe: Mapping[str, Any], names: Mapping[str, str]) -> dict[str, Any]:
-        """Chooses what a saved recipe says; returns it as of `checked`."""
-        given = self.checked(recipe, names)
-        self.choose(given["challenge"])
-        self.held_out = set(given.get("held", ()))
-        return given
+    def take(self, recipe: Recipe) -> None:
+        """Chooses what a recipe says."""
+        self.choose(recipe.challenge)
+        self.held_out = set(recipe.held)
 
-    def recall(self, recipe: Mapping[str, Any], challenge: Challenge | None, revealed: bool) -> None:
+    def recall(self, recipe: Recipe, challenge: Challenge | None, revealed: bool) -> None:
         """Chooses again what a story was made from, without reading anything."""
-        self.challenge, self.chosen, self.revealed = challenge, str(recipe.get("challenge", "")), revealed
-        self.held_out = set(recipe.get("held", ()))
+        self.challenge, self.chosen, self.revealed = challenge, recipe.challenge, revealed
+        self.held_out = set(recipe.held)
 
-    def read(self, recipe: Mapping[str, Any]) -> Material:
-        """Reads what a recipe says; InputError for files that are gone, or a recipe that is none."""
+    def read(self, recipe: Recipe) -> Material:
+        """Reads what a recipe says; InputError for files that are gone, or that make no sense."""
         if self.challenge is not None:
             with opened(self.challenge) as challenge:
                 actuator = load_actuator(challenge.actuator)
@@ -128,25 +114,17 @@ class DiscoverySource:
                     [read(file, actuator, max_bytes=CHALLENGE_RECORDING_BYTES) for file in files]
                     for files in (challenge.training, challenge.holdout)
                 )
-            return Material(fitted, held, actuator, None, recipe)
-        try:
-            actuator = actuator_of(recipe["actuator"])
-            fitted, held = (
-                [self._comparing.measurement(str(name), actuator) for name in recipe[which]]
-                for which in ("fitted", "held")
-            )
-            signals = None if recipe["signals"] is None else [str(name) for name in recipe["signals"]]
-            window = recipe["window_s"]
-            if window is not None:
-                first, last = (number(edge, "the window's edge") for edge in window)
-                fitted, held = ([one.selected((first, last)) for one in part] for part in (fitted, held))
-        except InputError:
-            raise
-        except (KeyError, TypeError, ValueError):
-            raise InputError(_DAMAGED) from None
+            return Material(fitted, held, actuator, None)
+        actuator = actuator_of(recipe.actuator)
+        fitted, held = (
+            [self._comparing.measurement(name, actuator) for name in part] for part in (recipe.fitted, recipe.held)
+        )
+        if recipe.window_s is not None:
+            window = recipe.window_s
+            fitted, held = ([one.selected(window) for one in part] for part in (fitted, held))
         if not fitted:
             raise InputError(NOTHING)
-        return Material(fitted, held, actuator, signals, recipe)
+        return Material(fitted, held, actuator, recipe.signals)
 
     def reveal(self) -> Truth:
         """What is hidden in the challenge."""
@@ -158,15 +136,8 @@ class DiscoverySource:
         return truth
 
 
-def files_of(recipe: Mapping[str, Any]) -> list[str]:
-    """Names in the data folder of what a recipe is made from."""
-    return [name for name in (recipe.get("challenge"), *recipe.get("fitted", ()), *recipe.get("held", ())) if name]
-
-
-def actuator_of(text: Any) -> Actuator:
+def actuator_of(text: str) -> Actuator:
     """The actuator of a file's text; InputError tells what is wrong in it."""
-    if not isinstance(text, str):
-        raise InputError(_DAMAGED)
     with tempfile.TemporaryDirectory(prefix="emaviz-actuator-") as name:
         path = Path(name) / "actuator.toml"
         path.write_text(text, encoding="utf-8")

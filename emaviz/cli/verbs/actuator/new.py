@@ -15,7 +15,7 @@ from ema_model.actuator.plausible import implausible, missing
 from ema_model.effects.user.entries import kind_of
 from ema_model.errors import InputError, quoted
 from ema_model.quantities.axes import KINDS as AXES
-from emaviz.cli import files, options, output
+from emaviz.cli import files, given, options, output
 from emaviz.cli.numbers import FINITE
 from emaviz.cli.verbs.actuator.questions import ask
 
@@ -134,7 +134,7 @@ def _effect(text: str) -> tuple[str, dict[str, Any]]:
     """The table of --effect NAME:param=value±tolerance,…"""
     name, _, rest = text.partition(":")
     table: dict[str, Any] = {}
-    for part in options.split_at_commas(rest):
+    for part in given.split_at_commas(rest):
         key, separator, value = (piece.strip() for piece in part.partition("="))
         where = f"--effect {quoted(name)}: {quoted(key)}"
         if not separator:
@@ -142,7 +142,7 @@ def _effect(text: str) -> tuple[str, dict[str, Any]]:
         if kind_of(name) and key in _TEXTS:
             table[key] = value
         elif kind_of(name) and key == "values":
-            table[key] = [entry_of(one, where) for one in options.split_at_commas(value.strip("[]"))]
+            table[key] = [entry_of(one, where) for one in given.split_at_commas(value.strip("[]"))]
         else:
             entry = entry_of(value, where)
             table[key] = entry["value"] if kind_of(name) == "torque_curve" else entry
@@ -156,7 +156,7 @@ def _rule(text: str) -> dict[str, Any]:
     if rest in ("map", "run"):
         return {"match": pattern, "kind": rest}
     values = {}
-    for part in options.split_at_commas(rest):
+    for part in given.split_at_commas(rest):
         path, _, value = part.partition("=")
         values[path.strip()] = entry_of(value, f"--where {quoted(path)}")["value"]
     return {"match": pattern, "set": values}

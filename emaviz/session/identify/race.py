@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,13 +16,15 @@ from ema_model.identification.objective import Objective
 from ema_model.identification.run import Identification, Progress, steps
 from ema_model.recordings import Measurement
 from ema_model.simulation import plant
+from emaviz.session.job import Run
 from emaviz.session.settings import SLIDERS, Settings
 from emaviz.session.worker import Steps
 
 Array = NDArray[np.float64]
+OpenFile = Callable[[str], Measurement]  # by the name of a file in the data folder
 
 MOST_FRAMES = 200  # of a swarm, kept to look at again
-_PAUSE_S = 0.01  # between two looks whether to go on; sliders are answered in between
+_LOOK_S = 0.01  # whether a file is read; sliders are answered in between
 _CURRENT_EVERY = 4  # iterations
 _SEARCH_SHARE = 0.6  # of an identification's time, about; model bias and intervals take the rest
 
@@ -95,7 +96,6 @@ class Race:
     truth: Array | None  # (8,), of the sliders' plant
     measurement: Measurement  # what is identified
     objective: Objective  # and its cost
-    began_s: float = field(default_factory=time.monotonic)
     known: bool = False  # the actuator's own parameters are exact, as in a simulation of the same file
     growing: Path | None = None  # of the recording, while it is written
     path: Path | None = None  # and once it is whole
@@ -111,9 +111,21 @@ class Race:
         return sum(track.share for track in self.tracks.values()) / len(self.tracks)
 
     @property
+    def said(self) -> str:
+        """What goes on."""
+        going = [track for track in self.tracks.values() if track.answer is None]
+        fitting = next((track.fitting[0] for track in going if track.fitting is not None), "fitting the answer")
+        return "searching" if any(track.fitting is None for track in going) else fitting
+
+    @property
     def answers(self) -> list[Identification]:
         """Of the optimisers that have ended."""
         return [track.answer for track in self.tracks.values() if track.answer is not None]
+
+    @property
+    def ran_whole(self) -> bool:
+        """Whether nobody stopped it."""
+        return not any(answer.stopped for answer in self.answers)
 
     @property
     def best(self) -> Track | None:
@@ -131,41 +143,8 @@ class Race:
         return {name: float(value) for (name, _, _), value in zip(known, coefficients)}
 
 
-class Reins:
-    """Stop and pause, held by the page while a race runs on the compute thread."""
-
-    def __init__(self) -> None:
-        self._stop, self._go = threading.Event(), threading.Event()
-        self._go.set()
-
-    @property
-    def stopping(self) -> bool:
-        """Whether it was asked to end."""
-        return self._stop.is_set()
-
-    @property
-    def paused(self) -> bool:
-        """Whether it rests."""
-        return not self._go.is_set() and not self.stopping
-
-    def stop(self) -> None:
-        """After the current iteration, keeping what there is."""
-        self._stop.set()
-        self._go.set()
-
-    def pause(self, paused: bool) -> None:
-        """Rests after the current iteration, or goes on."""
-        (self._go.clear if paused else self._go.set)()
-
-    def wait(self) -> Steps:
-        """Steps of a long job that do nothing while it rests."""
-        while self.paused:
-            self._go.wait(_PAUSE_S)
-            yield
-
-
 def target(
-    settings: Settings, actuator: Actuator, open_file: Callable[[str], Measurement]
+    settings: Settings, actuator: Actuator, open_file: OpenFile
 ) -> Generator[None, None, tuple[Measurement, Array | None]]:
     """Steps that end with the recording to identify, and the true k if it is the sliders' plant."""
     if settings.source != SLIDERS:
@@ -188,7 +167,7 @@ def _elsewhere(read: Callable[[], Measurement]) -> Generator[None, None, Measure
     thread = threading.Thread(target=work, name="emaviz-read", daemon=True)
     thread.start()
     while thread.is_alive():
-        thread.join(_PAUSE_S)
+        thread.join(_LOOK_S)
         yield
     if failed:
         raise failed[0]
@@ -213,17 +192,18 @@ def begin(settings: Settings, objective: Objective, truth: Array | None, known: 
     )
 
 
-def run(race: Race, objective: Objective, reins: Reins, tell: Callable[[Race, Progress | None], None]) -> Steps:
-    """All optimisers to their ends, an iteration of each in turn.
+def run(race: Race, asked: Run, tell: Callable[[Progress | None], object]) -> Steps:
+    """All optimisers to their ends, an iteration of each in turn; once asked to end, each keeps the best it has.
 
-    tell(race, progress): after each iteration; progress is None while the answer is fitted, and after its end.
+    tell(progress): after each iteration; progress is None while the answer is fitted, and after its end.
     """
+    objective = race.objective
     settings = race.settings
 
     def fitting(track: Track) -> Callable[[str, float], None]:
         def told(text: str, share: float) -> None:
             track.fitting = text, max(share, track.fitting[1] if track.fitting else 0.0)
-            tell(race, None)
+            tell(None)
 
         return told
 
@@ -243,20 +223,19 @@ def run(race: Race, objective: Objective, reins: Reins, tell: Callable[[Race, Pr
     begun = False
     while searches:
         for name, search in list(searches.items()):
-            yield from reins.wait()
             track = race.tracks[name]
             try:
-                at = search.send(reins.stopping) if begun else next(search)
+                at = search.send(asked.stopping) if begun else next(search)
             except StopIteration as finished:
                 track.answer = finished.value
                 track.current_A = objective.currents(finished.value.k)[0, : len(race.time_s)]
                 del searches[name]
-                tell(race, None)
+                tell(None)
             else:
                 track.add(at)
                 track.iterations = at.iterations
                 if at.iteration % _CURRENT_EVERY == 0:
                     track.current_A = objective.currents(at.k)[0, : len(race.time_s)]
-                tell(race, at)
+                tell(at)
             yield
         begun = True

@@ -1,0 +1,148 @@
+"""The one machine for long runs: what goes on, a pause, a stop that ends or keeps, an end, and how far it is."""
+
+from __future__ import annotations
+
+import threading
+
+import pytest
+from support.on_page import wait_until
+
+from ema_model.errors import InputError
+from emaviz.session.job import Job
+from emaviz.session.pace import Pace
+from emaviz.session.worker import Worker
+
+
+@pytest.fixture
+def errors():
+    return []
+
+
+@pytest.fixture
+def worker(errors):
+    worker = Worker("test-compute", errors.append)
+    yield worker
+    worker.close()
+
+
+class Heard:
+    """What a job tells."""
+
+    def __init__(self, job):
+        self.said, self.ended, self.rests = [], [], []
+        job.progressed.connect(lambda *said: self.said.append(said))
+        job.ended.connect(self.ended.append)
+        job.rests.connect(self.rests.append)
+
+
+def test_a_job_says_what_goes_on_and_what_came_of_it(worker):
+    job, gone_on = Job(worker), []
+    heard = Heard(job)
+    assert job.begin("Counting", lambda tell: [tell(f"the_{i}", i / 3) for i in range(3)], lambda: "Three.")
+    assert not job.begin("Again", gone_on.append), "one at a time"
+    wait_until(lambda: heard.ended)
+    assert heard.ended == ["Three."] and job.finished and not job.running and not gone_on
+    assert [(text, share) for text, _, share in heard.said] == [("the 0", 0.0), ("the 1", 1 / 3), ("the 2", 2 / 3)]
+    assert job.begin("Nothing", lambda tell: None)
+    wait_until(lambda: len(heard.ended) == 2)
+    assert heard.ended[1].startswith("Nothing: done in ")
+
+
+def test_one_that_rests_lets_quick_jobs_run(worker):
+    job, count, quick = Job(worker), [], threading.Event()
+    heard = Heard(job)
+    enough = threading.Event()
+
+    def work(tell):
+        while not enough.is_set():
+            count.append(0)
+            tell("counting")
+
+    job.begin("Counting", work)
+    wait_until(lambda: count)
+    job.pause(True)
+    assert job.paused and heard.rests == [True]
+    worker.post("quick", quick.set)
+    assert quick.wait(5.0)
+    at = len(count)
+    rested = threading.Event()
+    rested.wait(0.2)
+    assert len(count) <= at + 1, "the one that it was about to say"
+    job.pause(False)
+    wait_until(lambda: len(count) > at + 1)
+    enough.set()
+    wait_until(lambda: heard.ended)
+    assert not job.paused
+
+
+def test_a_stop_ends_one_that_tells_and_is_asked_for_by_one_that_keeps(worker, errors):
+    job, rows = Job(worker, on_stop=lambda: "As it was."), []
+    heard = Heard(job)
+
+    def told(tell):
+        while True:
+            tell("on")
+
+    def keeps(run):
+        while not run.stopping:
+            rows.append(0)
+            run.say("on")
+            yield
+
+    job.begin("Told", told)
+    job.pause(True)
+    job.stop()  # also one that rests
+    wait_until(lambda: heard.ended)
+    assert heard.ended == ["As it was."] and not job.finished
+    job.begin("Kept", keeps, lambda: f"{len(rows)} rows")
+    wait_until(lambda: rows)
+    job.stop()
+    wait_until(lambda: len(heard.ended) == 2)
+    assert heard.ended[1] == f"{len(rows)} rows" and job.finished and not errors
+
+
+def test_what_fails_is_told_once_and_the_next_can_begin(worker, errors):
+    job = Job(worker, on_divergence="check the file")
+    heard = Heard(job)
+
+    def diverges(tell):
+        raise FloatingPointError("the model diverged")
+
+    job.begin("Bad", diverges)
+    wait_until(lambda: heard.ended)
+    assert heard.ended == [""] and not job.running and not job.finished
+    (error,) = errors
+    assert isinstance(error, InputError) and str(error) == "the model diverged; check the file"
+    assert job.begin("Good", lambda tell: None)
+    wait_until(lambda: len(heard.ended) == 2)
+
+
+def test_a_worker_that_closes_ends_what_runs(errors):
+    worker = Worker("test-compute", errors.append)
+    job = Job(worker)
+    told = threading.Event()
+
+    def work(tell):
+        while True:
+            told.set()
+            tell("on")
+
+    job.begin("Long", work)
+    job.pause(True)
+    assert told.wait(5.0)
+    worker.close()
+    assert not worker._thread.is_alive()
+
+
+def test_the_second_run_knows_how_far_it_is_by_the_first():
+    pace = Pace()
+    pace.begin("a")
+    assert [pace.at(text, at) for text, at in (("reading", 0.0), ("step 1 of 2", 2.0))] == [None, None]
+    pace.end(4.0)
+    pace.begin("a")
+    assert pace.at("reading", 0.0) == 0.0 and pace.at("reading", 1.0) == 0.25
+    assert pace.at("reading", 3.0) == 0.5, "not beyond where the next began"
+    assert pace.at("step 2 of 2", 3.0) == 0.5 and pace.at("step 2 of 2", 99.0) == 0.99
+    assert pace.at("something new", 3.0) is None
+    pace.begin("b")
+    assert pace.at("reading", 1.0) is None

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import gzip
-import json
 
 import numpy as np
 import pytest
 from support.foreign_files import FILES as WRITERS
+from support.servo_logs import SERVO_SIGNALS, duty_of, write_servo_log
 
 from ema_model.actuator import load_actuator, shipped
 from ema_model.commands import command
@@ -74,15 +74,8 @@ def twincat(path, run):
 
 
 def bam(path, run):
-    """Rhoban/bam, bam/xl330/record.py: settings, and a record for each sample under `entries`."""
-    entries = [
-        {"position": q, "speed": dq, "load": 3, "input_volts": 7.4, "temp": 28, "timestamp": t, "goal_position": goal,
-         "torque_enable": True}
-        for t, q, dq, goal in zip(*(np.array(run[name])[::10].tolist() for name in (
-            "time_s", "user_position_rad", "motor_speed_rad_s", "command_rad")))
-    ]  # fmt: skip
-    head = {"mass": 0.49, "length": 0.1, "kp": 400, "vin": 7.4, "motor": "xl330", "trajectory": "sin_sin"}
-    path.write_text(json.dumps({**head, "entries": entries}))
+    """Rhoban/bam, bam/xl330/record.py: see support.servo_logs."""
+    write_servo_log(path, {signal: np.array(run[signal])[::10] for signal in SERVO_SIGNALS}, kp=400)
 
 
 def by_writer(kind, names):
@@ -142,6 +135,8 @@ def test_opened_with_no_option(name, run, tmp_path, monkeypatch, capsys):
         wanted = np.array(run[signal])[::step]
         # Logs begin at their first sample.
         np.testing.assert_allclose(found[signal], wanted, atol=2e-5 * np.ptp(wanted), err_msg=signal)
+    if name == "bam":
+        np.testing.assert_allclose(found["duty"], duty_of(found, 400), atol=1.0 / 885)
     told = capsys.readouterr().err
     assert told.count("\n") <= 1
     if name == "DIAdem":

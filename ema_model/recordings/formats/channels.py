@@ -35,7 +35,7 @@ class Channel:
 
 @dataclass(frozen=True)
 class Log:
-    """What a file holds: channels, clocks in seconds, single numbers, and what it says of itself."""
+    """What a file holds: channels, clocks, single numbers, and what it says of itself."""
 
     channels: Sequence[Channel]
     clocks: dict[str, Callable[[], Array]] = field(default_factory=dict)
@@ -43,6 +43,7 @@ class Log:
     notes: tuple[str, ...] = ()
     left_aside: tuple[str, ...] = ()  # names of what is no row of numbers
     title: str = ""  # what it calls the run, beside its file's name
+    time: str = "time_s"  # what the clocks' column is called: they are in seconds, unless their unit is not known
 
 
 Opened = Callable[[str, int], AbstractContextManager[Log]]  # path, most bytes

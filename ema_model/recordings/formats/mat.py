@@ -10,19 +10,22 @@ from dataclasses import replace
 import numpy as np
 
 from ema_model.files.limits import ARRAYS, megabytes
-from ema_model.files.refusal import refusal, shown
+from ema_model.files.refusal import listed, refusal, shown
 from ema_model.quantities.signals import SIGNALS
-from ema_model.recordings.formats import hdf5
-from ema_model.recordings.formats.arrays import Kind, column_names, take
-from ema_model.recordings.formats.channels import is_table, told
+from ema_model.recordings.formats import common_clock, hdf5
+from ema_model.recordings.formats.arrays import Kind, check_lengths, column_names, is_column, take
+from ema_model.recordings.formats.channels import Channel, Log, is_table, told
 from ema_model.recordings.formats.format import Array, Columns, Format
 from ema_model.recordings.formats.mat5 import HEADER_BYTES, Damaged, Leaf, TooLarge, TooMany, leaves
+from ema_model.recordings.formats.own_clocks import with_own_clocks
 
 
 def _header(path: str, max_bytes: int) -> list[str]:
     if _is_hdf5(path):
         return hdf5.FORMAT.header(path, max_bytes)
-    return column_names(_kinds(_load(path, max_bytes)))
+    arrays = _load(path, max_bytes)
+    log = _with_clocks(arrays)
+    return list(common_clock.offered(path, log)) if log.clocks else column_names(_kinds(arrays))
 
 
 def _read(path: str, names: Sequence[str], max_bytes: int, strict: bool) -> Columns:
@@ -30,10 +33,36 @@ def _read(path: str, names: Sequence[str], max_bytes: int, strict: bool) -> Colu
         return hdf5.FORMAT.read(path, names, max_bytes, strict)
     arrays = _load(path, max_bytes)
     numbers = {name: float(leaf.values()[0]) for name, leaf in arrays.items() if _is_number(leaf)}
+    if (log := _with_clocks(arrays)).clocks:
+        columns = _on_one_clock(path, log, names, max_bytes, strict)
+        return replace(columns, notes=(*_told(numbers), *columns.notes))
     kinds = {name: kind for name, kind in _kinds(arrays).items() if name not in numbers or name in names}
     columns = take(path, kinds, names, max_bytes, strict, lambda name: arrays.pop(name).values())
-    notes = (f"single numbers in the file: {told(numbers)}",) if numbers else ()
-    return replace(columns, notes=(*notes, *columns.notes))
+    return replace(columns, notes=(*_told(numbers), *columns.notes))
+
+
+def _told(numbers: Mapping[str, float]) -> tuple[str, ...]:
+    return (f"single numbers in the file: {told(dict(numbers))}",) if numbers else ()
+
+
+def _with_clocks(arrays: Mapping[str, Leaf]) -> Log:
+    """The columns as channels, with clocks where they have several."""
+    kinds = _kinds(arrays)
+    channels = [
+        Channel(leaf.path, math.prod(leaf.shape), leaf.values)
+        for name, leaf in arrays.items()
+        if is_column(kinds[name])
+    ]
+    aside = [name for name, leaf in arrays.items() if not is_column(kinds[name]) and not _is_number(leaf)]
+    return with_own_clocks(Log(channels, left_aside=tuple(aside)))
+
+
+def _on_one_clock(path: str, log: Log, names: Sequence[str], max_bytes: int, strict: bool) -> Columns:
+    arrays, notes, clocks = common_clock.taken(path, log, names, max_bytes, strict)
+    if strict:
+        check_lengths(path, arrays)
+    aside = [f"left aside, as they are no columns of numbers: {listed(log.left_aside)}"] if log.left_aside else []
+    return Columns(arrays, lambda row: f"sample {row + 1}", (*aside, *notes), clocks=clocks)
 
 
 def _write(signals: Mapping[str, Array], path: str) -> None:

@@ -53,7 +53,7 @@ def _lines(text: bytes, error: Exception) -> Any:
     if not (first.startswith(b"{") and first.endswith(b"}")):
         raise NoLog(str(error)) from None
     try:
-        return msgspec.json.decode(b"[" + b",".join(filter(None, map(bytes.strip, text.splitlines()))) + b"]")
+        return msgspec.json.Decoder().decode_lines(text)
     except (msgspec.DecodeError, RecursionError) as problem:
         raise NoLog(str(problem)) from None
 

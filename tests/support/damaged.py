@@ -11,6 +11,8 @@ import zlib
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+import h5py
+import nptdms
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -24,6 +26,8 @@ from ema_model.challenges.truth import Truth
 from emaviz.recording import RecordingWriter
 from emaviz.session.settings import Settings
 from support.foreign_files import FILES
+from support.robot_datasets import write_robot_dataset
+from support.servo_logs import SERVO_SIGNALS, write_servo_log
 
 N = 120
 k = np.arange(float(N))
@@ -59,6 +63,11 @@ values = [-0.01, { value = -0.002, sigma = 0.005 }, -0.01]
 match = "*kp100*"
 set = { "controller.position_gain_1_s" = 100.0 }
 """
+SLOW = k[: N // 2] / 500.0
+TWO_CLOCKS = {
+    "encoder": {name: COLUMNS[name] for name in ("time_s", "motor_position_rad")},
+    "drive": {"time_s": SLOW, "current_A": np.sin(SLOW)},
+}
 Change = Callable[[bytes, random.Random], bytes]
 
 
@@ -111,6 +120,38 @@ def recording(folder: Path) -> bytes:
     return path.read_bytes()
 
 
+def two_clocks(reader: str, folder: Path) -> list[bytes]:
+    """The same with two clocks, in formats that know of none."""
+    path = folder / "two clocks"
+    if reader == "json columns":
+        return [json.dumps(TWO_CLOCKS, default=np.ndarray.tolist).encode()]
+    if reader == "hdf5":
+        with h5py.File(path, "w") as file:
+            for group, columns in TWO_CLOCKS.items():
+                for name, values in columns.items():
+                    file[f"{group}/{name}"] = values
+        return [path.read_bytes()]
+    if reader == "tdms":
+        with nptdms.TdmsWriter(path) as file:
+            parts = ((g, name, values) for g, columns in TWO_CLOCKS.items() for name, values in columns.items())
+            file.write_segment([nptdms.ChannelObject(*part) for part in parts])
+        return [path.read_bytes()]
+    return []
+
+
+def servo_log(folder: Path) -> bytes:
+    signals = {**dict.fromkeys(SERVO_SIGNALS, np.sin(k)), "time_s": k / 200.0, "duty": np.cos(k)}
+    write_servo_log(folder / "whole.json", signals, 100)
+    return (folder / "whole.json").read_bytes()
+
+
+def robot_dataset(folder: Path) -> bytes:
+    """Its description, beside which it stands whole."""
+    root, state = folder / "dataset", np.column_stack([k, np.sin(k)])
+    write_robot_dataset(root, 3, 500.0, {"state": ["position_rad", "current_A"]}, [{"state": state}, {"state": state}])
+    return (root / "meta" / "info.json").read_bytes()
+
+
 def whole(reader: str, folder: Path) -> list[bytes]:
     """Some files that the reader takes."""
     if reader == "csv":
@@ -123,11 +164,14 @@ def whole(reader: str, folder: Path) -> list[bytes]:
         return [written(np.savez, **COLUMNS), written(np.savez_compressed, **COLUMNS), table]
     if reader in ("mat", "packed mat"):
         rig = {"rig": {**COLUMNS, "label": "x", "inner": {"x": k}}, "cells": np.array([k, "a"], object)}
-        return [written(savemat, arrays, do_compression=reader == "packed mat") for arrays in (COLUMNS, rig)]
+        kinds = (COLUMNS, rig, TWO_CLOCKS)
+        return [written(savemat, arrays, do_compression=reader == "packed mat") for arrays in kinds]
+    if reader in ("robot dataset", "servo log"):
+        return [robot_dataset(folder) if reader == "robot dataset" else servo_log(folder)]
     if reader in FILES:
         ending, write = FILES[reader]
         write(folder / f"whole{ending}", COLUMNS)
-        return [(folder / f"whole{ending}").read_bytes()]
+        return [(folder / f"whole{ending}").read_bytes(), *two_clocks(reader, folder)]
     if reader == "side file":
         return [SIDE.encode()]
     if reader == "actuator":

@@ -7,6 +7,7 @@ import gzip
 import numpy as np
 import pytest
 from support.foreign_files import FILES as WRITERS
+from support.mat_structs import write_dspace, write_simulink
 from support.servo_logs import SERVO_SIGNALS, duty_of, write_servo_log
 
 from ema_model.actuator import load_actuator, shipped
@@ -78,6 +79,23 @@ def bam(path, run):
     write_servo_log(path, {signal: np.array(run[signal])[::10] for signal in SERVO_SIGNALS}, kp=400)
 
 
+def simulink(path, run):
+    columns = renamed(run, SNAKE)
+    write_simulink(path, columns.pop("t"), columns)
+
+
+def dspace(path, run):
+    """As ControlDesk's users name signals: by the block's own name, with its unit."""
+    named = {
+        "command_rad": ("PosSetpoint", "deg", np.pi / 180.0),
+        "user_position_rad": ("OutputPosition", "deg", np.pi / 180.0),
+        "motor_speed_rad_s": ("MotorSpeed", "rpm", np.pi / 30.0),
+        "current_A": ("MotorCurrent", "A", 1.0),
+    }
+    signals = {name: (unit, np.array(run[signal]) / si) for signal, (name, unit, si) in named.items()}
+    write_dspace(path, {"HostService": (np.array(run["time_s"]), signals)})
+
+
 def by_writer(kind, names):
     return lambda path, run: WRITERS[kind][1](path, renamed(run, names))
 
@@ -85,6 +103,8 @@ def by_writer(kind, names):
 LOGS = {  # name: ending, writer, actuator
     "h5py": (".h5", by_writer("hdf5", ENGLISH), "thesis"),
     "MATLAB 7.3": (".mat", by_writer("mat 7.3", SNAKE), "thesis"),
+    "Simulink": (".mat", simulink, "thesis"),
+    "dSPACE": (".mat", dspace, "thesis"),
     "LabVIEW TDMS": (".tdms", by_writer("tdms", ENGLISH), "thesis"),
     "CANape MDF4": (".mf4", by_writer("mdf", ENGLISH), "thesis"),
     "PX4 ULog": (".ulg", by_writer("ulog", SNAKE), "thesis"),

@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 from scipy.io import savemat
+from support.mat_structs import write_dspace
 
 from ema_model.errors import InputError
 from ema_model.recordings import read_columns
@@ -115,6 +116,20 @@ def test_units_of_times_are_taken_out(tmp_path):
     assert list(columns) == ["time_s", "angle", "speed"]
     np.testing.assert_allclose(np.diff(columns["time_s"]), 1e-3, rtol=1e-6)
     np.testing.assert_allclose(columns["speed"][300], LATE[100], rtol=1e-9)
+
+
+def test_each_raster_of_dspace_has_its_own_time(tmp_path):
+    rasters = {
+        "HostService": (FAST, {"q": ("deg", np.rad2deg(angle(FAST))), "iq": ("A", np.cos(FAST))}),
+        "Slow": (SLOW, {"q": ("deg", SLOW), "speed": ("rpm", LATE * 30.0 / np.pi)}),
+    }
+    write_dspace(tmp_path / "a.mat", rasters)
+    columns = read_columns(tmp_path / "a.mat")
+    assert list(columns) == ["time_s", "Y(1).q [deg]", "iq [A]", "Y(3).q [deg]", "speed [rpm]"]
+    np.testing.assert_allclose(columns["Y(3).q [deg]"], np.minimum(columns["time_s"], SLOW[-1]), atol=1e-9)
+    one = {"HostService": rasters["HostService"]}
+    write_dspace(tmp_path / "one.mat", one)
+    assert list(read_columns(tmp_path / "one.mat")) == ["time [s]", "q [deg]", "iq [A]"]
 
 
 def test_a_clock_that_begins_later_stays_later(tmp_path):

@@ -26,6 +26,7 @@ from ema_model.challenges.truth import Truth
 from emaviz.recording import RecordingWriter
 from emaviz.session.settings import Settings
 from support.foreign_files import FILES
+from support.mat_structs import write_dspace
 from support.robot_datasets import write_robot_dataset
 from support.servo_logs import SERVO_SIGNALS, write_servo_log
 
@@ -139,6 +140,12 @@ def two_clocks(reader: str, folder: Path) -> list[bytes]:
     return []
 
 
+def dspace(folder: Path) -> bytes:
+    fast = k / 1e3, {"motor_position_rad": ("", COLUMNS["motor_position_rad"])}
+    write_dspace(folder / "whole.mat", {"Fast": fast, "Slow": (SLOW, {"current_A": ("", np.sin(SLOW))})})
+    return (folder / "whole.mat").read_bytes()
+
+
 def servo_log(folder: Path) -> bytes:
     signals = {**dict.fromkeys(SERVO_SIGNALS, np.sin(k)), "time_s": k / 200.0, "duty": np.cos(k)}
     write_servo_log(folder / "whole.json", signals, 100)
@@ -165,7 +172,8 @@ def whole(reader: str, folder: Path) -> list[bytes]:
     if reader in ("mat", "packed mat"):
         rig = {"rig": {**COLUMNS, "label": "x", "inner": {"x": k}}, "cells": np.array([k, "a"], object)}
         kinds = (COLUMNS, rig, TWO_CLOCKS)
-        return [written(savemat, arrays, do_compression=reader == "packed mat") for arrays in kinds]
+        found = [written(savemat, arrays, do_compression=reader == "packed mat") for arrays in kinds]
+        return found if reader == "packed mat" else [*found, dspace(folder)]
     if reader in ("robot dataset", "servo log"):
         return [robot_dataset(folder) if reader == "robot dataset" else servo_log(folder)]
     if reader in FILES:

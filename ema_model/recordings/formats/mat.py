@@ -17,6 +17,7 @@ from ema_model.recordings.formats.arrays import Kind, check_lengths, column_name
 from ema_model.recordings.formats.channels import Channel, Log, is_table, told
 from ema_model.recordings.formats.format import Array, Columns, Format
 from ema_model.recordings.formats.mat5 import HEADER_BYTES, Damaged, Leaf, TooLarge, TooMany, leaves
+from ema_model.recordings.formats.mat_named import with_names
 from ema_model.recordings.formats.own_clocks import with_own_clocks
 
 
@@ -105,13 +106,14 @@ def _load(path: str, max_bytes: int) -> dict[str, Leaf]:
     with open(path, "rb") as file:
         _check_version(path, file.read(HEADER_BYTES))
         try:
-            found = [one for leaf in leaves(file, max_bytes) if leaf.path[-1] for one in _columns(leaf)]
+            found = [leaf for leaf in leaves(file, max_bytes) if leaf.path[-1]]
         except Damaged as error:
             raise refusal(path, f"is not a whole .mat file ({error}); save it again") from None
         except TooLarge:
             raise refusal(path, f"unpacks to over {megabytes(max_bytes)}, which is the limit; split it") from None
         except TooMany:
             raise refusal(path, f"holds over {ARRAYS} arrays, which is the limit; save the columns alone") from None
+    found = [one for leaf in with_names(found) for one in _columns(leaf)]
     twice = [path for path, count in Counter(leaf.path for leaf in found).items() if count > 1]
     if twice:
         raise refusal(path, f"array {shown('.'.join(twice[0]))!r} stands twice; save it again with one of each name")

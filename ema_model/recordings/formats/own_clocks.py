@@ -20,6 +20,7 @@ from ema_model.recordings.formats.text_clocks import is_time
 
 _TIME = QUANTITIES["time"]
 _RISING = 0.9  # of a clock's steps
+_LOOKED_AT = 1_000_000  # of its samples
 
 
 def with_own_clocks(log: Log) -> Log:
@@ -75,7 +76,7 @@ def _rises(channel: Channel) -> bool:
     values = np.asarray(channel.values())
     if values.dtype.kind not in "fiu":
         return False
-    values = values.reshape(-1).astype(np.float64)
+    values = values.reshape(-1)[:_LOOKED_AT].astype(np.float64)
     return bool(np.isfinite(values).all() and np.count_nonzero(usable(values)) > _RISING * values.size)
 
 

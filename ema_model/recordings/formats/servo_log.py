@@ -30,15 +30,14 @@ def is_one(document: Any) -> bool:
 
 
 def with_units(document: dict[str, Any]) -> dict[str, Any]:
-    """The log with the units in its names, and the duty as a ratio where the motor's limit is known."""
+    """The log as columns with the units in their names, and the duty as a ratio where the motor's limit is known."""
     entries = [entry for entry in document["entries"] if isinstance(entry, dict)]
+    columns = {key: [entry.get(key) for entry in entries] for key in entries[0]}
     limit = _PWM_LIMITS.get(document["motor"]) if isinstance(document["motor"], str) else None
-    duties = _duties([entry.get("load") for entry in entries], limit) if limit else []
-    entries = [{**entry, "load": duty} for entry, duty in zip(entries, duties)] or entries
-    names = (
-        _SIGNALS | {name: f"{name} [{unit}]" for name, unit in _UNITS.items()} | ({"load": "duty"} if duties else {})
-    )
-    return {**document, "entries": [{names.get(key, key): value for key, value in one.items()} for one in entries]}
+    names = _SIGNALS | {name: f"{name} [{unit}]" for name, unit in _UNITS.items()}
+    if limit and (duties := _duties(columns.get("load", [None]), limit)):
+        columns["load"], names["load"] = duties, "duty"
+    return {**document, "entries": {names.get(key, key): values for key, values in columns.items()}}
 
 
 def _duties(loads: list[Any], limit: int) -> list[float]:

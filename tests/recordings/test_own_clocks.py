@@ -166,3 +166,11 @@ def test_channels_without_a_common_time(tmp_path):
     savemat(tmp_path / "a.mat", {**FLAT, "t_speed": SLOW + 9.0})
     with pytest.raises(InputError, match="its channels have no time in common"):
         read_measurement(tmp_path / "a.mat", ["time_s=time", f"{POSITION}=motor_angle", f"{SPEED}=motor_speed"])
+
+
+def test_a_name_that_says_nothing_has_its_groups_before_it(tmp_path):
+    """As of ROS's std_msgs/Float64, whose one field is `data`, and of records with a time and a value."""
+    topics = {"target_angle": {"stamp": FAST.tolist(), "data": FAST.tolist()}, "iq": {"stamp": SLOW.tolist()}}
+    topics["iq"]["value"] = SLOW.tolist()
+    (tmp_path / "a.json").write_text(json.dumps(topics))
+    assert read_header(str(tmp_path / "a.json"), 10**9) == ["time", "target_angle.data", "iq.value"]

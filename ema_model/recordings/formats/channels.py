@@ -19,6 +19,7 @@ from ema_model.quantities.units import dimensions_of
 Array = NDArray[np.float64]
 MOST_COLUMNS = 64  # of a table without names: beyond, it is an image, or the table lies on its side
 _LONGEST_UNIT = 24
+_SAYS_NOTHING = ("data", "value", "values")  # of a name: what a group or a topic holds, not what it is
 
 
 @dataclass(frozen=True)
@@ -118,8 +119,8 @@ def told(parameters: dict[str, float]) -> str:
 
 
 def _told_apart(paths: Sequence[tuple[str, ...]]) -> list[str]:
-    """Each path's last parts, as few as tell it from all others, joined by dots."""
-    lengths = [1] * len(paths)
+    """Each path's last parts, as few as say something and tell it from all others, joined by dots."""
+    lengths = [1 + (path[-1].lower() in _SAYS_NOTHING) for path in paths]
     for _ in range(max(map(len, paths), default=1)):
         names = [".".join(path[-length:]) for path, length in zip(paths, lengths)]
         count = Counter(names)

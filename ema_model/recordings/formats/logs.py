@@ -20,6 +20,7 @@ from ema_model.recordings.formats.channels import Log, NoLog, told
 from ema_model.recordings.formats.clocks import Clocks
 from ema_model.recordings.formats.format import Array, Columns, Format
 from ema_model.recordings.formats.own_clocks import with_own_clocks
+from ema_model.recordings.formats.run_groups import with_runs
 
 _PATIENCE_S = 20.0  # for one question; some libraries never end
 INSTALL = "pip install 'emaviz[rigs]'"
@@ -89,7 +90,8 @@ def _opened(module: str, path: str, max_bytes: int) -> Log:
     _close()
     files = ExitStack()
     with _told(module, path):
-        log = with_own_clocks(files.enter_context(importlib.import_module(module).opened(path, max_bytes)))
+        log = files.enter_context(importlib.import_module(module).opened(path, max_bytes))
+        log = with_own_clocks(with_runs(log))
     _last = key, log, files
     return log
 

@@ -19,14 +19,15 @@ from ema_model.recordings.formats.format import Array, Columns, Format
 from ema_model.recordings.formats.mat5 import HEADER_BYTES, Damaged, Leaf, TooLarge, TooMany, leaves
 from ema_model.recordings.formats.mat_named import with_names
 from ema_model.recordings.formats.own_clocks import with_own_clocks
+from ema_model.recordings.formats.run_groups import with_runs
 
 
 def _header(path: str, max_bytes: int) -> list[str]:
     if _is_hdf5(path):
         return hdf5.FORMAT.header(path, max_bytes)
     arrays = _load(path, max_bytes)
-    log = _with_clocks(arrays)
-    return list(common_clock.offered(path, log)) if log.clocks else column_names(_kinds(arrays))
+    log = _put_together(arrays)
+    return list(common_clock.offered(path, log)) if log else column_names(_kinds(arrays))
 
 
 def _read(path: str, names: Sequence[str], max_bytes: int, strict: bool) -> Columns:
@@ -34,8 +35,8 @@ def _read(path: str, names: Sequence[str], max_bytes: int, strict: bool) -> Colu
         return hdf5.FORMAT.read(path, names, max_bytes, strict)
     arrays = _load(path, max_bytes)
     numbers = {name: float(leaf.values()[0]) for name, leaf in arrays.items() if _is_number(leaf)}
-    if (log := _with_clocks(arrays)).clocks:
-        columns = _on_one_clock(path, log, names, max_bytes, strict)
+    if log := _put_together(arrays):
+        columns = _together(path, log, names, max_bytes, strict)
         return replace(columns, notes=(*_told(numbers), *columns.notes))
     kinds = {name: kind for name, kind in _kinds(arrays).items() if name not in numbers or name in names}
     columns = take(path, kinds, names, max_bytes, strict, lambda name: arrays.pop(name).values())
@@ -46,8 +47,8 @@ def _told(numbers: Mapping[str, float]) -> tuple[str, ...]:
     return (f"single numbers in the file: {told(dict(numbers))}",) if numbers else ()
 
 
-def _with_clocks(arrays: Mapping[str, Leaf]) -> Log:
-    """The columns as channels, with clocks where they have several."""
+def _put_together(arrays: Mapping[str, Leaf]) -> Log | None:
+    """The columns as channels, where they have several clocks or are several runs."""
     kinds = _kinds(arrays)
     channels = [
         Channel(leaf.path, math.prod(leaf.shape), leaf.values)
@@ -55,15 +56,17 @@ def _with_clocks(arrays: Mapping[str, Leaf]) -> Log:
         if is_column(kinds[name])
     ]
     aside = [name for name, leaf in arrays.items() if not is_column(kinds[name]) and not _is_number(leaf)]
-    return with_own_clocks(Log(channels, left_aside=tuple(aside)))
+    log = Log(channels, left_aside=tuple(aside))
+    found = with_own_clocks(with_runs(log))
+    return None if found is log else found
 
 
-def _on_one_clock(path: str, log: Log, names: Sequence[str], max_bytes: int, strict: bool) -> Columns:
+def _together(path: str, log: Log, names: Sequence[str], max_bytes: int, strict: bool) -> Columns:
     arrays, notes, clocks = common_clock.taken(path, log, names, max_bytes, strict)
     if strict:
         check_lengths(path, arrays)
     aside = [f"left aside, as they are no columns of numbers: {listed(log.left_aside)}"] if log.left_aside else []
-    return Columns(arrays, lambda row: f"sample {row + 1}", (*aside, *notes), clocks=clocks)
+    return Columns(arrays, lambda row: f"sample {row + 1}", (*aside, *log.notes, *notes), clocks=clocks)
 
 
 def _write(signals: Mapping[str, Array], path: str) -> None:

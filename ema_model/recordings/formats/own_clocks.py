@@ -27,7 +27,7 @@ def with_own_clocks(log: Log) -> Log:
     """The log with its channels of time as clocks, where the others have two or more of them; else as it is."""
     if log.clocks:
         return log
-    times = {i: one for i, one in enumerate(log.channels) if is_time(one.path[-1]) and _rises(one)}
+    times = {i: one for i, one in enumerate(log.channels) if is_clock(one)}
     if len(times) < 2:
         return log
     near: dict[tuple[tuple[str, ...], int], list[int]] = {}
@@ -70,8 +70,9 @@ def _name(time: Channel) -> str:
     return ".".join(time.path)
 
 
-def _rises(channel: Channel) -> bool:
-    if channel.samples < 2:
+def is_clock(channel: Channel) -> bool:
+    """Whether a channel is called a time, and rises as one does."""
+    if channel.samples < 2 or not is_time(channel.path[-1]):
         return False
     values = np.asarray(channel.values())
     if values.dtype.kind not in "fiu":

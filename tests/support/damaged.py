@@ -69,6 +69,7 @@ TWO_CLOCKS = {
     "encoder": {name: COLUMNS[name] for name in ("time_s", "motor_position_rad")},
     "drive": {"time_s": SLOW, "current_A": np.sin(SLOW)},
 }
+RUNS = {"trial_1": COLUMNS, "trial_2": {**COLUMNS, "time_s": COLUMNS["time_s"] + 1.0}}
 Change = Callable[[bytes, random.Random], bytes]
 
 
@@ -121,23 +122,24 @@ def recording(folder: Path) -> bytes:
     return path.read_bytes()
 
 
-def two_clocks(reader: str, folder: Path) -> list[bytes]:
-    """The same with two clocks, in formats that know of none."""
-    path = folder / "two clocks"
-    if reader == "json columns":
-        return [json.dumps(TWO_CLOCKS, default=np.ndarray.tolist).encode()]
-    if reader == "hdf5":
-        with h5py.File(path, "w") as file:
-            for group, columns in TWO_CLOCKS.items():
-                for name, values in columns.items():
+def in_groups(reader: str, folder: Path) -> list[bytes]:
+    """The same with two clocks, and with a group for each run, in formats that know of neither."""
+    path, found = folder / "in groups", []
+    for groups in (TWO_CLOCKS, RUNS):
+        parts = [(group, name, values) for group, columns in groups.items() for name, values in columns.items()]
+        if reader == "json columns":
+            path.write_text(json.dumps(groups, default=np.ndarray.tolist))
+        elif reader == "hdf5":
+            with h5py.File(path, "w") as file:
+                for group, name, values in parts:
                     file[f"{group}/{name}"] = values
-        return [path.read_bytes()]
-    if reader == "tdms":
-        with nptdms.TdmsWriter(path) as file:
-            parts = ((g, name, values) for g, columns in TWO_CLOCKS.items() for name, values in columns.items())
-            file.write_segment([nptdms.ChannelObject(*part) for part in parts])
-        return [path.read_bytes()]
-    return []
+        elif reader == "tdms":
+            with nptdms.TdmsWriter(path) as file:
+                file.write_segment([nptdms.ChannelObject(*part) for part in parts])
+        else:
+            return []
+        found.append(path.read_bytes())
+    return found
 
 
 def dspace(folder: Path) -> bytes:
@@ -171,7 +173,7 @@ def whole(reader: str, folder: Path) -> list[bytes]:
         return [written(np.savez, **COLUMNS), written(np.savez_compressed, **COLUMNS), table]
     if reader in ("mat", "packed mat"):
         rig = {"rig": {**COLUMNS, "label": "x", "inner": {"x": k}}, "cells": np.array([k, "a"], object)}
-        kinds = (COLUMNS, rig, TWO_CLOCKS)
+        kinds = (COLUMNS, rig, TWO_CLOCKS, RUNS)
         found = [written(savemat, arrays, do_compression=reader == "packed mat") for arrays in kinds]
         return found if reader == "packed mat" else [*found, dspace(folder)]
     if reader in ("robot dataset", "servo log"):
@@ -179,7 +181,7 @@ def whole(reader: str, folder: Path) -> list[bytes]:
     if reader in FILES:
         ending, write = FILES[reader]
         write(folder / f"whole{ending}", COLUMNS)
-        return [(folder / f"whole{ending}").read_bytes(), *two_clocks(reader, folder)]
+        return [(folder / f"whole{ending}").read_bytes(), *in_groups(reader, folder)]
     if reader == "side file":
         return [SIDE.encode()]
     if reader == "actuator":

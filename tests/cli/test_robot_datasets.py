@@ -76,6 +76,17 @@ def test_what_is_not_said_is_asked_by_the_joints_names(dataset, tmp_path, capsys
     assert "observation.state.hip (no unit), observation.state.knee (no unit)" in told and told.count("\n") == 1
 
 
+def test_an_action_is_a_command(tmp_path, capsys):
+    """The joints' names as lerobot's SO-101 has them; units stand nowhere, so that they are asked for."""
+    path = tmp_path / "one"
+    names = {"observation.state": ["elbow_flex.pos"], "action": ["elbow_flex.pos"]}
+    write_robot_dataset(path, 3, FPS, names, [dict.fromkeys(names, np.sin(np.arange(200.0))[:, None])])
+    assert main(["compare", str(path)]) == 2
+    told = capsys.readouterr().err
+    assert "'action.elbow_flex.pos' may be command_rad, but it has no unit" in told
+    assert "--map 'command_rad=action.elbow_flex.pos[rad]'" in told
+
+
 def test_lists_without_a_length_of_their_own(tmp_path):
     """As pandas and DuckDB write them: their length stands in the dataset's description alone."""
     write_robot_dataset(tmp_path / "rig", 2, FPS, NAMES, [episode(3.0)])

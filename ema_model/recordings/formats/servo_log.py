@@ -16,7 +16,7 @@ _UNITS = {
     "speed": "rad/s",
 }
 _SIGNALS = {"input_volts": "bus_voltage_V", "temp": "temperature_C", "torque_enable": "drive_enabled"}
-_PWM_LIMITS = {"xl330": 885}  # counts of the full duty; of the XL330's control table
+_PWM_LIMITS = {"xl330": 885, "xl330i": 885}  # counts of the full duty; of the XL330's control table
 _REGISTER = 1 << 16  # values of a register with a sign, written as it stands
 _KEYS = {"mass", "length", "kp", "motor", "entries"}
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -12,7 +12,7 @@ import numpy as np
 
 from ema_model.errors import InputError
 from ema_model.files.refusal import listed, refusal, shown
-from ema_model.recordings.formats import FORMATS
+from ema_model.recordings.formats import FORMATS, robot_dataset
 from ema_model.recordings.measurement import Measurement
 
 _MARKS = frozenset("*?[")
@@ -27,10 +27,13 @@ def is_pattern(text: str) -> bool:
 def files_of(text: str) -> list[str]:
     """The recordings that a folder holds, or a pattern names, in order of their names; of all else the text itself.
 
-    A folder's own folders are left out, as is what begins with a dot.  InputError where there are none.
+    A folder's own folders are left out, as is what begins with a dot; a LeRobot dataset has its episodes' files.
+    InputError where there are none.
     """
     path = Path(text)
     if os.path.isdir(text):
+        if episodes := robot_dataset.files_in(text):
+            return episodes
         found = [str(one) for one in recordings_in(path)]
         if not found:
             raise refusal(text, f"a folder without recordings; they end in {', '.join(FORMATS)}")
@@ -61,18 +64,33 @@ def _is_recording(path: Path) -> bool:
     return path.is_file() and path.suffix.lower() in FORMATS and not path.name.startswith(".")
 
 
+def column_of_runs(file: str) -> str:
+    """The column that tells a file's recordings apart where its format has several in one, else ""."""
+    return robot_dataset.EPISODE if robot_dataset.has_episodes(file) else ""
+
+
+def episodes_of(measurement: Measurement, file: str) -> list[Measurement]:
+    """The episodes of a dataset's file as recordings of their own, as the dataset calls them; of all else itself."""
+    entry = measurement.reading.mapping.get("segment")
+    if entry is None or entry.column != column_of_runs(file):
+        return [measurement]
+    return [replace(run, name=robot_dataset.episode(index)) for index, run in _runs(measurement)]
+
+
 def runs_of(measurement: Measurement) -> list[Measurement]:
     """The runs of one file as recordings of their own, NAME#INDEX, by its `segment`, each with its own time.
 
     InputError where the file has no such column.
     """
+    return [replace(run, name=f"{measurement.name}{RUN}{index:g}") for index, run in _runs(measurement)]
+
+
+def _runs(measurement: Measurement) -> Iterator[tuple[float, Measurement]]:
     measurement.require("segment")
-    found = []
-    for index in np.unique(measurement["segment"]):
+    for index in np.unique(measurement["segment"]).tolist():
         keep = measurement["segment"] == index
         signals = {name: values[keep] for name, values in measurement.signals.items() if name != "segment"}
-        found.append(replace(measurement, signals=signals, name=f"{measurement.name}{RUN}{index:g}"))
-    return found
+        yield index, replace(measurement, signals=signals)
 
 
 def held_out(measurements: Sequence[Measurement], rule: str) -> tuple[list[Measurement], list[Measurement]]:

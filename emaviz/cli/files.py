@@ -88,7 +88,7 @@ def add_recordings(parser: argparse.ArgumentParser, done: str, nargs: str = "+")
         nargs=nargs,
         type=RECORDINGS,
         metavar="FILE",
-        help=f"recordings of one actuator, {done} together; folders and patterns too",
+        help=f"recordings of one actuator, {done} together; folders, LeRobot datasets and patterns too",
     )
 
 

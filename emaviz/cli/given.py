@@ -19,7 +19,7 @@ from ema_model.quantities.axes import Axes
 from ema_model.recordings import Measurement, read
 from ema_model.recordings.formats.text_layout import Hints
 from ema_model.recordings.read import COMMAND_ALONE, INPUT_ALONE, Needs
-from ema_model.recordings.recording_set import files_of, held_out, is_pattern, runs_of
+from ema_model.recordings.recording_set import column_of_runs, episodes_of, files_of, held_out, is_pattern, runs_of
 from ema_model.simulation.run import Run
 from emaviz.cli.options import COMMAND_OR_FILE
 from emaviz.cli.output import Progress
@@ -55,7 +55,7 @@ def _read_files(
     for i, name in enumerate(names):
         progress.show(f"reading {Path(name).name} ({i + 1} of {len(names)})")
         one = read_one(name, arguments, actuator, progress)
-        found += runs_of(one) if arguments.runs else [one]
+        found += runs_of(one) if arguments.runs else episodes_of(one, name)
     if arguments.start_s is None and arguments.stop_s is None:
         return found
     start = -math.inf if arguments.start_s is None else arguments.start_s
@@ -72,6 +72,8 @@ def read_one(
 ) -> Measurement:
     """A recording as --map, --header-line, --encoding and --runs say; needs: of its signals, all by default."""
     runs = getattr(arguments, "runs", None)
+    if not runs and not any(text.partition("=")[0].strip() == "segment" for text in arguments.mapping):
+        runs = column_of_runs(file)
     by_run = [f"segment={runs}"] if runs and runs != "segment" else []
     hints = Hints(arguments.header_line, arguments.encoding)
     measurement = read(file, actuator, [*arguments.mapping, *by_run], needs=needs, hints=hints)

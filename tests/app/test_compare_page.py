@@ -8,7 +8,7 @@ import time
 
 import numpy as np
 import pytest
-from support.on_page import choose, field, wait_until
+from support.on_page import choose, field, fill, wait_until
 from support.two_clocks import write_two_clocks
 
 from ema_model.actuator import load_actuator
@@ -156,6 +156,28 @@ def test_data_health_tells_a_clock_that_is_late(compare, app, recording, tmp_pat
     assert 4.5 < low <= 5.0 <= high < 5.5
     page.get_by_text("others are in order").click()
     page.get_by_text("The file has 2 clocks: brought onto one, linearly between their samples: motor speed.").wait_for()
+
+
+def test_a_delay_is_said_and_stays_where_another_thing_is_edited(compare, app, recording, tmp_path):
+    page, path = compare, tmp_path / "late clock.csv"
+    write_two_clocks(path, recording, 0.005)
+    upload(page, path)
+    page.get_by_text("The motor speed comes").wait_for()
+    name = next(iter(app.comparing.opened))
+    page.get_by_role("button", name="Columns…").click()
+    choose(page, "Column", "motor_speed_rad_s")
+    fill(page, "Late by [ms]", "5")
+    page.get_by_text("← motor_speed_rad_s, 5 ms late").wait_for()
+    page.get_by_label("Sign turned", exact=True).click()
+    page.get_by_text("← motor_speed_rad_s × −1, 5 ms late").wait_for()
+    page.get_by_label("Sign turned", exact=True).click()
+    choose(page, "Column", "current_A")
+    choose(page, "Column", "motor_speed_rad_s")
+    wait_until(lambda: number_box(page, "Late by [ms]") == 5.0)
+    page.get_by_role("button", name="Use these columns").click()
+    page.get_by_text("No delay is seen between motor position and motor speed").wait_for(state="attached")
+    entry = app.comparing.opened[name].measurement.reading.mapping.get("motor_speed_rad_s")
+    assert (entry.delay_s, entry.sign) == (0.005, 1)
 
 
 @pytest.mark.long

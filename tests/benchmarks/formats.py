@@ -1,6 +1,7 @@
 """How long a million samples of eight channels take to read, of each format: `python tests/benchmarks/formats.py [N]`.
 
-Prints a line for each: the file's size, seconds of reading it as a measurement, by the clock and of computing.
+Prints a line for each: the file's size, seconds of reading it as a measurement, by the clock and of computing, and by
+how much memory grows at most meanwhile, of this process and those that it starts.
 """
 
 from __future__ import annotations
@@ -8,6 +9,10 @@ from __future__ import annotations
 import os
 import sys
 import tempfile
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from multiprocessing import get_context
 from pathlib import Path
 from time import perf_counter
 
@@ -18,13 +23,13 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from support.foreign_files import FILES
 
-import emaviz
+import emaviz.formats
 from ema_model.files import apart
 from ema_model.recordings import Measurement, write_measurement
 from ema_model.recordings.file import read_measurement
 from ema_model.recordings.formats import WRITTEN
 
-assert emaviz  # which adds formats
+assert emaviz.formats  # which join the others
 NAMES = "command_rad user_position_rad motor_position_rad motor_speed_rad_s current_A bus_voltage_V temperature_C"
 MOST_SECONDS = 10.0
 
@@ -46,23 +51,64 @@ def _computing() -> float:
     return sum(os.times()[:4]) + (sum(psutil.Process(alive).cpu_times()[:2]) if alive else 0.0)
 
 
+def _memory() -> int:
+    """Bytes in use, of this process and of those that it has started."""
+    here = psutil.Process()
+    total = here.memory_info().rss
+    for one in here.children(recursive=True):
+        with suppress(psutil.Error):  # it may have ended since
+            total += one.memory_info().rss
+    return total
+
+
+@contextmanager
+def _peak() -> Iterator[list[int]]:
+    """Looks at the memory twenty times a second; at the end the list holds by how much it has grown at most."""
+    seen, before, done = [0], _memory(), threading.Event()
+
+    def look() -> None:
+        while not done.wait(0.05):
+            seen[0] = max(seen[0], _memory() - before)
+
+    looking = threading.Thread(target=look, daemon=True)
+    looking.start()
+    yield seen
+    done.set()
+    looking.join()
+
+
+def _ending(kind: str) -> str:
+    return kind if kind in WRITTEN else FILES[kind][0]
+
+
+def _write(kind: str, path: Path, samples: int) -> None:
+    columns = signals(samples)
+    if kind in WRITTEN:
+        write_measurement(Measurement(columns), path)
+    else:
+        FILES[kind][1](path, columns)
+
+
 def main(samples: int, kinds: list[str]) -> None:
     """Writes, reads and prints each format."""
-    columns = signals(samples)
-    writers = {suffix: (suffix, lambda path, c: write_measurement(Measurement(dict(c)), path)) for suffix in WRITTEN}
-    for kind, (ending, write) in (writers | FILES).items():
-        if kinds and kind not in kinds:
-            continue
+    for kind in kinds or [*WRITTEN, *FILES]:
         with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder) / f"run{ending}"
-            write(path, columns)
+            path = Path(folder) / f"run{_ending(kind)}"
+            # Apart, so that no memory is left from it.
+            writing = get_context("spawn").Process(target=_write, args=(kind, path, samples))
+            writing.start()
+            writing.join()
             before, began = _computing(), perf_counter()
-            measurement = read_measurement(path)
+            with _peak() as peak:
+                measurement = read_measurement(path)
             seconds, computing = perf_counter() - began, _computing() - before
-            size = path.stat().st_size / 1e6
-            told = "" if computing <= MOST_SECONDS else f"  over {MOST_SECONDS:g} s"
-            assert measurement.samples == samples and len(measurement.signals) == len(columns)
-            print(f"{kind:14} {size:7.1f} MB  {seconds:6.2f} s ({computing:5.2f} s of computing){told}", flush=True)
+            size, told = path.stat().st_size / 1e6, "" if seconds <= MOST_SECONDS else f"  over {MOST_SECONDS:g} s"
+            assert measurement.samples == samples and len(measurement.signals) == 1 + len(NAMES.split())
+            memory = f"{peak[0] / 1e6:6.0f} MB of memory"
+            print(
+                f"{kind:14} {size:7.1f} MB  {seconds:6.2f} s ({computing:5.2f} s of computing) {memory}{told}",
+                flush=True,
+            )
 
 
 if __name__ == "__main__":

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import gzip
-import json
 
 import numpy as np
 import pytest
 from support.foreign_files import FILES as WRITERS
+from support.mat_structs import write_dspace, write_simulink
+from support.servo_logs import SERVO_SIGNALS, duty_of, write_servo_log
 
 from ema_model.actuator import load_actuator, shipped
 from ema_model.commands import command
@@ -74,15 +75,25 @@ def twincat(path, run):
 
 
 def bam(path, run):
-    """Rhoban/bam, bam/xl330/record.py: settings, and a record for each sample under `entries`."""
-    entries = [
-        {"position": q, "speed": dq, "load": 3, "input_volts": 7.4, "temp": 28, "timestamp": t, "goal_position": goal,
-         "torque_enable": True}
-        for t, q, dq, goal in zip(*(np.array(run[name])[::10].tolist() for name in (
-            "time_s", "user_position_rad", "motor_speed_rad_s", "command_rad")))
-    ]  # fmt: skip
-    head = {"mass": 0.49, "length": 0.1, "kp": 400, "vin": 7.4, "motor": "xl330", "trajectory": "sin_sin"}
-    path.write_text(json.dumps({**head, "entries": entries}))
+    """Rhoban/bam, bam/xl330/record.py: see support.servo_logs."""
+    write_servo_log(path, {signal: np.array(run[signal])[::10] for signal in SERVO_SIGNALS}, kp=400)
+
+
+def simulink(path, run):
+    columns = renamed(run, SNAKE)
+    write_simulink(path, columns.pop("t"), columns)
+
+
+def dspace(path, run):
+    """As ControlDesk's users name signals: by the block's own name, with its unit."""
+    named = {
+        "command_rad": ("PosSetpoint", "deg", np.pi / 180.0),
+        "user_position_rad": ("OutputPosition", "deg", np.pi / 180.0),
+        "motor_speed_rad_s": ("MotorSpeed", "rpm", np.pi / 30.0),
+        "current_A": ("MotorCurrent", "A", 1.0),
+    }
+    signals = {name: (unit, np.array(run[signal]) / si) for signal, (name, unit, si) in named.items()}
+    write_dspace(path, {"HostService": (np.array(run["time_s"]), signals)})
 
 
 def by_writer(kind, names):
@@ -92,6 +103,8 @@ def by_writer(kind, names):
 LOGS = {  # name: ending, writer, actuator
     "h5py": (".h5", by_writer("hdf5", ENGLISH), "thesis"),
     "MATLAB 7.3": (".mat", by_writer("mat 7.3", SNAKE), "thesis"),
+    "Simulink": (".mat", simulink, "thesis"),
+    "dSPACE": (".mat", dspace, "thesis"),
     "LabVIEW TDMS": (".tdms", by_writer("tdms", ENGLISH), "thesis"),
     "CANape MDF4": (".mf4", by_writer("mdf", ENGLISH), "thesis"),
     "PX4 ULog": (".ulg", by_writer("ulog", SNAKE), "thesis"),
@@ -142,6 +155,8 @@ def test_opened_with_no_option(name, run, tmp_path, monkeypatch, capsys):
         wanted = np.array(run[signal])[::step]
         # Logs begin at their first sample.
         np.testing.assert_allclose(found[signal], wanted, atol=2e-5 * np.ptp(wanted), err_msg=signal)
+    if name == "bam":
+        np.testing.assert_allclose(found["duty"], duty_of(found, 400), atol=1.0 / 885)
     told = capsys.readouterr().err
     assert told.count("\n") <= 1
     if name == "DIAdem":

@@ -86,6 +86,19 @@ def test_runs_of_one_file_are_recordings_of_their_own(logs):
     assert friction[0] == pytest.approx(friction[1], rel=1e-6) and friction[0] == pytest.approx(0.012, rel=0.1)
 
 
+def test_groups_of_one_file_are_recordings_of_their_own(logs):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(logs / "all.h5", "w") as file:
+        for i, gain in enumerate(GAINS):
+            for name, values in motion(gain, i).items():
+                file[f"run_{gain}/{name}"] = values
+    found = compared(logs, logs / "all.h5", "--runs", "run", "--holdout", "*#400")
+    assert names(found["recordings"]) == ["all#100", "all#200"] and names(found["holdout"]) == ["all#400"]
+    by_file = compared(logs, logs / "set", "--holdout", "kp400*")
+    friction = [one["calibration"]["parameters"]["motor.dynamic_friction_Nm"]["value"] for one in (found, by_file)]
+    assert friction[0] == pytest.approx(friction[1], rel=1e-4)
+
+
 def test_a_run_has_the_rules_of_its_file(logs):
     from ema_model.actuator import parse_actuator
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-_GAINS = {100: 0.28774, 400: 1.15097, 800: 2.30194}  # duty per rad by the servo's gain register
+_GAINS = {100: 0.28774, 200: 0.57548, 400: 1.15097, 800: 2.30194}  # duty per rad by the servo's gain register
 
 
 def _set(**sections: dict[str, str]) -> list[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from support.servo_logs import write_servo_log
 
 from ema_model.actuator import load_actuator
 from ema_model.comparison import compare
@@ -42,5 +43,19 @@ def test_the_load_is_named_first(compared):
 
 def test_gain_of_each_log_is_its_own(data_folder, actuators):
     actuator = load_actuator(actuators / "xl330.toml")
-    gains = [actuator.for_recording(f"xl330_kp{kp}_sin_sin").controller.gain_1_rad for kp in (100, 400, 800)]
-    assert gains == pytest.approx([kp * 4096 / (2 * np.pi) / (256 * 885) for kp in (100, 400, 800)], rel=1e-4)
+    gains = [actuator.for_recording(f"xl330_kp{kp}_sin_sin").controller.gain_1_rad for kp in (100, 200, 400, 800)]
+    assert gains == pytest.approx([kp * 4096 / (2 * np.pi) / (256 * 885) for kp in (100, 200, 400, 800)], rel=1e-4)
+
+
+def test_the_json_of_their_recorder_reads_as_the_csv(data_folder, actuators, tmp_path):
+    actuator = load_actuator(actuators / "xl330.toml")
+    for file in sorted((data_folder / "xl330").glob("*_sin_sin.csv")):
+        csv = read(file, actuator)
+        kp = int(file.stem.split("_")[1].removeprefix("kp"))
+        log = tmp_path / f"2026-01-15_10h28m{kp // 100:02}.json"  # their names tell the day alone
+        write_servo_log(log, csv.signals, kp)
+        found = read(log, actuator)
+        assert not found.reading.doubts and list(found) == list(csv)
+        for name in csv:
+            np.testing.assert_allclose(found[name], csv[name], rtol=1e-12, atol=1e-6, err_msg=name)
+        assert actuator.for_recording(found.name) == actuator.for_recording(csv.name)

@@ -9,7 +9,7 @@ from ema_model.errors import InputError
 from ema_model.recordings import Measurement, parse_mapping, read_side_file, side_path, write_side_file
 from ema_model.recordings.file import read_measurement
 from ema_model.recordings.health.card import health
-from ema_model.recordings.health.speed_lag import speed_lag
+from ema_model.recordings.health.speed_lag import clock_drift, speed_lag
 from ema_model.recordings.side_file.read import SideFile
 
 PERIOD, N = 1e-3, 3000
@@ -100,6 +100,26 @@ def test_nothing_is_told_without_motion(seed):
     assert lag_of(np.tanh((time - 1.0) / 0.02), 50.0 / np.cosh((time - 1.0) / 0.02) ** 2) is None  # one move
 
 
+@pytest.mark.parametrize("rate", [0.0, 2e-4, -1e-3])
+def test_nine_of_ten_intervals_hold_the_drift(rate):
+    """Of the same sensors over 8 s; a drift that is not there is claimed once in a hundred times."""
+    time, held, sure, half = np.arange(8000) * PERIOD, 0, 0, []
+    own = np.arange(-3.7e-3, 8.1, 3.7e-3)
+    for seed in range(0, 60, 2):
+        rng, (position, speed) = np.random.default_rng(1000 + seed), motion(seed)
+        angle = position(time)
+        angle = np.round(angle / (2e-3 * np.ptp(angle))) * 2e-3 * np.ptp(angle)
+        late = speed((own - 3e-3) / (1.0 + rate))
+        late = late + 0.05 * np.std(late) * rng.standard_normal(own.size)
+        found = clock_drift(angle, np.interp(time, own, late), time, [slice(0, time.size)])
+        assert found is not None
+        held += found.low <= rate <= found.high
+        sure += found.is_sure
+        half.append(0.5 * (found.high - found.low))
+    assert held >= 24 and np.median(half) < 4e-5
+    assert sure <= 2 if rate == 0.0 else sure >= 27
+
+
 # --- of a file -------------------------------------------------------------------------------------------------------
 
 
@@ -148,6 +168,26 @@ def test_what_the_card_says_to_do_takes_the_delay_out(tmp_path):
     assert again is not None and again.severity == "good" and abs(again.values["delay_s"]) < 1e-4
     assert any("moved" in note and "back" in note for note in moved.notes)
     assert moved.time_s[-1] < (N - 3) * PERIOD - 4e-3  # the end, of which no late speed is known
+
+
+def test_clocks_that_do_not_run_alike(tmp_path):
+    time, own, (position, speed) = np.arange(8000) * PERIOD, np.arange(2650) * 3.0 * PERIOD, motion(0)
+    for drift in (0.0, 5e-4):
+        columns = [time, position(time), own, speed(own / (1.0 + drift))]
+        columns = [[f"{value:.9g}" for value in values] for values in columns]
+        rows = [";".join(column[i] if i < len(column) else "" for column in columns) for i in range(time.size)]
+        (tmp_path / "two.csv").write_text("\n".join(["t [s];angle [rad];t [s];speed [rad/s]", *rows]))
+        mapping = ["time_s=t [s]", f"{POSITION}=angle [rad]", f"{SPEED}=speed [rad/s]"]
+        found = health(read_measurement(tmp_path / "two.csv", mapping)).of("clock_drift")
+        if not drift:
+            assert found is None
+            continue
+        assert (
+            found is not None
+            and found.severity == "warning"
+            and "ppm fast against the motor position" in (found.sentence)
+        )
+        assert found.values["rate_low"] <= drift <= found.values["rate_high"]
 
 
 def test_what_cannot_be_known_is_said(tmp_path):

@@ -111,9 +111,9 @@ def test_mat_structs(packed, tmp_path):
     inner = {name: COLUMNS[name] for name in ("current_A", "motor_position_rad")}
     savemat(path, {"rig": {"time_s": COLUMNS["time_s"], "signals": inner, "operator": "x"}}, do_compression=packed)
     assert_same(read_measurement(path))
-    # Simulink's "structure with time", mapped
+    # Simulink's "structure with time", mapped by its label
     savemat(path, {"out": {"time": k / 1e3, "signals": {"values": k / 7.0, "label": "theta"}}}, do_compression=packed)
-    mapped = read_measurement(path, ["time_s=time[s]", "motor_position_rad=values"])
+    mapped = read_measurement(path, ["time_s=time[s]", "motor_position_rad=theta"])
     assert_same(mapped, {"time_s": k / 1e3, "motor_position_rad": k / 7.0})
     savemat(path, {"x": {"time_s": k, "duty": k}, "y": {"duty": -k}}, do_compression=packed)
     assert set(read_columns(path)) == {"time_s", "x.duty", "y.duty"}

@@ -11,6 +11,8 @@ import zlib
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+import h5py
+import nptdms
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -24,6 +26,9 @@ from ema_model.challenges.truth import Truth
 from emaviz.recording import RecordingWriter
 from emaviz.session.settings import Settings
 from support.foreign_files import FILES
+from support.mat_structs import write_dspace
+from support.robot_datasets import write_robot_dataset
+from support.servo_logs import SERVO_SIGNALS, write_servo_log
 
 N = 120
 k = np.arange(float(N))
@@ -59,6 +64,12 @@ values = [-0.01, { value = -0.002, sigma = 0.005 }, -0.01]
 match = "*kp100*"
 set = { "controller.position_gain_1_s" = 100.0 }
 """
+SLOW = k[: N // 2] / 500.0
+TWO_CLOCKS = {
+    "encoder": {name: COLUMNS[name] for name in ("time_s", "motor_position_rad")},
+    "drive": {"time_s": SLOW, "current_A": np.sin(SLOW)},
+}
+RUNS = {"trial_1": COLUMNS, "trial_2": {**COLUMNS, "time_s": COLUMNS["time_s"] + 1.0}}
 Change = Callable[[bytes, random.Random], bytes]
 
 
@@ -111,6 +122,45 @@ def recording(folder: Path) -> bytes:
     return path.read_bytes()
 
 
+def in_groups(reader: str, folder: Path) -> list[bytes]:
+    """The same with two clocks, and with a group for each run, in formats that know of neither."""
+    path, found = folder / "in groups", []
+    for groups in (TWO_CLOCKS, RUNS):
+        parts = [(group, name, values) for group, columns in groups.items() for name, values in columns.items()]
+        if reader == "json columns":
+            path.write_text(json.dumps(groups, default=np.ndarray.tolist))
+        elif reader == "hdf5":
+            with h5py.File(path, "w") as file:
+                for group, name, values in parts:
+                    file[f"{group}/{name}"] = values
+        elif reader == "tdms":
+            with nptdms.TdmsWriter(path) as file:
+                file.write_segment([nptdms.ChannelObject(*part) for part in parts])
+        else:
+            return []
+        found.append(path.read_bytes())
+    return found
+
+
+def dspace(folder: Path) -> bytes:
+    fast = k / 1e3, {"motor_position_rad": ("", COLUMNS["motor_position_rad"])}
+    write_dspace(folder / "whole.mat", {"Fast": fast, "Slow": (SLOW, {"current_A": ("", np.sin(SLOW))})})
+    return (folder / "whole.mat").read_bytes()
+
+
+def servo_log(folder: Path) -> bytes:
+    signals = {**dict.fromkeys(SERVO_SIGNALS, np.sin(k)), "time_s": k / 200.0, "duty": np.cos(k)}
+    write_servo_log(folder / "whole.json", signals, 100)
+    return (folder / "whole.json").read_bytes()
+
+
+def robot_dataset(folder: Path) -> bytes:
+    """Its description, beside which it stands whole."""
+    root, state = folder / "dataset", np.column_stack([k, np.sin(k)])
+    write_robot_dataset(root, 3, 500.0, {"state": ["position_rad", "current_A"]}, [{"state": state}, {"state": state}])
+    return (root / "meta" / "info.json").read_bytes()
+
+
 def whole(reader: str, folder: Path) -> list[bytes]:
     """Some files that the reader takes."""
     if reader == "csv":
@@ -123,11 +173,15 @@ def whole(reader: str, folder: Path) -> list[bytes]:
         return [written(np.savez, **COLUMNS), written(np.savez_compressed, **COLUMNS), table]
     if reader in ("mat", "packed mat"):
         rig = {"rig": {**COLUMNS, "label": "x", "inner": {"x": k}}, "cells": np.array([k, "a"], object)}
-        return [written(savemat, arrays, do_compression=reader == "packed mat") for arrays in (COLUMNS, rig)]
+        kinds = (COLUMNS, rig, TWO_CLOCKS, RUNS)
+        found = [written(savemat, arrays, do_compression=reader == "packed mat") for arrays in kinds]
+        return found if reader == "packed mat" else [*found, dspace(folder)]
+    if reader in ("robot dataset", "servo log"):
+        return [robot_dataset(folder) if reader == "robot dataset" else servo_log(folder)]
     if reader in FILES:
         ending, write = FILES[reader]
         write(folder / f"whole{ending}", COLUMNS)
-        return [(folder / f"whole{ending}").read_bytes()]
+        return [(folder / f"whole{ending}").read_bytes(), *in_groups(reader, folder)]
     if reader == "side file":
         return [SIDE.encode()]
     if reader == "actuator":

@@ -10,6 +10,7 @@ import json
 import os
 import resource
 import select
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -96,6 +97,28 @@ def _measurement(path: Path, most_bytes: int) -> None:
         raise refused
 
 
+def _servo_log(path: Path, most_bytes: int) -> None:
+    from ema_model.actuator import parse_actuator, shipped
+    from ema_model.recordings import read
+
+    read(path, parse_actuator(shipped("xl330.toml"), "xl330.toml"), max_bytes=most_bytes)
+
+
+def _robot_dataset(path: Path, most_bytes: int) -> None:
+    """path: a dataset's description, put into one that is whole otherwise."""
+    from ema_model.recordings.file import read_header, read_measurement
+    from ema_model.recordings.recording_set import episodes_of, files_of
+
+    root = path.parent / "dataset"
+    shutil.copy(path, root / "meta" / "info.json")
+    (file,) = files_of(str(root))
+    names = read_header(file, most_bytes)
+    time = next(name for name in names if name.startswith("timestamp"))
+    episode = next(name for name in names if name.startswith("episode_index"))
+    mapping = [f"time_s={time}[s]", f"segment={episode}", f"current_A={names[1]}[A]"]
+    assert episodes_of(read_measurement(file, mapping, max_bytes=most_bytes), file)
+
+
 def _side_file(path: Path, _: int) -> None:
     from ema_model.recordings import read_side_file
 
@@ -147,6 +170,8 @@ def _listed(path: Path, _: int) -> None:
 
 READERS: dict[str, Callable[[Path, int], Any]] = {
     **dict.fromkeys(("csv", "parquet", "npz", "mat", "packed mat", *FILES), _measurement),
+    "servo log": _servo_log,
+    "robot dataset": _robot_dataset,
     "side file": _side_file,
     "actuator": _actuator,
     "user effects": _actuator,

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 _LATE_START_S = 1e5  # clocks of a computer start later than any recording lasts
 _MOST = 1e30  # so that no product overflows
-_WITHOUT_DELAY = ("time_s", "segment")  # which say when all others are
+WITHOUT_DELAY = ("time_s", "segment")  # which say when all others are
 _FORM = "write signal=column[unit], e.g. motor_speed_rad_s=speed[rpm]"
 NUMBERS = {"sign": 1, "scale": 1.0, "offset": 0.0, "delay_s": 0.0}  # of a column, and what they are where left out
 _OPTION = re.compile(rf"({'|'.join(NUMBERS)})\s*=\s*(\S+)")
@@ -54,7 +54,7 @@ class MappedColumn:
             raise InputError(f"mapping of {self.signal}: the sign must be 1 or -1, not {shown(self.sign)}")
         if not 0.0 < abs(self.scale) <= _MOST or not abs(self.offset) <= _MOST:
             raise InputError(f"mapping of {self.signal}: scale and offset must be numbers up to 1e30, the scale not 0")
-        if not abs(self.delay_s) <= _MOST or (self.delay_s and self.signal in _WITHOUT_DELAY):
+        if not abs(self.delay_s) <= _MOST or (self.delay_s and self.signal in WITHOUT_DELAY):
             raise InputError(
                 f"mapping of {self.signal}: delay_s must be a number of seconds, and 0 for time_s and segment"
             )

@@ -28,7 +28,9 @@ QUANTITIES: dict[str, frozenset[str]] = {
     }.items()
 }
 # Whose it is.
-COMMAND = frozenset("cmd command commanded setpoint sp set target goal ref reference desired des demand wanted".split())
+COMMAND = frozenset(
+    "cmd command commanded setpoint sp set target goal ref reference desired des demand wanted action".split()
+)
 MEASURED = frozenset(
     "act actual meas measured fb feedback present raw value val estimate estimated est filtered".split()
 )

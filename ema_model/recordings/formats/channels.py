@@ -19,6 +19,7 @@ from ema_model.quantities.units import dimensions_of
 Array = NDArray[np.float64]
 MOST_COLUMNS = 64  # of a table without names: beyond, it is an image, or the table lies on its side
 _LONGEST_UNIT = 24
+_SAYS_NOTHING = ("data", "value", "values")  # of a name: what a group or a topic holds, not what it is
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,7 @@ class Channel:
 
 @dataclass(frozen=True)
 class Log:
-    """What a file holds: channels, clocks in seconds, single numbers, and what it says of itself."""
+    """What a file holds: channels, clocks, single numbers, and what it says of itself."""
 
     channels: Sequence[Channel]
     clocks: dict[str, Callable[[], Array]] = field(default_factory=dict)
@@ -43,6 +44,7 @@ class Log:
     notes: tuple[str, ...] = ()
     left_aside: tuple[str, ...] = ()  # names of what is no row of numbers
     title: str = ""  # what it calls the run, beside its file's name
+    time: str = "time_s"  # what the clocks' column is called: they are in seconds, unless their unit is not known
 
 
 Opened = Callable[[str, int], AbstractContextManager[Log]]  # path, most bytes
@@ -117,8 +119,8 @@ def told(parameters: dict[str, float]) -> str:
 
 
 def _told_apart(paths: Sequence[tuple[str, ...]]) -> list[str]:
-    """Each path's last parts, as few as tell it from all others, joined by dots."""
-    lengths = [1] * len(paths)
+    """Each path's last parts, as few as say something and tell it from all others, joined by dots."""
+    lengths = [1 + (path[-1].lower() in _SAYS_NOTHING) for path in paths]
     for _ in range(max(map(len, paths), default=1)):
         names = [".".join(path[-length:]) for path, length in zip(paths, lengths)]
         count = Counter(names)

@@ -53,7 +53,7 @@ def _lines(text: bytes, error: Exception) -> Any:
     if not (first.startswith(b"{") and first.endswith(b"}")):
         raise NoLog(str(error)) from None
     try:
-        return msgspec.json.decode(b"[" + b",".join(filter(None, map(bytes.strip, text.splitlines()))) + b"]")
+        return msgspec.json.Decoder().decode_lines(text)
     except (msgspec.DecodeError, RecursionError) as problem:
         raise NoLog(str(problem)) from None
 
@@ -65,6 +65,7 @@ class _Found:
         self.channels: list[Channel] = []
         self.parameters: dict[str, float] = {}
         self.aside: list[str] = []
+        self.begin: Any = None  # the first stamp that there is: all count from it
 
     def walk(self, item: Any, path: tuple[str, ...]) -> None:
         """Adds what an item holds."""
@@ -98,7 +99,7 @@ class _Found:
         elif isinstance(items[0], list):
             if not self._rows(items, path or ("data",), ()):
                 self.aside.append(name)
-        elif (values := _numbers(items)) is not None:
+        elif (values := self._numbers(items)) is not None:
             self.channels.append(Channel(path or ("list",), len(items), lambda: values))
         else:
             self.aside.append(name)
@@ -115,7 +116,7 @@ class _Found:
             elif isinstance(first, list) and all(isinstance(one, list) and len(one) == len(first) for one in inner):
                 if not self._rows(inner, (*path, key), [f"{key}.{i}" for i in range(len(first))]):
                     self.aside.append(key)
-            elif (values := _numbers(inner)) is not None:
+            elif (values := self._numbers(inner)) is not None:
                 self.channels.append(Channel((*path, key), len(inner), lambda values=values: values))
             else:
                 self.aside.append(key)
@@ -131,28 +132,28 @@ class _Found:
         self.channels += table(path, values.shape[0], values.shape[1], lambda i: values[:, i], names)
         return True
 
+    def _numbers(self, items: Sequence[Any]) -> Any:
+        """The numbers, truth being 0 and 1, stamps of date and time seconds; None for anything else, and for blanks."""
+        kinds = set(map(type, items))
+        if kinds <= {int, float, bool}:
+            try:
+                return np.fromiter(items, np.float64, len(items))
+            except OverflowError:
+                return None
+        if kinds == {str}:
+            try:
+                stamps = np.array([text.removesuffix("Z") for text in items], "datetime64[ns]").astype(np.int64)
+            except ValueError:
+                return None
+            self.begin = stamps[0] if self.begin is None else self.begin
+            return (stamps - self.begin) * 1e-9
+        return None
+
 
 def _indexed(item: dict[str, Any]) -> list[Any] | None:
     """The values of an object that is a list in disguise, as pandas writes columns: {"0": 1.5, "1": 1.7}."""
     if all(name == str(i) for i, name in enumerate(item)):
         return list(item.values())
-    return None
-
-
-def _numbers(items: Sequence[Any]) -> Any:
-    """The numbers, truth being 0 and 1, stamps of date and time seconds; None for anything else, and for blanks."""
-    kinds = set(map(type, items))
-    if kinds <= {int, float, bool}:
-        try:
-            return np.fromiter(items, np.float64, len(items))
-        except OverflowError:
-            return None
-    if kinds == {str}:
-        try:
-            stamps = np.array([text.removesuffix("Z") for text in items], "datetime64[ns]").astype(np.int64)
-        except ValueError:
-            return None
-        return (stamps - stamps[0]) * 1e-9
     return None
 
 

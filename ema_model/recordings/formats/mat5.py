@@ -26,7 +26,9 @@ _MATRIX, _COMPRESSED = 14, 15
 _STORED = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
 _NUMERIC = range(6, 16)
 _OTHERS = {1: "cells", 3: "an object", 4: "text", 5: "a sparse matrix", 16: "a function", 17: "an object"}
-_CELLS, _STRUCT, _OBJECT, _OPAQUE = 1, 2, 3, 17
+_CELLS, _STRUCT, _OBJECT, _TEXT, _OPAQUE = 1, 2, 3, 4, 17
+_CODECS = {2: "latin-1", 4: "utf-16", 16: "utf-8", 17: "utf-16"}  # of characters, by how they are stored
+_LONGEST_TEXT = 1_000
 _COMPLEX = 0x0800
 _DEEPEST = 8  # structs within structs
 _MOST_STRUCTS = 1_000  # in one array of structs, and cells
@@ -50,13 +52,14 @@ class TooMany(Exception):
 
 @dataclass(frozen=True)
 class Leaf:
-    """One array: its path of struct fields, its shape, and its numbers, or in `other` what it is instead."""
+    """One array: its path of struct fields, its shape, its numbers or, if short, text, or in `other` what it is."""
 
     path: tuple[str, ...]
     shape: tuple[int, ...]
     data: memoryview = _NO_DATA
     dtype: str = "f8"
     other: str = ""
+    text: str = ""
 
     def values(self) -> NDArray[np.float64]:
         """The numbers in MATLAB's order, column by column; (n,)."""
@@ -160,6 +163,8 @@ def _matrix(view: memoryview, order: str, above: tuple[str, ...], depth: int, fi
     path = (*above, field or _text(name))
     if kind in _NUMERIC:
         yield _numbers(view, order, path, shape, bool(flag & _COMPLEX))
+    elif kind == _TEXT:
+        yield Leaf(path, shape, other=_OTHERS[kind], text=_characters(view, order, shape))
     elif kind in (_STRUCT, _OBJECT) and depth < _DEEPEST and _may_open(shape, path[-1]):
         if kind == _OBJECT:
             _, _, view = _element(view, order)  # its class
@@ -180,6 +185,16 @@ def _numbers(view: memoryview, order: str, path: tuple[str, ...], shape: tuple[i
     if len(data) != math.prod(shape) * np.dtype(dtype).itemsize:
         raise Damaged("an array holds more or fewer numbers than its shape says")
     return Leaf(path, shape, data, dtype)
+
+
+def _characters(view: memoryview, order: str, shape: tuple[int, ...]) -> str:
+    """A row of characters; nothing of a long or a wide text, which names nothing."""
+    if len(shape) != 2 or shape[0] != 1 or shape[1] > _LONGEST_TEXT:
+        return ""
+    stored, data, _ = _element(view, order)
+    codec = _CODECS.get(stored, "")
+    endian = {"<": "-le", ">": "-be"}[order] if codec == "utf-16" else ""
+    return bytes(data).decode(codec + endian, "replace").strip("\0 ") if codec else ""
 
 
 def _may_open(shape: tuple[int, ...], name: str) -> bool:

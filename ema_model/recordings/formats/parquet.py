@@ -60,7 +60,7 @@ def _read(path: str, names: Sequence[str], max_bytes: int, strict: bool) -> Colu
         left[field] -= 1
         column = columns[field] if left[field] else columns.pop(field)
         if part is not None:
-            column = pc.list_element(column, part)
+            column = _part(path, name, column, part)
         if not column.null_count:
             arrays[name] = column.to_numpy().astype(np.float64, copy=False)
         elif strict:
@@ -76,19 +76,30 @@ def _places(path: str, schema: pa.Schema) -> dict[str, tuple[str, int | None]]:
     places: dict[str, tuple[str, int | None]] = {}
     parts = robot_dataset.names_of_parts(path)
     for field in schema:
-        if pa.types.is_fixed_size_list(field.type) and 0 < field.type.list_size <= MOST_COLUMNS:
+        known = parts.get(field.name, [])
+        size = len(known) if pa.types.is_list(field.type) else 0  # of another length than its rows say
+        if pa.types.is_fixed_size_list(field.type):
             size = field.type.list_size
-            known = parts.get(field.name, ())
+        if 0 < size <= MOST_COLUMNS:
             names = known if len(known) == size else [f"{i}" for i in range(size)]
             places |= {f"{field.name}.{name}": (field.name, i) for i, name in enumerate(names)}
         else:
-            places[field.name] = (field.name, None)
+            own = f".{known[0]}" if len(known) == 1 else ""
+            places[f"{field.name}{own}"] = (field.name, None)
     return places
 
 
 def _kind(schema: pa.Schema, place: tuple[str, int | None]) -> pa.DataType:
     kind = schema.field(place[0]).type
     return kind if place[1] is None else kind.value_type
+
+
+def _part(path: str, name: str, rows: pa.ChunkedArray, part: int) -> pa.ChunkedArray:
+    """One number of each row's list."""
+    try:
+        return pc.list_element(rows, part)
+    except pa.ArrowInvalid:
+        raise refusal(path, f"column {quoted(name)!r}: some rows have fewer numbers; export it again") from None
 
 
 def _is_numeric(kind: pa.DataType) -> bool:

@@ -9,12 +9,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
+import numpy as np
+
 from ema_model.files.refusal import listed, shown
 from ema_model.quantities.signals import SIGNALS
 from ema_model.quantities.titles import in_sentence
 from ema_model.recordings.columns.mapping import MappedColumn
 from ema_model.recordings.health.finding import Finding
-from ema_model.recordings.health.speed_lag import speed_lag
+from ema_model.recordings.health.speed_lag import clock_drift, speed_lag
 from ema_model.recordings.measurement import Measurement
 
 _PAIRS = (("motor_position_rad", "motor_speed_rad_s"), ("motor_position_m", "motor_speed_m_s"))
@@ -22,7 +24,7 @@ _USUAL = 2.0  # periods, by which a speed that a drive makes of its encoder is l
 
 
 def clocks(measurement: Measurement) -> Iterator[Finding]:
-    """The clocks and how they were made one; the delay that position and speed tell; what is not known of the rest."""
+    """The clocks and how they were made one; the delay and drift that position and speed tell; what is not known."""
     read = measurement.reading.clocks
     names = [name for name in measurement if measurement.shown(name) in (read.of if read else ())]
     clock = {name: read.of[measurement.shown(name)] for name in names} if read else {}
@@ -39,6 +41,8 @@ def clocks(measurement: Measurement) -> Iterator[Finding]:
         found = _speed_delay(measurement, position, speed, apart)
         if found is not None:
             yield found
+            if apart:
+                yield from _drift(measurement, position, speed)
             known |= {clock.get(position), clock.get(speed)}
     if read and several:
         told = {read.main, *(known if read.main in known else ())}
@@ -71,6 +75,22 @@ def _speed_delay(measurement: Measurement, position: str, speed: str, apart: boo
     return Finding("speed_delay", "warning" if late else "note", sentence, values, speed)
 
 
+def _drift(measurement: Measurement, position: str, speed: str) -> Iterator[Finding]:
+    """That their clocks do not run alike, where that is sure; what a delay taken out cannot take out."""
+    drift = clock_drift(measurement[position], measurement[speed], measurement.time_s, measurement.runs)
+    if drift is None or not drift.is_sure:
+        return
+    names, way = (_title(measurement, speed), _title(measurement, position)), "fast" if drift.rate > 0.0 else "slow"
+    apart = abs(drift.rate) * float(np.ptp(measurement.time_s))
+    sentence = (
+        f"The {names[0]}'s clock runs {_ppm(abs(drift.rate))} ppm {way} against the {names[1]}'s (90 % interval "
+        f"{_ppm(drift.low)} to {_ppm(drift.high)} ppm), {_ms(apart)} ms over the recording: fit shorter parts of it."
+    )
+    values = {"rate": drift.rate, "rate_low": drift.low, "rate_high": drift.high}
+    severity = "warning" if apart > measurement.sample_period_s else "note"
+    yield Finding("clock_drift", severity, sentence, values, speed)
+
+
 def _advice(measurement: Measurement, speed: str, lag_s: float) -> str:
     name = measurement.shown(speed)
     entry = measurement.reading.mapping.get(name) or MappedColumn(name, name)
@@ -81,6 +101,10 @@ def _advice(measurement: Measurement, speed: str, lag_s: float) -> str:
 def _title(measurement: Measurement, name: str) -> str:
     signal = SIGNALS.get(measurement.shown(name))
     return in_sentence(signal.title) if signal else shown(name)
+
+
+def _ppm(rate: float) -> str:
+    return f"{1e6 * rate:.3g}".replace("-", "−")
 
 
 def _ms(seconds: float) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from ema_model.quantities.numbers import number
-from ema_model.recordings import SIGNALS, ColumnMapping
+from ema_model.recordings import SIGNALS, ColumnMapping, MappedColumn
 from ema_model.recordings.health.card import Finding, Health
 from emaviz.figures.calibration_scores import Score
 from emaviz.session.opened import Opened
@@ -39,7 +39,6 @@ def mapping_table(mapping: ColumnMapping) -> Html:
         unit = entry.unit or signal.unit
         sure = f"{100.0 * entry.confidence:.0f} %"
         colour = "#2b8a3e" if entry.confidence >= 0.8 else "#e8590c" if entry.confidence < 0.6 else "inherit"
-        sign = " × −1" if entry.sign < 0 else ""
         rows.append(
             html(
                 '<tr title="{}"><td><b>{}</b></td>'
@@ -49,7 +48,7 @@ def mapping_table(mapping: ColumnMapping) -> Html:
                 entry.reason,
                 signal.title,
                 entry.column,
-                sign,
+                _done(entry),
                 unit or "–",
                 colour,
                 sure,
@@ -63,6 +62,14 @@ def mapping_table(mapping: ColumnMapping) -> Html:
     left = html('<div style="padding-top:6px"><span {}>Left aside</span>{}{}</div>', _DIM, aside, more) if aside else ""
     table = _table((("signal", "left"), ("column", "left"), ("unit", "left"), ("sure", "right")), rows)
     return html("<div {}>{}{}</div>", _BOX, table, left)
+
+
+def _done(entry: MappedColumn) -> str:
+    """What is done to a column's numbers beside its unit, and to its time."""
+    factor = entry.sign * entry.scale
+    offset = f" {'+' if entry.offset > 0.0 else '−'} {abs(entry.offset):.6g}" if entry.offset else ""
+    delay = f", {abs(1e3 * entry.delay_s):.6g} ms {'late' if entry.delay_s > 0.0 else 'early'}" if entry.delay_s else ""
+    return (f" × {factor:.6g}".replace("-", "−") if factor != 1.0 else "") + offset + delay
 
 
 def health_card(health: Health) -> Html:

@@ -11,6 +11,7 @@ import viser
 from ema_model.errors import InputError, quoted
 from ema_model.quantities.units import known_units
 from ema_model.recordings import SIGNALS, ColumnMapping, MappedColumn
+from ema_model.recordings.columns.mapping import WITHOUT_DELAY
 from emaviz.page.compare.cards import mapping_table
 from emaviz.page.compare.layout import LayoutControls
 from emaviz.page.page import Page
@@ -38,11 +39,15 @@ class MappingStep:
             self._signal = gui.add_dropdown("is", titles)
             self._unit = gui.add_dropdown("in", [NOT_USED])
             self._turned = gui.add_checkbox("Sign turned", False)
+            self._late = gui.add_number(
+                "Late by [ms]", 0.0, step=0.001, hint="Moved back by as much: a delay of its clock, or of its sensor"
+            )
             self._use = gui.add_button("Use these columns", icon=viser.Icon.CHECK)
         self._column.on_update(lambda event: self._later(event, "column", self._show_column))
         self._signal.on_update(lambda event: self._later(event, "signal", lambda: self._edit(new_signal=True)))
         self._unit.on_update(lambda event: self._later(event, "unit", self._edit))
         self._turned.on_update(lambda event: self._later(event, "sign", self._edit))
+        self._late.on_update(lambda event: self._later(event, "delay", self._edit))
         self._use.on_click(lambda _: self._apply())
 
     @property
@@ -81,15 +86,17 @@ class MappingStep:
         return next((e for e in self.mapping.entries if e.column == self._column.value), None)
 
     def _show_column(self) -> None:
-        """The chosen column's signal, unit and sign into the controls."""
+        """The chosen column's signal, unit, sign and delay into the controls."""
         entry = self._entry()
         self._signal.value = NOT_USED if entry is None else _title(entry.signal)
         units = [NOT_USED] if entry is None else _units(entry)
         self._unit.options = units
         self._unit.value = units[0] if entry is None else entry.unit or _si(entry.signal)
         self._turned.value = entry is not None and entry.sign < 0
+        self._late.value = 0.0 if entry is None else float(f"{1e3 * entry.delay_s:.9g}")
         for control in (self._unit, self._turned):
             control.visible = entry is not None
+        self._late.visible = entry is not None and entry.signal not in WITHOUT_DELAY
 
     def _edit(self, new_signal: bool = False) -> None:
         """The controls into the mapping."""
@@ -107,14 +114,22 @@ class MappingStep:
             entries = others
         else:
             aside.pop(column, None)
-            unit = "" if new_signal or self._unit.value in (NOT_USED, _si(signal)) else self._unit.value
-            turned = -1 if self._turned.value and not new_signal else 1
-            entries = (*others, MappedColumn(signal, column, unit, turned, reason="chosen by you"))
+            entries = (*others, self._edited(signal, new_signal))
         order = list(SIGNALS)
         mapping = ColumnMapping(tuple(sorted(entries, key=lambda e: order.index(e.signal))), tuple(aside.items()))
         self._opened = replace(self._opened, mapping=mapping)
         self._show_column()
         self._draw()
+
+    def _edited(self, signal: str, new_signal: bool) -> MappedColumn:
+        """The chosen column as this signal; what has no control here stays as it was said."""
+        late_s = 0.0 if signal in WITHOUT_DELAY else self._late.value / 1e3
+        before = self._entry()
+        if new_signal or before is None:
+            return MappedColumn(signal, self._column.value, delay_s=late_s, reason="chosen by you")
+        unit = "" if self._unit.value in (NOT_USED, _si(signal)) else self._unit.value
+        chosen = {"confidence": 1.0, "reason": "chosen by you", "rivals": ()}
+        return replace(before, unit=unit, sign=-1 if self._turned.value else 1, delay_s=late_s, **chosen)
 
     def _draw(self) -> None:
         if self._opened is not None:

@@ -1,0 +1,50 @@
+"""Faults of an actuator that was programmed a second time: the model's own slips would not cancel out."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from support.second_plant import SecondPlant
+
+from ema_model import faults
+from ema_model.actuator import load_actuator
+from ema_model.identification.objective import Objective
+from ema_model.identification.run import ROBUST, identify
+from ema_model.recordings import Measurement
+from ema_model.simulation.run import Run, simulate_reference
+
+# Several faults at once, with an eccentricity; the last is the thesis's (T 5.3).
+VECTORS = (
+    (0.2, 0.0, 0.0, 0.0, 0.0, 0.3, 0.6, 0.5),
+    (0.0, 0.3, 0.2, 0.0, 0.0, 0.4, 0.3, 0.5),
+    (0.4, 0.5, 0.0, 0.3, 0.0, 0.2, 0.8, 0.4),
+    (0.1, 0.1, 0.05, 0.05, 0.05, 0.5, 0.5, 0.7),
+    (0.6, 0.2, 0.0, 0.0, 0.4, 0.6, 0.25, 0.3),
+    (0.0133, 0.05, 0.003, 0.0, 0.0, 0.012, 0.5, 0.35),
+)
+NOISE_A = 0.1
+
+
+def recording(k: tuple[float, ...], noise_A: float = NOISE_A, seed: int = 0) -> Measurement:
+    return Measurement(SecondPlant(k).recorded(0.5, noise_A, seed), name="second plant")
+
+
+def test_the_two_programs_agree_on_a_faulty_actuator():
+    k = VECTORS[4]
+    mine, other = simulate_reference(Run(), load_actuator(), np.array(k)), recording(k, 0.0)
+    count = len(other["current_A"])
+    assert np.allclose(mine.time_s[:count], other.time_s)
+    current = mine["current_A"][:count]
+    assert np.sqrt(np.mean((current - other["current_A"]) ** 2)) < 0.1 * np.sqrt(np.mean(current**2))
+    assert np.max(np.abs(mine["user_position_rad"][:count] - other["user_position_rad"])) < 2e-5
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("known", [True, False], ids=["parameters exact", "parameters within tolerances"])
+def test_the_worst_error_over_several_faults_at_once(known):
+    actuator, errors = load_actuator(), []
+    for seed, k in enumerate(VECTORS):
+        found = identify(Objective([recording(k, seed=seed)], actuator), ROBUST, seed=seed, parameters_known=known)
+        errors.append(faults.error_percent(found.k, np.array(k), wrap=True))
+        print(f"{k}: {errors[-1]:.2f} %, {np.round(found.k, 4)}")
+    assert max(errors) <= 1.0

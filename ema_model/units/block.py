@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ema_model.actuator import Actuator
 from ema_model.discovery.evidence import colour
 from ema_model.discovery.model_fit import Data
-from ema_model.estimation import Floor, default_free, floor
+from ema_model.estimation import Floor, calibrate, default_free, floor
 from ema_model.estimation.problem import SIGNALS, Problem
 from ema_model.estimation.unknowns import starts_of, unknowns_of
 from ema_model.identification.model_bias import TWINS, Twins, twins
@@ -50,7 +50,8 @@ class Linearised:
     noise: Array  # of the gradient, by the sensors: (parameters, parameters)
     ripple: Array  # (twins, parameters): each twin's gradient from their mean
     rounds: int  # of twins, each with a mean of its own
-    left: float  # χ² per value
+    by_recording: Array  # (recordings, parameters): the curvature's diagonal, of each recording alone
+    twins: Twins | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,10 +77,10 @@ def unit_of(
     parameters: that may differ; without it, those that the file leaves free.
     """
     paths = default_free(actuator) if parameters is None else tuple(parameters)
-    model = model_for(recordings, actuator, stretches=fit_stretches(recordings, actuator))
+    model = model_for(recordings, wider(actuator), stretches=fit_stretches(recordings, actuator))
     floors = [floor(model, place) for place in range(len(model.windows))]
     starts = starts_of(model, floors, worn=False)
-    return Unit(name, model, floors, Problem(model, floors, [*unknowns_of(wider(actuator), paths), *starts]))
+    return Unit(name, model, floors, Problem(model, floors, [*unknowns_of(model.actuator, paths), *starts]))
 
 
 def wider(actuator: Actuator) -> Actuator:
@@ -88,15 +89,22 @@ def wider(actuator: Actuator) -> Actuator:
     return replace(actuator, tolerances=tolerances)
 
 
-def linearised(unit: Unit, x: Array, seed: int = 0, rounds: int = 1, starts: Array | None = None) -> Linearised:
+def linearised(
+    unit: Unit,
+    x: Array,
+    seed: int = 0,
+    rounds: int = 1,
+    starts: Array | None = None,
+    before: Twins | None = None,
+) -> Linearised:
     """At parameters x in σ of the file's tolerances, and starts where the fit had them (or at none).
 
-    rounds: of twins, the more, the better their spread is known.  Without a three-phase model, what is left tells the
-    scatter by its colour alone.
+    rounds: of twins, beside those of `before`; the more, the better their spread is known.  Without a three-phase
+    model, what is left tells the scatter by its colour alone.
     """
     problem, count = unit.problem, len(x)
     at = problem.clip(np.concatenate([x / WIDER, np.zeros(problem.count - count) if starts is None else starts]))
-    found: Twins | None = None
+    found = before
     problem.reweighted(unit.floors)
     for number in range(rounds):
         found = twins(problem, at, seed + number, found)
@@ -111,6 +119,7 @@ def linearised(unit: Unit, x: Array, seed: int = 0, rounds: int = 1, starts: Arr
     measured = Data(unit.model.recorded, None, unit.floors, _ALL)
     lasting = colour(measured, unit.model, residual)
     noise, ripple = np.diag(is_start * 1.0), np.zeros((0, problem.count))
+    by_recording = np.zeros((len(unit.model.recorded), count))
     for window, name, rows in problem.parts():
         share = lasting[rows].copy()
         if found is not None:
@@ -118,6 +127,7 @@ def linearised(unit: Unit, x: Array, seed: int = 0, rounds: int = 1, starts: Arr
             share *= problem.over_sigma(window, name, np.full(rows.stop - rows.start, floors.noise[name])) ** 2
             moved = problem.over_sigma(window, name, found.deviations[window][name]) @ slope[rows]
             ripple = moved if not len(ripple) else ripple + moved
+        by_recording[unit.model.windows[window].recording] += np.sum(slope[rows, :count] ** 2, axis=0) / WIDER**2
         noise = noise + (slope[rows] * share[:, None]).T @ slope[rows]
     # Starts are integrated out: what is left of each parameter's effect once they have taken theirs.
     taken = np.linalg.solve(curvature[count:, count:], curvature[count:, :count]).T
@@ -128,8 +138,21 @@ def linearised(unit: Unit, x: Array, seed: int = 0, rounds: int = 1, starts: Arr
         noise=without @ noise @ without.T,
         ripple=ripple @ without.T,
         rounds=len(ripple) // TWINS,
-        left=float(residual @ residual) / problem.values,
+        by_recording=by_recording,
+        twins=found,
     )
+
+
+def starts_at(unit: Unit, x: Array) -> Array:
+    """The starts of a unit's windows that suit its recordings best at x, in σ of the file's tolerances."""
+    model, count = unit.model, len(x)
+    values = unit.problem.parameters(
+        unit.problem.clip(np.concatenate([x / WIDER, np.zeros(unit.problem.count - count)]))
+    )
+    there = model_for(
+        model.recorded, model.actuator.varied(values), stretches=fit_stretches(model.recorded, model.actuator)
+    )
+    return calibrate(there, unit.floors, free=()).x
 
 
 def pooled(parts: Sequence[Linearised]) -> list[Block]:

@@ -96,18 +96,24 @@ def linearised(
     rounds: int = 1,
     starts: Array | None = None,
     before: Twins | None = None,
+    about: Array | None = None,
 ) -> Linearised:
     """At parameters x in σ of the file's tolerances, and starts where the fit had them (or at none).
 
-    rounds: of twins, beside those of `before`; the more, the better their spread is known.  Without a three-phase
-    model, what is left tells the scatter by its colour alone.
+    rounds: of twins, beside those of `before`; the more, the better their spread is known.  about: a root of the
+    covariance of x (parameters, parameters), within which the model's bias must hold.  Without a three-phase model,
+    what is left tells the scatter by its colour alone.
     """
     problem, count = unit.problem, len(x)
     at = problem.clip(np.concatenate([x / WIDER, np.zeros(problem.count - count) if starts is None else starts]))
     found = before
     problem.reweighted(unit.floors)
+    near = None
+    if about is not None:
+        near = np.zeros((problem.count, problem.count))
+        near[:count, :count] = about / WIDER
     for number in range(rounds):
-        found = twins(problem, at, seed + number, found)
+        found = twins(problem, at, seed + number, found, near)
         if found is None:
             break
         problem.reweighted(found.floors(unit.floors), found.added)

@@ -20,7 +20,9 @@ from ema_model.units.select import price_of, select
 
 Array = NDArray[np.float64]
 
-PASSES = 3  # after which the answers of made fleets stay
+PASSES = 4  # after which the answers of made fleets stay
+_SETTLING = 2  # of them, in which the point still moves, and the model's bias with it
+_FIRST = 0.2  # tolerances, about the first point
 _WORSE = 1.5  # times the χ² of the best unit so far, from which on a unit is fitted from further starts
 _FREEDOM = 90  # independent values, over all units, that the ripple's spread is to be known by
 _NEXT = 1000  # from one pass's seeds to the next one's, and
@@ -74,26 +76,24 @@ def together(fits: Sequence[Fitted], seed: int = 0, tell: Callable[[str], None] 
     """Linearises and selects, PASSES times."""
     count = len(fits)
     middle = np.median([one.x for one in fits], axis=0)
-    points = [middle] * count
-    parts: list[Linearised | None] = [None] * count
-    rounds = max(1, -(-_FREEDOM // (PASSES * (TWINS - 1) * count)))
+    points, about = [middle] * count, _FIRST * np.eye(len(middle))
+    parts: list[Linearised] = []
+    rounds = max(1, -(-_FREEDOM // ((PASSES - _SETTLING) * (TWINS - 1) * count)))
     found: Together | None = None
     for number in range(PASSES):
+        settling = number < _SETTLING
+        before = parts if number > _SETTLING else None
+        parts = []
         for i, one in enumerate(fits):
             tell(f"linearising {one.unit.name}, pass {number + 1} of {PASSES}")
-            last = parts[i]
-            parts[i] = linearised(
-                one.unit,
-                points[i],
-                seed + _NEXT * number + _NEXT_UNIT * i,
-                rounds,
-                one.starts,
-                None if last is None else last.twins,
-            )
-        done = [one for one in parts if one is not None]
-        freedom = sum((TWINS - 1) * one.rounds for one in done)
-        pool = select(pooled(done), price_of(count, len(middle), freedom))
-        points = [pool.unit(i) for i in range(count)]
-        found = Together(done, pool, freedom)
+            place = seed + _NEXT * number + _NEXT_UNIT * i
+            last = before[i].twins if before else None
+            parts.append(linearised(one.unit, points[i], place, 1 if settling else rounds, one.starts, last, about))
+        freedom = sum((TWINS - 1) * one.rounds for one in parts)
+        pool = select(pooled(parts), price_of(count, len(middle), freedom))
+        # The first point may be far: what seems to differ there may be how curved the model is.
+        points = [pool.unit(i) if number else pool.shared for i in range(count)]
+        about = pool.shared_root
+        found = Together(parts, pool, freedom)
     assert found is not None
     return found

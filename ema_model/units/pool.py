@@ -97,6 +97,11 @@ class Pool:
         return self._solved[0][: self.parameters]
 
     @property
+    def shared_root(self) -> Array:
+        """A root of its covariance, (parameters, parameters)."""
+        return np.asarray(np.linalg.cholesky(self._solved[1][: self.parameters, : self.parameters]), dtype=float)
+
+    @property
     def shared_sigma(self) -> Array:
         """1 σ of it."""
         return np.sqrt(np.diag(self._solved[1])[: self.parameters])

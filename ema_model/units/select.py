@@ -98,6 +98,9 @@ def _scattered(pool: Pool, place: int, kept: Sequence[Pair], price: Price) -> Po
     if len(pool.blocks) < SCATTER_UNITS or pool.tau[place]:
         return pool
     bare = pool.with_pairs([one for one in pool.pairs if one[1] != place or one in kept])
+    each = np.maximum(bare.gains[:, place], 1.0)
+    if np.sum(each - 1.0 - np.log(each)) <= price.scatter:  # the most that a variance for each unit could gain
+        return pool
     tau = pool.tau.copy()
     tau[place] = scatter(bare, place)
     changed = _paid(bare.with_tau(tau), price)

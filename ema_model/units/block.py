@@ -97,12 +97,13 @@ def linearised(
     starts: Array | None = None,
     before: Twins | None = None,
     about: Array | None = None,
+    lasting: Array | None = None,
 ) -> Linearised:
     """At parameters x in σ of the file's tolerances, and starts where the fit had them (or at none).
 
     rounds: of twins, beside those of `before`; the more, the better their spread is known.  about: a root of the
-    covariance of x (parameters, parameters), within which the model's bias must hold.  Without a three-phase model,
-    what is left tells the scatter by its colour alone.
+    covariance of x (parameters, parameters), within which the model's bias must hold.  lasting: the
+    colour (values,) of what the unit's own calibration leaves; without it, of what is left here.
     """
     problem, count = unit.problem, len(x)
     at = problem.clip(np.concatenate([x / WIDER, np.zeros(problem.count - count) if starts is None else starts]))
@@ -122,8 +123,7 @@ def linearised(
     is_start = np.arange(problem.count) >= count
     curvature = slope.T @ slope + np.diag(is_start * 1.0)  # a start's own prior is as good as a measurement of it
     gradient = curvature @ at - slope.T @ residual - is_start * at
-    measured = Data(unit.model.recorded, None, unit.floors, _ALL)
-    lasting = colour(measured, unit.model, residual)
+    lasting = colour_of(unit, residual) if lasting is None else lasting
     noise, ripple = np.diag(is_start * 1.0), np.zeros((0, problem.count))
     by_recording = np.zeros((len(unit.model.recorded), count))
     for window, name, rows in problem.parts():
@@ -147,6 +147,11 @@ def linearised(
         by_recording=by_recording,
         twins=found,
     )
+
+
+def colour_of(unit: Unit, residual: Array) -> Array:
+    """How many times above white noise a residual (values,) of a unit is, (values,)."""
+    return colour(Data(unit.model.recorded, None, unit.floors, _ALL), unit.model, residual)
 
 
 def starts_at(unit: Unit, x: Array) -> Array:

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from ema_model.actuator import Actuator, Tolerance
 from ema_model.actuator.naming import on_axes, path_inside
 from ema_model.actuator.parameters import low_limit
-from ema_model.comparison.criteria import BAND
 from ema_model.errors import InputError, quoted
 from ema_model.estimation import default_free
 from ema_model.quantities.interval import HALF_90
@@ -223,7 +222,7 @@ def _warnings(units: Mapping[str, Sequence[Measurement]], fits: Sequence[Fitted]
             "each unit has one recording: whether a difference is the unit's, or of the day, the load or the sensors "
             "in that recording, cannot be known; record each unit twice"
         )
-    missing = [one for one in fits if one.error > MISFIT * BAND]
+    missing = [one for one in fits if one.error > MISFIT]
     if missing:
         worst = max(missing, key=lambda one: one.error)
         found.append(

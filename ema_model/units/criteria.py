@@ -11,8 +11,8 @@ FALSE = 0.005
 ALIKE = 6.0
 
 # Of the same on recordings that were not fitted, by which they must speak against a difference before it is dropped:
-# the 1 % of χ² with one degree of freedom.
-REFUSED = 6.6
+# "very strong", since the model's own error in another command counts with it.
+REFUSED = 10.0
 
 # Fewest units that can be said to scatter: of less, each is named that differs.
 SCATTER_UNITS = 4

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.estimation import Calibration, calibrate
 from ema_model.identification.model_bias import TWINS
-from ema_model.units.block import WIDER, Linearised, Unit, linearised, pooled
+from ema_model.units.block import WIDER, Linearised, Unit, colour_of, linearised, pooled
 from ema_model.units.pool import Pool
 from ema_model.units.select import price_of, select
 
@@ -45,6 +46,11 @@ class Fitted:
     def starts(self) -> Array:
         """Of its windows."""
         return self.calibration.x[len(self.unit.parameters) :]
+
+    @cached_property
+    def lasting(self) -> Array:
+        """The colour of what its own calibration leaves, (values,): a difference to other units is none of it."""
+        return colour_of(self.unit, self.calibration.residual)
 
     @property
     def error(self) -> float:
@@ -88,7 +94,9 @@ def together(fits: Sequence[Fitted], seed: int = 0, tell: Callable[[str], None] 
             tell(f"linearising {one.unit.name}, pass {number + 1} of {PASSES}")
             place = seed + _NEXT * number + _NEXT_UNIT * i
             last = before[i].twins if before else None
-            parts.append(linearised(one.unit, points[i], place, 1 if settling else rounds, one.starts, last, about))
+            parts.append(
+                linearised(one.unit, points[i], place, 1 if settling else rounds, one.starts, last, about, one.lasting)
+            )
         freedom = sum((TWINS - 1) * one.rounds for one in parts)
         pool = select(pooled(parts), price_of(count, len(middle), freedom))
         # The first point may be far: what seems to differ there may be how curved the model is.

@@ -128,17 +128,26 @@ class Pool:
     @cached_property
     def gains(self) -> Array:
         """By how much −2 log likelihood falls where a pair is freed besides, (units, parameters)."""
-        _, covariance, _ = self._solved
         found = np.zeros((len(self.blocks), self.parameters))
-        for unit, (information, pull, _) in enumerate(self._scattered):
-            places = [*range(self.parameters), *self._columns[unit]]
-            rows = [*range(self.parameters), *(p for u, p in self.pairs if u == unit)]
-            linked = information[rows]
-            taken = np.sum(linked * (covariance[np.ix_(places, places)] @ linked), axis=0)
-            free = np.diag(information) + DIFFERENCE**-2 - taken
-            found[unit] = (pull - information @ self.fixed(unit)) ** 2 / np.maximum(free, 1e-12)
+        for unit in self._units:
+            score, curvature = self.freeing(unit)
+            found[unit] = score**2 / np.maximum(np.diag(curvature), 1e-12)
             found[unit, [p for u, p in self.pairs if u == unit]] = 0.0
         return found
+
+    def freeing(self, unit: int) -> tuple[Array, Array]:
+        """Score (parameters,) and curvature of a unit's differences, were they freed besides, all else following.
+
+        Freeing a set of them gains scoreᵀ curvature⁻¹ score of that set.
+        """
+        _, covariance, _ = self._solved
+        information, pull, _ = self._scattered[unit]
+        places = [*range(self.parameters), *self._columns[unit]]
+        rows = [*range(self.parameters), *(p for u, p in self.pairs if u == unit)]
+        linked = information[rows]
+        taken = linked.T @ covariance[np.ix_(places, places)] @ linked
+        curvature = information + DIFFERENCE**-2 * np.eye(self.parameters) - taken
+        return pull - information @ self.fixed(unit), curvature
 
     def loss(self, pair: Pair) -> float:
         """By how much −2 log likelihood rises where a pair is shared again."""

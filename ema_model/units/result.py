@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.text import InWords
+from ema_model.units.criteria import MISFIT
 
 Array = NDArray[np.float64]
 Interval = tuple[float, float]
@@ -81,6 +82,11 @@ class UnitsCompared(InWords):
     errors: Array  # (units,), of each unit's own model, in floors
     type_actuator: Actuator  # with the type's values and tolerances
     warnings: tuple[str, ...]
+
+    @property
+    def is_missed(self) -> bool:
+        """Whether a unit's own model leaves far more than the floor."""
+        return bool(np.any(self.errors > MISFIT))
 
     @property
     def scattering(self) -> list[str]:

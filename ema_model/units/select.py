@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 from scipy.special import chdtri, stdtrit
@@ -15,6 +16,8 @@ from scipy.special import chdtri, stdtrit
 from ema_model.units.block import Block
 from ema_model.units.criteria import ALIKE, FALSE, MINORITY, SCATTER_UNITS
 from ema_model.units.pool import Pair, Pool, scatter
+
+_LARGEST_SET = 4  # parameters of a unit, that are chosen together
 
 
 @dataclass(frozen=True)
@@ -44,7 +47,7 @@ def select(blocks: Sequence[Block], price: Price, start: Pool | None = None) -> 
         at = np.unravel_index(int(np.argmax(pool.gains)), pool.gains.shape)
         pair = int(at[0]), int(at[1])
         if pool.gains[pair] > price.pair:
-            changed = _paid(_swapped(pool.with_pairs([*pool.pairs, pair])), price)
+            changed = _paid(_best_of_unit(pool.with_pairs([*pool.pairs, pair]), pair[0]), price)
             if sum(p == pair[1] for _, p in changed.pairs) > MINORITY * len(blocks):
                 changed = _scattered(changed, pair[1], (), price)
         else:  # a scatter in which no unit stands out
@@ -68,19 +71,21 @@ def _total(pool: Pool, price: Price) -> float:
     return pool.cost + len(pool.pairs) * price.pair + np.count_nonzero(pool.tau) * price.scatter
 
 
-def _swapped(pool: Pool) -> Pool:
-    """Each pair's parameter replaced by another of its unit, where that tells the difference better."""
-    for _ in range(len(pool.pairs)):
-        before = pool
-        for pair in before.pairs:
-            rest = pool.with_pairs([one for one in pool.pairs if one != pair])
-            best = pair[0], int(np.argmax(rest.gains[pair[0]]))
-            changed = rest.with_pairs([*rest.pairs, best])
-            if best != pair and changed.cost < pool.cost - 1e-6:
-                pool = changed
-        if pool is before:
-            break
-    return pool
+def _best_of_unit(pool: Pool, unit: int) -> Pool:
+    """A unit's pairs replaced by as many others that tell its differences best, whichever came first.
+
+    Of more than a few, the last one alone has been chosen, since sets grow fast.
+    """
+    own = [p for u, p in pool.pairs if u == unit]
+    if not 1 <= len(own) <= _LARGEST_SET:
+        return pool
+    others = [pair for pair in pool.pairs if pair[0] != unit]
+    score, curvature = pool.with_pairs(others).freeing(unit)
+    sets = np.array(list(combinations(range(pool.parameters), len(own))))
+    scores = score[sets]
+    solved = np.linalg.solve(curvature[sets[:, :, None], sets[:, None, :]], scores[:, :, None])[:, :, 0]
+    best = sets[int(np.argmax(np.sum(scores * solved, axis=1)))]
+    return pool.with_pairs([*others, *((unit, int(p)) for p in best)])
 
 
 def _paid(pool: Pool, price: Price) -> Pool:

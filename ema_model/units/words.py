@@ -72,9 +72,12 @@ def _differ(result: UnitsCompared, group: Sequence[Difference]) -> str:
     of_type = result.of_type[first.parameter]
     amount = _signed(change, known, None if first.share is None else first.change / first.share, of_type.unit)
     if len(result.units) == 2:
-        return f"{' and '.join(result.units)} differ in {names} ({first.unit} has {amount})"
+        verb = "seem to differ" if result.is_missed else "differ"
+        return f"{' and '.join(result.units)} {verb} in {names} ({first.unit} has {amount})"
     units = [one.unit for one in group]
     verb = "differ" if len(units) > 1 else "differs"
+    if result.is_missed:  # what is missing may stand behind it
+        verb = "seem to differ" if len(units) > 1 else "seems to differ"
     return f"{_and(units)} {verb} from the rest in {names} ({amount})"
 
 

@@ -146,3 +146,12 @@ def test_what_is_only_known_together_is_named_as_one():
 def test_more_units_and_less_known_ripple_ask_more():
     assert price_of(20, 13).pair > price_of(4, 13).pair > price_of(2, 13).pair
     assert price_of(4, 13, 20).pair > price_of(4, 13, 90).pair > price_of(4, 13).pair
+
+
+def test_several_differences_of_a_unit_are_chosen_together():
+    """Two together look nearly like a third one alone, which must not stay when both are there."""
+    g = np.diag([400.0, 400.0, 400.0, 400.0])
+    g[2, :2] = g[:2, 2] = 270.0  # the third shows as the first and the second do together
+    blocks = [Block(g, g @ (np.array([2.0, 2.0, 0.0, 0.0]) * (unit == 2))) for unit in range(6)]
+    pool = select(blocks, price_of(6, 4))
+    assert pool.pairs == ((2, 0), (2, 1))

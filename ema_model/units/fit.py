@@ -25,7 +25,7 @@ PASSES = 4  # after which the answers of made fleets stay
 _SETTLING = 2  # of them, in which the point still moves, and the model's bias with it
 _FIRST = 0.2  # tolerances, about the first point
 _WORSE = 1.5  # times the χ² of the best unit so far, from which on a unit is fitted from further starts
-_FREEDOM = 90  # independent values, over all units, that the ripple's spread is to be known by
+_FREEDOM = 60  # independent values, over all units, that the ripple's spread is to be known by
 _NEXT = 1000  # from one pass's seeds to the next one's, and
 _NEXT_UNIT = 50  # from one unit's
 

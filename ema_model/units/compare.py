@@ -19,7 +19,7 @@ from ema_model.recordings.prepared import prepared
 from ema_model.recordings.read import check_same_actuator
 from ema_model.units.block import Block, pooled, starts_at, unit_of
 from ema_model.units.block import linearised as linearised_at
-from ema_model.units.criteria import MISFIT, REFUSED, TOLD, UNTOLD
+from ema_model.units.criteria import MISFIT, REFUSED, SLOPE, TOLD, UNTOLD
 from ema_model.units.fit import Fitted, Together, fit, together
 from ema_model.units.pool import Pair, Pool
 from ema_model.units.result import Difference, Need, OfType, UnitsCompared
@@ -147,7 +147,7 @@ def _difference(
     unit, place = pair
     sigma, shared = _in_unit(pool, place, actuator, paths)
     value, known = pool.difference(pair)
-    change, half = sigma * value, HALF_90 * sigma * known
+    change, half = sigma * value, HALF_90 * sigma * float(np.hypot(known, SLOPE * value))
     interval = (change - half, change + half)
     return Difference(
         unit=names[unit],

@@ -103,8 +103,9 @@ class Pool:
 
     @property
     def shared_sigma(self) -> Array:
-        """1 σ of it."""
-        return np.sqrt(np.diag(self._solved[1])[: self.parameters])
+        """1 σ of it, as one unit tells it: what the model is off by is common to all, and averages out nowhere."""
+        of_one = sum(information for information, _, _ in self._scattered) / len(self.blocks)
+        return np.sqrt(np.diag(np.linalg.inv(of_one + np.eye(self.parameters))))
 
     def difference(self, pair: Pair) -> tuple[float, float]:
         """δ and 1 σ of it."""

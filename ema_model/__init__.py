@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from ema_model.face import (
         InputError,
         compare,
+        compare_units,
         discover,
         health,
         identify,
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 __all__ = [
     "InputError",
     "compare",
+    "compare_units",
     "discover",
     "health",
     "identify",

@@ -28,6 +28,8 @@ from ema_model.recordings.health.card import Health, health_of
 from ema_model.simulation import plant
 from ema_model.simulation.run import Run
 from ema_model.simulation.sensors import Sensors
+from ema_model.units.compare import compare_units as compared_units
+from ema_model.units.result import UnitsCompared
 
 One = str | os.PathLike[str] | Measurement
 Recordings = One | Sequence[One]
@@ -75,6 +77,19 @@ def compare(
     """Where the model fails; options as of `ema_model.comparison.compare`."""
     actuator = actuator or load_actuator()
     return comparison.compare(_read(of, actuator), actuator, holdout=_read(holdout, actuator), **options)
+
+
+def compare_units(
+    units: Mapping[str, Recordings],
+    actuator: Actuator | None = None,
+    *,
+    holdout: Mapping[str, Recordings] | None = None,
+    **options: Any,
+) -> UnitsCompared:
+    """What units of one type differ in, by their names; options as of `ema_model.units.compare.compare_units`."""
+    actuator = actuator or load_actuator()
+    fitted, held = ({name: _read(of, actuator) for name, of in given.items()} for given in (units, holdout or {}))
+    return compared_units(fitted, actuator, holdout=held, **options)
 
 
 def discover(

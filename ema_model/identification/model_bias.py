@@ -44,12 +44,22 @@ class Twins:
         return [replace(one, model=spread, white=WHITE) for one, spread in zip(before, self.spread)]
 
 
-def twins(problem: Problem, x: Array, seed: int, before: Twins | None = None) -> Twins | None:
-    """The difference at x (unknowns,), its spread from earlier ones too; None if there is no twin, or it diverges."""
+def twins(
+    problem: Problem, x: Array, seed: int, before: Twins | None = None, about: Array | None = None
+) -> Twins | None:
+    """The difference at x (unknowns,), its spread from earlier ones too; None if there is no twin, or it diverges.
+
+    about: a root of the covariance of x (unknowns, unknowns) that the twins are drawn from, in place of a hair of each
+    fault: what is known of the difference is then what holds wherever x may be.
+    """
     if not problem.model.actuator.has_reference_model:
         return None
     near = np.repeat(x[None, :], TWINS, axis=0)
-    near[:, : len(NAMES)] += _HAIR * np.random.default_rng([seed, 2]).standard_normal((TWINS, len(NAMES)))
+    random = np.random.default_rng([seed, 2])
+    if about is None:
+        near[:, : len(NAMES)] += _HAIR * random.standard_normal((TWINS, len(NAMES)))
+    else:
+        near += random.standard_normal(near.shape) @ about.T
     near = problem.clip(near)
     added, spread, deviations = [], [], []
     for i, window in enumerate(problem.model.windows):

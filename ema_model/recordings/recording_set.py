@@ -24,17 +24,20 @@ def is_pattern(text: str) -> bool:
     return bool(_MARKS & set(text)) and not os.path.exists(text)
 
 
-def files_of(text: str) -> list[str]:
+def files_of(text: str, *, in_folders: bool = False) -> list[str]:
     """The recordings that a folder holds, or a pattern names, in order of their names; of all else the text itself.
 
-    A folder's own folders are left out, as is what begins with a dot; a LeRobot dataset has its episodes' files.
-    InputError where there are none.
+    A folder's own folders are left out, as is what begins with a dot; in_folders: of a folder without recordings those
+    in its folders are taken.  A LeRobot dataset has its episodes' files.  InputError where there are none.
     """
     path = Path(text)
     if os.path.isdir(text):
         if episodes := robot_dataset.files_in(text):
             return episodes
         found = [str(one) for one in recordings_in(path)]
+        if not found and in_folders:
+            folders = sorted(one for one in path.iterdir() if one.is_dir() and not one.name.startswith("."))
+            found = [str(one) for folder in folders for one in recordings_in(folder)]
         if not found:
             raise refusal(text, f"a folder without recordings; they end in {', '.join(FORMATS)}")
         return found

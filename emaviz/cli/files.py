@@ -32,6 +32,7 @@ class Input:
     has_side_file: bool = False
     is_file: Callable[[str], bool] = bool  # tells a file's name from what else the option takes
     several: bool = False  # a folder or a pattern stands for the recordings in it
+    in_folders: bool = False  # a folder without recordings stands for those in its folders
 
     def __call__(self, text: str) -> str:
         return text
@@ -63,6 +64,7 @@ class Folder:
 
 RECORDING = Input("the file of a measurement", has_side_file=True)
 RECORDINGS = replace(RECORDING, several=True)
+UNITS = replace(RECORDINGS, in_folders=True)
 HELD_OUT = replace(RECORDINGS, is_file=lambda text: not is_pattern(text))
 ACTUATOR = Input("an actuator file (.toml)")
 JSON = Output((".json",), is_kept=False)
@@ -81,12 +83,12 @@ class _Named(NamedTuple, Generic[_Declared]):
     declared: _Declared
 
 
-def add_recordings(parser: argparse.ArgumentParser, done: str, nargs: str = "+") -> None:
+def add_recordings(parser: argparse.ArgumentParser, done: str, nargs: str = "+", declared: Input = RECORDINGS) -> None:
     """The recordings of one actuator that a command takes; done: "fitted"."""
     parser.add_argument(
         "files",
         nargs=nargs,
-        type=RECORDINGS,
+        type=declared,
         metavar="FILE",
         help=f"recordings of one actuator, {done} together; folders, LeRobot datasets and patterns too",
     )
@@ -130,8 +132,9 @@ def _named(
 
 
 def _files(text: str, declared: Input | Output) -> list[str]:
-    is_set = isinstance(declared, Input) and declared.several and declared.is_file(text)
-    return files_of(text) if is_set else [text]
+    if isinstance(declared, Input) and declared.several and declared.is_file(text):
+        return files_of(text, in_folders=declared.in_folders)
+    return [text]
 
 
 def _taken(one: _Named[_Declared]) -> list[tuple[Path, str]]:

@@ -40,7 +40,7 @@ def read_set(
     ]
     if not given and arguments.files:
         raise InputError("--holdout takes out every recording; leave some to fit")
-    fitted, held = (_read_files(names, arguments, actuator, progress) for names in (given, unseen))
+    fitted, held = (read_files(names, arguments, actuator, progress) for names in (given, unseen))
     for rule in arguments.holdout:
         if is_pattern(rule):
             fitted, taken = held_out(fitted, rule)
@@ -48,9 +48,10 @@ def read_set(
     return fitted, held
 
 
-def _read_files(
+def read_files(
     names: Sequence[str], arguments: argparse.Namespace, actuator: Actuator, progress: Progress
 ) -> list[Measurement]:
+    """One after another, cut into runs and to --from and --to; says on stderr what was assumed of columns."""
     found: list[Measurement] = []
     for i, name in enumerate(names):
         progress.show(f"reading {Path(name).name} ({i + 1} of {len(names)})")

@@ -36,6 +36,15 @@ def test_a_recording_is_a_file_or_a_measurement_one_or_several(recording, tmp_pa
         em.simulate(faults={"k9": 0.1})
 
 
+def test_units_are_compared_by_name():
+    given = {name: em.simulate("chirp", duration_s=0.2, noise_A=0.3, seed=i) for i, name in enumerate("ab")}
+    found = em.compare_units(given, free=["transmission.backlash_rad"])
+    assert found.units == ("a", "b") and not found.differences
+    assert "the 2 units do not differ" in str(found)
+    with pytest.raises(em.InputError, match="one unit only"):
+        em.compare_units({"a": given["a"]})
+
+
 def test_results_show_themselves(recording):
     answer = em.identify(recording)
     assert str(answer) == repr(answer) and re.search(r"^k1 +0\.2[0-9]+ .*not healthy$", str(answer), re.M)

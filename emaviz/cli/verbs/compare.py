@@ -7,7 +7,7 @@ import argparse
 from ema_model.actuator import save_actuator
 from ema_model.comparison import Comparison, as_dict, compare
 from ema_model.errors import InputError
-from emaviz.cli import files, given, options, output
+from emaviz.cli import by_unit, files, given, options, output
 
 HELP = "show where the model fails beside recordings"
 PLACE = 4
@@ -15,7 +15,8 @@ PLACE = 4
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of INTERFACES, with the signals to fit."""
-    files.add_recordings(parser, "compared")
+    files.add_recordings(parser, "compared", declared=files.UNITS)
+    by_unit.add_units(parser)
     options.add_fit(parser, "the comparison")
     parser.add_argument(
         "--calibrate", action=argparse.BooleanOptionalAction, default=True, help="fit the actuator within tolerances"
@@ -41,6 +42,8 @@ def run(arguments: argparse.Namespace) -> int:
     actuator = given.actuator_of(arguments)
     if arguments.save_actuator and not arguments.calibrate:
         raise InputError("--save-actuator writes what the calibration found; leave --no-calibrate out")
+    if by_unit.is_asked(arguments):
+        return by_unit.run(arguments, actuator)
     progress = output.Progress()
     try:
         measurements, held = given.read_set(arguments, actuator, progress)

@@ -1,0 +1,192 @@
+"""What the recordings of one unit tell of its parameters, as a quadratic form in them.
+
+The model is linearised at some parameters, with the difference to its three-phase twin added, so that the model's own
+bias, which depends on the command, is no difference between units.  The starts of all windows are integrated out.
+
+The form is the sandwich A M⁻¹ A: A is the curvature of the weighted squares, M what their gradient really scatters by:
+the sensors' noise, and the chopping's ripple, which no model repeats and which the twins show (`pooled`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ema_model.actuator import Actuator
+from ema_model.discovery.evidence import colour
+from ema_model.discovery.model_fit import Data
+from ema_model.estimation import Floor, calibrate, default_free, floor
+from ema_model.estimation.problem import SIGNALS, Problem
+from ema_model.estimation.unknowns import starts_of, unknowns_of
+from ema_model.identification.model_bias import TWINS, Twins, twins
+from ema_model.models import Model, model_for
+from ema_model.models.stretches import fit_stretches
+from ema_model.recordings import Measurement
+
+Array = NDArray[np.float64]
+
+WIDER = 2.0  # times the file's tolerances, within whose 3 σ a unit may be: one that differs may well be outside
+_ALL: dict[str, float] = dict.fromkeys(SIGNALS, 1.0)
+_NOTHING = 1e-6  # information in σ⁻² that is none
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Of one unit: −½ (x − x̂)ᵀ G (x − x̂) is what its recordings say of x, in σ of the file's tolerances."""
+
+    information: Array  # G, (parameters, parameters)
+    pull: Array  # G x̂, (parameters,): x̂ itself is not known where G is small
+
+
+@dataclass(frozen=True, eq=False)
+class Linearised:
+    """The parts of a block, before the ripple is pooled with that of other units."""
+
+    curvature: Array  # A, (parameters, parameters)
+    gradient: Array  # A x̂, (parameters,)
+    noise: Array  # of the gradient, by the sensors: (parameters, parameters)
+    ripple: Array  # (twins, parameters): each twin's gradient from their mean
+    rounds: int  # of twins, each with a mean of its own
+    by_recording: Array  # (recordings, parameters): the curvature's diagonal, of each recording alone
+    twins: Twins | None
+
+
+@dataclass(frozen=True, eq=False)
+class Unit:
+    """A unit's recordings beside the model."""
+
+    name: str
+    model: Model
+    floors: list[Floor]
+    problem: Problem  # its parameters first, then its starts
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Paths of those that may differ."""
+        return tuple(one.name for one in self.problem.unknowns if one.kind == "parameter")
+
+
+def unit_of(
+    name: str, recordings: Sequence[Measurement], actuator: Actuator, parameters: Sequence[str] | None = None
+) -> Unit:
+    """A unit beside the actuator's model; InputError for recordings that cannot be compared.
+
+    parameters: that may differ; without it, those that the file leaves free.
+    """
+    paths = default_free(actuator) if parameters is None else tuple(parameters)
+    model = model_for(recordings, wider(actuator), stretches=fit_stretches(recordings, actuator))
+    floors = [floor(model, place) for place in range(len(model.windows))]
+    starts = starts_of(model, floors, worn=False)
+    return Unit(name, model, floors, Problem(model, floors, [*unknowns_of(model.actuator, paths), *starts]))
+
+
+def wider(actuator: Actuator) -> Actuator:
+    """The actuator with tolerances within which a unit that differs may be."""
+    tolerances = {path: replace(one, sigma=WIDER * one.sigma) for path, one in actuator.tolerances.items()}
+    return replace(actuator, tolerances=tolerances)
+
+
+def linearised(
+    unit: Unit,
+    x: Array,
+    seed: int = 0,
+    rounds: int = 1,
+    starts: Array | None = None,
+    before: Twins | None = None,
+    about: Array | None = None,
+    lasting: Array | None = None,
+) -> Linearised:
+    """At parameters x in σ of the file's tolerances, and starts where the fit had them (or at none).
+
+    rounds: of twins, beside those of `before`; the more, the better their spread is known.  about: a root of the
+    covariance of x (parameters, parameters), within which the model's bias must hold.  lasting: the
+    colour (values,) of what the unit's own calibration leaves; without it, of what is left here.
+    """
+    problem, count = unit.problem, len(x)
+    at = problem.clip(np.concatenate([x / WIDER, np.zeros(problem.count - count) if starts is None else starts]))
+    found = before
+    problem.reweighted(unit.floors)
+    near = None
+    if about is not None:
+        near = np.zeros((problem.count, problem.count))
+        near[:count, :count] = about / WIDER
+    for number in range(rounds):
+        found = twins(problem, at, seed + number, found, near)
+        if found is None:
+            break
+        problem.reweighted(found.floors(unit.floors), found.added)
+    residuals, slopes = problem.jacobians(at[None, :])
+    residual, slope = residuals[0][: problem.values], slopes[0][: problem.values]
+    is_start = np.arange(problem.count) >= count
+    curvature = slope.T @ slope + np.diag(is_start * 1.0)  # a start's own prior is as good as a measurement of it
+    gradient = curvature @ at - slope.T @ residual - is_start * at
+    lasting = colour_of(unit, residual) if lasting is None else lasting
+    noise, ripple = np.diag(is_start * 1.0), np.zeros((0, problem.count))
+    by_recording = np.zeros((len(unit.model.recorded), count))
+    for window, name, rows in problem.parts():
+        share = lasting[rows].copy()
+        if found is not None:
+            floors = problem.floors[window]
+            share *= problem.over_sigma(window, name, np.full(rows.stop - rows.start, floors.noise[name])) ** 2
+            moved = problem.over_sigma(window, name, found.deviations[window][name]) @ slope[rows]
+            ripple = moved if not len(ripple) else ripple + moved
+        by_recording[unit.model.windows[window].recording] += np.sum(slope[rows, :count] ** 2, axis=0) / WIDER**2
+        noise = noise + (slope[rows] * share[:, None]).T @ slope[rows]
+    # Starts are integrated out: what is left of each parameter's effect once they have taken theirs.
+    taken = np.linalg.solve(curvature[count:, count:], curvature[count:, :count]).T
+    without = np.concatenate([np.eye(count), -taken], axis=1) / WIDER
+    return Linearised(
+        curvature=without @ curvature @ without.T,
+        gradient=without @ gradient,
+        noise=without @ noise @ without.T,
+        ripple=ripple @ without.T,
+        rounds=len(ripple) // TWINS,
+        by_recording=by_recording,
+        twins=found,
+    )
+
+
+def colour_of(unit: Unit, residual: Array) -> Array:
+    """How many times above white noise a residual (values,) of a unit is, (values,)."""
+    return colour(Data(unit.model.recorded, None, unit.floors, _ALL), unit.model, residual)
+
+
+def starts_at(unit: Unit, x: Array) -> Array:
+    """The starts of a unit's windows that suit its recordings best at x, in σ of the file's tolerances."""
+    model, count = unit.model, len(x)
+    values = unit.problem.parameters(
+        unit.problem.clip(np.concatenate([x / WIDER, np.zeros(unit.problem.count - count)]))
+    )
+    there = model_for(
+        model.recorded, model.actuator.varied(values), stretches=fit_stretches(model.recorded, model.actuator)
+    )
+    return calibrate(there, unit.floors, free=()).x
+
+
+def pooled(parts: Sequence[Linearised]) -> list[Block]:
+    """The blocks of all units, whose ripple is taken to be alike relative to what their recordings tell."""
+    roots = [_root(one.curvature) for one in parts]
+    freedom = sum(one.rounds * (TWINS - 1) for one in parts)
+    ripple = np.zeros_like(roots[0])
+    if freedom:
+        over = np.concatenate([one.ripple @ np.linalg.inv(root) for one, root in zip(parts, roots)])
+        ripple = (1.0 + 1.0 / TWINS) * over.T @ over / freedom  # of the recording itself, and of the twins' mean
+    blocks = []
+    for one, root in zip(parts, roots):
+        scatter = one.noise + root @ ripple @ root
+        weighed = np.asarray(np.linalg.solve(scatter + _NOTHING * np.eye(len(root)), one.curvature), dtype=float)
+        blocks.append(Block(_symmetric(one.curvature @ weighed), weighed.T @ one.gradient))
+    return blocks
+
+
+def _root(matrix: Array) -> Array:
+    """Its symmetric square root, of full rank."""
+    values, vectors = np.linalg.eigh(_symmetric(matrix))
+    return (vectors * np.sqrt(np.maximum(values, _NOTHING))) @ vectors.T
+
+
+def _symmetric(matrix: Array) -> Array:
+    return 0.5 * (matrix + matrix.T)

@@ -1,0 +1,235 @@
+"""Compares the units of one type: each calibrated alone, then all together, what was held out looked at last."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ema_model.actuator import Actuator, Tolerance
+from ema_model.actuator.naming import on_axes, path_inside
+from ema_model.actuator.parameters import low_limit
+from ema_model.errors import InputError, quoted
+from ema_model.estimation import default_free
+from ema_model.quantities.interval import HALF_90
+from ema_model.recordings import Measurement
+from ema_model.recordings.prepared import prepared
+from ema_model.recordings.read import check_same_actuator
+from ema_model.units.block import Block, pooled, starts_at, unit_of
+from ema_model.units.block import linearised as linearised_at
+from ema_model.units.criteria import MISFIT, REFUSED, SLOPE, TOLD, UNTOLD
+from ema_model.units.fit import Fitted, Together, fit, together
+from ema_model.units.pool import Pair, Pool
+from ema_model.units.result import Difference, Need, OfType, UnitsCompared
+from ema_model.units.select import alike
+from ema_model.units.transfer import transfer
+
+Array = NDArray[np.float64]
+Progress = Callable[[str], None]
+
+_HELD = 7_000_000  # of seeds, from fitted to held-out recordings' twins
+
+
+def compare_units(
+    units: Mapping[str, Sequence[Measurement]],
+    actuator: Actuator,
+    *,
+    holdout: Mapping[str, Sequence[Measurement]] | None = None,
+    free: Sequence[str] | None = None,
+    seed: int = 0,
+    on_progress: Progress | None = None,
+) -> UnitsCompared:
+    """The recordings of several units of one type, by the units' names.
+
+    free: parameters that may differ, in place of those that the actuator's file leaves free; holdout: recordings of the
+    units that are not fitted, by which differences are confirmed.  Raises InputError for one unit only, and for
+    recordings that cannot be compared.
+    """
+    tell = on_progress or (lambda text: None)
+    names = tuple(units)
+    _check(units)
+    paths = default_free(actuator) if free is None else free
+    paths = tuple(path_inside(path, actuator.tolerances, actuator.axes) for path in paths)
+    if not paths:
+        raise InputError(
+            f"{actuator.name}: no parameter is free to differ; give one a tolerance in the actuator's file"
+        )
+    fits: list[Fitted] = []
+    for number, (name, recordings) in enumerate(units.items()):
+        tell(f"calibrating {name} ({number + 1} of {len(units)})")
+        fits.append(fit(unit_of(name, [prepared(one, actuator) for one in recordings], actuator, paths), fits))
+    found = together(fits, seed, tell)
+    held = _held_blocks(holdout or {}, names, actuator, paths, found, seed, tell)
+    pool, dropped = _confirmed(found.pool, held, actuator, names, paths)
+    tell("holding each model against each unit")
+    moved = transfer(fits)
+    of_type = _of_type(pool, actuator, paths)
+    result = UnitsCompared(
+        actuator=actuator,
+        units=names,
+        recordings=tuple(tuple(one.name for one in recordings) for recordings in units.values()),
+        held_out=tuple(tuple(one.name for one in (holdout or {}).get(name, ())) for name in names),
+        differences=tuple(_difference(pool, pair, actuator, names, paths, held) for pair in pool.pairs),
+        dropped=dropped,
+        of_type=of_type,
+        transfer=moved,
+        needs=tuple(_needs(found, names, paths, [[one.name for one in given] for given in units.values()])),
+        errors=np.array([one.error for one in fits]),
+        type_actuator=_type_actuator(actuator, of_type),
+        warnings=tuple(_warnings(units, fits)),
+    )
+    return result
+
+
+def _check(units: Mapping[str, Sequence[Measurement]]) -> None:
+    if len(units) < 2:
+        only = quoted(next(iter(units), ""), 60)
+        raise InputError(f"one unit only ({only}): two or more are needed to compare; name others, or leave --by out")
+    if empty := next((name for name, recordings in units.items() if not recordings), None):
+        raise InputError(f"unit {quoted(empty, 60)}: no recording of it is left to fit; hold out fewer")
+    check_same_actuator([one for recordings in units.values() for one in recordings])
+
+
+def _held_blocks(
+    holdout: Mapping[str, Sequence[Measurement]],
+    names: Sequence[str],
+    actuator: Actuator,
+    paths: tuple[str, ...],
+    found: Together,
+    seed: int,
+    tell: Progress,
+) -> dict[int, Block]:
+    """Blocks of what was not fitted, at the answer, by the unit's place; only of units that differ."""
+    parts = {}
+    for i, name in enumerate(names):
+        if holdout.get(name) and any(unit == i for unit, _ in found.pool.pairs):
+            tell(f"holding what was found against what was not fitted of {name}")
+            unit = unit_of(name, [prepared(one, actuator) for one in holdout[name]], actuator, paths)
+            x = found.pool.unit(i)
+            parts[i] = linearised_at(unit, x, seed + _HELD + i, 2, starts_at(unit, x))
+    return dict(zip(parts, pooled(list(parts.values())))) if parts else {}
+
+
+def _confirmed(
+    pool: Pool, held: Mapping[int, Block], actuator: Actuator, names: Sequence[str], paths: tuple[str, ...]
+) -> tuple[Pool, tuple[Difference, ...]]:
+    """Without the differences that held-out recordings contradict, the most contradicted first."""
+    dropped: list[Difference] = []
+    while pool.pairs:
+        told = {pair: _held_out(pool, pair, held) for pair in pool.pairs}
+        spoken = {pair: value for pair, value in told.items() if value is not None}
+        worst = min(spoken, key=lambda pair: spoken[pair], default=None)
+        if worst is None or spoken[worst] > -REFUSED:
+            break
+        dropped.append(_difference(pool, worst, actuator, names, paths, held))
+        pool = pool.with_pairs([one for one in pool.pairs if one != worst])
+    return pool, tuple(dropped)
+
+
+def _held_out(pool: Pool, pair: Pair, held: Mapping[int, Block]) -> float | None:
+    """By how much more the held-out recordings of its unit are missed where a pair is shared again."""
+    block = held.get(pair[0])
+    if block is None:
+        return None
+    without = pool.with_pairs([one for one in pool.pairs if one != pair])
+    return _missed(block, without.unit(pair[0])) - _missed(block, pool.unit(pair[0]))
+
+
+def _missed(block: Block, x: Array) -> float:
+    return float(x @ block.information @ x - 2.0 * block.pull @ x)
+
+
+def _difference(
+    pool: Pool, pair: Pair, actuator: Actuator, names: Sequence[str], paths: Sequence[str], held: Mapping[int, Block]
+) -> Difference:
+    unit, place = pair
+    sigma, shared = _in_unit(pool, place, actuator, paths)
+    value, known = pool.difference(pair)
+    change, half = sigma * value, HALF_90 * sigma * float(np.hypot(known, SLOPE * value))
+    interval = (change - half, change + half)
+    return Difference(
+        unit=names[unit],
+        parameter=paths[place],
+        alike=tuple(paths[p] for p in alike(pool, pair)[1:]),
+        change=change,
+        change90=interval,
+        share=change / abs(shared) if shared else None,
+        share90=(interval[0] / abs(shared), interval[1] / abs(shared)) if shared else None,
+        evidence=pool.loss(pair),
+        held_out=_held_out(pool, pair, held),
+    )
+
+
+def _in_unit(pool: Pool, place: int, actuator: Actuator, paths: Sequence[str]) -> tuple[float, float]:
+    """A parameter's tolerance, and what the type shares, in its unit."""
+    sigma = actuator.tolerances[paths[place]].sigma
+    value = actuator.value(paths[place])
+    return sigma, value + sigma * float(pool.shared[place]) if value else 0.0
+
+
+def _of_type(pool: Pool, actuator: Actuator, paths: Sequence[str]) -> dict[str, OfType]:
+    found = {}
+    for place, path in enumerate(paths):
+        sigma = actuator.tolerances[path].sigma
+        mean = actuator.value(path) + sigma * float(pool.shared[place])
+        low = low_limit(path, actuator.controller.kind) if not path.startswith("effects.") else -np.inf
+        known = sigma * float(pool.shared_sigma[place])
+        half = HALF_90 * known
+        scatter = sigma * float(pool.tau[place])
+        found[path] = OfType(
+            mean=max(mean, low),
+            mean90=(mean - half, mean + half),
+            scatter=scatter,
+            sigma=float(np.hypot(scatter, known)),
+            unit=on_axes(path, actuator.axes).unit,
+            told=bool(known < UNTOLD * sigma),
+        )
+    return found
+
+
+def _type_actuator(actuator: Actuator, of_type: Mapping[str, OfType]) -> Actuator:
+    """With the type's means as values, and as tolerances how far a further unit may be from them."""
+    told = {path: one for path, one in of_type.items() if one.told}
+    tolerances = {
+        path: Tolerance(told[path].sigma, one.free) if path in told else one
+        for path, one in actuator.tolerances.items()
+    }
+    return replace(actuator.with_values({path: one.mean for path, one in told.items()}), tolerances=tolerances)
+
+
+def _needs(
+    found: Together, names: Sequence[str], paths: Sequence[str], recordings: Sequence[Sequence[str]]
+) -> list[Need]:
+    """What the prior alone tells of a unit, with the recording of another that tells it there."""
+    left = np.array([1.0 / np.sqrt(1.0 + np.diag(one.information)) for one in found.pool.blocks])
+    needs = []
+    for place, path in enumerate(paths):
+        best = int(np.argmin(left[:, place]))
+        told_by = ""
+        if left[best, place] < TOLD:
+            told_by = recordings[best][int(np.argmax(found.parts[best].by_recording[:, place]))]
+        untold = [i for i in range(len(names)) if left[i, place] > UNTOLD]
+        needs += [Need(names[i], path, told_by) for i in untold if told_by or len(untold) == len(names)]
+    return needs
+
+
+def _warnings(units: Mapping[str, Sequence[Measurement]], fits: Sequence[Fitted]) -> list[str]:
+    found = []
+    if all(len(recordings) == 1 for recordings in units.values()):
+        found.append(
+            "each unit has one recording: whether a difference is the unit's, or of the day, the load or the sensors "
+            "in that recording, cannot be known; record each unit twice"
+        )
+    missing = [one for one in fits if one.error > MISFIT]
+    if missing:
+        worst = max(missing, key=lambda one: one.error)
+        found.append(
+            f"the models leave up to {worst.error:.1f} × the floor ({worst.unit.name}): physics is missing, and "
+            "differences are judged by what is left; `emaviz discover` looks for it"
+        )
+    loose = [one.unit.name for one in fits if not one.calibration.converged]
+    if loose:
+        found.append(f"the calibration of {', '.join(loose)} has not converged: what is said of it may be off")
+    return found

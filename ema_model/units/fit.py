@@ -1,0 +1,107 @@
+"""Each unit's own calibration, and all units' linearisations at what they together say of each.
+
+The first common point is the middle of the units' own; each pass goes on from the last one's answer (Gauss and
+Newton's steps for all units at once), and adds to what is known of the chopping's ripple.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ema_model.estimation import Calibration, calibrate
+from ema_model.identification.model_bias import TWINS
+from ema_model.units.block import WIDER, Linearised, Unit, colour_of, linearised, pooled
+from ema_model.units.pool import Pool
+from ema_model.units.select import price_of, select
+
+Array = NDArray[np.float64]
+
+PASSES = 4  # after which the answers of made fleets stay
+_SETTLING = 2  # of them, in which the point still moves, and the model's bias with it
+_FIRST = 0.2  # tolerances, about the first point
+_WORSE = 1.5  # times the χ² of the best unit so far, from which on a unit is fitted from further starts
+_FREEDOM = 60  # independent values, over all units, that the ripple's spread is to be known by
+_NEXT = 1000  # from one pass's seeds to the next one's, and
+_NEXT_UNIT = 50  # from one unit's
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """A unit alone, with the model as it is: with its own bias."""
+
+    unit: Unit
+    calibration: Calibration
+
+    @property
+    def x(self) -> Array:
+        """Its parameters, in the file's tolerances."""
+        return WIDER * self.calibration.x[: len(self.unit.parameters)]
+
+    @property
+    def starts(self) -> Array:
+        """Of its windows."""
+        return self.calibration.x[len(self.unit.parameters) :]
+
+    @cached_property
+    def lasting(self) -> Array:
+        """The colour of what its own calibration leaves, (values,): a difference to other units is none of it."""
+        return colour_of(self.unit, self.calibration.residual)
+
+    @property
+    def error(self) -> float:
+        """What it leaves, in floors."""
+        return float(np.sqrt(self.calibration.chi2_per_value))
+
+
+def fit(unit: Unit, before: Sequence[Fitted] = ()) -> Fitted:
+    """Calibrates one; it begins where the first of those before ended, unless that leaves more."""
+    free = unit.parameters
+    if before:
+        start = dict(zip(free, before[0].calibration.x))
+        found = calibrate(unit.model, unit.floors, free=free, start=start)
+        if found.chi2_per_value <= _WORSE * min(one.calibration.chi2_per_value for one in before):
+            return Fitted(unit, found)
+    return Fitted(unit, calibrate(unit.model, unit.floors, free=free))
+
+
+@dataclass(frozen=True, eq=False)
+class Together:
+    """All units' last linearisations, and what they say."""
+
+    parts: list[Linearised]
+    pool: Pool
+    freedom: int  # independent values that the ripple's spread is known by, 0 where there is none
+
+
+def together(fits: Sequence[Fitted], seed: int = 0, tell: Callable[[str], None] = lambda text: None) -> Together:
+    """Linearises and selects, PASSES times."""
+    count = len(fits)
+    middle = np.median([one.x for one in fits], axis=0)
+    points, about = [middle] * count, _FIRST * np.eye(len(middle))
+    parts: list[Linearised] = []
+    rounds = max(1, -(-_FREEDOM // ((PASSES - _SETTLING) * (TWINS - 1) * count)))
+    found: Together | None = None
+    for number in range(PASSES):
+        settling = number < _SETTLING
+        before = parts if number > _SETTLING else None
+        parts = []
+        for i, one in enumerate(fits):
+            tell(f"linearising {one.unit.name}, pass {number + 1} of {PASSES}")
+            place = seed + _NEXT * number + _NEXT_UNIT * i
+            last = before[i].twins if before else None
+            parts.append(
+                linearised(one.unit, points[i], place, 1 if settling else rounds, one.starts, last, about, one.lasting)
+            )
+        freedom = sum((TWINS - 1) * one.rounds for one in parts)
+        pool = select(pooled(parts), price_of(count, len(middle), freedom))
+        # The first point may be far: what seems to differ there may be how curved the model is.
+        points = [pool.unit(i) if number else pool.shared for i in range(count)]
+        about = pool.shared_root
+        found = Together(parts, pool, freedom)
+    assert found is not None
+    return found

@@ -1,0 +1,165 @@
+"""`emaviz compare … --by unit`: which recording is of which unit, and what the units differ in."""
+
+from __future__ import annotations
+
+import argparse
+from copy import copy
+from fnmatch import fnmatchcase
+from pathlib import Path
+
+from ema_model.actuator import Actuator, save_actuator
+from ema_model.errors import InputError, quoted
+from ema_model.files.limits import FILE_BYTES
+from ema_model.files.refusal import listed
+from ema_model.recordings import Measurement, find_side_file, read_side_file
+from ema_model.recordings.file import read_header
+from ema_model.recordings.formats.text_layout import Hints
+from ema_model.recordings.recording_set import RUN, files_of, held_out, is_pattern
+from emaviz.cli import given, output
+
+_BY_FOLDER = ("unit", "folder")
+_NOT_OF_UNITS = {"record": None, "calibrate": True, "signals": None, "fault": []}  # with their defaults
+_Units = dict[str, list[Measurement]]
+
+
+def add_units(parser: argparse.ArgumentParser) -> None:
+    """--by and --unit"""
+    parser.add_argument(
+        "--by",
+        metavar="unit|COLUMN",
+        help="compare units with each other: a unit is a folder of recordings, or a number in a column of that name",
+    )
+    parser.add_argument(
+        "--unit",
+        action="append",
+        default=[],
+        metavar="NAME=GLOB",
+        help="the recordings of one unit, by their names or paths: left='*left*'; repeat for each unit",
+    )
+
+
+def is_asked(arguments: argparse.Namespace) -> bool:
+    """Whether units are to be compared."""
+    return bool(arguments.by or arguments.unit)
+
+
+def run(arguments: argparse.Namespace, actuator: Actuator) -> int:
+    """Reads, compares the units, writes and prints."""
+    from dataclasses import replace
+
+    from ema_model.units.compare import compare_units
+    from ema_model.units.summary import as_dict
+
+    for name, default in _NOT_OF_UNITS.items():
+        if getattr(arguments, name) != default:
+            option = {"calibrate": "--no-calibrate", "signals": "--signal"}.get(name, f"--{name}")
+            raise InputError(f"{option}: has no meaning where units are compared; leave it out")
+    actuator = replace(actuator, effects={**actuator.effects, **given.effects_of(arguments, actuator.axes)})
+    progress = output.Progress()
+    try:
+        fitted, held = read_units(arguments, actuator, progress)
+        result = compare_units(
+            fitted, actuator, holdout=held, free=arguments.free, seed=arguments.seed, on_progress=progress.show
+        )
+        if arguments.report:
+            progress.show("writing the report")
+            from emaviz.report import write_units_report  # plotly takes a second to import
+
+            write_units_report(result, arguments.report)
+    finally:
+        progress.done()
+    if arguments.save_actuator:
+        save_actuator(result.type_actuator, arguments.save_actuator)
+    output.write_json(arguments.json, as_dict(result), arguments.seed, output.configuration(arguments))
+    print(result)
+    return 0
+
+
+def read_units(arguments: argparse.Namespace, actuator: Actuator, progress: output.Progress) -> tuple[_Units, _Units]:
+    """The recordings to fit and those held out, by unit; InputError where it is not clear whose one is."""
+    named = {Path(file).resolve() for text in arguments.holdout if not is_pattern(text) for file in files_of(text)}
+    files = list(dict.fromkeys(file for text in arguments.files for file in files_of(text, in_folders=True)))
+    unseen = [text for text in arguments.holdout if not is_pattern(text)]
+    files += [file for text in unseen for file in files_of(text) if file not in files]
+    _check_same_actuator(files)
+    column = _column(arguments, files)
+    if column:
+        arguments = copy(arguments)
+        arguments.runs = column
+    fitted: _Units = {}
+    held: _Units = {}
+    for number, file in enumerate(files):
+        progress.show(f"reading {Path(file).name} ({number + 1} of {len(files)})")
+        for one in given.read_files([file], arguments, actuator, progress):
+            unit = f"{column} {one.name.rpartition(RUN)[2]}" if column else _unit_of(file, one.name, arguments.unit)
+            (held if Path(file).resolve() in named else fitted).setdefault(unit, []).append(one)
+    for text in arguments.unit:
+        if (name := _named(text)[0]) not in fitted and name not in held:
+            raise InputError(f"--unit {quoted(text)}: none of the recordings has such a name; check the pattern")
+    for rule in filter(is_pattern, arguments.holdout):
+        kept, taken = held_out([one for given in fitted.values() for one in given], rule)
+        held = {
+            unit: [*held.get(unit, []), *(one for one in given if any(one is other for other in taken))]
+            for unit, given in fitted.items()
+        }
+        fitted = {unit: [one for one in given if any(one is other for other in kept)] for unit, given in fitted.items()}
+    return fitted, held
+
+
+def _column(arguments: argparse.Namespace, files: list[str]) -> str:
+    """The column that tells the unit; "" where folders or patterns do."""
+    if arguments.by is None:
+        return ""
+    if arguments.unit and arguments.by not in _BY_FOLDER:
+        raise InputError("--by names a column, and --unit patterns: give one of them")
+    if arguments.unit:
+        return ""
+    hints = Hints(arguments.header_line, arguments.encoding)
+    columns = read_header(files[0], FILE_BYTES, hints)
+    if arguments.by in columns:
+        if arguments.runs:
+            raise InputError("--runs and --by COLUMN both cut the files into runs; give one of them")
+        return arguments.by
+    if arguments.by in _BY_FOLDER:
+        return ""
+    raise InputError(
+        f"--by {quoted(arguments.by)}: {quoted(Path(files[0]).name)} has no such column (it has {listed(columns)}); "
+        "--by unit takes folders as units"
+    )
+
+
+def _unit_of(file: str, name: str, units: list[str]) -> str:
+    if not units:
+        return Path(file).resolve().parent.name
+    found = [
+        unit
+        for unit, pattern in map(_named, units)
+        if any(fnmatchcase(text, pattern) for text in (name, Path(file).name, file))
+    ]
+    if len(set(found)) != 1:
+        of = "of no unit" if not found else f"of {' and of '.join(dict.fromkeys(found))}"
+        raise InputError(f"{quoted(Path(file).name)}: is {of}, by --unit; give patterns that name each recording once")
+    return found[0]
+
+
+def _named(text: str) -> tuple[str, str]:
+    name, separator, pattern = (part.strip() for part in text.partition("="))
+    if not separator or not name or not pattern:
+        raise InputError(f"--unit {quoted(text)}: write it as NAME=GLOB, for example left='*left*'")
+    return name, pattern
+
+
+def _check_same_actuator(files: list[str]) -> None:
+    """InputError for recordings whose side files name different actuators: units are of one type."""
+    known: dict[str, str] = {}
+    for file in files:
+        beside = find_side_file(file)
+        actuator = read_side_file(beside).actuator if beside else None
+        if actuator is not None:
+            known.setdefault(actuator, file)
+    if len(known) > 1:
+        (one, first), (other, second) = list(known.items())[:2]
+        raise InputError(
+            f"{quoted(Path(second).name)}: is of the actuator {quoted(other)}, and {quoted(Path(first).name)} of "
+            f"{quoted(one)}; units that are compared are of one type"
+        )

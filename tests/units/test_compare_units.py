@@ -1,0 +1,129 @@
+"""Units compared from recordings of the three-phase model: what was put in is found, by the unit and by its size."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ema_model.actuator import load_actuator, save_actuator
+from ema_model.estimation import calibrate
+from ema_model.fleets import draw, recorded
+from ema_model.units import fit as fitting
+from ema_model.units.block import unit_of, wider
+from ema_model.units.compare import compare_units
+from ema_model.units.fit import fit
+from ema_model.units.summary import as_dict
+from ema_model.units.words import sentences
+
+ACTUATOR = load_actuator()
+BACKLASH = "transmission.backlash_rad"
+RUNS = ("chirp", "step")
+SHARED = np.linspace(-0.5, 0.5, 11)
+
+
+def units_of(count: int, changes: dict[tuple[int, str], float], seed: int = 0):
+    """Recordings of a fleet whose truth is written here: (unit, parameter) → tolerances."""
+    fleet = draw(ACTUATOR, seed, units=max(count, 2), differing=0)
+    x = np.tile(SHARED, (max(count, 2), 1))
+    for (unit, path), change in changes.items():
+        x[unit, fleet.parameters.index(path)] += change
+    fleet = replace(fleet, x=x)
+    every = [recorded(fleet.unit(unit), seed, unit, (*RUNS, "unseen")) for unit in range(count)]
+    fitted = {fleet.names[i]: [one[run] for run in RUNS] for i, one in enumerate(every)}
+    return fitted, {fleet.names[i]: [one["unseen"]] for i, one in enumerate(every)}
+
+
+@pytest.fixture(scope="module")
+def differing():
+    """Three units, of which the second has 0.6 of a tolerance less play."""
+    fitted, held = units_of(3, {(1, BACKLASH): -0.6})
+    return compare_units(fitted, ACTUATOR, holdout={"unit_02": held["unit_02"]})
+
+
+def test_what_differs_is_found(differing):
+    (one,) = differing.differences
+    assert (one.unit, one.parameter, one.alike) == ("unit_02", BACKLASH, ())
+    true = -0.6 * ACTUATOR.tolerances[BACKLASH].sigma
+    wide = one.change90[1] - one.change90[0]
+    assert one.change90[0] - wide < true < one.change90[1] + wide and wide < abs(true)
+    assert one.share is not None and one.share < 0.0 and one.held_out is not None and one.held_out > 0.0
+    told = sentences(differing)
+    assert len(told) == 1 and told[0].startswith("unit_02 differs from the rest in transmission backlash (−")
+    assert told[0].endswith("nothing else")
+
+
+def test_the_transfer_matrix_shows_it(differing):
+    floors = differing.transfer.floors
+    assert floors.shape == (3, 3) and np.all(np.diag(floors) <= floors.min(axis=0) + 0.02)
+    assert differing.transfer.error.shape == (3, 3) and np.all(differing.transfer.floor > 0.0)
+
+
+def test_the_type_is_an_actuator_file(differing, tmp_path):
+    save_actuator(differing.type_actuator, tmp_path / "type.toml")
+    again = load_actuator(tmp_path / "type.toml")
+    assert again.value(BACKLASH) == pytest.approx(differing.of_type[BACKLASH].mean)
+    assert again.tolerances[BACKLASH].sigma < 0.5 * ACTUATOR.tolerances[BACKLASH].sigma
+    nothing = [path for path, one in differing.of_type.items() if not one.told]
+    assert all(again.tolerances[path].sigma == ACTUATOR.tolerances[path].sigma for path in nothing)
+
+
+def test_json_has_the_same(differing):
+    told = as_dict(differing)
+    assert told["differences"][0]["unit"] == "unit_02" and told["differences"][0]["same_as"] == []
+    assert [one["name"] for one in told["units"]] == ["unit_01", "unit_02", "unit_03"]
+    assert len(told["transfer"]["floors"]) == 3 and BACKLASH in told["type"]
+
+
+def test_equal_units_are_equal_and_a_missing_recording_is_named():
+    fitted, _ = units_of(3, {}, seed=2)
+    fitted["unit_03"] = fitted["unit_03"][:1]  # the chirp: no step, which tells the resistance
+    found = compare_units(fitted, ACTUATOR)
+    assert not found.differences and not found.scattering
+    assert sentences(found) == ["the 3 units do not differ in anything that their recordings tell"]
+    needed = {(one.unit, one.parameter): one.recording for one in found.needs}
+    assert needed["unit_03", "motor.resistance_Ohm"] == "step"
+    assert re.search("unit_03 tells nothing of motor .*resistance: a recording like step would", str(found))
+
+
+def test_two_units_with_one_recording_each_say_what_cannot_be_known():
+    fitted, _ = units_of(2, {(1, BACKLASH): 1.2}, seed=3)
+    found = compare_units({name: given[:1] for name, given in fitted.items()}, ACTUATOR)
+    assert any("one recording" in line for line in found.warnings)
+    assert "unit_01 and unit_02 differ in transmission backlash" in sentences(found)[0]
+
+
+def test_a_unit_alone_is_calibrated_as_it_would_be_without_others():
+    fitted, _ = units_of(1, {})
+    unit = unit_of("one", fitted["unit_01"], ACTUATOR)
+    alone = calibrate(unit.model, unit.floors, free=unit.parameters)
+    found = fit(unit)
+    assert found.calibration.x == pytest.approx(alone.x)
+    assert found.x == pytest.approx(2.0 * alone.x[: len(unit.parameters)])
+    path = unit.parameters[0]
+    assert alone.parameters[path].initial == wider(ACTUATOR).value(path) == ACTUATOR.value(path)
+
+
+def test_the_work_grows_with_the_units_and_no_faster(monkeypatch):
+    """Linearisations are what costs: as many for each of six units as for each of three, and a fit each."""
+    counted = {}
+    real_fit, real_line = fitting.fit, fitting.linearised
+    for count in (3, 6):
+        calls = {"fit": 0, "linearised": 0}
+
+        def fitted_(*given, calls=calls):
+            calls["fit"] += 1
+            return real_fit(*given)
+
+        def line(unit, x, seed, rounds, *rest, calls=calls):
+            calls["linearised"] += 1
+            return real_line(unit, x, seed, 1, *rest)
+
+        monkeypatch.setattr("ema_model.units.compare.fit", fitted_)
+        monkeypatch.setattr(fitting, "linearised", line)
+        recordings, _ = units_of(count, {}, seed=5)
+        compare_units({name: given[:1] for name, given in recordings.items()}, ACTUATOR)
+        counted[count] = calls
+    assert counted[6] == {key: 2 * value for key, value in counted[3].items()}

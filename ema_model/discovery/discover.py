@@ -11,12 +11,13 @@ from dataclasses import dataclass, replace
 
 from ema_model.actuator import Actuator, load_actuator
 from ema_model.comparison.explain import Explanation
+from ema_model.discovery.begin import begun
 from ema_model.discovery.claim import claimed
 from ema_model.discovery.contradiction import contradictions
 from ema_model.discovery.criteria import FAR, HALF
 from ema_model.discovery.dropped import drop_doubtful, drop_idle
 from ema_model.discovery.next_experiment import next_experiment
-from ema_model.discovery.path import Story, begun, refreshed, with_drops
+from ema_model.discovery.path import Story, refreshed, with_drops
 from ema_model.discovery.refit import Trial, pays
 from ema_model.discovery.remaining import at_floor
 from ema_model.discovery.repeated import repeated

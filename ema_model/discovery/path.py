@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.actuator.unread import idle
-from ema_model.comparison.compare import weights_of
 from ema_model.comparison.explain import Explanation
 from ema_model.discovery.controller_seen import ControllerSeen
 from ema_model.discovery.evidence import predicted_evidence
@@ -25,7 +24,6 @@ from ema_model.discovery.model_fit import (
     Fit,
     fit,
     floor_ratio,
-    gather,
     holdout_fit,
     ratio_by_recording,
     rms_by_signal,
@@ -33,20 +31,14 @@ from ema_model.discovery.model_fit import (
 )
 from ema_model.discovery.refit import Trial, promising, tried
 from ema_model.discovery.remaining import Left, at_floor, left_by
-from ema_model.discovery.repeatability import by_inverse_dynamics, is_lost, with_divergence
 from ema_model.discovery.result import Added, Candidate, Change, Contradiction, Rung, StoodIn
 from ema_model.discovery.score import scored, signatures
-from ema_model.discovery.sentences import NOT_REPEATABLE
 from ema_model.discovery.transmission_seen import TransmissionSeen
 from ema_model.discovery.uncertainty import settled
 from ema_model.discovery.unknown import curve_for
 from ema_model.effects import CATALOGUE, catalogue_name, find
 from ema_model.estimation import Calibration
-from ema_model.models.stretches import fit_stretches
-from ema_model.recordings import Measurement
-from ema_model.recordings.prepared import prepared
-from ema_model.recordings.read import check_same_actuator
-from ema_model.simulation.one_stack import compile_behind, compile_library
+from ema_model.simulation.one_stack import compile_behind
 
 Progress = Callable[[str], None]
 Array = NDArray[np.float64]
@@ -54,6 +46,7 @@ Array = NDArray[np.float64]
 _SAME_CHI2 = 25.0  # between two effects, below which they cannot be told apart
 _SAME_DIRECTION = 1.0 - 0.98**2  # sin² between their signatures, likewise
 _MOVED = 1.5  # σ that a parameter comes back by, when it had been standing in for an effect
+_MOST_PITCHES = 8  # along a linear motor, each of which is simulated
 _NOT_LOOKED_FOR = ("pendulum_load",)  # whoever has an arm on the shaft knows of it
 
 
@@ -116,6 +109,8 @@ class Story:
         looked_for = [name for name in CATALOGUE if name not in _NOT_LOOKED_FOR and _may_act(name, actuator)]
         wanted = [name for name in names or looked_for if name not in known and name not in _NOT_LOOKED_FOR]
         orders = (left or self.left()).orders
+        if actuator.axes.motor == "linear":
+            orders = orders[:_MOST_PITCHES]  # the rest are there to tell what noise is
         self._prints = fingerprints(self.data, self.current, wanted, orders)
         return scored(self.current, self._prints)
 
@@ -254,60 +249,6 @@ def _may_act(name: str, actuator: Actuator) -> bool:
     kinds = actuator.controller.kind, actuator.inverter.kind
     places = {function.__name__ for function in effect.places}
     return effect.family != "drive" or not idle(places, bool(effect.states), *kinds)
-
-
-def begun(
-    measurements: Sequence[Measurement],
-    actuator: Actuator,
-    holdout: Sequence[Measurement] = (),
-    signals: Sequence[str] | None = None,
-    tell: Progress = lambda text: None,
-) -> Story:
-    """The calibrated model, before any effect.
-
-    A loop that is not repeatable is taken by inverse dynamics, where the recordings allow it.
-    Raises InputError for recordings that cannot be compared.
-    """
-    check_same_actuator([*measurements, *holdout])
-    compile_library(actuator)
-    story = calibrated_story(measurements, actuator, holdout, signals, tell)
-    inverse = None if story.repeatable else by_inverse_dynamics(story.data, actuator)
-    if inverse is None:
-        return story
-    story = calibrated_story(measurements, inverse, holdout, signals, tell)
-    story.warnings.append(NOT_REPEATABLE)
-    return story
-
-
-def calibrated_story(
-    measurements: Sequence[Measurement],
-    actuator: Actuator,
-    holdout: Sequence[Measurement],
-    signals: Sequence[str] | None,
-    tell: Progress,
-    guarded: bool = False,
-) -> Story:
-    """guarded: as of `InverseDynamics`."""
-    tell("measuring the model's floor")
-    data, held = (_data(recordings, actuator, signals, guarded) for recordings in (measurements, holdout))
-    assert data is not None
-    tell("calibrating")
-    base = fit(data, actuator, tell=tell)
-    # How the two models differ depends on their parameters: on where the motor comes to stand above all.
-    bare, (data, lost) = data, with_divergence(data.beside(base), base)
-    held = None if held is None else held.beside(base)
-    if not data.weighs_as(bare):
-        base = fit(data, actuator, base.starts, tell)
-    return Story(data, held, [Step(base, rung_of(Change(), base, data, held), ())], not is_lost(lost))
-
-
-def _data(
-    recordings: Sequence[Measurement], actuator: Actuator, signals: Sequence[str] | None, guarded: bool
-) -> Data | None:
-    if not recordings:
-        return None
-    inside = [prepared(recording, actuator) for recording in recordings]
-    return gather(inside, actuator, weights_of(signals, actuator), fit_stretches(inside, actuator), guarded)
 
 
 def rung_of(change: Change, found: Fit, data: Data, held: Data | None) -> Rung:

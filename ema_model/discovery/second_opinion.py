@@ -12,9 +12,10 @@ from dataclasses import dataclass, replace
 from ema_model.actuator import Actuator, Tolerance
 from ema_model.actuator.unread import INVERSE_PLACES, unread
 from ema_model.comparison.criteria import BAND
+from ema_model.discovery.begin import calibrated_story
 from ema_model.discovery.controller_seen import ControllerSeen, controller_seen
 from ema_model.discovery.criteria import APART, GONE, HEARD, LOOP_TOLD, MUCH_BETTER
-from ema_model.discovery.path import Story, calibrated_story
+from ema_model.discovery.path import Story
 from ema_model.discovery.refit import pays
 from ema_model.discovery.remaining import at_floor
 from ema_model.discovery.repeatability import by_inverse_dynamics

@@ -9,10 +9,10 @@ from support.representative import first_of
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
 from ema_model.discovery import discover
+from ema_model.discovery.begin import begun
 from ema_model.discovery.discover import result_of
 from ema_model.discovery.faults import fault_for
 from ema_model.discovery.model_fit import holdout_error
-from ema_model.discovery.path import begun
 from ema_model.discovery.result import Change
 from ema_model.discovery.summary import as_dict
 from ema_model.faults import vector

@@ -10,11 +10,12 @@ import pytest
 from support.hidden_effects import ACTUATOR, recorded
 
 from ema_model.discovery import as_dict, discover
+from ema_model.discovery.begin import begun, calibrated_story
 from ema_model.discovery.contradiction import contradictions
 from ema_model.discovery.controller_seen import controller_seen
-from ema_model.discovery.path import begun, calibrated_story
 from ema_model.discovery.second_opinion import delayed, second_opinion
-from ema_model.models.inverse_dynamics import InverseDynamics, _moving
+from ema_model.models.inverse_dynamics import InverseDynamics
+from ema_model.models.measured_motion import _moving
 
 GAIN = "controller.speed_gain_Nms_rad"
 MOTION = ("multisine", {"amplitude_rad": 0.012, "frequencies_Hz": (2, 5, 9)}, 1.2)

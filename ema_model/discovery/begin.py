@@ -1,0 +1,74 @@
+"""The first model of a discovery: calibrated to the recordings, before any effect."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from ema_model.actuator import Actuator
+from ema_model.comparison.compare import weights_of
+from ema_model.discovery.model_fit import Data, fit, gather
+from ema_model.discovery.path import Step, Story, rung_of
+from ema_model.discovery.repeatability import by_inverse_dynamics, is_lost, with_divergence
+from ema_model.discovery.result import Change
+from ema_model.discovery.sentences import NOT_REPEATABLE
+from ema_model.models.stretches import fit_stretches
+from ema_model.recordings import Measurement
+from ema_model.recordings.prepared import prepared
+from ema_model.recordings.read import check_same_actuator
+from ema_model.simulation.one_stack import compile_library
+
+Progress = Callable[[str], None]
+
+
+def begun(
+    measurements: Sequence[Measurement],
+    actuator: Actuator,
+    holdout: Sequence[Measurement] = (),
+    signals: Sequence[str] | None = None,
+    tell: Progress = lambda text: None,
+) -> Story:
+    """The calibrated model, before any effect.
+
+    A loop that is not repeatable is taken by inverse dynamics, where the recordings allow it.
+    Raises InputError for recordings that cannot be compared.
+    """
+    check_same_actuator([*measurements, *holdout])
+    compile_library(actuator)
+    story = calibrated_story(measurements, actuator, holdout, signals, tell)
+    inverse = None if story.repeatable else by_inverse_dynamics(story.data, actuator)
+    if inverse is None:
+        return story
+    story = calibrated_story(measurements, inverse, holdout, signals, tell)
+    story.warnings.append(NOT_REPEATABLE)
+    return story
+
+
+def calibrated_story(
+    measurements: Sequence[Measurement],
+    actuator: Actuator,
+    holdout: Sequence[Measurement],
+    signals: Sequence[str] | None,
+    tell: Progress,
+    guarded: bool = False,
+) -> Story:
+    """guarded: as of `InverseDynamics`."""
+    tell("measuring the model's floor")
+    data, held = (_data(recordings, actuator, signals, guarded) for recordings in (measurements, holdout))
+    assert data is not None
+    tell("calibrating")
+    base = fit(data, actuator, tell=tell)
+    # How the two models differ depends on their parameters: on where the motor comes to stand above all.
+    bare, (data, lost) = data, with_divergence(data.beside(base), base)
+    held = None if held is None else held.beside(base)
+    if not data.weighs_as(bare):
+        base = fit(data, actuator, base.starts, tell)
+    return Story(data, held, [Step(base, rung_of(Change(), base, data, held), ())], not is_lost(lost))
+
+
+def _data(
+    recordings: Sequence[Measurement], actuator: Actuator, signals: Sequence[str] | None, guarded: bool
+) -> Data | None:
+    if not recordings:
+        return None
+    inside = [prepared(recording, actuator) for recording in recordings]
+    return gather(inside, actuator, weights_of(signals, actuator), fit_stretches(inside, actuator), guarded)

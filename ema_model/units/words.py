@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ema_model.actuator.naming import on_axes
-from ema_model.quantities.numbers import number, with_uncertainty
+from ema_model.quantities.numbers import Quantity, number, with_uncertainty
 from ema_model.quantities.shown import of_signal
 from ema_model.quantities.titles import in_sentence
 from ema_model.text import Document, Lines, Note, Table
@@ -26,6 +26,8 @@ def sentences(result: UnitsCompared) -> list[str]:
         told.append(f"all units scatter in {_title(result, path)} (1 σ: {_amount(one.scatter, one.mean, one.unit)})")
     if not told:
         return [f"the {len(result.units)} units do not differ in anything that their recordings tell"]
+    if result.is_missed:  # how sure that is, nobody knows who does not have the physics
+        return [*told, "the models miss something, which may stand behind what seems to differ"]
     return [*told[:-1], f"{told[-1]}, nothing else"]
 
 
@@ -70,7 +72,12 @@ def _differ(result: UnitsCompared, group: Sequence[Difference]) -> str:
     if len(first.together) > 1:
         names += ", which are only known together"
     of_type = result.of_type[first.parameter]
-    amount = _signed(change, known, None if first.share is None else first.change / first.share, of_type.unit)
+    amount = _signed(
+        change,
+        0.0 if result.is_missed else known,
+        None if first.share is None else first.change / first.share,
+        of_type.unit,
+    )
     if len(result.units) == 2:
         verb = "seem to differ" if result.is_missed else "differ"
         return f"{' and '.join(result.units)} {verb} in {names} ({first.unit} has {amount})"
@@ -151,14 +158,19 @@ def _title(result: UnitsCompared, path: str) -> str:
 
 
 def _signed(change: float, half: float, shared: float | None, unit: str) -> str:
-    """'+38 ± 6 %', or in the parameter's unit where there is nothing to count it by."""
+    """'+38 ± 6 %', or in the parameter's unit where there is nothing to count it by; half 0: nobody knows how sure."""
     if shared:
-        return f"{100.0 * change / abs(shared):+.3g} ± {100.0 * half / abs(shared):.2g} %".replace("-", "−")
-    return ("+" if change > 0.0 else "") + with_uncertainty(change, half, unit)
+        sure = f" ± {100.0 * half / abs(shared):.2g}" if half else ""
+        return f"{100.0 * change / abs(shared):+.3g}{sure} %".replace("-", "−")
+    return ("+" if change > 0.0 else "") + (with_uncertainty(change, half, unit) if half else _plain(change, unit))
 
 
 def _amount(size: float, mean: float, unit: str) -> str:
-    return f"{100.0 * size / abs(mean):.2g} %" if mean else with_uncertainty(size, 0.0, unit).partition(" ±")[0]
+    return f"{100.0 * size / abs(mean):.2g} %" if mean else _plain(size, unit)
+
+
+def _plain(value: float, unit: str) -> str:
+    return Quantity("", unit).scaled(value).text(value)
 
 
 def _plus(value: float) -> str:

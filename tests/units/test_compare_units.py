@@ -43,6 +43,13 @@ def differing():
     return compare_units(fitted, ACTUATOR, holdout={"unit_02": held["unit_02"]})
 
 
+def test_what_models_do_not_explain_has_no_interval(differing):
+    """How sure a difference is, nobody knows who does not have the physics."""
+    missed = sentences(replace(differing, errors=np.full(3, 50.0)))
+    assert "±" in sentences(differing)[0] and "nothing else" in sentences(differing)[0]
+    assert "seems to differ" in missed[0] and "±" not in missed[0] and "may stand behind" in missed[-1]
+
+
 def test_what_differs_is_found(differing):
     (one,) = differing.differences
     assert (one.unit, one.parameter, one.alike) == ("unit_02", BACKLASH, ())

@@ -8,7 +8,7 @@ from ema_model.recordings.columns.guess import guess_mapping
 from ema_model.recordings.columns.mapping import ColumnMapping, MappedColumn, apply_mapping, parse_mapping
 from ema_model.recordings.columns.reading import Reading
 from ema_model.recordings.equivalent_current import can_have_current, with_equivalent_current
-from ema_model.recordings.file import hints_of, read_columns, read_head
+from ema_model.recordings.file import hints_of, read_columns, read_head, read_header
 from ema_model.recordings.measurement import Measurement
 from ema_model.recordings.prepared import prepared
 from ema_model.recordings.read import read
@@ -36,6 +36,7 @@ __all__ = [
     "read",
     "read_columns",
     "read_head",
+    "read_header",
     "read_side_file",
     "side_path",
     "with_equivalent_current",

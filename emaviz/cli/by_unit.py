@@ -11,8 +11,7 @@ from ema_model.actuator import Actuator, save_actuator
 from ema_model.errors import InputError, quoted
 from ema_model.files.limits import FILE_BYTES
 from ema_model.files.refusal import listed
-from ema_model.recordings import Measurement, find_side_file, read_side_file
-from ema_model.recordings.file import read_header
+from ema_model.recordings import Measurement, find_side_file, read_header, read_side_file
 from ema_model.recordings.formats.text_layout import Hints
 from ema_model.recordings.recording_set import RUN, files_of, held_out, is_pattern
 from emaviz.cli import given, output

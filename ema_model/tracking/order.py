@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from itertools import pairwise
 from pathlib import Path
 
@@ -24,7 +24,12 @@ def flights_in(folder: Path) -> list[Path]:
         if recordings_in(inner):
             told = f"{quoted(folder)}: there are recordings beside it in its folder {quoted(inner.name)}"
             raise InputError(f"{told}; a folder holds the flights of one unit, so move them or name the files")
-    return sorted(found, key=_when)
+    return in_order(found)
+
+
+def in_order(paths: Iterable[Path]) -> list[Path]:
+    """Flights in order of time; InputError for a name that tells none."""
+    return sorted(paths, key=_when)
 
 
 def check_order(paths: Sequence[Path]) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -82,3 +83,39 @@ def test_mixed_actuators_and_units_are_refused(folder, capsys):
 def test_an_empty_folder(tmp_path, capsys):
     assert main(["track", str(tmp_path)]) == 2
     assert "holds no recording" in capsys.readouterr().err
+
+
+def test_flights_that_arrive_are_taken_up(folder, tmp_path, monkeypatch, capsys):
+    """Once they are whole; a name that tells no time is told once, and the rest goes on."""
+    told = tmp_path / "track.json"
+    flights = drawn(worn_life("linear", 1))
+    monkeypatch.setattr(
+        "emaviz.cli.verbs.track.identify_all",
+        lambda paths, *_: (replace(flights[int(path.stem[7:])], name=path.stem) for path in paths),
+    )
+    seen = []
+
+    def arrives() -> None:
+        shutil.copy(folder / "flight_1.csv", folder / "flight_10.csv")
+        shutil.copy(folder / "flight_1.csv", folder / "nameless.csv")
+
+    def grows() -> None:
+        (folder / "flight_10.csv").write_text((folder / "flight_10.csv").read_text() + "\n")
+
+    def ends() -> None:
+        raise KeyboardInterrupt
+
+    def look() -> None:
+        seen.append(len(json.loads(told.read_text())["flights"]) if told.exists() else 0)
+
+    actions = iter([look, look, arrives, grows, look, look, ends])
+    monkeypatch.setattr("emaviz.cli.verbs.track.time.sleep", lambda seconds: next(actions)())
+    assert main(["track", str(folder), "--watch", "--json", str(told)]) == 0
+    assert seen == [0, 9, 9, 10], "it is taken once it has stopped growing"
+    err = capsys.readouterr().err
+    assert err.count("nameless.csv") == 1 and "left out" in err and "Ctrl-C" in err
+
+
+def test_only_a_folder_can_be_watched(folder, capsys):
+    assert main(["track", str(folder / "flight_1.csv"), "--watch"]) == 2
+    assert "name one folder" in (told := capsys.readouterr().err) and told.count("\n") == 1

@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 import argparse
+import sys
+import time
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from ema_model.actuator import Actuator
 from ema_model.errors import InputError, quoted
+from ema_model.recordings.recording_set import recordings_in
 from ema_model.tracking.criteria import LEAST_FLIGHTS
+from ema_model.tracking.flight import Flight
 from ema_model.tracking.identify import identify_all
-from ema_model.tracking.order import check_order, flights_in
+from ema_model.tracking.order import check_order, flights_in, in_order
 from ema_model.tracking.summary import as_dict
 from ema_model.tracking.track import check_thresholds, track
 from emaviz.cli import files, given, options, output
+from emaviz.cli.watching import LOOK_S, Watched
 
 HELP = "follow k over the flights of one unit: what drifts, and what life remains"
 PLACE = 6
@@ -34,6 +41,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="k2=0.6",
         help="the value of a k at which the life ends; repeat for more",
     )
+    parser.add_argument(
+        "--watch", action="store_true", help="go on, and take up each flight that arrives in the folder; Ctrl-C ends it"
+    )
     options.add_actuator(parser)
     options.add_mapping(parser)
     options.add_record(parser, "k over the flights")
@@ -44,35 +54,84 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Identifies each flight, follows k, writes and prints."""
+    """Identifies each flight, follows k, writes and prints; again for each that arrives, if it shall watch."""
     thresholds = _thresholds(arguments.threshold)
-    paths = _paths(arguments.files)
     actuator = given.actuator_of(arguments)
     progress = output.Progress()
     try:
-        flights = list(
-            identify_all(
-                paths,
-                lambda path: given.read_one(str(path), arguments, actuator, progress),
-                actuator,
-                arguments.seed,
-                lambda number, name: progress.show(f"flight {number + 1} of {len(paths)}: {name}"),
-            )
-        )
-        result = track(flights, thresholds, arguments.seed)
-        if arguments.record:
-            from emaviz.recording.tracking import write_tracking  # rerun takes a second to import
-
-            write_tracking(result, arguments.record, output.configuration(arguments))
-        if arguments.report:
-            from emaviz.report import write_tracking_report  # plotly takes a second to import
-
-            write_tracking_report(result, actuator.name, arguments.report)
+        if arguments.watch:
+            _watch(arguments, actuator, thresholds, progress)
+        else:
+            paths = _paths(arguments.files)
+            _tell(_identified(paths, arguments, actuator, progress), arguments, actuator, thresholds, progress)
     finally:
         progress.done()
-    output.write_json(arguments.json, as_dict(result), arguments.seed, output.configuration(arguments))
-    print(result)
     return 0
+
+
+def _identified(
+    paths: Sequence[Path], arguments: argparse.Namespace, actuator: Actuator, progress: output.Progress
+) -> list[Flight]:
+    return list(
+        identify_all(
+            paths,
+            lambda path: given.read_one(str(path), arguments, actuator, progress),
+            actuator,
+            arguments.seed,
+            lambda number, name: progress.show(f"flight {number + 1} of {len(paths)}: {name}"),
+        )
+    )
+
+
+def _tell(
+    flights: Sequence[Flight],
+    arguments: argparse.Namespace,
+    actuator: Actuator,
+    thresholds: Mapping[str, float],
+    progress: output.Progress,
+) -> None:
+    result = track(flights, thresholds, arguments.seed)
+    if arguments.record:
+        from emaviz.recording.tracking import write_tracking  # rerun takes a second to import
+
+        write_tracking(result, arguments.record, output.configuration(arguments))
+    if arguments.report:
+        from emaviz.report import write_tracking_report  # plotly takes a second to import
+
+        write_tracking_report(result, actuator.name, arguments.report)
+    progress.done()
+    output.write_json(arguments.json, as_dict(result), arguments.seed, output.configuration(arguments))
+    print(result, flush=True)
+
+
+def _watch(
+    arguments: argparse.Namespace, actuator: Actuator, thresholds: Mapping[str, float], progress: output.Progress
+) -> None:
+    """Until it is interrupted; a file that cannot be used is told once and left out, and may be replaced."""
+    folder = Path(arguments.files[0])
+    if len(arguments.files) > 1 or not folder.is_dir():
+        raise InputError(f"--watch: {quoted(arguments.files[0])}: name one folder, in which flights arrive")
+    watched, flights, refused = Watched(), dict[Path, Flight](), dict[Path, int]()
+    print(f"watching {folder}; Ctrl-C ends it", file=sys.stderr)
+    try:
+        while True:
+            whole = watched.whole(recordings_in(folder))
+            new = [path for path in whole if path not in flights and refused.get(path) != path.stat().st_mtime_ns]
+            for path in new:
+                try:
+                    check_order(in_order([*flights, path]))
+                    flights |= zip([path], _identified([path], arguments, actuator, progress))
+                except InputError as error:
+                    refused[path] = path.stat().st_mtime_ns
+                    progress.done()
+                    print(f"{error}; left out", file=sys.stderr)
+            if len(flights) < LEAST_FLIGHTS:
+                progress.show(f"{len(flights)} of the {LEAST_FLIGHTS} flights that a trend needs")
+            elif any(path in flights for path in new):
+                _tell([flights[path] for path in in_order(flights)], arguments, actuator, thresholds, progress)
+            time.sleep(LOOK_S)
+    except KeyboardInterrupt:  # how a watch ends
+        return
 
 
 def _thresholds(texts: list[str]) -> dict[str, float]:

@@ -240,7 +240,7 @@ def result_of(
         warnings=[
             *story.warnings,
             *mismatch(story.controller_seen, calibration.actuator.axes),
-            *(story.transmission_seen.sentences(calibration.actuator) if story.transmission_seen else ()),
+            *([story.transmission_seen.sentence(calibration.actuator)] if story.transmission_seen else ()),
             *(one.sentence for one in story.disagreements),
             *held_back(story.current.held, calibration.actuator.axes),
             *masked(story.added, calibration.actuator.axes),

@@ -45,7 +45,7 @@ class TransmissionSeen:
     period: float | None = None  # at the motor, rad or m, where it repeats with the position
     amplitude: float | None = None
 
-    def sentences(self, actuator: Actuator) -> list[str]:
+    def sentence(self, actuator: Actuator) -> str:
         """What is seen, in the axes' units."""
         axes = actuator.axes
         user, motor = of_signal("user_position_rad", axes), of_signal("motor_position_rad", axes)
@@ -54,11 +54,11 @@ class TransmissionSeen:
             f"{number(self.error / self.noise, 2)} times the noise of the two; the current tells nothing of it."
         )
         if self.period is None or self.amplitude is None:
-            return [said, *filter(None, [_CAUSES.get(self.cause)])]
+            return f"{said} {_CAUSES.get(self.cause, '')}".rstrip()
         period = motor.scaled(self.period).text(self.period)
         amplitude = user.scaled(self.amplitude).text(self.amplitude)
         repeats = f"It repeats every {period} of the motor with an amplitude of {amplitude}, as an error of a "
-        return [said, f"{repeats}{'screw' if axes.user == 'linear' else 'gear'} or of an encoder does."]
+        return f"{said} {repeats}{'screw' if axes.user == 'linear' else 'gear'} or of an encoder does."
 
 
 def transmission_seen(measurements: Sequence[Measurement], actuator: Actuator) -> TransmissionSeen | None:

@@ -56,6 +56,8 @@ def _answer(found: Discovery) -> str:
         return "No physics is missing, but not all parameters are within their tolerance."
     if found.verdict == "partly_explained":
         return f"Found in part: {_named(found) or 'a curve'}{f', and {faulty}' if faulty else ''}; {remains(found)}."
+    if found.verdict == "unknown_effect" and found.at_floor and found.transmission_seen is not None:
+        return "Motion and current are explained; the user's position beyond the motor's is not."
     if found.verdict == "unknown_effect" and found.curve is None:
         return f"Something is missing that none of the known effects explains: {remains(found)}."
     text = VERDICTS.get(found.verdict, found.verdict.replace("_", " "))

@@ -12,6 +12,7 @@ from support.hidden_effects import ACTUATOR, recorded
 
 from ema_model.discovery.transmission_seen import transmission_seen
 from ema_model.discovery.verdict import verdict_of
+from ema_model.discovery.words import headline
 
 MOTION = ("multisine", {"amplitude_rad": 0.012, "frequencies_Hz": (2, 5, 9)}, 0.6)
 NOISE = 2e-6  # rad of the user, rms
@@ -47,7 +48,7 @@ def test_an_error_that_repeats_is_told_with_its_period_and_amplitude(healthy):
     seen = transmission_seen([one.with_signals(user_position_rad=one["user_position_rad"] + error)], ACTUATOR)
     assert seen is not None and seen.cause == "position" and seen.error > 5.0 * seen.noise
     assert seen.period == pytest.approx(2.0 * np.pi / 3.0) and seen.amplitude == pytest.approx(4e-5, rel=0.1)
-    assert "repeats every 2.09 rad of the motor" in " ".join(seen.sentences(ACTUATOR))
+    assert "repeats every 2.09 rad of the motor" in seen.sentence(ACTUATOR)
 
 
 def test_a_shaft_that_gives_goes_with_the_acceleration(healthy):
@@ -56,7 +57,7 @@ def test_a_shaft_that_gives_goes_with_the_acceleration(healthy):
     smooth = np.convolve(acceleration, np.hanning(401) / np.hanning(401).sum(), mode="same")
     twisted = one["user_position_rad"] - 8e-5 * smooth / np.std(smooth)
     seen = transmission_seen([one.with_signals(user_position_rad=twisted)], ACTUATOR)
-    assert seen is not None and seen.cause == "acceleration" and "twist" in " ".join(seen.sentences(ACTUATOR))
+    assert seen is not None and seen.cause == "acceleration" and "twist" in seen.sentence(ACTUATOR)
 
 
 def test_it_needs_both_positions(healthy):
@@ -78,3 +79,11 @@ def test_nothing_is_adequate_beside_it(monkeypatch):
     assert verdict_of(story, [], None) == "adequate" and verdict_of(story, [named], None) == "effects_found"
     story.transmission_seen = object()
     assert verdict_of(story, [], None) == "unknown_effect" and verdict_of(story, [named], None) == "partly_explained"
+
+
+def test_the_headline_says_what_is_explained_and_what_is_not():
+    found: Any = SimpleNamespace(
+        verdict="unknown_effect", at_floor=True, transmission_seen=object(), controller_seen=None
+    )
+    found.faults, found.parameters_outside_tolerance, found.effects, found.unknown = {}, [], [], None
+    assert headline(found) == "Motion and current are explained; the user's position beyond the motor's is not."

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from ema_model.discovery.criteria import ALIKE, FAR, LARGEST_GROUP, SECOND, TIE
+from ema_model.discovery.criteria import ALIKE, FAR, HALF, LARGEST_GROUP, SECOND, TIE
 from ema_model.discovery.evidence import evidence
 from ema_model.discovery.harmonics import Further, further_orders
+from ema_model.discovery.model_fit import holdout_error
 from ema_model.discovery.objections import against, ratio
 from ema_model.discovery.path import Story
 from ema_model.discovery.refit import Trial
@@ -40,7 +41,7 @@ def claimed(story: Story, accepted: Sequence[Trial], tell: Progress) -> Claim | 
         elif further is not None and not further.stands_out:
             reason = f"its order {best.candidate.settings['order']:g} tells no more than its neighbours"
         # Without a controller there is no twin, whose floor would tell a faint further order from what is left.
-        alone_first = story.data.guarded and ratio(story.data, best.fit) <= FAR
+        alone_first = story.data.guarded and not (more is not None and _halves(story, best, more))
         for whole in () if reason else (best, more) if alone_first else (more, best):
             if whole is None:
                 continue
@@ -70,6 +71,14 @@ def _chosen(story: Story, accepted: Sequence[Trial]) -> tuple[Trial, list[Trial]
     ]
     best = next((trial for trial in tied if not find(trial.candidate.name).duplicates), tied[0])
     return best, [trial for trial in tied if trial is not best]
+
+
+def _halves(story: Story, best: Trial, more: Trial) -> bool:
+    """Whether further orders take half of what one alone leaves far above the floor, also where nothing was fitted."""
+    alone = ratio(story.data, best.fit)
+    if story.held is None or alone <= FAR or ratio(story.data, more.fit) > HALF * alone:
+        return False
+    return holdout_error(story.held, more.fit) < HALF * holdout_error(story.held, best.fit)
 
 
 def _of_other_parts(best: Trial, others: Sequence[Trial]) -> list[Trial]:

@@ -29,16 +29,19 @@ def of_cogging(monkeypatch):
     monkeypatch.setattr(claim, "further_orders", lambda *args: Further(True, together))
     asked: list[int] = []
 
-    def ask(guarded: bool, outdone: int, left: float = 1.0):
+    def ask(guarded: bool, outdone: int, left: float = 1.0, then: float = 1.0, unseen: float | None = None):
+        """left, then: the error of one order and of three, in floors; unseen: that of three in what was held out."""
         asked.clear()
-        monkeypatch.setattr(claim, "ratio", lambda data, fit: left)
+        held = None if unseen is None else object()
+        monkeypatch.setattr(claim, "holdout_error", lambda held, fit: left if fit is alone.fit else unseen)
+        monkeypatch.setattr(claim, "ratio", lambda data, fit: left if fit is alone.fit else then)
 
         def spoken(data, before, after, keys, settled):
             asked.append(1 if after is alone.fit else 3)
             return OUTDONE if asked[-1] <= outdone else ""
 
         monkeypatch.setattr(claim, "against", spoken)
-        story = SimpleNamespace(data=SimpleNamespace(guarded=guarded), held=None, current=None, refused={})
+        story = SimpleNamespace(data=SimpleNamespace(guarded=guarded), held=held, current=None, refused={})
         return claim.claimed(story, [alone], lambda text: None), story.refused, list(asked)
 
     return ask, alone, together
@@ -48,7 +51,10 @@ def test_in_inverse_dynamics_further_orders_count_where_one_alone_is_outdone(of_
     ask, alone, together = of_cogging
     assert ask(guarded=True, outdone=1) == ((alone, [], together), {}, [1, 3])
     assert ask(guarded=True, outdone=0) == ((alone, [], None), {}, [1]), "one order that is enough needs no more"
-    assert ask(guarded=True, outdone=0, left=20.0) == ((alone, [], together), {}, [3]), "here it is not enough"
+    far = {"guarded": True, "outdone": 0, "left": 20.0}
+    assert ask(**far, then=3.0, unseen=4.0) == ((alone, [], together), {}, [3]), "here one is not enough"
+    for then, unseen in ((3.0, None), (3.0, 15.0), (15.0, 4.0)):
+        assert ask(**far, then=then, unseen=unseen) == ((alone, [], None), {}, [1]), "what was not fitted must agree"
 
 
 def test_in_a_closed_loop_all_orders_are_judged_before_one(of_cogging):

@@ -155,4 +155,4 @@ def busy(pid):
     """Whether a worker has begun to compute: it has taken more processor time than its imports do."""
     import psutil
 
-    return any(psutil.Process(one).cpu_times().user > 4.0 for one in children_of(pid))
+    return any(psutil.Process(one).cpu_times().user > 2.5 for one in children_of(pid))

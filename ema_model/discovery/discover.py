@@ -92,7 +92,7 @@ def walk(
         if opinion is not None and opinion.blames_controller:
             other = _Walk(opinion.story, tell, candidates, most_effects).ended()
     if opinion is not None and other is not None and opinion.settles(story) and not _bends(story, tell):
-        taken_over(story, opinion.again(story))
+        taken_over(story, opinion)
         walked = other
     else:
         walked = own.ended()
@@ -102,7 +102,7 @@ def walk(
             if asked and other is None:
                 other = _Walk(opinion.story, tell, candidates, most_effects).ended()
             if asked and other is not None and opinion.explains_better(story):
-                taken_over(story, opinion.again(story))
+                taken_over(story, opinion)
                 walked = other
             else:
                 compared(story, opinion, tell)

@@ -97,6 +97,7 @@ def _seen(story: Story, other: Story) -> ControllerSeen | None:
 
 def taken_over(story: Story, opinion: Opinion) -> None:
     """Goes on with inverse dynamics: what its effects are, the closed loop has no say in but to agree."""
+    opinion = opinion.again(story)
     both = [
         mine.name for mine in story.added for its in opinion.story.added if mine.name == its.name and _agree(mine, its)
     ]

@@ -72,19 +72,13 @@ def _differ(result: UnitsCompared, group: Sequence[Difference]) -> str:
     if len(first.together) > 1:
         names += ", which are only known together"
     of_type = result.of_type[first.parameter]
-    amount = _signed(
-        change,
-        0.0 if result.is_missed else known,
-        None if first.share is None else first.change / first.share,
-        of_type.unit,
-    )
+    shared = None if first.share is None else first.change / first.share
+    amount = _signed(change, 0.0 if result.is_missed else known, shared, of_type.unit)
+    single, several = ("seems to differ", "seem to differ") if result.is_missed else ("differs", "differ")
     if len(result.units) == 2:
-        verb = "seem to differ" if result.is_missed else "differ"
-        return f"{' and '.join(result.units)} {verb} in {names} ({first.unit} has {amount})"
+        return f"{' and '.join(result.units)} {several} in {names} ({first.unit} has {amount})"
     units = [one.unit for one in group]
-    verb = "differ" if len(units) > 1 else "differs"
-    if result.is_missed:  # what is missing may stand behind it
-        verb = "seem to differ" if len(units) > 1 else "seems to differ"
+    verb = several if len(units) > 1 else single
     return f"{_and(units)} {verb} from the rest in {names} ({amount})"
 
 
@@ -96,7 +90,8 @@ def _differences(result: UnitsCompared) -> Table:
         held = "–" if one.held_out is None else ("agrees" if one.held_out > 0.0 else "says neither")
         share = "–" if one.share is None else f"{100.0 * one.share:+.3g} %"
         path = on_axes(one.parameter, result.actuator.axes).path
-        rows.append([f"{one.unit}: {path}", _plus(one.change), number(half, 2), share, held])
+        sure = "–" if result.is_missed else number(half, 2)
+        rows.append([f"{one.unit}: {path}", _plus(one.change), sure, share, held])
         also = [on_axes(other, result.actuator.axes).path for other in one.alike]
         remarks.append(of_type.unit + (f"  or {', '.join(also)}" if also else ""))
     return Table(("difference", "± (90 %)", "share", "held out"), rows, "what differs", remarks)

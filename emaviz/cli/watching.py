@@ -6,16 +6,18 @@ from collections.abc import Iterable
 from pathlib import Path
 
 LOOK_S = 1.0  # between two looks
+_As = tuple[int, int]  # size and time of the last change
 
 
 class Watched:
-    """Files as they grow: one is whole once it is as it was at the look before."""
+    """Files as they grow: one has arrived once it is as it was at the look before, and again if it changes later."""
 
     def __init__(self) -> None:
-        self._seen: dict[Path, tuple[int, int]] = {}
+        self._seen: dict[Path, _As] = {}
+        self._arrived: dict[Path, _As] = {}
 
-    def whole(self, paths: Iterable[Path]) -> list[Path]:
-        """Those that have not changed since the last call; to be called every `LOOK_S`."""
+    def arrived(self, paths: Iterable[Path]) -> list[Path]:
+        """Those that have stopped growing since the last call; to be called every `LOOK_S`."""
         before, self._seen = self._seen, {}
         for path in paths:
             try:
@@ -23,4 +25,6 @@ class Watched:
             except OSError:  # it is gone again
                 continue
             self._seen[path] = at.st_size, at.st_mtime_ns
-        return [path for path, at in self._seen.items() if before.get(path) == at]
+        new = {path: at for path, at in self._seen.items() if before.get(path) == at != self._arrived.get(path)}
+        self._arrived |= new
+        return [*new]

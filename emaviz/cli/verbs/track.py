@@ -111,18 +111,17 @@ def _watch(
     folder = Path(arguments.files[0])
     if len(arguments.files) > 1 or not folder.is_dir():
         raise InputError(f"--watch: {quoted(arguments.files[0])}: name one folder, in which flights arrive")
-    watched, flights, refused = Watched(), dict[Path, Flight](), dict[Path, int]()
+    watched, flights = Watched(), dict[Path, Flight]()
     print(f"watching {folder}; Ctrl-C ends it", file=sys.stderr)
     try:
         while True:
-            whole = watched.whole(recordings_in(folder))
-            new = [path for path in whole if path not in flights and refused.get(path) != path.stat().st_mtime_ns]
+            new = watched.arrived(recordings_in(folder))
             for path in new:
+                flights.pop(path, None)  # it may have been replaced
                 try:
                     check_order(in_order([*flights, path]))
                     flights |= zip([path], _identified([path], arguments, actuator, progress))
                 except InputError as error:
-                    refused[path] = path.stat().st_mtime_ns
                     progress.done()
                     print(f"{error}; left out", file=sys.stderr)
             if len(flights) < LEAST_FLIGHTS:

@@ -12,7 +12,7 @@ from ema_model.recordings.file import hints_of, read_columns, read_head, read_he
 from ema_model.recordings.measurement import Measurement
 from ema_model.recordings.prepared import prepared
 from ema_model.recordings.read import read
-from ema_model.recordings.side_file.read import SideFile, find_side_file, read_side_file, side_path
+from ema_model.recordings.side_file.read import SideFile, actuators_of, find_side_file, read_side_file, side_path
 from ema_model.recordings.side_file.write import write_side_file
 from ema_model.recordings.write import check_target, write_measurement
 
@@ -24,6 +24,7 @@ __all__ = [
     "Reading",
     "SideFile",
     "Signal",
+    "actuators_of",
     "apply_mapping",
     "can_have_current",
     "check_needed",

@@ -8,7 +8,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from ema_model.errors import InputError, quoted
-from ema_model.recordings import find_side_file, read_side_file
+from ema_model.recordings import actuators_of
 from ema_model.recordings.formats import FORMATS
 from ema_model.recordings.recording_set import recordings_in
 
@@ -45,18 +45,13 @@ def check_order(paths: Sequence[Path]) -> None:
                 f"{quoted(after.name)}: comes after {quoted(before.name)}, though its name says that it flew before; "
                 "give the flights in order of time"
             )
-    known: tuple[str, Path] | None = None
-    for path in paths:
-        beside = find_side_file(path)
-        actuator = read_side_file(beside).actuator if beside else None
-        if actuator is None:
-            continue
-        if known is not None and actuator != known[0]:
-            raise InputError(
-                f"{quoted(path.name)}: is of the actuator {quoted(actuator)}, and {quoted(known[1].name)} of "
-                f"{quoted(known[0])}; the flights are of one unit"
-            )
-        known = known or (actuator, path)
+    known = list(actuators_of(paths).items())
+    if len(known) > 1:
+        (one, first), (other, second) = known[:2]
+        raise InputError(
+            f"{quoted(second.name)}: is of the actuator {quoted(other)}, and {quoted(first.name)} of {quoted(one)}; "
+            "the flights are of one unit"
+        )
 
 
 def _when(path: Path) -> tuple[int, ...]:

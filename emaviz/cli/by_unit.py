@@ -11,7 +11,7 @@ from ema_model.actuator import Actuator, save_actuator
 from ema_model.errors import InputError, quoted
 from ema_model.files.limits import FILE_BYTES
 from ema_model.files.refusal import listed
-from ema_model.recordings import Measurement, find_side_file, read_header, read_side_file
+from ema_model.recordings import Measurement, actuators_of, read_header
 from ema_model.recordings.formats.text_layout import Hints
 from ema_model.recordings.recording_set import RUN, files_of, held_out, is_pattern
 from emaviz.cli import given, output
@@ -76,10 +76,10 @@ def run(arguments: argparse.Namespace, actuator: Actuator) -> int:
 
 def read_units(arguments: argparse.Namespace, actuator: Actuator, progress: output.Progress) -> tuple[_Units, _Units]:
     """The recordings to fit and those held out, by unit; InputError where it is not clear whose one is."""
-    named = {Path(file).resolve() for text in arguments.holdout if not is_pattern(text) for file in files_of(text)}
-    files = list(dict.fromkeys(file for text in arguments.files for file in files_of(text, in_folders=True)))
-    unseen = [text for text in arguments.holdout if not is_pattern(text)]
-    files += [file for text in unseen for file in files_of(text) if file not in files]
+    unseen = [file for text in arguments.holdout if not is_pattern(text) for file in files_of(text)]
+    named = {Path(file).resolve() for file in unseen}
+    files = [file for text in arguments.files for file in files_of(text, in_folders=True)]
+    files = list(dict.fromkeys([*files, *unseen]))
     _check_same_actuator(files)
     column = _column(arguments, files)
     if column:
@@ -150,15 +150,10 @@ def _named(text: str) -> tuple[str, str]:
 
 def _check_same_actuator(files: list[str]) -> None:
     """InputError for recordings whose side files name different actuators: units are of one type."""
-    known: dict[str, str] = {}
-    for file in files:
-        beside = find_side_file(file)
-        actuator = read_side_file(beside).actuator if beside else None
-        if actuator is not None:
-            known.setdefault(actuator, file)
+    known = list(actuators_of(files).items())
     if len(known) > 1:
-        (one, first), (other, second) = list(known.items())[:2]
+        (one, first), (other, second) = known[:2]
         raise InputError(
-            f"{quoted(Path(second).name)}: is of the actuator {quoted(other)}, and {quoted(Path(first).name)} of "
-            f"{quoted(one)}; units that are compared are of one type"
+            f"{quoted(second.name)}: is of the actuator {quoted(other)}, and {quoted(first.name)} of {quoted(one)}; "
+            "units that are compared are of one type"
         )

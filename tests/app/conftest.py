@@ -10,6 +10,7 @@ from support.on_page import wait_until
 from support.one_tab import Tab
 
 from emaviz.page.app import App
+from emaviz.session.worker import Worker
 
 
 @pytest.fixture(scope="module")
@@ -76,3 +77,17 @@ def watched(browser: Any, app: App) -> Iterator[Any]:
     allowed = (app.address, app.viewer.address, "ws://127.0.0.1", "data:", "blob:")
     assert any(url.startswith(app.viewer.address) for url in asked)
     assert not [url for url in asked if not url.startswith(allowed)], "nothing may come from elsewhere"
+
+
+@pytest.fixture
+def errors() -> list[Any]:
+    """What the compute thread of `worker` could not do."""
+    return []
+
+
+@pytest.fixture
+def worker(errors: list[Any]) -> Iterator[Worker]:
+    """A compute thread of the test's own."""
+    worker = Worker("test-compute", errors.append)
+    yield worker
+    worker.close()

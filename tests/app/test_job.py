@@ -4,25 +4,12 @@ from __future__ import annotations
 
 import threading
 
-import pytest
 from support.on_page import wait_until
 
 from ema_model.errors import InputError
 from emaviz.session.job import Job
 from emaviz.session.pace import Pace
 from emaviz.session.worker import Worker
-
-
-@pytest.fixture
-def errors():
-    return []
-
-
-@pytest.fixture
-def worker(errors):
-    worker = Worker("test-compute", errors.append)
-    yield worker
-    worker.close()
 
 
 class Heard:

@@ -6,21 +6,7 @@ import itertools
 import threading
 import time
 
-import pytest
-
 from emaviz.session.worker import Worker
-
-
-@pytest.fixture
-def errors():
-    return []
-
-
-@pytest.fixture
-def worker(errors):
-    worker = Worker("test-compute", errors.append)
-    yield worker
-    worker.close()
 
 
 def wait_until(condition, seconds=5.0):

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import re
 import shutil
 
 import numpy as np
 import pytest
+from support.compared import compared, one_file
 
 from ema_model.actuator import load_actuator
 from ema_model.recordings import Measurement, write_measurement
@@ -43,18 +43,9 @@ def bench(tmp_path_factory):
             signals = motion(friction, len(RUNS) * i + j)
             write_measurement(Measurement(signals), folder / "units" / unit / f"{unit}_{run}.csv")
             parts += [{"serial": np.full(1000, i + 11.0), **signals}] if run == "slow" else []
-    table = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-    rows = np.column_stack(list(table.values()))
-    np.savetxt(folder / "all.csv", rows, delimiter=",", header=",".join(table), comments="", fmt="%.10g")
+    one_file(folder / "all.csv", parts)
     assert main(["actuator", "new", str(folder / "mine.toml"), *ACTUATOR]) == 0
     return folder
-
-
-def compared(bench, *arguments) -> dict:
-    out = bench / "result.json"
-    given = [str(one) for one in arguments]
-    assert main(["compare", *given, "--actuator", str(bench / "mine.toml"), "--json", str(out)]) == 0
-    return json.loads(out.read_text())
 
 
 def check(found: dict, unit: str) -> None:

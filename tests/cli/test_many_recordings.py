@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import json
-
 import numpy as np
 import pytest
+from support.compared import compared, one_file
 
 from ema_model.errors import InputError
 from ema_model.recordings import Measurement, write_measurement
@@ -40,20 +39,10 @@ def logs(tmp_path_factory):
         write_measurement(Measurement(motion(gain, i)), folder / "set" / f"kp{gain}_sine.csv")
     (folder / "set" / "notes.txt").write_text("measured in May")
     (folder / "set" / ".hidden.csv").write_text("")
-    parts = [motion(gain, i) for i, gain in enumerate(GAINS)]
-    table = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-    table = {"shot": np.repeat(np.arange(3.0) + 7.0, len(parts[0]["time_s"])), **table}
-    rows = np.column_stack(list(table.values()))
-    np.savetxt(folder / "all.csv", rows, delimiter=",", header=",".join(table), comments="", fmt="%.10g")
+    runs = [motion(gain, i) for i, gain in enumerate(GAINS)]
+    one_file(folder / "all.csv", [{"shot": np.full(len(run["time_s"]), 7.0 + i), **run} for i, run in enumerate(runs)])
     assert main(["actuator", "new", str(folder / "mine.toml"), *ACTUATOR]) == 0
     return folder
-
-
-def compared(logs, *arguments) -> dict:
-    out = logs / "result.json"
-    given = [str(one) for one in arguments]
-    assert main(["compare", *given, "--actuator", str(logs / "mine.toml"), "--json", str(out)]) == 0
-    return json.loads(out.read_text())
 
 
 def names(found: list[dict]) -> list[str]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import math
 import os
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any, Literal, cast
@@ -77,6 +78,17 @@ def find_side_file(path: str | os.PathLike[str]) -> Path | None:
     own = side_path(path)
     # Whatever else has the name, a pipe as well, is for `read_side_file` to refuse.
     return next((side for side in (own, own.with_name(OF_A_FOLDER)) if side.exists() and not side.is_dir()), None)
+
+
+def actuators_of(paths: Iterable[str | os.PathLike[str]]) -> dict[str, Path]:
+    """The actuators that recordings' side files name, with the first recording of each, in their order."""
+    found: dict[str, Path] = {}
+    for path in paths:
+        beside = find_side_file(path)
+        actuator = read_side_file(beside).actuator if beside else None
+        if actuator is not None:
+            found.setdefault(actuator, Path(path))
+    return found
 
 
 def read_side_file(path: str | os.PathLike[str]) -> SideFile:

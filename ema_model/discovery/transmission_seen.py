@@ -17,7 +17,7 @@ from ema_model.actuator import Actuator
 from ema_model.comparison.orders import Order, orders
 from ema_model.comparison.pitches import pitches
 from ema_model.models.motion import motion_of
-from ema_model.quantities.numbers import number
+from ema_model.quantities.numbers import amount, number
 from ema_model.quantities.shown import of_signal
 from ema_model.recordings import Measurement
 from ema_model.recordings.noise import sample_noise
@@ -48,15 +48,15 @@ class TransmissionSeen:
     def sentence(self, actuator: Actuator) -> str:
         """What is seen, in the axes' units."""
         axes = actuator.axes
-        user, motor = of_signal("user_position_rad", axes), of_signal("motor_position_rad", axes)
+        user, motor = (of_signal(name, axes).unit for name in ("user_position_rad", "motor_position_rad"))
+        error, times = amount(self.error, user), number(self.error / self.noise, 2)
         said = (
-            f"The user's position leaves the motor's by {user.scaled(self.error).text(self.error)} rms, "
-            f"{number(self.error / self.noise, 2)} times the noise of the two; the current tells nothing of it."
+            f"The user's position leaves the motor's by {error} rms, {times} times the noise of the two; "
+            "the model without a controller stops at the motor."
         )
         if self.period is None or self.amplitude is None:
             return f"{said} {_CAUSES.get(self.cause, '')}".rstrip()
-        period = motor.scaled(self.period).text(self.period)
-        amplitude = user.scaled(self.amplitude).text(self.amplitude)
+        period, amplitude = amount(self.period, motor), amount(self.amplitude, user)
         repeats = f"It repeats every {period} of the motor with an amplitude of {amplitude}, as an error of a "
         return f"{said} {repeats}{'screw' if axes.user == 'linear' else 'gear'} or of an encoder does."
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 
 from ema_model.actuator.naming import on_axes
@@ -181,7 +182,7 @@ def effect_title(name: str) -> str:
 def rung_title(one: Change, axes: Axes) -> str:
     """'+ Cogging torque'."""
     if one.kind in _SIGNS:
-        return f"{_SIGNS[one.kind]} {_listed([effect_title(name) for name in one.names])}{_of_orders(one)}"
+        return f"{_SIGNS[one.kind]} {_listed([effect_title(name) for name in one.names])}{_of_orders(one, axes)}"
     if one.kind == "parameter":
         return f"{on_axes(one.names[0], axes).title} freed"
     label = rung_label(one, axes)
@@ -199,11 +200,16 @@ def rung_label(one: Change, axes: Axes) -> str:
     if one.kind == "calibrated":
         return one.kind
     names = [name if name in CATALOGUE else in_sentence(effect_title(name)) for name in one.names]
-    return f"{_SIGNS[one.kind]} {_listed(names)}{_of_orders(one)}"
+    return f"{_SIGNS[one.kind]} {_listed(names)}{_of_orders(one, axes)}"
 
 
-def _of_orders(one: Change) -> str:
-    return f" of orders {', '.join(f'{order:g}' for order in one.orders)}" if one.orders else ""
+def _of_orders(one: Change, axes: Axes) -> str:
+    """' of orders 28, 14', or along a linear motor ' of pitches 2.50 mm, 417 µm'."""
+    if not one.orders:
+        return ""
+    if axes.motor == "linear":
+        return f" of pitches {', '.join(amount(2.0 * math.pi / order, 'm') for order in one.orders)}"
+    return f" of orders {', '.join(f'{order:g}' for order in one.orders)}"
 
 
 def value(one: Calibrated) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ema_model.actuator.naming import on_axes
-from ema_model.quantities.numbers import Quantity, number, with_uncertainty
+from ema_model.quantities.numbers import amount, number, with_uncertainty
 from ema_model.quantities.shown import of_signal
 from ema_model.quantities.titles import in_sentence
 from ema_model.text import Document, Lines, Note, Table
@@ -73,13 +73,13 @@ def _differ(result: UnitsCompared, group: Sequence[Difference]) -> str:
         names += ", which are only known together"
     of_type = result.of_type[first.parameter]
     shared = None if first.share is None else first.change / first.share
-    amount = _signed(change, 0.0 if result.is_missed else known, shared, of_type.unit)
+    size = _signed(change, 0.0 if result.is_missed else known, shared, of_type.unit)
     single, several = ("seems to differ", "seem to differ") if result.is_missed else ("differs", "differ")
     if len(result.units) == 2:
-        return f"{' and '.join(result.units)} {several} in {names} ({first.unit} has {amount})"
+        return f"{' and '.join(result.units)} {several} in {names} ({first.unit} has {size})"
     units = [one.unit for one in group]
     verb = several if len(units) > 1 else single
-    return f"{_and(units)} {verb} from the rest in {names} ({amount})"
+    return f"{_and(units)} {verb} from the rest in {names} ({size})"
 
 
 def _differences(result: UnitsCompared) -> Table:
@@ -157,15 +157,11 @@ def _signed(change: float, half: float, shared: float | None, unit: str) -> str:
     if shared:
         sure = f" ± {100.0 * half / abs(shared):.2g}" if half else ""
         return f"{100.0 * change / abs(shared):+.3g}{sure} %".replace("-", "−")
-    return ("+" if change > 0.0 else "") + (with_uncertainty(change, half, unit) if half else _plain(change, unit))
+    return ("+" if change > 0.0 else "") + (with_uncertainty(change, half, unit) if half else amount(change, unit))
 
 
 def _amount(size: float, mean: float, unit: str) -> str:
-    return f"{100.0 * size / abs(mean):.2g} %" if mean else _plain(size, unit)
-
-
-def _plain(value: float, unit: str) -> str:
-    return Quantity("", unit).scaled(value).text(value)
+    return f"{100.0 * size / abs(mean):.2g} %" if mean else amount(size, unit)
 
 
 def _plus(value: float) -> str:

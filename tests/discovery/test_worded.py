@@ -7,9 +7,11 @@ from dataclasses import replace
 
 from support.discovered import with_cogging
 
-from ema_model.discovery.result import StoodIn
+from ema_model.discovery.result import Change, StoodIn
 from ema_model.discovery.sentences import NOT_REPEATABLE, masked, untold
 from ema_model.discovery.summary import as_dict
+from ema_model.discovery.words import rung_label
+from ema_model.quantities.axes import ROTARY, Axes
 from emaviz.report import write_discovery_report
 
 RAW = re.compile(r"[a-z]+\.[a-z_]+_|cogging_torque|torque_ripple|_Nm|_A\b")
@@ -38,3 +40,9 @@ def test_an_effect_that_is_a_parameter_does_not_mask_itself():
     (one,) = found.effects
     itself = replace(one, name="viscous_friction", stood_in=(StoodIn("motor.viscous_friction_Nms_rad", 2.0, 0.0),))
     assert masked([itself], found.actuator.axes) == []
+
+
+def test_orders_along_a_linear_motor_are_pitches():
+    change = Change("effect", ("cogging_torque",), (2513.274, 7539.82))
+    assert rung_label(change, Axes("linear", "linear")) == "+ cogging_torque of pitches 2.50 mm, 0.833 mm"
+    assert rung_label(Change("effect", ("cogging_torque",), (24.0, 4.0)), ROTARY) == "+ cogging_torque of orders 24, 4"

@@ -11,7 +11,7 @@ from ema_model.discovery.harmonics import Further, further_orders
 from ema_model.discovery.model_fit import holdout_error
 from ema_model.discovery.objections import against, ratio
 from ema_model.discovery.path import Story
-from ema_model.discovery.refit import Trial
+from ema_model.discovery.refit import Trial, stands_for
 from ema_model.effects import find
 
 Progress = Callable[[str], None]
@@ -58,7 +58,8 @@ def claimed(story: Story, accepted: Sequence[Trial], tell: Progress) -> Claim | 
 def _chosen(story: Story, accepted: Sequence[Trial]) -> tuple[Trial, list[Trial]]:
     """The best of the trials, and those that cannot be told from it.
 
-    Of what cannot be told apart, a parameter outside its tolerance comes after an effect.
+    Of what cannot be told apart, a parameter outside its tolerance comes after an effect, and one that takes parameters
+    farther from the file after one that does not.
     """
     first = accepted[0]
     is_far = ratio(story.data, first.fit) > FAR
@@ -69,7 +70,8 @@ def _chosen(story: Story, accepted: Sequence[Trial]) -> tuple[Trial, list[Trial]
         or evidence(story.data, trial.fit, first.fit) < TIE
         or (is_far and trial.drop > ALIKE * first.drop)
     ]
-    best = next((trial for trial in tied if not find(trial.candidate.name).duplicates), tied[0])
+    effects = [trial for trial in tied if not stands_for(story.current, trial.candidate.name)] or tied[:1]
+    best = min(effects, key=lambda trial: 0.0 if trial is first else evidence(story.data, trial.fit, first.fit))
     return best, [trial for trial in tied if trial is not best]
 
 

@@ -26,6 +26,9 @@ MOMENT, MOMENTS = 25.0, 2
 # disagree; and how much of their size they must differ by, since no model is exact.
 DISAGREES, APART = 1e-3, 0.35
 
+# Samples, that a delay may differ by between parts: how late a sampled loop is depends on how it is moved.
+LATE_BY = 0.5
+
 # rad, that a phase may differ by between parts: half the power of the wave would be missed.
 PHASES_APART = 1.0
 
@@ -39,6 +42,10 @@ FAR = 2.0
 
 # Of the error, that an effect must take away beside a model whose parameters keep to their tolerances (MODEL §6).
 LEAST_FALL = 0.01
+
+# σ of its tolerance, by which an effect must move a parameter to drive it to its bound: one that stands a hair off the
+# bound without the effect as well (a scale that no recording tells) is no sign of anything.
+DRIVEN = 0.5
 
 # Of what the residual's own curve tells, that an effect must tell: a curve has more freedom.
 AS_MUCH = 0.9

@@ -17,6 +17,7 @@ from ema_model.discovery.contradiction import contradictions
 from ema_model.discovery.criteria import FAR, HALF
 from ema_model.discovery.dropped import drop_doubtful, drop_idle
 from ema_model.discovery.next_experiment import next_experiment
+from ema_model.discovery.objections import ratio
 from ema_model.discovery.path import Story, refreshed, with_drops
 from ema_model.discovery.refit import Trial, pays
 from ema_model.discovery.remaining import at_floor
@@ -28,7 +29,7 @@ from ema_model.discovery.transmission_seen import transmission_seen
 from ema_model.discovery.uncertainty import with_intervals
 from ema_model.discovery.unknown import curve_instead, is_a_shape
 from ema_model.discovery.verdict import verdict_of
-from ema_model.effects import CATALOGUE, find
+from ema_model.effects import CATALOGUE
 from ema_model.recordings import Measurement
 
 Progress = Callable[[str], None]
@@ -160,6 +161,9 @@ class _Walk:
             return True
         self._first = self._first or with_drops(ranked, trials)
         accepted = [trial for trial in trials if pays(story.current, trial, story.data, story.held)]
+        if not accepted and ratio(story.data, story.current) > FAR:
+            trials = story.tried_whole([one for one in ranked if one not in [t.candidate for t in trials]], tell)
+            accepted = [trial for trial in trials if pays(story.current, trial, story.data, story.held)]
         claim = claimed(story, accepted, tell)
         if claim is None:
             return False
@@ -201,7 +205,7 @@ def _with_curve(story: Story, curve: Trial | None, unknown: Explanation, tell: P
 
 def _named(story: Story) -> list[str]:
     """The library's effects in the model that are no parameters outside their tolerance."""
-    return [one.name for one in story.added if one.name in CATALOGUE and not find(one.name).duplicates]
+    return [one.name for one in story.added if one.name in CATALOGUE and not one.stands_for]
 
 
 def result_of(
@@ -217,7 +221,7 @@ def result_of(
     named = [one for one in added if one.name in names]
     faults = {name: calibration.parameters[name] for name in story.current.faults}
     outside = [name for name in calibration.outside_tolerance if "." in name and not name.startswith("effects.")]
-    stand_ins = [path for one in story.added if (path := find(one.name).duplicates)]
+    stand_ins = [one.stands_for for one in story.added if one.stands_for]
     told = {*names, *(rival for one in named for rival in one.same_as)}  # refused at an earlier step, or not
     return Discovery(
         verdict=verdict_of(story, named, unknown),

@@ -27,16 +27,18 @@ _DIVERGED = 1e100  # floors, from which on a change has no meaning: its square w
 class Fingerprint:
     """What an effect with these settings changes, over the floor: (values, columns).
 
-    Two columns are the two phases of a periodic effect.
+    Two columns are the two phases of a periodic effect.  Of an effect that the file has they are what its own
+    parameters do beyond their tolerances.
     """
 
     name: str
     settings: dict[str, float]
     columns: Array
+    frees: tuple[str, ...] = ()  # the calibrated parameters of the file's effect, whose columns they are
 
 
-def variants(effect: Effect, orders: Sequence[float]) -> list[list[dict[str, float]]]:
-    """Settings to try; those of one entry are columns of one fingerprint."""
+def variants(effect: Effect, orders: Sequence[float], top_rad_s: float = 0.0) -> list[list[dict[str, float]]]:
+    """Settings to try; those of one entry are columns of one fingerprint.  top_rad_s: the motor's top speed."""
     names = [parameter.name for parameter in effect.parameters]
     first = effect.parameters[0].name
     middle = effect.severities[1]
@@ -47,13 +49,16 @@ def variants(effect: Effect, orders: Sequence[float]) -> list[list[dict[str, flo
         ]
     if "phase_rad" in names:
         return [[{first: middle, "phase_rad": phase} for phase in (0.0, 0.5 * np.pi)]]
-    return [[{first: severity}] for severity in effect.severities]
+    low, high = effect.parameters[0].low, effect.parameters[0].high
+    speeds = [share * top_rad_s for share in effect.at_speeds]
+    return [[{first: one}] for one in (*effect.severities, *(speed for speed in speeds if low <= speed <= high))]
 
 
 def fingerprints(data: Data, found: Fit, names: Iterable[str], orders: Sequence[float]) -> list[Fingerprint]:
     """Those of all effects that are not yet in the model, at the model's calibrated parameters."""
     effects = [find(name, found.actuator.axes) for name in names if name not in found.effects]
-    tried = [(effect, settings) for effect in effects for settings in variants(effect, orders)]
+    top = _top_speed(found)
+    tried = [(effect, settings) for effect in effects for settings in variants(effect, orders, top)]
     lanes = [(effect, one) for effect, settings in tried for one in settings]
     if not lanes:
         return []
@@ -74,6 +79,26 @@ def fingerprints(data: Data, found: Fit, names: Iterable[str], orders: Sequence[
         prints.append(Fingerprint(effect.name, dict(lanes[lane][1]), columns))
         lane += len(settings)
     return prints
+
+
+def of_the_file(found: Fit, names: Iterable[str]) -> list[Fingerprint]:
+    """Those of effects that the file has, as far as their parameters are free: what they would do beyond it."""
+    calibration = found.calibration
+    columns = [*calibration.parameters, *calibration.starts]
+    prints = []
+    for name in names:
+        own = tuple(path for path in calibration.parameters if path.startswith(f"effects.{name}."))
+        if own:
+            jacobian = calibration.weighted_jacobian[:, [columns.index(path) for path in own]]
+            prints.append(Fingerprint(name, dict(calibration.actuator.effects[name]), jacobian, own))
+    return prints
+
+
+def _top_speed(found: Fit) -> float:
+    """The motor's top speed in the recordings, rad/s; 0 where it is not known."""
+    windows = zip(found.plant.windows, found.calibration.signals)
+    shown = [window.context.get("motor_speed_rad_s", signals.get("motor_speed_rad_s")) for window, signals in windows]
+    return float(max((np.max(np.abs(one)) for one in shown if one is not None), default=0.0))
 
 
 def _changes(data: Data, found: Fit, lanes: list[Lane]) -> Array:

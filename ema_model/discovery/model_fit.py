@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 _SHARE = 0.5  # 1 σ of an effect's parameter, of the value that its fingerprint suggests
 _ORDER_SHARE = 1e-3  # of an order along a linear axis: it was found as exactly as the travel tells it
 _ANGLE_SIGMA = 0.7  # rad
+ANGLES = ("phase_rad", "angle_rad")  # parameters of which any value is as likely as another
 _ALIKE = 0.02  # of a floor, that two may differ by
 
 
@@ -116,7 +117,7 @@ def with_effect(actuator: Actuator, name: str, settings: Mapping[str, float]) ->
         if not parameter.integer:
             value = full[parameter.name]
             share = _ORDER_SHARE if parameter.name == "order" else _SHARE
-            sigma = _ANGLE_SIGMA if parameter.name == "phase_rad" else share * abs(value)
+            sigma = _ANGLE_SIGMA if parameter.name in ANGLES else share * abs(value)
             sigma = sigma or _SHARE * abs(parameter.default) or 0.01 * (parameter.high - parameter.low)
             tolerances[f"effects.{name}.{parameter.name}"] = Tolerance(sigma, True)
     return replace(actuator, effects={**actuator.effects, name: full}, tolerances=tolerances)
@@ -128,6 +129,13 @@ def without_effect(actuator: Actuator, name: str) -> Actuator:
     return replace(
         actuator, effects={other: given for other, given in actuator.effects.items() if other != name}, tolerances=kept
     )
+
+
+def as_in(file: Actuator, name: str, actuator: Actuator) -> Actuator:
+    """An actuator with an effect as another one, the file, has it."""
+    given = {path: one for path, one in file.tolerances.items() if path.startswith(f"effects.{name}.")}
+    effects = {**actuator.effects, name: file.effects[name]}
+    return replace(actuator, effects=effects, tolerances={**actuator.tolerances, **given})
 
 
 def fit(

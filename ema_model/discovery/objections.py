@@ -11,9 +11,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ema_model.actuator.naming import on_axes
-from ema_model.discovery.criteria import AS_MUCH, FAR, LEAST_FALL, LEAST_SHARE, PLAUSIBLE, TIE
+from ema_model.discovery.criteria import ANOTHER, AS_MUCH, DRIVEN, FAR, LEAST_FALL, LEAST_SHARE, PLAUSIBLE, TIE
 from ema_model.discovery.evidence import colour_of, evidence, signals_of
-from ema_model.discovery.model_fit import Data, Fit, floor_ratio
+from ema_model.discovery.model_fit import ANGLES, Data, Fit, floor_ratio
 from ema_model.discovery.remaining import at_floor, left_by, used_left
 from ema_model.discovery.stability import disagreement
 from ema_model.effects import catalogue_name, find
@@ -30,7 +30,7 @@ def against(data: Data, before: Fit, after: Fit, keys: Sequence[str], settled: C
     long as a fit, so that it is asked for last.
     """
     return (
-        next((reason for key in keys if (reason := _unmeasured(data, key))), "")
+        next((reason for key in keys if (reason := _unmeasured(data, key) or _within(before, after, key))), "")
         or _worse(data, before, after)
         or _little(data, before, after)
         or outdone(data, before, after)
@@ -93,6 +93,20 @@ def _unmeasured(data: Data, key: str) -> str:
     return ""
 
 
+def _within(before: Fit, after: Fit, key: str) -> str:
+    """An effect of the file that stays where the file has it."""
+    file = before.actuator
+    if key not in file.effects:
+        return ""
+    values = after.calibration.actuator.effects[key].items()
+    moved = [
+        abs(value - file.effects[key][name]) / file.tolerances[path].sigma
+        for name, value in values
+        if (path := f"effects.{key}.{name}") in file.tolerances and file.tolerances[path].sigma > 0.0
+    ]
+    return "" if max(moved, default=0.0) > ANOTHER else "with it the actuator is within the file's tolerances"
+
+
 def _bent(before: Fit, after: Fit, key: str) -> str:
     """A parameter of the effect at its bound, or one of the actuator that is not there in the fit before.
 
@@ -100,11 +114,13 @@ def _bent(before: Fit, after: Fit, key: str) -> str:
     """
     parameters = after.calibration.parameters
     for path, one in parameters.items():
-        if not one.at_bound or path.endswith("phase_rad"):
+        if not one.at_bound or path.endswith(ANGLES):
             continue
         if path.startswith(f"effects.{key}."):
             return f"its {_title(after, path)} would stand at the bound"
-        if "." in path and not path.startswith("effects.") and not before.calibration.parameters[path].at_bound:
+        if "." not in path or path.startswith("effects."):
+            continue
+        if before is after or abs(one.z) - abs(before.calibration.parameters[path].z) > DRIVEN:
             return f"it drives the {_title(after, path)} to its bound"
     return ""
 

@@ -18,10 +18,11 @@ from ema_model.comparison.explain import Explanation
 from ema_model.discovery.controller_seen import ControllerSeen
 from ema_model.discovery.evidence import predicted_evidence
 from ema_model.discovery.faults import fault_for
-from ema_model.discovery.fingerprints import Fingerprint, fingerprints
+from ema_model.discovery.fingerprints import Fingerprint, fingerprints, of_the_file
 from ema_model.discovery.model_fit import (
     Data,
     Fit,
+    as_in,
     fit,
     floor_ratio,
     holdout_fit,
@@ -29,7 +30,7 @@ from ema_model.discovery.model_fit import (
     rms_by_signal,
     without_effect,
 )
-from ema_model.discovery.refit import Trial, promising, tried
+from ema_model.discovery.refit import Trial, promising, stands_for, tried
 from ema_model.discovery.remaining import Left, at_floor, left_by
 from ema_model.discovery.result import Added, Candidate, Change, Contradiction, Rung, StoodIn
 from ema_model.discovery.score import scored, signatures
@@ -94,6 +95,11 @@ class Story:
         return self.steps[-1].added
 
     @property
+    def of_the_file(self) -> Mapping[str, Mapping[str, float]]:
+        """Effects that the actuator's file has, as it has them."""
+        return self.base.actuator.effects
+
+    @property
     def ladder(self) -> list[Rung]:
         """The error of each step."""
         return [step.rung for step in self.steps]
@@ -108,10 +114,12 @@ class Story:
         actuator = self.current.actuator
         looked_for = [name for name in CATALOGUE if name not in _NOT_LOOKED_FOR and _may_act(name, actuator)]
         wanted = [name for name in names or looked_for if name not in known and name not in _NOT_LOOKED_FOR]
+        given = [name for name in self.of_the_file if name not in {one.key for one in self.added}]
         orders = (left or self.left()).orders
         if actuator.axes.motor == "linear":
             orders = orders[:_MOST_PITCHES]  # the rest are there to tell what noise is
         self._prints = fingerprints(self.data, self.current, wanted, orders)
+        self._prints += of_the_file(self.current, [name for name in given if not names or name in names])
         return scored(self.current, self._prints)
 
     def signatures(self, ranked: Sequence[Candidate]) -> dict[str, Array]:
@@ -137,6 +145,20 @@ class Story:
             trials.append(self.trial(candidate, tell))
         return sorted(trials, key=lambda trial: -trial.drop)
 
+    def tried_whole(self, ranked: Sequence[Candidate], tell: Progress) -> list[Trial]:
+        """The candidates that act by a speed, refitted from where all of their change comes nearest.
+
+        What sticks and slides is not straight in any parameter; a score, which takes it to be, may then see nothing.
+        """
+        trials = []
+        for candidate in ranked:
+            prints = [one for one in self._prints if one.name == candidate.name and find(one.name).at_speeds]
+            if prints and not candidate.untestable_reason:
+                nearest = min(prints, key=lambda one: float(np.sum((self.current.residual + one.columns[:, 0]) ** 2)))
+                tell(f"trying {candidate.name}")
+                trials.append(self.trial(replace(candidate, settings=nearest.settings), tell))
+        return trials
+
     def trial(self, candidate: Candidate, tell: Progress = lambda text: None) -> Trial:
         """One candidate in the model, refitted."""
         return tried(self.data, self.current, candidate, {candidate.name: candidate.settings}, tell)
@@ -157,9 +179,13 @@ class Story:
     def add(self, trial: Trial, ties: Sequence[str] = ()) -> None:
         """Takes a trial for the next model."""
         before, moved = self.steps[-1].rung, _stood_in(self.current, trial.fit)
-        rung = self._rung(_change(trial), trial.fit)
+        parameter = "" if trial.faults else stands_for(self.current, trial.candidate.name)
+        rung = self._rung(_change(trial, parameter), trial.fit)
         errors = before.rmse, rung.rmse, before.holdout_rmse, rung.holdout_rmse
-        new = [Added(catalogue_name(key), {}, *errors, tuple(ties), key, {}, moved) for key in trial.effects]
+        new = [
+            Added(catalogue_name(key), {}, *errors, tuple(ties), key, {}, moved, stands_for=parameter)
+            for key in trial.effects
+        ]
         self._append(trial.fit, rung, (*self.added, *new))
         compile_behind(trial.fit.actuator)
 
@@ -172,9 +198,10 @@ class Story:
 
     def without(self, key: str, tell: Progress = lambda text: None) -> Fit:
         """The last model without one of its effects, refitted."""
-        return fit(
-            self.data, without_effect(self.current.actuator, key), self.current.starts, tell, self.current.faults
-        )
+        actuator = without_effect(self.current.actuator, key)
+        if key in self.of_the_file:
+            actuator = as_in(self.base.actuator, key, actuator)
+        return fit(self.data, actuator, self.current.starts, tell, self.current.faults)
 
     def settle(self, tell: Progress = lambda text: None) -> None:
         """Fits the models anew as what each leaves asks for, where what the last one leaves is no noise.
@@ -232,13 +259,13 @@ class Story:
         return rung_of(change, found, self.data, self.held)
 
 
-def _change(trial: Trial) -> Change:
-    """What a step that adds this changes."""
+def _change(trial: Trial, parameter: str) -> Change:
+    """What a step that adds this changes; parameter: the path of the one that it stands for."""
     if trial.faults:
         return Change("fault", trial.faults)
     name = trial.candidate.name
-    if path := find(name).duplicates:
-        return Change("parameter", (path,))
+    if parameter:
+        return Change("parameter", (parameter,))
     orders = tuple(values["order"] for key, values in trial.effects.items() if key != name and "order" in values)
     return Change("effect", (name,), orders)
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ema_model.discovery.criteria import LEAST_BIC, MOMENT, MOMENTS
 from ema_model.discovery.evidence import colour_of, effective_values, evidence
-from ema_model.discovery.model_fit import Data, Fit, fit, holdout_error, with_effect
+from ema_model.discovery.model_fit import ANGLES, Data, Fit, fit, holdout_error, with_effect
 from ema_model.discovery.result import Candidate
 from ema_model.effects import Effect, find
 from ema_model.quantities.axes import Axes
@@ -18,14 +18,17 @@ from ema_model.quantities.axes import Axes
 Progress = Callable[[str], None]
 
 _LEAST_FALL = 0.004  # of the error: what is less is immaterial
-_FALL = 0.01  # below which the data must be twice as sure
+_FALL = 0.01  # below which a fall is slight, and the data must be twice as sure
 _LEAST_T = 2.4  # of the mean gain over blocks of time: 1 % of chance
-_HELD = 0.01  # of the held-out error: at the floor chance may raise it so much, above the floor it must fall so much
+_HELD = 0.01  # of the held-out error, that must go above the floor
+_SHOWS = 1.0 / 3.0  # of the fall of the fitted error at the floor, that must be seen there as well
 _AGREES = 0.8  # of the held-out error: so great a fall there, and of the fitted one, needs no other test
 _FLOOR = 1.1  # of the floor, up to which an error counts as at it
 _CORRELATED = 50  # values of a signal that may share their error
 _SCORE = 0.4  # of what a refit gives, that a score may have fallen short of predicting
-_RECENTRED = 2  # times that a refit begins anew from where its first guess stopped it
+_RECENTRED = 4  # times that a refit begins anew from where its first guess held it back
+_HELD_BACK = 2.0  # σ of that guess, from which on it did
+_UNMOVED = 1.0  # σ
 _FAINT = 0.1  # of the suggested strength, from which a fit that went astray begins anew
 
 
@@ -51,11 +54,24 @@ def tried(
         faint = {name: _weakened(find(name, current.actuator.axes), settings) for name, settings in effects.items()}
         best = min(best, _refitted(data, current, faint, tell), key=lambda one: one.chi2)
     for _ in range(_RECENTRED):
-        if best.chi2 > current.chi2 - LEAST_BIC or not _stopped(best, effects):
+        if best.chi2 > current.chi2 - LEAST_BIC or not _held_back(best, effects):
             break
         found = best.calibration.actuator.effects
         best = _refitted(data, current, {name: found[name] for name in effects}, tell)
     return Trial(candidate, effects, best, current.chi2 - best.chi2)
+
+
+def stands_for(before: Fit, name: str) -> str:
+    """The path of the base parameter outside its tolerance that an effect beside this fit would be; "" for none.
+
+    A parameter that is free, and stays where the file has it, is not what is missing, though a reading alone would not
+    tell the two apart: a constant load moves the axis, a current sensor's bias need not.
+    """
+    path = find(name).duplicates
+    if not path:
+        return ""
+    free = before.calibration.parameters.get(path)
+    return "" if free is not None and not free.at_bound and abs(free.z) < _UNMOVED else path
 
 
 def worth(data: Data, current: Fit, trial: Trial) -> float:
@@ -76,7 +92,7 @@ def pays(current: Fit, trial: Trial, data: Data, held: Data | None) -> bool:
         before, after = holdout_error(held, current), holdout_error(held, trial.fit)
         if after < _AGREES * before:
             return True  # no chance repeats itself where it was not fitted
-        tells = tells and _holds(before, after)
+        tells = tells and _holds(before, after, fall)
     return tells and _lasts(data, current, trial.fit)
 
 
@@ -92,9 +108,14 @@ def _lasts(data: Data, before: Fit, after: Fit) -> bool:
     return bool(apart >= MOMENTS and -sums[sums < 0.0].sum() < 0.5 * sums[sums > 0.0].sum())
 
 
-def _holds(before: float, after: float) -> bool:
-    """Whether what was not fitted agrees: an effect need not show in every recording, but must not be at odds."""
-    return after < (1.0 - _HELD if before > _FLOOR else 1.0 + _HELD) * before
+def _holds(before: float, after: float, fall: float) -> bool:
+    """Whether what was not fitted agrees; fall: of the error of what was.
+
+    What falls by little at the floor must fall there as well: a model that is not quite the rig's finds something in
+    every recording, and another thing in each.
+    """
+    least = _HELD if before > _FLOOR else _SHOWS * fall
+    return after < (1.0 - least) * before
 
 
 def _refitted(data: Data, current: Fit, effects: Mapping[str, Mapping[str, float]], tell: Progress) -> Fit:
@@ -104,12 +125,12 @@ def _refitted(data: Data, current: Fit, effects: Mapping[str, Mapping[str, float
     return fit(data, actuator, current.starts, tell, current.faults)
 
 
-def _stopped(found: Fit, effects: Mapping[str, Mapping[str, float]]) -> bool:
-    """Whether a parameter of the effects ended where only the guess that it began with held it."""
+def _held_back(found: Fit, effects: Mapping[str, Mapping[str, float]]) -> bool:
+    """Whether a parameter of the effects ended so far from the guess that it began with that this holds it back."""
     for name in effects:
         for parameter in find(name, found.actuator.axes).parameters:
             one = found.calibration.parameters.get(f"effects.{name}.{parameter.name}")
-            if one is None or not one.at_bound or parameter.name == "phase_rad":
+            if one is None or abs(one.z) < _HELD_BACK or parameter.name in ANGLES:
                 continue
             near = 0.01 * abs(one.value)
             if parameter.low + near < one.value < parameter.high - near:

@@ -90,6 +90,7 @@ class Added:
     chosen: dict[str, float] = field(default_factory=dict)  # parameters that are not fitted: a whole order
     stood_in: tuple[StoodIn, ...] = ()  # parameters that had been standing in for it
     supported_by: tuple[str, ...] = ()  # of "closed_loop" and "inverse_dynamics"
+    stands_for: str = ""  # the path of the base parameter whose value outside its tolerance it is
 
 
 @dataclass(frozen=True)

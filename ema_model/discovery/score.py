@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ema_model.discovery.fingerprints import Fingerprint
 from ema_model.discovery.model_fit import Fit
 from ema_model.discovery.result import Candidate
-from ema_model.effects import find
+from ema_model.effects import Effect, find
 
 Array = NDArray[np.float64]
 
@@ -35,8 +35,8 @@ def scored(found: Fit, prints: Sequence[Fingerprint]) -> list[Candidate]:
 
 def scored_all(found: Fit, prints: Sequence[Fingerprint]) -> list[Candidate]:
     """A candidate for each fingerprint, in their order."""
-    jacobian, gram = movable(found)
-    return [_scored(found, one, jacobian, gram) for one in prints]
+    usual = movable(found)
+    return [_scored(found, one, *(movable(found, one.frees) if one.frees else usual)) for one in prints]
 
 
 def signatures(found: Fit, prints: Mapping[str, Sequence[Fingerprint]]) -> dict[str, Array]:
@@ -44,10 +44,10 @@ def signatures(found: Fit, prints: Mapping[str, Sequence[Fingerprint]]) -> dict[
 
     At the strength that suits best, and only what the parameters cannot do as well.
     """
-    jacobian, gram = movable(found)
+    usual = movable(found)
     told = {}
     for name, its in prints.items():
-        own = [_beyond(jacobian, gram, one.columns) for one in its]
+        own = [_beyond(*(movable(found, one.frees) if one.frees else usual), one.columns) for one in its]
         parts = [columns @ np.linalg.lstsq(columns, -found.residual, rcond=None)[0] for columns in own]
         told[name] = min(parts, key=lambda part: float(np.sum((found.residual + part) ** 2)))
     return told
@@ -83,10 +83,14 @@ def scored_beside(found: Fit, prints: Sequence[Fingerprint], known: Sequence[Can
     return [_scored(beside, one, jacobian, gram) for one in prints]
 
 
-def movable(found: Fit) -> tuple[Array, Array]:
-    """J = ∂residual/∂x of the parameters that do not stand at a bound, (values, unknowns), and JᵀJ with the prior."""
+def movable(found: Fit, but: Sequence[str] = ()) -> tuple[Array, Array]:
+    """J = ∂residual/∂x of the parameters that do not stand at a bound, (values, unknowns), and JᵀJ with the prior.
+
+    but: parameters that are left out.
+    """
     low, high = found.calibration.room
     free = np.minimum(-low, high) > _AT_BOUND
+    free &= np.isin([*found.calibration.parameters, *found.calibration.starts], but, invert=True)
     jacobian = found.calibration.weighted_jacobian[:, free]
     return jacobian, jacobian.T @ jacobian + np.eye(jacobian.shape[1])
 
@@ -111,6 +115,8 @@ def amounts_of(found: Fit, columns: Array, jacobian: Array, gram: Array) -> tupl
 def _scored(found: Fit, one: Fingerprint, jacobian: Array, gram: Array) -> Candidate:
     amounts, energy, toward = amounts_of(found, one.columns, jacobian, gram)
     effect = find(one.name, found.actuator.axes)
+    if one.frees:
+        return _beyond_the_file(found, one, effect, amounts, float(toward @ amounts))
     first = effect.parameters[0]
     strong = effect.severities[2] / one.settings[first.name]
     reason = ""
@@ -131,3 +137,14 @@ def _scored(found: Fit, one: Fingerprint, jacobian: Array, gram: Array) -> Candi
         settings[first.name] = float(np.clip(settings[first.name] * math.hypot(*amounts), first.low, first.high))
         settings["phase_rad"] = math.atan2(float(amounts[1]), float(amounts[0]))
     return Candidate(one.name, 0.0 if reason else max(0.0, drop), settings, reason)
+
+
+def _beyond_the_file(found: Fit, one: Fingerprint, effect: Effect, amounts: Array, drop: float) -> Candidate:
+    """An effect of the file at other values; amounts: steps of its parameters, in σ of their tolerances."""
+    settings = dict(one.settings)
+    of = {f"effects.{one.name}.{parameter.name}": parameter for parameter in effect.parameters}
+    for path, step in zip(one.frees, amounts):
+        parameter, sigma = of[path], found.actuator.tolerances[path].sigma
+        value = settings[parameter.name] + sigma * float(step)
+        settings[parameter.name] = float(np.clip(value, parameter.low, parameter.high))
+    return Candidate(one.name, max(0.0, drop), settings)

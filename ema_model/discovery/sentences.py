@@ -53,7 +53,7 @@ def masked(added: Sequence[Added], axes: Axes) -> list[str]:
         moved = [
             f"{in_sentence(on_axes(part.path, axes).title)} ({part.before:+.1f} → {part.after:+.1f} σ)"
             for part in one.stood_in
-            if part.path != find(one.name).duplicates
+            if part.path != one.stands_for
         ]
         if moved:
             came = ", ".join(moved).replace("-", "−")

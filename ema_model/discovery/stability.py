@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ema_model.discovery.criteria import APART, DISAGREES, PHASES_APART
+from ema_model.discovery.criteria import APART, DISAGREES, LATE_BY, PHASES_APART
 from ema_model.discovery.evidence import colour, signals_of
-from ema_model.discovery.model_fit import Data, Fit
+from ema_model.discovery.model_fit import ANGLES, Data, Fit
 from ema_model.effects import catalogue_name, find
 
 Array = NDArray[np.float64]
@@ -46,8 +46,10 @@ def disagreement(data: Data, found: Fit, key: str) -> Disagreement | None:
         one = found.calibration.parameters[names[i]]
         sigma = found.actuator.tolerances[names[i]].sigma
         tell = [(one.value + sigma * step[place], sigma * error[place]) for step, error in parts]
-        is_phase = names[i].endswith("phase_rad")
+        is_phase = names[i].endswith(ANGLES)
         limit = PHASES_APART if is_phase else APART * abs(one.value)
+        if names[i].endswith("delay_s"):
+            limit = max(limit, LATE_BY * _sample_s(data))
         tell = [(value, error) for value, error in tell if error < max(limit, _TELLS * abs(one.value))]
         if not (is_phase or names[i] == strength):  # a step of its own size is beyond what is straight
             tell = [(value, error) for value, error in tell if abs(value - one.value) < abs(one.value)]
@@ -60,6 +62,11 @@ def disagreement(data: Data, found: Fit, key: str) -> Disagreement | None:
         if chance < least and float(np.max(np.abs(values - one.value))) > limit:
             worst, least = Disagreement(names[i], tuple(float(value) for value in values)), chance
     return worst
+
+
+def _sample_s(data: Data) -> float:
+    """The recordings' sampling interval, s."""
+    return float(np.median(np.concatenate([np.diff(one["time_s"]) for one in data.measurements])))
 
 
 def parts_of(data: Data, found: Fit) -> list[NDArray[np.bool_]]:

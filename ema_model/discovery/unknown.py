@@ -7,7 +7,7 @@ from collections.abc import Callable
 from ema_model.comparison.explain import Explanation
 from ema_model.discovery.criteria import LEAST_BIC
 from ema_model.discovery.model_fit import Data, Fit, fit
-from ema_model.discovery.refit import Trial, pays
+from ema_model.discovery.refit import Trial, pays, stands_for
 from ema_model.discovery.result import Candidate
 from ema_model.discovery.torque_curve import is_torque, with_curve
 from ema_model.effects import find
@@ -46,7 +46,7 @@ def curve_instead(
     """
     if explanation is None:
         return None
-    stands_in = bool(find(best.candidate.name).duplicates)
+    stands_in = bool(stands_for(current, best.candidate.name))
     if not stands_in and best.drop > _HALF * explanation.r2 * current.chi2:
         return None
     curve = curve_for(data, held, current, explanation, tell)

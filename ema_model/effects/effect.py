@@ -141,6 +141,7 @@ class Effect:
     advance_states: Callable[..., Any] | None = None  # (*ema_model.stacks.ADVANCE, parameters, states) → new states
     duplicates: str = ""  # path of the base parameter that does the same, e.g. "motor.inertia_kgm2"
     is_load: bool = False  # pulls at the user from outside, so that its torque counts as the load
+    at_speeds: tuple[float, ...] = ()  # of a first parameter that is a speed: shares of the top speed to look for it at
     against: str = "time"  # of `quantities.variables`: what its residual follows; time where it follows nothing else
     nothing: float = 0.0  # the first parameter, the others at their defaults, with which kernels go on as without it
     name: str = ""  # of the file; the catalogue fills it in

@@ -35,6 +35,7 @@ EFFECT = Effect(
         Parameter("breakaway_ratio", "least ratio of friction at breakaway to that in motion, T_s/T_d", 1.5, 1.0, 4.0),
     ),
     severities=(3.0, 10.0, 25.0),
+    at_speeds=(0.01, 0.03, 0.1, 0.3),
     places=(moving_friction,),
     shows="in the current just after reversals and at low speed",
     against="motor_speed",

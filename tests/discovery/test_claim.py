@@ -130,5 +130,16 @@ def test_far_above_the_floor_what_tells_as_much_cannot_be_told_apart(monkeypatch
         Trial(Candidate(name, {}, drop), {name: {}}, SimpleNamespace(), drop)
         for name, drop in (("asymmetric_friction", 1000.0), ("current_sensor_bias", 1000.0 * share))
     ]
-    best, others = claim._chosen(SimpleNamespace(data=None), trials)
+    best, others = claim._chosen(SimpleNamespace(data=None, current=None), trials)
     assert best is trials[0] and [one.candidate.name for one in others] == names
+
+
+def test_of_what_cannot_be_told_apart_the_one_that_keeps_parameters_nearer_the_file_is_named_first(monkeypatch):
+    monkeypatch.setattr(claim, "ratio", lambda data, found: 1.0)
+    monkeypatch.setattr(claim, "evidence", lambda data, small, large: -260.0)
+    trials = [
+        Trial(Candidate(name, {}, drop), {name: {}}, SimpleNamespace(), drop)
+        for name, drop in (("current_sensor_gain", 950.0), ("computation_delay", 630.0))
+    ]
+    best, others = claim._chosen(SimpleNamespace(data=None, current=None), trials)
+    assert best is trials[1] and others == [trials[0]]

@@ -27,7 +27,7 @@ _OF_FAULT = {"k1": "friction", "k2": "backlash", "k8": "position_gain"}
 
 def agrees(truth: Truth, found: Discovery, added: tuple[Added, ...]) -> bool:
     """Whether the answer names exactly what is hidden: the effects, or a torque of its own for an unknown one."""
-    named = {one.name for one in added if one.name in CATALOGUE and not find(one.name).duplicates}
+    named = {one.name for one in added if one.name in CATALOGUE and not one.stands_for}
     own = any(one.name not in CATALOGUE for one in added)
     seen = all(_sees(found, fault) for fault in truth.faults)
     return named == set(truth.effects) and own == bool(truth.torque) and seen and not _invented(truth, found)
@@ -71,7 +71,7 @@ def reveal(truth: Truth, found: Discovery, added: tuple[Added, ...]) -> Html:
     for one in added:
         if one.name in CATALOGUE and one.name not in truth.effects:
             tied = [name for name in one.same_as if name in truth.effects]
-            if find(one.name).duplicates:
+            if one.stands_for:
                 why = "a parameter outside its tolerance; nothing of the kind is hidden"
             elif tied:
                 why = f"cannot be told from {in_sentence(effect_title(tied[0]))} by these recordings"

@@ -1,0 +1,49 @@
+"""What a rig that nobody here wrote hides far from the file: the study is in test_foreign_rigs_study.py."""
+
+from __future__ import annotations
+
+import pytest
+from support.foreign_rigs import FITTED, HELD, actuator_of, measured, recorded, truth_of
+
+from ema_model.comparison.criteria import BAND
+from ema_model.discovery import discover
+
+pytestmark = pytest.mark.long
+
+
+def discovered(tmp_path, effect, unit=5):
+    """A hobby servo's discovery with one effect hidden, and what the effect set."""
+    recorded("hobby", unit, tmp_path, hide=[effect])
+    actuator = actuator_of("hobby")
+    found = discover(
+        measured(tmp_path, actuator, FITTED), actuator, holdout=measured(tmp_path, actuator, HELD), most_effects=1
+    )
+    return found, truth_of(tmp_path / f"{FITTED[0]}.csv")
+
+
+def test_an_arm_that_hangs_elsewhere_than_the_file_says_is_found_there(tmp_path):
+    found, truth = discovered(tmp_path, "gravity")
+    assert [one.name for one in found.effects] == ["pendulum_load"], found
+    hidden = truth["hidden"]["gravity"]["parameters"]
+    told = found.effects[0].parameters
+    assert told["moment_Nm"].value == pytest.approx(hidden["pendulum"], rel=0.1)
+    assert told["angle_rad"].value == pytest.approx(hidden["pendulum_zero"], abs=0.02)
+    assert found.ladder[-1].rmse <= BAND < 0.05 * found.ladder[0].rmse
+
+
+def test_friction_that_falls_at_a_servos_low_speeds_is_looked_for_there(tmp_path):
+    """The library's usual speeds are beyond the fastest that this servo turns."""
+    found, truth = discovered(tmp_path, "stribeck")
+    assert [one.name for one in found.effects] == ["stribeck_friction"], found
+    hidden = truth["hidden"]["stribeck"]["parameters"]
+    told = found.effects[0].parameters
+    assert told["breakaway_ratio"].value == pytest.approx(hidden["breakaway"], rel=0.1)
+    assert told["speed_rad_s"].value == pytest.approx(hidden["stribeck"] / 200.0, rel=0.2)
+    assert found.ladder[-1].rmse < 1.3
+
+
+def test_a_load_that_moves_the_axis_is_no_bias_of_the_current_sensor(tmp_path):
+    found, _ = discovered(tmp_path, "constant")
+    assert [one.name for one in found.effects] == ["constant_load"], found
+    assert "sensors.current_bias_A" not in found.parameters_outside_tolerance
+    assert found.ladder[-1].rmse <= BAND

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from ema_model.discovery.begin import begun
-from ema_model.discovery.discover import discover, result_of, settings_of, walk
+from ema_model.discovery.discover import discover, result_of, settings_of
 from ema_model.discovery.path import Story
 from ema_model.discovery.result import Added, Candidate, Discovery, Experiment, Rung
 from ema_model.discovery.summary import as_dict
 from ema_model.discovery.verify import Verified, verified
+from ema_model.discovery.walking import walk
 
 __all__ = [
     "Added",

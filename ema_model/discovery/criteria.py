@@ -87,6 +87,10 @@ LOOP_TOLD = 0.05
 # and of a model's error, below which one with an effect must stay for the effect to be needed.
 HALF = 0.5
 
+# Of the closed loop's χ², that what is missing in its drive is expected to tell.  A drive that lacks one thing shows it
+# (0.75 to 0.99 in the three-phase model's), one that is built otherwise shows a little of several (0.4 to 0.6).
+TOLD_WELL = 2.0 / 3.0
+
 # Floors that inverse dynamics may leave before any effect, up to which it may contradict one; and how much of an effect
 # it may leave then, that is said to be none of it.
 HEARD, GONE = 2.0, 0.3

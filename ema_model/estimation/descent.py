@@ -38,8 +38,12 @@ class Problem(Protocol):
         """(n, residuals) of candidates (n, count)."""
         ...
 
-    def jacobians(self, x: Array) -> tuple[Array, Array]:
-        """The same, and their derivatives (n, residuals, count)."""
+    def jacobians(self, x: Array, *, in_whole_blocks: bool) -> tuple[Array, Array]:
+        """The same, and their derivatives (n, residuals, count), to one side where that spares a block of lanes."""
+        ...
+
+    def points_in_whole_blocks(self, n: int) -> int:
+        """How many are simulated for those derivatives of n candidates."""
         ...
 
 
@@ -70,8 +74,8 @@ class Descent:
         """One step of those that still move."""
         problem = self.problem
         chosen = np.flatnonzero(self.moving)
-        residuals, slopes = problem.jacobians(self.x[chosen])
-        self.evaluations += len(chosen) * (2 * problem.count + 1)
+        residuals, slopes = problem.jacobians(self.x[chosen], in_whole_blocks=True)
+        self.evaluations += problem.points_in_whole_blocks(len(chosen))
         self.cost[chosen] = np.sum(residuals**2, axis=1)
         trials = np.concatenate(
             [

@@ -122,6 +122,10 @@ class Problem:
         slopes[:, at, self.values + at] = self.prior
         return np.concatenate([*residuals, x * self.prior], axis=1), np.swapaxes(slopes, 1, 2)
 
+    def points_in_whole_blocks(self, n: int) -> int:
+        """How many of a window `jacobians` of n candidates simulates in whole blocks, at most."""
+        return n * (1 + self.count + _room(n, self.count))
+
     def _errors(self, x: Array, window: int) -> Array:
         """A window's part of the residuals of x (n, unknowns): (n, values); of a run that diverges a very great one."""
         shown, measured = self.simulate(x, window), self.model.windows[window].measured

@@ -1,0 +1,75 @@
+"""When inverse dynamics is walked before the loop, and what is looked for where a score sees nothing."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from ema_model.discovery import walking
+from ema_model.discovery.fingerprints import Fingerprint, variants
+from ema_model.discovery.path import Story
+from ema_model.discovery.result import Candidate
+from ema_model.effects import find
+
+
+def walk_of(monkeypatch, ranked, floors=50.0, simulates=True):
+    """A walk whose model stands so many floors off, with these candidates for a χ² of 1000."""
+    monkeypatch.setattr(walking, "ratio", lambda data, found: floors)
+    current = SimpleNamespace(chi2=1000.0, plant=SimpleNamespace(simulates_commands=simulates))
+    story = SimpleNamespace(data=None, current=current, left=lambda: None, ranked=lambda names, left: ranked)
+    return walking._Walk(story, lambda text: None, None, 3)
+
+
+DELAY, COGGING = Candidate("computation_delay", 550.0, {}), Candidate("cogging_torque", 600.0, {})
+
+
+@pytest.mark.parametrize(
+    ("ranked", "given", "suspected"),
+    [
+        ([DELAY, COGGING], {}, True),
+        ([COGGING, DELAY], {}, False),
+        ([Candidate("dead_band", 900.0, {})], {}, False),
+        ([DELAY], {"floors": 1.5}, False),
+        ([DELAY], {"simulates": False}, False),
+        ([], {}, False),
+    ],
+    ids=["a little of several", "an effect first", "one thing tells it well", "near", "without a loop", "none"],
+)
+def test_a_far_loop_whose_drive_tells_a_little_is_suspected(monkeypatch, ranked, given, suspected):
+    assert walk_of(monkeypatch, ranked, **given).suspects_drive() is suspected
+
+
+def test_candidates_are_scored_once_for_a_model(monkeypatch):
+    asked = []
+    walk = walk_of(monkeypatch, [DELAY])
+    walk.story.ranked = lambda names, left: asked.append(names) or [DELAY]
+    walk.suspects_drive()
+    walk.suspects_drive()
+    assert len(asked) == 1
+
+
+def test_speeds_are_looked_for_at_shares_of_the_recordings_top_speed():
+    effect = find("stribeck_friction")
+    usual = [one["speed_rad_s"] for [one] in variants(effect, [])]
+    slow = [one["speed_rad_s"] for [one] in variants(effect, [], 3.0)]
+    assert usual == list(effect.severities)
+    assert slow[: len(usual)] == usual and sorted(slow)[:2] == pytest.approx([0.3, 0.9])
+    assert [one["torque_Nm"] for [one] in variants(find("constant_load"), [], 3.0)] == list(
+        find("constant_load").severities
+    )
+
+
+def test_friction_that_falls_is_tried_from_where_its_whole_change_comes_nearest():
+    """The residual asks for the change at 0.3 rad/s, whatever its slope there says."""
+    shape = np.sin(np.linspace(0.0, 20.0, 400))
+    prints = [
+        Fingerprint("stribeck_friction", {"speed_rad_s": 3.0}, 9.0 * shape[:, None]),
+        Fingerprint("stribeck_friction", {"speed_rad_s": 0.3}, 4.0 * shape[:, None]),
+        Fingerprint("hinge_moment", {"stiffness_Nm_rad": 1.0}, 5.0 * shape[:, None]),
+    ]
+    story = SimpleNamespace(_prints=prints, current=SimpleNamespace(residual=-5.0 * shape), trial=lambda one, tell: one)
+    ranked = [Candidate("hinge_moment", 9.0, {}), Candidate("stribeck_friction", 0.0, {"speed_rad_s": 3.0})]
+    [tried] = Story.tried_whole(story, ranked, lambda text: None)
+    assert tried.name == "stribeck_friction" and tried.settings == {"speed_rad_s": 0.3}

@@ -59,7 +59,7 @@ def _chosen(story: Story, accepted: Sequence[Trial]) -> tuple[Trial, list[Trial]
     """The best of the trials, and those that cannot be told from it.
 
     Of what cannot be told apart, a parameter outside its tolerance comes after an effect, and one that takes parameters
-    farther from the file after one that does not.
+    farther from the file after one that does not.  Far above the floor what was not fitted tells them apart.
     """
     first = accepted[0]
     is_far = ratio(story.data, first.fit) > FAR
@@ -71,8 +71,13 @@ def _chosen(story: Story, accepted: Sequence[Trial]) -> tuple[Trial, list[Trial]
         or (is_far and trial.drop > ALIKE * first.drop)
     ]
     effects = [trial for trial in tied if not stands_for(story.current, trial.candidate.name)] or tied[:1]
-    best = min(effects, key=lambda trial: 0.0 if trial is first else evidence(story.data, trial.fit, first.fit))
-    return best, [trial for trial in tied if trial is not best]
+    if not is_far or story.held is None:
+        best = min(effects, key=lambda trial: 0.0 if trial is first else evidence(story.data, trial.fit, first.fit))
+        return best, [trial for trial in tied if trial is not best]
+    unseen = {trial.candidate.name: holdout_error(story.held, trial.fit) for trial in tied}
+    best = min(effects, key=lambda trial: unseen[trial.candidate.name])
+    near = unseen[best.candidate.name] / ALIKE
+    return best, [trial for trial in tied if trial is not best and unseen[trial.candidate.name] <= near]
 
 
 def _halves(story: Story, best: Trial, more: Trial) -> bool:

@@ -130,7 +130,7 @@ def test_far_above_the_floor_what_tells_as_much_cannot_be_told_apart(monkeypatch
         Trial(Candidate(name, {}, drop), {name: {}}, SimpleNamespace(), drop)
         for name, drop in (("asymmetric_friction", 1000.0), ("current_sensor_bias", 1000.0 * share))
     ]
-    best, others = claim._chosen(SimpleNamespace(data=None, current=None), trials)
+    best, others = claim._chosen(SimpleNamespace(data=None, held=None, current=None), trials)
     assert best is trials[0] and [one.candidate.name for one in others] == names
 
 
@@ -141,5 +141,23 @@ def test_of_what_cannot_be_told_apart_the_one_that_keeps_parameters_nearer_the_f
         Trial(Candidate(name, {}, drop), {name: {}}, SimpleNamespace(), drop)
         for name, drop in (("current_sensor_gain", 950.0), ("computation_delay", 630.0))
     ]
-    best, others = claim._chosen(SimpleNamespace(data=None, current=None), trials)
+    best, others = claim._chosen(SimpleNamespace(data=None, held=None, current=None), trials)
     assert best is trials[1] and others == [trials[0]]
+
+
+@pytest.mark.parametrize(
+    ("held", "first", "tied"), [(0.97, 1, True), (0.7, 1, False), (1.02, 0, True), (1.3, 0, False)]
+)
+def test_far_above_the_floor_what_was_not_fitted_tells_apart(monkeypatch, held, first, tied):
+    """held: the error that load-dependent friction leaves there, of the one that bus voltage sag leaves."""
+    monkeypatch.setattr(claim, "ratio", lambda data, found: 90.0)
+    monkeypatch.setattr(claim, "evidence", lambda data, small, large: 5.0)
+    left = {"bus_voltage_sag": 135.0, "load_dependent_friction": 135.0 * held}
+    monkeypatch.setattr(claim, "holdout_error", lambda held, found: left[found.name])
+    trials = [
+        Trial(Candidate(name, {}, drop), {name: {}}, SimpleNamespace(name=name), drop)
+        for name, drop in (("bus_voltage_sag", 1000.0), ("load_dependent_friction", 750.0))
+    ]
+    best, rest = claim._chosen(SimpleNamespace(data=None, held=object(), current=None), trials)
+    assert best is trials[first]
+    assert rest == ([trials[1 - first]] if tied else [])

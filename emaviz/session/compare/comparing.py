@@ -17,9 +17,9 @@ from ema_model.recordings import (
     SIGNALS,
     ColumnMapping,
     Measurement,
+    change_side_file,
     prepared,
     read,
-    write_side_file,
 )
 from ema_model.recordings.formats.text_layout import Hints
 from ema_model.recordings.side_file.read import SideFile
@@ -128,7 +128,8 @@ class Comparing:
             return
         side = self._side_of(opened, mapping=mapping)
         self._opened(measured(replace(opened, mapping=mapping), self.actuator, side))
-        write_side_file(side, self.folder.beside(opened.path))  # last, so that nothing wrong is remembered
+        # Last, so that nothing wrong is remembered.
+        change_side_file(self.folder.beside(opened.path), side, mapping=mapping)
 
     def _lay_out(self, name: str, hints: Hints) -> None:
         opened = self.opened.get(name)
@@ -144,7 +145,7 @@ class Comparing:
             self.events.refused()
             raise
         self._opened(found)
-        write_side_file(side, self.folder.beside(opened.path))
+        change_side_file(self.folder.beside(opened.path), side, text=hints, mapping=None)
 
     def _side_of(self, opened: Opened, **said: Any) -> SideFile:
         """The recording's side file with what somebody has said now, which is kept beside the recording itself."""

@@ -63,7 +63,9 @@ def _cut(text: str) -> tuple[str, str]:
     lines = text.split("\n")
     while lines and (not lines[-1].strip() or lines[-1].lstrip().startswith("#")):
         lines.pop()
-    said = "\n".join([*lines, ""]) if lines else ""
+    if not lines:
+        return text, ""
+    said = "\n".join([*lines, ""])
     return text[: len(said)], text[len(said) :]
 
 

@@ -55,13 +55,14 @@ def plan_text(document: Mapping[str, Any], file: Path) -> str:
         if "recordings" in table:
             table["recordings"] = _whole_paths(table["recordings"], file.parent.resolve())
         groups[name] = table
-    whole: dict[str, Any] = {}
-    for name, one in {**document, "groups": groups}.items():  # tables at its top, what is in them on a line
-        named = isinstance(one, dict)
-        whole[name] = (
-            {inner: {k: inline(v) for k, v in t.items()} for inner, t in one.items()} if named else inline(one)
-        )
-    return toml_text(whole)
+    return toml_text({name: _at_the_top(one) for name, one in {**document, "groups": groups}.items()})
+
+
+def _at_the_top(entry: Any) -> Any:
+    """Tables of tables stay so, and what is in them stands on a line."""
+    if not isinstance(entry, dict):
+        return inline(entry)
+    return {name: {key: inline(value) for key, value in table.items()} for name, table in entry.items()}
 
 
 def _whole_paths(entry: Any, beside: Path) -> Any:

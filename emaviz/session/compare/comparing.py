@@ -127,9 +127,8 @@ class Comparing:
         if opened is None:
             return
         side = self._side_of(opened, mapping=mapping)
-        self._opened(measured(replace(opened, mapping=mapping), self.actuator, side))
-        # Last, so that nothing wrong is remembered.
-        change_side_file(self.folder.beside(opened.path), side, mapping=mapping)
+        found = measured(replace(opened, mapping=mapping), self.actuator, side)  # first: nothing wrong is remembered
+        self._remember(found, side, mapping=mapping)
 
     def _lay_out(self, name: str, hints: Hints) -> None:
         opened = self.opened.get(name)
@@ -144,8 +143,14 @@ class Comparing:
         except InputError:
             self.events.refused()
             raise
-        self._opened(found)
-        change_side_file(self.folder.beside(opened.path), side, text=hints, mapping=None)
+        self._remember(found, side, text=hints, mapping=None)
+
+    def _remember(self, found: Opened, side: SideFile, **said: Any) -> None:
+        """Puts what was said into the side file, and tells; where it cannot be written, it holds all the same."""
+        try:
+            change_side_file(self.folder.beside(found.path), side, **said)
+        finally:
+            self._opened(found)
 
     def _side_of(self, opened: Opened, **said: Any) -> SideFile:
         """The recording's side file with what somebody has said now, which is kept beside the recording itself."""

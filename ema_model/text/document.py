@@ -11,9 +11,10 @@ from typing import Literal
 Severity = Literal["good", "bad", "warning", "note"]
 COLOURS: dict[Severity, str] = {"good": "#2b8a3e", "bad": "#e03131", "warning": "#e8590c", "note": "#868e96"}
 _GAP = 3  # characters between the columns of plain text
-_STYLE = "border-collapse:collapse;margin:.6em 0"
-_CELL = "padding:1px 8px 1px 0;text-align:right;border:0"
+_STYLE = "border-collapse:collapse;margin:.6em 0;font-variant-numeric:tabular-nums"
+_CELL = "padding:1px 8px 1px 0;text-align:right;border:0;white-space:nowrap"
 _FIRST = "padding:1px 8px 1px 0;text-align:left;border:0"
+_HEAD = ";font-weight:400;opacity:.65;white-space:normal"
 _NAMES = 24  # characters of a fact's name
 
 
@@ -140,12 +141,13 @@ class Table:
             severity = self.severities[i] if self.severities else None
             colour = f";color:{COLOURS[severity]}" if severity else ""
             shown.append(_cells("td", row, self.remarks[i] if self.remarks else "", colour))
-        return f'<table style="{_STYLE}">{"".join(shown)}</table>'
+        return f'<div style="overflow-x:auto"><table style="{_STYLE}">{"".join(shown)}</table></div>'
 
 
 def _cells(tag: str, row: Sequence[str], beside: str, colour: str = "") -> str:
     styles = [_FIRST, *([_CELL] * (len(row) - 1)), _FIRST]
     styles[len(row) - 1] += colour
+    styles = [style + (_HEAD if tag == "th" else "") for style in styles]
     cells = (f'<{tag} style="{style}">{escape(cell)}</{tag}>' for style, cell in zip(styles, (*row, beside)))
     return f"<tr>{''.join(cells)}</tr>"
 

@@ -13,14 +13,7 @@ from ema_model.comparison.result import Comparison
 from ema_model.errors import InputError, quoted
 from ema_model.files.refusal import refusal, shown
 from ema_model.quantities.titles import in_sentence
-from ema_model.recordings import (
-    SIGNALS,
-    ColumnMapping,
-    Measurement,
-    change_side_file,
-    prepared,
-    read,
-)
+from ema_model.recordings import SIGNALS, ColumnMapping, Measurement, change_side_file, prepared, read
 from ema_model.recordings.formats.text_layout import Hints
 from ema_model.recordings.side_file.read import SideFile
 from emaviz.session import actuators as actuator_files
@@ -28,7 +21,7 @@ from emaviz.session.compare.keep import keep
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.described import number
 from emaviz.session.job import Job, Tell
-from emaviz.session.opened import Opened, guesses, measured, read_opened, side_file_of
+from emaviz.session.opened import Opened, guesses, measured, read_opened, side_file_of, side_with
 from emaviz.session.session import Session
 from emaviz.session.signal import Signal
 from emaviz.session.worker import Worker
@@ -126,7 +119,7 @@ class Comparing:
         opened = self.opened.get(name)
         if opened is None:
             return
-        side = self._side_of(opened, mapping=mapping)
+        side = side_with(opened, self.folder, mapping=mapping)
         found = measured(replace(opened, mapping=mapping), self.actuator, side)  # first: nothing wrong is remembered
         self._remember(found, side, mapping=mapping)
 
@@ -136,7 +129,7 @@ class Comparing:
             return
         try:
             # Another header makes other columns, of which the mapping says nothing.
-            side = self._side_of(opened, text=hints, mapping=None)
+            side = side_with(opened, self.folder, text=hints, mapping=None)
             found = read_opened(name, opened.path, self.actuator, side)
             if found.problem:
                 raise refusal(name, found.problem)
@@ -151,11 +144,6 @@ class Comparing:
             change_side_file(self.folder.beside(found.path), side, **said)
         finally:
             self._opened(found)
-
-    def _side_of(self, opened: Opened, **said: Any) -> SideFile:
-        """The recording's side file with what somebody has said now, which is kept beside the recording itself."""
-        known = side_file_of(opened.path, self.folder) or SideFile()
-        return replace(known, **said, path=str(self.folder.beside(opened.path)))
 
     def _opened(self, opened: Opened) -> None:
         self.opened[opened.name] = opened

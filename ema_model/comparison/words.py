@@ -44,29 +44,30 @@ def document_of(result: Comparison) -> Document:
 def errors(result: Comparison) -> Table:
     """Of each signal, over all recordings that were fitted."""
     shown = {name: of_signal(name, result.actuator.axes) for name in result.signals}
-    return _errors("signal", result, [(shown[name].title, shown[name], one) for name, one in result.signals.items()])
+    return _errors(
+        "signal", result, [(shown[name].title, shown[name], one, "") for name, one in result.signals.items()]
+    )
 
 
 def errors_by_recording(result: Comparison, signal: str) -> Table | None:
     """Of one signal, in each recording, fitted or not; None where there is but one."""
-    every = [(one, "") for one in result.recordings] + [(one, "held out: ") for one in result.holdout]
-    known = [(how + one.name, one.errors[signal]) for one, how in every if signal in one.errors]
-    if len(known) < 2:
-        return None
+    every = [(one, "") for one in result.recordings] + [(one, ", held out") for one in result.holdout]
     shown = of_signal(signal, result.actuator.axes)
-    return _errors(in_sentence(shown.title), result, [(name, shown, error) for name, error in known])
+    known = [(one.name, shown, one.errors[signal], how) for one, how in every if signal in one.errors]
+    return _errors(f"recording, {in_sentence(shown.title)}", result, known) if len(known) > 1 else None
 
 
-def _errors(title: str, result: Comparison, of: Sequence[tuple[str, Quantity, SignalError]]) -> Table:
+def _errors(title: str, result: Comparison, of: Sequence[tuple[str, Quantity, SignalError, str]]) -> Table:
+    """of: by row its name, the signal, its error, and what else is to be said."""
     rows, units, severities = [], [], []
-    for name, signal, error in of:
+    for name, signal, error, said in of:
         shown = error.quantity(signal)
         over = error.rmse / error.noise_floor if error.noise_floor > 0.0 else math.nan
         before = [error.rmse_initial] if result.calibration is not None else []
         numbers = [number(shown.factor * one) for one in (*before, error.rmse, error.noise_floor)]
         mean, share = number(shown.factor * error.mean_absolute), f"{number(100.0 * error.nrmse)} %"
         rows.append([name, *numbers, mean, share, number(over)])
-        units.append(shown.unit)
+        units.append(f"{shown.unit}{said}")
         severities.append(_severity(over))
     head = ["before"] if result.calibration is not None else []
     head += ["rms error", "floor", "mean |e|", "of range", "error / floor"]

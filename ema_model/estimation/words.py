@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 from ema_model.actuator.naming import on_axes
 from ema_model.estimation.calibrate import Calibration
 from ema_model.faults import NAMES
@@ -17,10 +19,11 @@ def convergence(fit: Calibration) -> str:
     return f"{how}; χ² per value {number(fit.chi2_per_value)} (1 is the floor), {fit.evaluations} evaluations."
 
 
-def calibration_table(fit: Calibration, axes: Axes) -> Table | None:
-    """What each parameter was in the file and is now, with its interval, and how many σ that is apart."""
+def calibration_table(fit: Calibration, axes: Axes, among: Collection[str] | None = None) -> Table | None:
+    """What each parameter, or some, was in the file and is now, with its interval, and how many σ that is apart."""
     rows, remarks = [], []
-    for path, one in fit.parameters.items():
+    fitted = {path: one for path, one in fit.parameters.items() if among is None or path in among}
+    for path, one in fitted.items():
         low, high = (number(edge, 4) for edge in one.interval90)
         moved = f"{round(one.z, 2) + 0.0:+.2f}".replace("-", "−")
         rows.append([_title(path, axes), number(one.initial, 4), number(one.value, 4), f"{low} … {high}", moved])
@@ -28,7 +31,7 @@ def calibration_table(fit: Calibration, axes: Axes) -> Table | None:
     if not rows:
         return None
     state = "converged" if fit.converged else "NOT converged"
-    severities: list[Severity | None] = ["bad" if one.at_bound else None for one in fit.parameters.values()]
+    severities: list[Severity | None] = ["bad" if one.at_bound else None for one in fitted.values()]
     head = ("file", "value", "90 % interval", "moved [σ]")
     return Table(head, rows, f"calibration {state}", remarks, severities=severities)
 

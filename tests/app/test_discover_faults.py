@@ -10,12 +10,12 @@ from support.rig import Rig
 
 from ema_model.actuator import load_actuator
 from ema_model.challenges.truth import Truth
-from ema_model.discovery.beside_truth import agrees, document_of
 from ema_model.discovery.criteria import LEAST_BIC
 from ema_model.discovery.result import Change
 from ema_model.discovery.words import faults, headline, sentences
 from ema_model.errors import InputError
 from emaviz.page.discover.result import answer
+from emaviz.session.discover.beside_truth import agrees, document_of
 from emaviz.session.discover.saved_story import story_of
 
 

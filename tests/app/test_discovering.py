@@ -11,7 +11,6 @@ from support.on_page import wait_until
 from support.rig import Rig
 
 from ema_model.actuator import load_actuator
-from ema_model.discovery.beside_truth import agrees, document_of
 from ema_model.discovery.tracks import tracks
 from ema_model.effects.user import user_torque
 from ema_model.errors import InputError
@@ -22,6 +21,7 @@ from emaviz.page.discover.guide import STEPS, step
 from emaviz.page.discover.next_experiment import as_csv
 from emaviz.recording.read import read
 from emaviz.scene.motion import motion
+from emaviz.session.discover.beside_truth import agrees, document_of
 
 EASY = "first_bench_run"
 

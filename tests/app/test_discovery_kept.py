@@ -11,10 +11,10 @@ from support.on_page import wait_until
 from support.rig import Rig
 
 from ema_model.actuator import load_actuator
-from ema_model.discovery.beside_truth import agrees, document_of
 from ema_model.discovery.result import Experiment
 from ema_model.effects.user import user_torque
 from ema_model.errors import InputError
+from emaviz.session.discover.beside_truth import agrees, document_of
 from emaviz.session.discover.sealing import sensors_of, truth_of
 from emaviz.session.settings import Settings
 

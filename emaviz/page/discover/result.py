@@ -8,7 +8,6 @@ from typing import Any
 import plotly.graph_objects as go
 import viser
 
-from ema_model.discovery import beside_truth
 from ema_model.discovery.snapshot import AT_FLOOR, Look
 from ema_model.discovery.tables import per_recording
 from ema_model.discovery.tracks import Track, tracks
@@ -23,6 +22,7 @@ from emaviz.page.discover.next_experiment import NextTest
 from emaviz.page.kept import Cleared
 from emaviz.page.page import Page
 from emaviz.page.playback import PlaybackStrip
+from emaviz.session.discover import beside_truth
 from emaviz.session.discover.discovering import Discovering
 from emaviz.text.html import Html, add_html, html, joined
 from emaviz.text.notes import BOX, boxed

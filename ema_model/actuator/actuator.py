@@ -57,6 +57,7 @@ class Actuator:
     torque_known: bool = True  # whether the torque constant is known, so that currents can be told as torques
     mapping: tuple[str, ...] = ()  # of its recordings' columns, as for --map
     rules: tuple[Rule, ...] = ()
+    text: str = field(default="", compare=False, repr=False)  # of its file, whose comments stay when it is saved
 
     @property
     def has_reference_model(self) -> bool:

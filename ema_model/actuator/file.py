@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -58,7 +59,7 @@ def parse_actuator(text: str, path: str | Path) -> Actuator:
     except ValueError as error:
         raise InputError(f"{where}: not valid TOML: {quoted(error)}") from None
     try:
-        return actuator_of(document, where)
+        return replace(actuator_of(document, where), text=text)
     except InputError:
         raise
     except ValueError:  # of a number with thousands of digits, read or shown

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import time
+from contextlib import suppress
 from pathlib import Path
 
 from ema_model.files.lock import FileLock
 from ema_model.kernel_cache import kept
 
-_POLL_S = 0.05
 _LONGEST_S = 300.0  # to wait: a compilation takes seconds, and whoever holds the lock may have been stopped
 
 
@@ -20,16 +19,11 @@ class Turns:
 
     def begin(self, path: Path) -> None:
         """Returns when nobody else compiles this kernel."""
-        until = time.monotonic() + _LONGEST_S
-        while path not in self._held and time.monotonic() < until:
-            try:
-                lock = FileLock.acquire(path.with_name(f"{path.name}.lock"))
-            except OSError:  # no lock to be had in that folder: each compiles for itself
-                return
-            if lock is not None:
+        if path in self._held:
+            return
+        with suppress(OSError):  # no lock to be had in that folder: each compiles for itself
+            if (lock := FileLock.acquire(path.with_name(f"{path.name}.lock"), _LONGEST_S)) is not None:
                 self._held[path] = lock
-                return
-            time.sleep(_POLL_S)
 
     def end(self, path: Path) -> None:
         """Lets the next one look for the kernel."""

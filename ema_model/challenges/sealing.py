@@ -52,7 +52,8 @@ def seal(
     parts = {HIDDEN: _packed(truth)}
     with tempfile.TemporaryDirectory(prefix="emaviz-sealing-") as name:
         folder = Path(name)
-        save_actuator(replace(actuator, faults={}), folder / "actuator.toml")  # those that are known are hidden, too
+        # The faults that are known are hidden, too, and so is what somebody has noted in the file.
+        save_actuator(replace(actuator, faults={}, text=""), folder / "actuator.toml")
         try:
             for i, (run, recording) in enumerate(recorded(truth, actuator, sensors, load_torque_Nm), 1):
                 on_progress(f"recorded {i} of {len(RUNS)}")

@@ -27,6 +27,13 @@ _ALWAYS = ("load", "motor_speed", "user_position", "time")
 _ONE_WAY = 0.9
 
 
+def worst_moment(residuals: Residuals, region: Region) -> tuple[int, int]:
+    """The recording and the block, of all joined ones, in the region whose residual is most out of its floor."""
+    size = np.abs(residuals.values[region.signal]) / residuals.sigma[region.signal]
+    at = int(np.argmax(np.where(region.blocks & np.isfinite(size), size, -1.0)))
+    return int(residuals.recording[at]), at
+
+
 def worst_regions(
     residuals: Residuals, signal: str, explanations: Sequence[Explanation], axes: Axes, count: int = 5
 ) -> list[Region]:

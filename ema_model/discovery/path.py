@@ -44,8 +44,6 @@ from ema_model.simulation.one_stack import compile_behind
 Progress = Callable[[str], None]
 Array = NDArray[np.float64]
 
-_SAME_CHI2 = 25.0  # between two effects, below which they cannot be told apart
-_SAME_DIRECTION = 1.0 - 0.98**2  # sin² between their signatures, likewise
 _MOVED = 1.5  # σ that a parameter comes back by, when it had been standing in for an effect
 _MOST_PITCHES = 8  # along a linear motor, each of which is simulated
 _NOT_LOOKED_FOR = ("pendulum_load",)  # whoever has an arm on the shaft knows of it
@@ -311,19 +309,3 @@ def refreshed(one: Added, calibration: Calibration) -> Added:
     settings = calibration.actuator.effects[one.key]
     chosen = {name: value for name, value in settings.items() if name not in fitted}
     return replace(one, parameters=fitted, chosen=chosen)
-
-
-def alike(signatures: Mapping[str, Array]) -> dict[str, tuple[str, ...]]:
-    """Effects whose signatures no refit is expected to tell apart, by name."""
-    return {
-        name: tuple(other for other, its in signatures.items() if other != name and _same(own, its))
-        for name, own in signatures.items()
-    }
-
-
-def _same(one: Array, other: Array) -> bool:
-    first, second, shared = one @ one, other @ other, one @ other
-    if min(first, second) == 0.0:
-        return False
-    apart = 1.0 - max(shared, 0.0) ** 2 / (first * second)
-    return bool(apart < _SAME_DIRECTION or max(first, second) * apart < _SAME_CHI2)

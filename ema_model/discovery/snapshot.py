@@ -14,8 +14,9 @@ from ema_model.comparison.criteria import BAND
 from ema_model.comparison.explain import Explanation
 from ema_model.comparison.residuals import Residuals
 from ema_model.discovery import Candidate, Discovery, Story
+from ema_model.discovery.alike import alike
 from ema_model.discovery.criteria import LEAST_BIC
-from ema_model.discovery.path import Step, alike
+from ema_model.discovery.path import Step
 from ema_model.discovery.remaining import Left
 from ema_model.discovery.result import Added
 from ema_model.discovery.tracks import primary

@@ -10,8 +10,8 @@ import numpy as np
 from ema_model.actuator.naming import on_axes
 from ema_model.comparison.summary import calibration_dict, parameter_dict, plain
 from ema_model.discovery.controller_seen import ControllerSeen
+from ema_model.discovery.labels import rung_label
 from ema_model.discovery.result import Added, Discovery, Experiment, Rung
-from ema_model.discovery.words import rung_label
 from ema_model.effects import find
 from ema_model.quantities.axes import Axes
 

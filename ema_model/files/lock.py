@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import errno
 import os
-import sys
 from contextlib import suppress
 from pathlib import Path
+
+import filelock
+
+_NO_LOCKS = (errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP, errno.EINVAL)  # what such file systems answer
 
 
 class FileLock:
@@ -15,65 +19,46 @@ class FileLock:
     number written in a file, it never outlives its owner and cannot be mistaken for another's.
     """
 
-    def __init__(self, path: Path, descriptor: int) -> None:
+    def __init__(self, path: Path) -> None:
         self.path = path
-        self._descriptor = descriptor
+        # Where a file system has no such locks, a marker that outlives a killed process is no substitute.
+        self._lock = filelock.FileLock(path, thread_local=False, fallback_to_soft=False)
 
     @classmethod
-    def acquire(cls, path: Path) -> FileLock | None:
-        """The lock, or None if somebody living holds it.  OSError if the folder cannot be written."""
-        while True:
-            descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
-            if not _try_lock(descriptor):
-                os.close(descriptor)
-                return None
-            # Between opening and locking the former owner may have removed the file; ours would guard nothing.
-            if _is_file_at(descriptor, path):
-                return cls(path, descriptor)
-            os.close(descriptor)
+    def acquire(cls, path: Path, wait_s: float = 0.0) -> FileLock | None:
+        """The lock, or None if somebody living still holds it after `wait_s`, or the file system has none.
+
+        OSError if the folder cannot be written.
+        """
+        if not path.parent.is_dir():  # which filelock would make
+            raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(path.parent))
+        taken = cls(path)
+        try:
+            taken._lock.acquire(wait_s)
+        except filelock.Timeout:
+            return None
+        except OSError as error:
+            if error.errno not in _NO_LOCKS:
+                raise
+            return None
+        return taken
 
     @staticmethod
     def is_held(path: Path) -> bool:
         """Whether somebody living holds the lock; a file that a killed process left is no lock."""
-        try:
-            descriptor = os.open(path, os.O_RDWR)
-        except OSError:
+        if not path.exists():
             return False
         try:
-            return not _try_lock(descriptor)
-        finally:
-            os.close(descriptor)
+            lock = FileLock.acquire(path)
+        except OSError:
+            return False
+        if lock is not None:
+            lock.release()
+        return lock is None
 
     def release(self) -> None:
         """Removes the file and unlocks; a second call does nothing."""
-        if self._descriptor < 0:
-            return
-        descriptor, self._descriptor = self._descriptor, -1
-        if sys.platform == "win32":  # where no open file can be removed
-            os.close(descriptor)
-        with suppress(OSError):
-            self.path.unlink(missing_ok=True)
-        if sys.platform != "win32":
-            os.close(descriptor)
-
-
-def _is_file_at(descriptor: int, path: Path) -> bool:
-    try:
-        return os.path.samestat(os.fstat(descriptor), path.stat())
-    except FileNotFoundError:
-        return False
-
-
-def _try_lock(descriptor: int) -> bool:
-    try:
-        if sys.platform == "win32":
-            import msvcrt
-
-            msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
-        else:
-            import fcntl
-
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        return False
-    return True
+        if self._lock.is_locked:
+            with suppress(OSError):  # while it is held: another's must not go; Windows keeps open files
+                self.path.unlink(missing_ok=True)
+            self._lock.release()

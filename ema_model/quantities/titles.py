@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from ema_model.quantities.si import of_name, without_unit
 
 _PROPER = frozenset(("Stribeck",))
@@ -31,3 +33,8 @@ def in_sentence(title: str) -> str:
     if title[1:2].isupper() or title.partition(" ")[0] in _PROPER:
         return title
     return title[:1].lower() + title[1:]
+
+
+def all_of(names: Sequence[str]) -> str:
+    """'a, b and c'."""
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

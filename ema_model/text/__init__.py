@@ -2,6 +2,30 @@
 
 from __future__ import annotations
 
-from ema_model.text.document import COLOURS, Document, InWords, Lines, Note, Remark, Remarks, Table
+from ema_model.text.document import (
+    COLOURS,
+    Block,
+    Document,
+    Facts,
+    InWords,
+    Lines,
+    Note,
+    Remark,
+    Remarks,
+    Severity,
+    Table,
+)
 
-__all__ = ["COLOURS", "Document", "InWords", "Lines", "Note", "Remark", "Remarks", "Table"]
+__all__ = [
+    "COLOURS",
+    "Block",
+    "Document",
+    "Facts",
+    "InWords",
+    "Lines",
+    "Note",
+    "Remark",
+    "Remarks",
+    "Severity",
+    "Table",
+]

@@ -1,8 +1,8 @@
-"""What a result says, as data: lines, notes, remarks and tables; a terminal and a notebook each show them."""
+"""What a result says, as data: lines, notes, remarks, facts, tables; a terminal, a page and a notebook show them."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from importlib import import_module
@@ -11,9 +11,11 @@ from typing import Literal
 Severity = Literal["good", "bad", "warning", "note"]
 COLOURS: dict[Severity, str] = {"good": "#2b8a3e", "bad": "#e03131", "warning": "#e8590c", "note": "#868e96"}
 _GAP = 3  # characters between the columns of plain text
-_STYLE = "border-collapse:collapse;margin:.6em 0"
-_CELL = "padding:1px 12px 1px 0;text-align:right;border:0"
-_FIRST = "padding:1px 12px 1px 0;text-align:left;border:0"
+_STYLE = "border-collapse:collapse;margin:.6em 0;font-variant-numeric:tabular-nums"
+_CELL = "padding:1px 8px 1px 0;text-align:right;border:0;white-space:nowrap"
+_FIRST = "padding:1px 8px 1px 0;text-align:left;border:0"
+_HEAD = ";font-weight:400;opacity:.65;white-space:normal"
+_NAMES = 24  # characters of a fact's name
 
 
 @dataclass(frozen=True)
@@ -86,6 +88,26 @@ class Remarks:
 
 
 @dataclass(frozen=True)
+class Facts:
+    """Names with what is said of each; below them, what is to be said of all."""
+
+    facts: Mapping[str, str]
+    title: str = ""
+    lines: Sequence[str] = ()
+
+    @property
+    def text(self) -> str:
+        """A line for each, indented below the title."""
+        told = [*(f"{name:{_NAMES}}  {one}" for name, one in self.facts.items()), *self.lines]
+        return Lines(told, self.title).text
+
+    @property
+    def html(self) -> str:
+        """Escaped."""
+        return Table(("",), list(self.facts.items()), self.title).html + (Lines(self.lines).html if self.lines else "")
+
+
+@dataclass(frozen=True)
 class Table:
     """Numbers, each written already; the first cell of a row names it."""
 
@@ -94,6 +116,7 @@ class Table:
     title: str = ""
     remarks: Sequence[str] = ()  # beside the rows, or none at all
     unit: str = ""  # what all numbers are in, said beside the head
+    severities: Sequence[Severity | None] = ()  # of the rows: the colour of their last number
 
     @property
     def text(self) -> str:
@@ -113,17 +136,23 @@ class Table:
     @property
     def html(self) -> str:
         """Escaped."""
-        beside = [self.unit, *(self.remarks or [""] * len(self.rows))]
-        rows = []
-        for i, row in enumerate([(self.title, *self.head), *self.rows]):
-            tag = "th" if i == 0 else "td"
-            cells = "".join(f'<{tag} style="{_CELL}">{escape(cell)}</{tag}>' for cell in row[1:])
-            last = f'<{tag} style="{_FIRST}">{escape(beside[i])}</{tag}>'
-            rows.append(f'<tr><{tag} style="{_FIRST}">{escape(row[0])}</{tag}>{cells}{last}</tr>')
-        return f'<table style="{_STYLE}">{"".join(rows)}</table>'
+        shown = [_cells("th", [self.title, *self.head], self.unit)]
+        for i, row in enumerate(self.rows):
+            severity = self.severities[i] if self.severities else None
+            colour = f";color:{COLOURS[severity]}" if severity else ""
+            shown.append(_cells("td", row, self.remarks[i] if self.remarks else "", colour))
+        return f'<div style="overflow-x:auto"><table style="{_STYLE}">{"".join(shown)}</table></div>'
 
 
-Block = Lines | Note | Remarks | Table
+def _cells(tag: str, row: Sequence[str], beside: str, colour: str = "") -> str:
+    styles = [_FIRST, *([_CELL] * (len(row) - 1)), _FIRST]
+    styles[len(row) - 1] += colour
+    styles = [style + (_HEAD if tag == "th" else "") for style in styles]
+    cells = (f'<{tag} style="{style}">{escape(cell)}</{tag}>' for style, cell in zip(styles, (*row, beside)))
+    return f"<tr>{''.join(cells)}</tr>"
+
+
+Block = Facts | Lines | Note | Remarks | Table
 
 
 @dataclass(frozen=True)

@@ -69,7 +69,7 @@ def run(arguments: argparse.Namespace, actuator: Actuator) -> int:
         progress.done()
     if arguments.save_actuator:
         save_actuator(result.type_actuator, arguments.save_actuator)
-    output.write_json(arguments.json, as_dict(result), arguments.seed, output.configuration(arguments))
+    output.write_json(arguments, as_dict(result))
     print(result)
     return 0
 

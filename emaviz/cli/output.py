@@ -15,18 +15,19 @@ from ema_model.files.whole_file import whole_file
 from emaviz import __version__
 
 
-def write_json(path: str | None, result: dict[str, Any], seed: int, configuration: dict[str, Any]) -> None:
-    """Writes a result with its schema, versions, seed and configuration, whole or not at all; nothing without a path.
+def write_json(arguments: Any, result: dict[str, Any]) -> None:
+    """Writes a result with its schema, versions, seed and options to --json, whole or not at all; nothing without it.
 
     InputError if it cannot be written.
     """
+    path = arguments.json
     if path is None:
         return
     document = {
         "schema": 1,
         "versions": {"emaviz": __version__, "numpy": np.__version__, "numba": numba.__version__},
-        "seed": seed,
-        "configuration": configuration,
+        "seed": getattr(arguments, "seed", 0),
+        "configuration": configuration(arguments),
         **result,
     }
     try:

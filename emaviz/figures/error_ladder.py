@@ -7,7 +7,7 @@ import math
 import plotly.graph_objects as go
 
 from ema_model.discovery import Discovery
-from ema_model.discovery.words import rung_title
+from ema_model.discovery.labels import rung_title
 from ema_model.quantities.numbers import number
 from emaviz.figures import theme
 

@@ -6,8 +6,8 @@ import re
 from collections.abc import Sequence
 
 from ema_model.discovery import Discovery
+from ema_model.discovery.labels import effect_title, settings
 from ema_model.discovery.result import Added
-from ema_model.discovery.words import effect_title, settings
 from ema_model.effects import Effect, find
 from ema_model.effects.effect import STAGES
 from emaviz.colours import ALGORITHMS, MONITOR, TRUTH

@@ -6,8 +6,8 @@ and do their work in the process that reads logs, so that rerun is loaded there 
 
 from __future__ import annotations
 
+from ema_model.members import members
 from ema_model.recordings.formats import add_format
-from emaviz.formats import mcap, rrd
 
-for _one in (mcap, rrd):
-    add_format(_one.FORMAT)
+for _format in members(__name__, "FORMAT").values():
+    add_format(_format)

@@ -9,14 +9,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ema_model.actuator.naming import on_axes
+from ema_model.comparison.regions import worst_moment
 from ema_model.comparison.result import Compared, Comparison
 from ema_model.comparison.summary import as_dict
+from ema_model.comparison.words import details, verdict
 from ema_model.errors import InputError
 from ema_model.estimation.floor import BAND_SIGMAS
-from ema_model.quantities.shown import of_signal
+from ema_model.estimation.words import convergence, warnings
+from ema_model.text import Lines, Note
+from emaviz.recording.configured import configured
 from emaviz.recording.errors import RecordingError
-from emaviz.recording.markdown import escaped
+from emaviz.recording.markdown import written
 from emaviz.recording.style import COMPARISON, plain
 from emaviz.recording.writer import RecordingWriter
 
@@ -45,7 +48,7 @@ def write_comparison(comparison: Comparison, path: str | Path, configuration: Ma
             for name in _not_compared(comparison):
                 values = [one.measurement.get(name) for one in comparison.recordings]
                 _write(writer, "measurement", name, raw, values)
-            writer.finding("answer", _answer(comparison))
+            writer.finding("answer", written(f"The model is {verdict(comparison)}", comparison.document.blocks))
             writer.finding("regions", _regions(comparison, times))
     except RecordingError as error:
         raise InputError(str(error)) from None
@@ -142,53 +145,23 @@ def _not_compared(comparison: Comparison) -> list[str]:
     return [name for name in names if name != "time_s" and name not in comparison.signals]
 
 
-def _answer(comparison: Comparison) -> str:
-    verdict = "The model is adequate." if comparison.adequate else "The model is not adequate."
-    lines = [f"# {escaped(verdict)}", "", *(f"{escaped(sentence)}\n" for sentence in comparison.sentences)]
-    lines += [f"- ⚠ {escaped(warning)}" for warning in comparison.warnings]
-    lines += ["", "| signal | rmse | before calibration | floor |", "|---|---|---|---|"]
-    for name, error in comparison.signals.items():
-        shown = error.quantity(of_signal(name, comparison.actuator.axes))
-        row = " | ".join(shown.text(value) for value in (error.rmse, error.rmse_initial, error.noise_floor))
-        lines.append(f"| {escaped(name)} | {row} |")
-    return "\n".join(lines)
-
-
 def _regions(comparison: Comparison, times: Sequence[Array]) -> str:
-    lines = ["# Worst regions", ""]
-    residuals, time = comparison.residuals, np.concatenate(times)
-    for i, region in enumerate(comparison.worst_regions):
-        size = np.abs(residuals.values[region.signal]) / residuals.sigma[region.signal]
-        at = int(np.argmax(np.where(region.blocks & np.isfinite(size), size, -1.0)))
-        lines.append(
-            f"{i + 1}. **{escaped(region.sentence)}** {region.excess:.3g} times the floor; worst at {time[at]:.4g} s."
-        )
-    return "\n".join(lines if comparison.worst_regions else [*lines, "No region stands out of the floor."])
+    if not comparison.worst_regions:
+        return written("Worst regions", [Lines(["No region stands out of the floor."])])
+    time = np.concatenate(times)
+    told = []
+    for region in comparison.worst_regions:
+        _, at = worst_moment(comparison.residuals, region)
+        told.append(Lines([details(comparison, region), f"Worst at {time[at]:.4g} s."], region.sentence))
+    return written("Worst regions", told)
 
 
 def _configuration(
     comparison: Comparison, times: Sequence[Array], shifts: Sequence[float], configuration: Mapping[str, Any]
 ) -> str:
     settings = {"actuator": comparison.actuator.name, **configuration}
-    lines = ["# Comparison", "", "| setting | value |", "|---|---|"]
-    lines += [f"| {escaped(k)} | {escaped(v)} |" for k, v in settings.items() if v not in (None, [], "")]
-    lines.append(f"| block | {1e3 * comparison.residuals.block_s:.4g} ms |")
-    for i, (one, time, shift) in enumerate(zip(comparison.recordings, times, shifts)):
-        moved = f", moved by {shift:.4g} s" if shift else ""
-        lines.append(f"| recording {i + 1} | {escaped(one.name)}: {time[0]:.4g} … {time[-1]:.4g} s{moved} |")
-    fit = comparison.calibration
-    if fit is not None:
-        lines += [
-            "",
-            "# Calibration",
-            "",
-            "| parameter | value | 90 % interval | unit | z [σ] |",
-            "|---|---|---|---|---|",
-        ]
-        for path, found in fit.parameters.items():
-            name = on_axes(path, comparison.actuator.axes).path
-            low, high = found.interval90
-            lines.append(
-                f"| {escaped(name)} | {found.value:.5g} | {low:.5g} … {high:.5g} | {found.unit} | {found.z:.2f} |"
-            )
-    return "\n".join(lines) + "\n"
+    settings["block"] = f"{1e3 * comparison.residuals.block_s:.4g} ms"
+    said = configured(settings, [one.name for one in comparison.recordings], times, shifts)
+    fit, axes = comparison.calibration, comparison.actuator.axes
+    told = [] if fit is None else [Lines([convergence(fit)]), *map(Note, warnings(fit, axes))]
+    return written("Comparison", [said, *told])

@@ -7,6 +7,8 @@ from collections.abc import Iterable, Sequence
 
 from ema_model.text import Table
 
+_STRONG = "\x1e"  # before the number that a row is marked by
+
 
 def escape(text: object) -> str:
     """Text as HTML shows it, in an element or in a quoted attribute."""
@@ -52,8 +54,12 @@ def with_remarks(told: Table) -> str:
     """A table of a result's document; what stands beside its rows is a last column."""
     remarks = told.remarks or [""] * len(told.rows)
     beside = any(remarks)
-    rows = [[*row, *([remark] if beside else [])] for row, remark in zip(told.rows, remarks)]
-    return table([told.title, *told.head, *([""] if beside else [])], rows)
+    strong = [one in ("warning", "bad") for one in told.severities] or [False] * len(told.rows)
+    rows = [
+        [*row[:-1], f"{_STRONG if marked else ''}{row[-1]}", *([remark] if beside else [])]
+        for row, remark, marked in zip(told.rows, remarks, strong)
+    ]
+    return table([told.title, *told.head, *([""] if beside else [])], rows, marked=_STRONG)
 
 
 def link(anchor: str, text: object) -> str:

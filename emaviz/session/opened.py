@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +47,12 @@ def side_file_of(path: Path, folder: DataFolder) -> SideFile | None:
     if found != beside and not folder.holds(found):
         raise InputError(f"{found.name} leads out of the data folder; replace the link by the file")
     return read_side_file(found)
+
+
+def side_with(opened: Opened, folder: DataFolder, **said: Any) -> SideFile:
+    """The recording's side file with what somebody has said now, which is kept beside the recording itself."""
+    known = side_file_of(opened.path, folder) or SideFile()
+    return replace(known, **said, path=str(folder.beside(opened.path)))
 
 
 def read_opened(name: str, path: Path, actuator: Actuator, side: SideFile) -> Opened:

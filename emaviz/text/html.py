@@ -13,8 +13,6 @@ from collections.abc import Iterable
 from html import escape as _escape
 from typing import TYPE_CHECKING, Any, LiteralString
 
-from ema_model.text import Table
-
 if TYPE_CHECKING:
     import viser
 
@@ -52,28 +50,6 @@ def html(template: LiteralString, *values: object, **named: object) -> Html:
 def joined(parts: Iterable[str], between: LiteralString = "") -> Html:
     """Pieces one after another, escaped where they are plain text."""
     return unescaped(between.join(escape(part) for part in parts))
-
-
-def table_of(told: Table | None, title: str) -> Html:
-    """A table of a result's document, folded below its title; nothing for none."""
-    if told is None:
-        return Html()
-    remarks = told.remarks or [""] * len(told.rows)
-    lines = []
-    for i, (row, remark) in enumerate(zip(((told.title, *told.head), *told.rows), ("", *remarks))):
-        shade = ";font-weight:400;opacity:.65" if i == 0 else ""
-        sides = ("left", *(["right"] * len(told.head)))
-        cells = [html('<td style="text-align:{}{}">{}</td>', side, shade, text) for side, text in zip(sides, row)]
-        lines.append(html('<tr>{}<td style="padding-left:8px;opacity:.65">{}</td></tr>', joined(cells), remark))
-    style = "width:100%;border-collapse:collapse;font-variant-numeric:tabular-nums"
-    return html(
-        '<details><summary style="cursor:pointer">{} <span style="opacity:.65">{}</span></summary>'
-        '<table style="{}">{}</table></details>',
-        title,
-        told.unit,
-        style,
-        joined(lines),
-    )
 
 
 def add_html(gui: viser.GuiApi, content: str = "", *, visible: bool = True) -> HtmlPiece:

@@ -15,7 +15,7 @@ from ema_model.discovery.result import Change
 from ema_model.discovery.words import faults, headline, sentences
 from ema_model.errors import InputError
 from emaviz.page.discover.result import answer
-from emaviz.page.discover.reveal import agrees, reveal
+from emaviz.session.discover.beside_truth import agrees, document_of
 from emaviz.session.discover.saved_story import story_of
 
 
@@ -70,12 +70,14 @@ def test_reveal_holds_the_faults_against_the_truth(worn):
     truth = worn.source.reveal()
     assert truth.faults == {"k2": 0.2}
     assert agrees(truth, worn.look.found, ())
-    told = reveal(truth, worn.look.found, ())
+    told = document_of(truth, worn.look.found, ()).text
     assert "Your answer agrees" in told and "k2 0.2 in truth" in told
     nothing = Truth("", 0, "nothing")
-    assert not agrees(nothing, worn.look.found, ()) and "not hidden here" in reveal(nothing, worn.look.found, ())
+    assert (
+        not agrees(nothing, worn.look.found, ()) and "not hidden here" in document_of(nothing, worn.look.found, ()).text
+    )
     shorted = Truth("", 0, "a short", faults={"k3": 0.4})
-    assert not agrees(shorted, worn.look.found, ()) and "not found" in reveal(shorted, worn.look.found, ())
+    assert not agrees(shorted, worn.look.found, ()) and "not found" in document_of(shorted, worn.look.found, ()).text
 
 
 @pytest.mark.long

@@ -19,9 +19,9 @@ from emaviz.page.discover import cards as discover_cards
 from emaviz.page.discover.actuator import _SHOWN, run_of
 from emaviz.page.discover.guide import STEPS, step
 from emaviz.page.discover.next_experiment import as_csv
-from emaviz.page.discover.reveal import agrees, reveal
 from emaviz.recording.read import read
 from emaviz.scene.motion import motion
+from emaviz.session.discover.beside_truth import agrees, document_of
 
 EASY = "first_bench_run"
 
@@ -71,7 +71,7 @@ def test_a_prediction_is_what_the_refit_gives(fresh):
     assert not fresh.look.promising, "nothing else is hidden"
     truth = fresh.source.reveal()
     assert agrees(truth, fresh.look.found, fresh.look.added)
-    assert "Your answer agrees" in reveal(truth, fresh.look.found, fresh.look.added)
+    assert "Your answer agrees" in document_of(truth, fresh.look.found, fresh.look.added).text
     assert not agrees(truth, fresh.look.found, ())
 
 

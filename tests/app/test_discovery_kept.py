@@ -14,7 +14,7 @@ from ema_model.actuator import load_actuator
 from ema_model.discovery.result import Experiment
 from ema_model.effects.user import user_torque
 from ema_model.errors import InputError
-from emaviz.page.discover.reveal import agrees, reveal
+from emaviz.session.discover.beside_truth import agrees, document_of
 from emaviz.session.discover.sealing import sensors_of, truth_of
 from emaviz.session.settings import Settings
 
@@ -69,7 +69,7 @@ def test_what_was_sealed_in_explore_is_found_and_revealed(solved):
     assert truth.effects == {"cogging_torque": HIDDEN} and not truth.faults
     assert "cogging torque of order 12" in truth.answer
     assert agrees(truth, found, added[:1])
-    assert "Your answer agrees" in reveal(truth, found, added[:1])
+    assert "Your answer agrees" in document_of(truth, found, added[:1]).text
     assert found.ladder[1].rmse < 1.1 < found.ladder[0].rmse
     amplitude = added[0].parameters["amplitude_Nm"].value
     assert amplitude == pytest.approx(0.02, rel=0.1)

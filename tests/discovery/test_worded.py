@@ -7,10 +7,10 @@ from dataclasses import replace
 
 from support.discovered import with_cogging
 
+from ema_model.discovery.labels import rung_label
 from ema_model.discovery.result import Change, StoodIn
 from ema_model.discovery.sentences import NOT_REPEATABLE, masked, untold
 from ema_model.discovery.summary import as_dict
-from ema_model.discovery.words import rung_label
 from ema_model.quantities.axes import ROTARY, Axes
 from emaviz.report import write_discovery_report
 

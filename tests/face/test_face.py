@@ -13,7 +13,9 @@ import pytest
 
 import ema_model as em
 from ema_model.recordings import write_measurement
-from ema_model.text import Document, Lines, Note, Table
+from ema_model.text import Document, Facts, Lines, Note, Remark, Remarks, Table
+from emaviz.recording.markdown import written
+from emaviz.text.told import shown
 
 PROJECT = Path(__file__).parents[2]
 NOTEBOOKS = sorted((PROJECT / "assets" / "notebooks").glob("*.ipynb"))
@@ -80,6 +82,24 @@ def test_a_table_is_aligned():
         "  calibrated    1.785      2.345",
         "  + effect      0.719",
     ]
+
+
+def test_every_block_is_shown_everywhere_and_escaped():
+    blocks = [
+        Lines(["a line of <b>", "another"], "lines"),
+        Note("a note of <b>"),
+        Remarks([Remark("a remark", "of <b>", "bad")]),
+        Facts({"fact_of": "<b> 1"}, "facts", ["said of all"]),
+        Table(("head",), [["row", "1.0 | <b>"]], "table", ["beside"], "in A", ["warning"]),
+    ]
+    told = Document(blocks)
+    recording = written("title", blocks)
+    for page in (told.html, "".join(shown(one) for one in blocks)):
+        assert "<b>1" not in page and page.count("&lt;b&gt;") == 5
+    assert recording.count("&lt;b>") == 5 and "1.0 \\| &lt;b>" in recording and r"fact\_of" in recording
+    assert told.text.count("<b>") == 5
+    for word in ("another", "a note", "a remark", "said of all", "beside", "in A", "head"):
+        assert word in told.text and word in told.html and word in recording, word
 
 
 def test_nothing_is_loaded_before_it_is_asked_for():

@@ -8,6 +8,7 @@ from __future__ import annotations
 import itertools
 import json
 import sys
+from argparse import Namespace
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -57,7 +58,7 @@ def _read_rrd(path: Path) -> np.ndarray:
 # By the file's name: saves a number, as often as it goes in; reads them back, all of them.
 KINDS: dict[str, tuple[Callable[[Path, int], None], Callable[[Path], object]]] = {
     "a.json": (
-        lambda path, n: write_json(str(path), {"numbers": [n] * SIZE}, 0, {}),
+        lambda path, n: write_json(Namespace(json=str(path)), {"numbers": [n] * SIZE}),
         lambda path: json.loads(path.read_text())["numbers"],
     ),
     "a.csv": (

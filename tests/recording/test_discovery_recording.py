@@ -79,7 +79,9 @@ def test_words_tell_the_verdict_the_effect_and_the_candidates(found, written):
     for told in ("The model lacks cogging torque.", f"{1e3 * value:.1f} ± ", "mN·m", "| 12 |", "+ Cogging torque"):
         assert told in verdict[0], told
     [ranking] = _columns(written, "/discovery/candidates", "TextDocument:text")
-    assert "| 1 | Cogging torque |" in ranking[0] and "Dead time: these recordings cannot show it" in ranking[0]
+    assert (
+        "|\n| Cogging torque |" in ranking[0] and "| Dead time | – |  | these recordings cannot show it" in ranking[0]
+    )
     told = read(written).properties["discovery"]
     assert told["verdict"] == "effects_found" and told["effects"][0]["name"] == "cogging_torque"
 

@@ -161,12 +161,18 @@ side_files = st.builds(
 @settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(side_files)
 def test_written_and_read_back(tmp_path, side):
+    """Over whatever was there before, with somebody's comments in it."""
     path = tmp_path / "a.toml"
+    if path.exists():
+        path.write_text(f"# of the bench\n{path.read_text(encoding='utf-8')}# the end\n", encoding="utf-8")
     write_side_file(side, path)
     again = read_side_file(path)
     assert again.path == str(path)
-    for name in ("actuator", "kind", "sampling", "mapping", "sensors", "window_s", "segments", "text"):
+    for name in ("actuator", "kind", "sampling", "sensors", "window_s", "segments", "text"):
         assert getattr(again, name) == getattr(side, name)
+    found, wanted = ({one.signal: one for one in (m.entries if m else ())} for m in (again.mapping, side.mapping))
+    assert found == wanted
+    path.write_text(path.read_text(encoding="utf-8").replace("# of the bench\n", ""), encoding="utf-8")
 
 
 def test_a_window_open_at_one_end(tmp_path):

@@ -11,7 +11,7 @@ from ema_model.comparison.result import SignalError
 from ema_model.comparison.verdict import judge
 from ema_model.comparison.words import held_out
 from emaviz.page.compare.result import headline
-from emaviz.recording.comparison import _answer
+from emaviz.recording.markdown import written
 from emaviz.report.comparison.errors_per_signal import ErrorsPerSignal
 
 SIZES = {  # of the error and its floor, A: as both are to be read
@@ -31,13 +31,16 @@ def test_an_error_reads_alike_wherever_it_is_told(sizes, comparison):
     told = replace(comparison, signals={"current_A": error}, recordings=[])
     sentence = judge(comparison.residuals, comparison.signals | told.signals, None, comparison.actuator).sentences[-1]
     assert f"{size} {unit} rms" in sentence and f"{least} {unit}" in sentence
-    row = next(line for line in str(told).splitlines() if line.startswith("  current_A ")).split()
-    assert row[1] == size and row[3] == least and row[-1] == unit
-    page = headline(told)
-    assert f"Equivalent current [{unit}]" in page and f">{size}<" in page and f">{least}<" in page
+    row = next(line for line in str(told).splitlines() if line.startswith("  Equivalent current ")).split()
+    assert row[3] == size and row[4] == least and row[-1] == unit  # behind its name and what it was before
+    page, notebook = headline(told), told._repr_html_()
     report = ErrorsPerSignal().body(told, None)  # pyright: ignore[reportArgumentType]
-    assert f"{size} {unit}" in report and f"{least} {unit}" in report
-    assert f"| {size} {unit} |" in _answer(told) and f"| {least} {unit} |" in _answer(told)
+    for one in (page, notebook, report):
+        cells = re.findall(r">([^<>]+)</td>", one)
+        at = cells.index("Equivalent current")
+        assert cells[at + 2 : at + 4] == [size, least] and unit in cells[at:]
+    recording = written("The answer", told.document.blocks)
+    assert f" | {size} | {least} | " in recording and f" | {unit} |" in recording
     unseen = replace(comparison.recordings[0], errors=told.signals)
     assert f"{size} {unit} (floor {least} {unit})" in held_out(unseen)
 

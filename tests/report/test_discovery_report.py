@@ -79,7 +79,7 @@ def test_ladder_tells_every_signal_in_its_unit(report, found):
 
 def test_candidates_that_cannot_be_shown_are_told(report):
     text = _section(report, "candidates")
-    assert "Dead time: these recordings cannot show it" in text and "Cogging torque" in text
+    assert ">Dead time</td>" in text and "these recordings cannot show it" in text and "Cogging torque" in text
 
 
 def test_it_says_how_it_was_made(report):

@@ -10,6 +10,7 @@ from typing import Any
 from ema_model.errors import InputError, quoted
 from ema_model.files.limits import TEXT_BYTES
 from ema_model.files.toml_text import toml_of
+from ema_model.files.toml_write import inline, toml_text
 from ema_model.files.user_file import open_user_file
 
 _DEEPEST = 5  # plans that are like others
@@ -46,8 +47,6 @@ def _over(above: dict[str, Any], below: dict[str, Any], depth: int = 0) -> dict[
 
 def plan_text(document: Mapping[str, Any], file: Path) -> str:
     """The whole plan as one file, with whole paths of what it names."""
-    from ema_model.campaign.toml_write import toml_text
-
     groups = {}
     for name, table in document["groups"].items():
         table = dict(table)
@@ -56,7 +55,14 @@ def plan_text(document: Mapping[str, Any], file: Path) -> str:
         if "recordings" in table:
             table["recordings"] = _whole_paths(table["recordings"], file.parent.resolve())
         groups[name] = table
-    return toml_text({**document, "groups": groups})
+    return toml_text({name: _at_the_top(one) for name, one in {**document, "groups": groups}.items()})
+
+
+def _at_the_top(entry: Any) -> Any:
+    """Tables of tables stay so, and what is in them stands on a line."""
+    if not isinstance(entry, dict):
+        return inline(entry)
+    return {name: {key: inline(value) for key, value in table.items()} for name, table in entry.items()}
 
 
 def _whole_paths(entry: Any, beside: Path) -> Any:

@@ -96,13 +96,22 @@ def read_side_file(path: str | os.PathLike[str]) -> SideFile:
     path = os.fspath(path)
     try:
         with open_user_file(path, "the side file of a recording", TEXT_BYTES) as file:
-            return _parsed(path, toml_of(file.read().decode("utf-8")))
+            text = file.read().decode("utf-8")
     except InputError:
         raise
     except UnicodeDecodeError:
         raise refusal(path, "is not text in UTF-8; save it as UTF-8") from None
     except OSError as error:
         raise refusal(path, f"cannot be read ({reason(error)}); check the name and the permissions") from None
+    return parse_side_file(text, path)
+
+
+def parse_side_file(text: str, path: str) -> SideFile:
+    """The side file of a text, which stands at the path; InputError, one line, for whatever is wrong in it."""
+    try:
+        return _parsed(path, toml_of(text))
+    except InputError:
+        raise
     except ValueError as error:
         raise refusal(path, f"is not valid TOML: {shown(error, 120)}; correct it") from None
 

@@ -75,7 +75,7 @@ def _run(plan: Plan, arguments: argparse.Namespace) -> int:
     finally:
         progress.done()
     print(_ended(status, arguments.out))
-    output.write_json(arguments.json, _numbers(Store(arguments.out)), 0, output.configuration(arguments))
+    output.write_json(arguments, _numbers(Store(arguments.out)))
     return 0
 
 
@@ -119,14 +119,14 @@ def _dry_run(plan: Plan, arguments: argparse.Namespace) -> int:
         print(f"{group:28}{kind:10}{left:8} of {len(tasks)}   {duration(seconds)} on one core ({how})")
     print(f"{workers} workers: about {total / 3600.0:.2g} h ({duration(total)})")
     numbers = {"tasks": len(plan.tasks), "there": len(there), "workers": workers, "seconds": total}
-    output.write_json(arguments.json, numbers, 0, output.configuration(arguments))
+    output.write_json(arguments, numbers)
     return 0
 
 
 def _status(arguments: argparse.Namespace) -> int:
     store = Store(arguments.folder)
     print(progress_table(store))
-    output.write_json(arguments.json, _numbers(store), 0, output.configuration(arguments))
+    output.write_json(arguments, _numbers(store))
     return 0
 
 
@@ -137,7 +137,7 @@ def _report(arguments: argparse.Namespace) -> int:
     print(report_text(store))
     path = Path(arguments.folder) / "report.html"
     write_campaign_report(store, path)
-    output.write_json(arguments.json, _numbers(store), 0, output.configuration(arguments))
+    output.write_json(arguments, _numbers(store))
     return 0
 
 

@@ -70,7 +70,7 @@ def run(arguments: argparse.Namespace) -> int:
         progress.done()
     if result.calibration is not None and arguments.save_actuator:
         save_actuator(result.calibration.actuator, arguments.save_actuator)
-    output.write_json(arguments.json, as_dict(result), arguments.seed, output.configuration(arguments))
+    output.write_json(arguments, as_dict(result))
     print(result)
     return 0
 

@@ -53,7 +53,7 @@ def run(arguments: argparse.Namespace) -> int:
             }
     finally:
         progress.done()
-    output.write_json(arguments.json, plain(document), arguments.seed, output.configuration(arguments))
+    output.write_json(arguments, plain(document))
     print(told)
     _write(found, arguments)
     return 0

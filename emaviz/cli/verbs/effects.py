@@ -14,7 +14,7 @@ from ema_model.quantities.axes import Axes
 from ema_model.quantities.variables import VARIABLES
 from emaviz.cli import files
 from emaviz.cli.options import add_json
-from emaviz.cli.output import configuration, write_json
+from emaviz.cli.output import write_json
 
 HELP = "list the physical effects that can be added to the models, or explain one"
 PLACE = 8
@@ -33,7 +33,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Prints the list or the explanation, or writes the pages."""
     if arguments.name in KEYS:
         print(explain_users(arguments.name))
-        write_json(arguments.json, {"effects": [_users_facts(arguments.name)]}, 0, configuration(arguments))
+        write_json(arguments, {"effects": [_users_facts(arguments.name)]})
         return 0
     chosen = [find(arguments.name)] if arguments.name else list(CATALOGUE.values())
     if arguments.html:
@@ -49,9 +49,7 @@ def run(arguments: argparse.Namespace) -> int:
         for name in KEYS:
             print(f"{name:{width}}  {'yours':9}  {TITLES[name]}")
     users = [] if arguments.name else [_users_facts(name) for name in KEYS]
-    write_json(
-        arguments.json, {"effects": [*(_facts(effect) for effect in chosen), *users]}, 0, configuration(arguments)
-    )
+    write_json(arguments, {"effects": [*(_facts(effect) for effect in chosen), *users]})
     return 0
 
 

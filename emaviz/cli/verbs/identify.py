@@ -94,7 +94,7 @@ def run(arguments: argparse.Namespace) -> int:
         found = replace(actuator.with_values(answer.parameters), faults=faults.named(answer.k))
         save_actuator(found, arguments.save_actuator)
     document = result(answer, actuator, holdout_rmse)
-    output.write_json(arguments.json, document, arguments.seed, output.configuration(arguments))
+    output.write_json(arguments, document)
     print(answer)
     if unseen and holdout_rmse is None:
         print("the model diverges on what was not fitted")

@@ -34,6 +34,6 @@ def run(arguments: argparse.Namespace) -> int:
     except RecordingError as error:
         raise InputError(str(error)) from None
     result = {"file": str(target), "bytes": target.stat().st_size}
-    output.write_json(arguments.json, result, 0, output.configuration(arguments))
+    output.write_json(arguments, result)
     print(f"{target}: recovered from {part.name}, which is removed")
     return 0

@@ -55,7 +55,7 @@ def run(arguments: argparse.Namespace) -> int:
         write_reproduction(found, responses, folder / RECORDING)
     finally:
         progress.done()
-    output.write_json(arguments.json, dict(found.as_dict()), 0, output.configuration(arguments))
+    output.write_json(arguments, dict(found.as_dict()))
     print(aligned(*short_table(found)))
     print("", *answer(found), sep="\n")
     if status.errors:

@@ -67,7 +67,7 @@ def run(arguments: argparse.Namespace) -> int:
         "effects": effects,
         "rms": {name: float(np.sqrt(np.mean(signals[name] ** 2))) for name in signals.signals if name != "time_s"},
     }
-    output.write_json(arguments.json, summary, arguments.seed, output.configuration(arguments))
+    output.write_json(arguments, summary)
     rate = 1.0 / signals.sample_period_s
     print(f"{arguments.out}: {signals.samples} samples, {signals.duration_s:g} s at {rate:g} Hz")
     return 0

@@ -100,7 +100,7 @@ def _tell(
 
         write_tracking_report(result, actuator.name, arguments.report)
     progress.done()
-    output.write_json(arguments.json, as_dict(result), arguments.seed, output.configuration(arguments))
+    output.write_json(arguments, as_dict(result))
     print(result, flush=True)
 
 

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
-from ema_model.quantities.numbers import number
 from ema_model.recordings import SIGNALS, ColumnMapping, MappedColumn
 from ema_model.recordings.health.card import Finding, Health
-from emaviz.figures.calibration_scores import Score
 from emaviz.session.opened import Opened
 from emaviz.text.html import Html, html, joined
 
@@ -91,35 +89,6 @@ def _finding(finding: Finding) -> Html:
         _mark(finding.severity),
         finding.sentence,
     )
-
-
-def calibration_table(scores: Sequence[Score]) -> Html:
-    """What each parameter was found to be, its 90 % interval, and how many σ that is from the file."""
-    if not scores:
-        return Html()
-    rows = []
-    for score in scores:
-        colour = "#e03131" if score.at_bound else "inherit"
-        moved = f"{round(score.z, 2) + 0.0:+.2f} σ{' at its bound' if score.at_bound else ''}"
-        moved = moved.replace("-", "−")
-        interval = f"{number(score.low)} … {number(score.high)}"
-        rows.append(
-            html(
-                "<tr><td>{}</td>"
-                '<td style="text-align:right;white-space:nowrap">{}</td>'
-                '<td style="text-align:right;white-space:nowrap;padding-left:8px">{}</td>'
-                '<td style="padding-left:6px">{}</td>'
-                '<td style="text-align:right;white-space:nowrap;color:{}">{}</td></tr>',
-                score.title,
-                number(score.value, 4),
-                interval,
-                score.unit,
-                colour,
-                moved,
-            )
-        )
-    heads = ("parameter", "left"), ("value", "right"), ("90 % interval", "right"), ("", "left"), ("from file", "right")
-    return html("<div {}>{}</div>", _BOX, _table(heads, rows))
 
 
 def _table(heads: Iterable[tuple[str, str]], rows: Iterable[str]) -> Html:

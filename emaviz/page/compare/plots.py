@@ -10,6 +10,7 @@ import plotly.graph_objects as go
 import viser
 
 from ema_model.comparison.result import Comparison, Region
+from ema_model.estimation.words import calibration_table
 from ema_model.quantities.variables import VARIABLES
 from emaviz.figures import (
     calibration_scores,
@@ -21,9 +22,9 @@ from emaviz.figures import (
     residual_polar,
     residual_time,
 )
-from emaviz.page.compare.cards import calibration_table
 from emaviz.page.page import Page
 from emaviz.text.html import add_html
+from emaviz.text.told import shown
 
 _CONFIG = {"displayModeBar": False}
 _FIRST = next(iter(VARIABLES))
@@ -95,7 +96,8 @@ class ComparePlots:
         self._variable.options = tuple(self._variables) or (_EMPTY,)
         first = comparison.explained_by[0].variable if comparison.explained_by else ""
         self._choose(comparison.primary, first)
-        self._numbers.content = calibration_table(calibration_scores.scores(comparison))
+        fit = comparison.calibration
+        self._numbers.content = shown(calibration_table(fit, comparison.actuator.axes) if fit is not None else None)
         self._draw(list(self._all()))
 
     def show(self, view: View) -> None:

@@ -6,14 +6,13 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
 import viser
 
+from ema_model.comparison.regions import worst_moment
 from ema_model.comparison.result import Comparison, Region
-from ema_model.comparison.words import per_recording
+from ema_model.comparison.words import details, errors, errors_by_recording
 from ema_model.errors import InputError
-from ema_model.quantities.numbers import number
-from emaviz.figures import mapped_columns, quantity
+from emaviz.figures import mapped_columns
 from emaviz.page.compare import WORKSPACE
 from emaviz.page.compare.moment import motion_of
 from emaviz.page.compare.plots import ComparePlots, View
@@ -23,7 +22,8 @@ from emaviz.page.page import Page
 from emaviz.page.playback import PlaybackStrip
 from emaviz.server.viser_private import selector_of
 from emaviz.session.opened import Opened
-from emaviz.text.html import Html, add_html, html, joined, table_of, unescaped
+from emaviz.text.html import Html, add_html, html, joined, unescaped
+from emaviz.text.told import folded, large, shown, warned
 
 _BOX = Html('style="padding:2px 12px 6px;font-size:13px;line-height:1.45"')
 _CARD = "height:auto!important;min-height:2em;padding:4px 8px;font-weight:400;font-size:13px;"
@@ -133,7 +133,8 @@ class ResultPanel:
             return
         region = comparison.worst_regions[index]
         self._region = region
-        recording, time_s = worst_moment(comparison, region)
+        recording, block = worst_moment(comparison.residuals, region)
+        time_s = float(comparison.residuals.time_s[block])
         self._style_regions(index)
         self._recording.value = self._recording.options[recording]
         self._put(recording, time_s)
@@ -149,7 +150,7 @@ class ResultPanel:
         with self._answer:
             for i, region in enumerate(comparison.worst_regions):
                 button = self._page.server.gui.add_button(
-                    region.sentence, icon=viser.Icon.FOCUS_2, hint=_details(comparison, region)
+                    region.sentence, icon=viser.Icon.FOCUS_2, hint=details(comparison, region)
                 )
                 button.on_click(lambda _, i=i: self._page.screen.post("region", lambda: self.select(i)))
                 self._buttons.append(button)
@@ -197,66 +198,17 @@ class ResultPanel:
         self._drawn_at = time.monotonic()
 
 
-def worst_moment(comparison: Comparison, region: Region) -> tuple[int, float]:
-    """The recording and the time, s, of the block in the region whose residual is most above its floor."""
-    residuals = comparison.residuals
-    size = np.abs(residuals.values[region.signal]) / residuals.sigma[region.signal]
-    at = int(np.nanargmax(np.where(region.blocks, size, -1.0)))
-    return int(residuals.recording[at]), float(residuals.time_s[at])
-
-
 def headline(comparison: Comparison) -> Html:
     """The sentences and, for each signal, error against floor."""
     first, *others = comparison.sentences or ("",)
     regions = {region.sentence for region in comparison.worst_regions}  # which stand in their own list
-    colour = "#2b8a3e" if comparison.adequate else "#e03131"
-    rows = []
-    for name, error in comparison.signals.items():
-        shown = error.quantity(quantity.of_signal(comparison, name))
-        ratio = error.rmse / error.noise_floor if error.noise_floor > 0.0 else np.inf
-        shade = "#2b8a3e" if ratio < 1.2 else "#e8590c" if ratio < 2.0 else "#e03131"
-        before = (
-            html('<td style="text-align:right;opacity:.65">{}</td>', number(shown.factor * error.rmse_initial))
-            if comparison.calibration is not None
-            else ""
-        )
-        rows.append(
-            html(
-                '<tr><td>{}</td>{}<td style="text-align:right">'
-                '{}</td><td style="text-align:right">{}</td>'
-                '<td style="text-align:right;color:{}"><b>{:.2f} ×</b></td></tr>',
-                shown.label,
-                before,
-                number(shown.factor * error.rmse),
-                number(shown.factor * error.noise_floor),
-                shade,
-                ratio,
-            )
-        )
-    heads = ["", *(["before"] if comparison.calibration is not None else []), "error", "floor", "error / floor"]
-    head = joined(html('<th style="text-align:right;font-weight:400;opacity:.65">{}</th>', text) for text in heads)
-    warnings = joined(html('<div style="color:#e8590c">▲ {}</div>', text) for text in comparison.warnings)
-    large = f"font-size:16px;font-weight:600;color:{colour};padding:4px 0"
+    severity = "good" if comparison.adequate else "bad"
     return html(
-        '<div {}><div style="{}">{}</div>'
-        "{}{}"
-        '<table style="width:100%;border-collapse:collapse;margin-top:6px;font-variant-numeric:tabular-nums">'
-        "<tr>{}</tr>{}</table>{}</div>",
+        "<div {}>{}{}{}{}{}</div>",
         _BOX,
-        large,
-        first,
+        large(first, severity),
         joined(html("<div>{}</div>", text) for text in others if text not in regions),
-        warnings,
-        head,
-        joined(rows),
-        table_of(per_recording(comparison), "Each recording"),
-    )
-
-
-def _details(comparison: Comparison, region: Region) -> str:
-    axis = quantity.of_variable(comparison, region.variable).scaled([region.low, region.high])
-    shown = quantity.of_residual(comparison, region.signal).scaled(region.rmse)
-    return (
-        f"{axis.title} from {number(axis.factor * region.low)} to {axis.text(region.high)}: "
-        f"error {shown.text(region.rmse)} rms, {region.excess:.1f} times the floor"
+        warned(comparison.warnings),
+        shown(errors(comparison)),
+        folded("Each recording", errors_by_recording(comparison, comparison.primary)),
     )

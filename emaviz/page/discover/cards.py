@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ema_model.discovery import Candidate
+from ema_model.discovery.labels import effect_title
 from ema_model.discovery.snapshot import Look
-from ema_model.discovery.words import effect_title
 from ema_model.effects import find
 from ema_model.quantities.numbers import amount, number, with_uncertainty
 from ema_model.quantities.titles import in_sentence

@@ -8,8 +8,9 @@ from typing import Any
 import viser
 
 from ema_model.discovery import Candidate
+from ema_model.discovery.labels import effect_title
 from ema_model.discovery.snapshot import AT_FLOOR, Look
-from ema_model.discovery.words import effect_title, sentences
+from ema_model.discovery.words import sentences
 from ema_model.effects import CATALOGUE
 from emaviz.page.discover import cards
 from emaviz.page.discover.entries import EntriesControl

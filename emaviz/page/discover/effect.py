@@ -9,8 +9,8 @@ import plotly.graph_objects as go
 import viser
 
 from ema_model.discovery import Candidate
+from ema_model.discovery.labels import effect_title
 from ema_model.discovery.snapshot import Look
-from ema_model.discovery.words import effect_title
 from ema_model.effects import Effect, find
 from ema_model.effects.effect import FAMILIES
 from ema_model.quantities.numbers import Quantity, number

@@ -9,8 +9,9 @@ import plotly.graph_objects as go
 import viser
 
 from ema_model.discovery.snapshot import AT_FLOOR, Look
+from ema_model.discovery.tables import per_recording
 from ema_model.discovery.tracks import Track, tracks
-from ema_model.discovery.words import FLOOR_NOTE, headline, per_recording, sentences
+from ema_model.discovery.words import FLOOR_NOTE, headline, sentences
 from ema_model.effects import CATALOGUE
 from ema_model.recordings import SIGNALS
 from emaviz.figures import error_ladder, explained_steps, missing_curve, residual_steps
@@ -18,13 +19,14 @@ from emaviz.figures.model_equation import equation
 from emaviz.page.discover.actuator import ActuatorSwitch
 from emaviz.page.discover.effect import CONFIG, EffectView
 from emaviz.page.discover.next_experiment import NextTest
-from emaviz.page.discover.reveal import reveal
 from emaviz.page.kept import Cleared
 from emaviz.page.page import Page
 from emaviz.page.playback import PlaybackStrip
+from emaviz.session.discover import beside_truth
 from emaviz.session.discover.discovering import Discovering
-from emaviz.text.html import Html, add_html, html, joined, table_of
+from emaviz.text.html import Html, add_html, html, joined
 from emaviz.text.notes import BOX, boxed
+from emaviz.text.told import folded, large, shown, warned
 
 _RESTING = Html(
     "Choose recordings on the left, and press <b>Start</b>: the model is calibrated, and what it leaves is held "
@@ -159,7 +161,8 @@ class DiscoveryPanel:
 
     def _show_truth(self) -> None:
         if self._look is not None:
-            self._truth.content = reveal(self._discovering.source.reveal(), self._look.found, self._look.added)
+            told = beside_truth.document_of(self._discovering.source.reveal(), self._look.found, self._look.added)
+            self._truth.content = boxed(joined(map(shown, told.blocks)))
             self._discovering.events.revealed()
 
 
@@ -175,18 +178,13 @@ def answer(look: Look) -> Html:
         others = [sentences(found)[0], *([left.sentence] if left is not None else [])]
     else:
         first, others = headline(found), sentences(found)
-    colour = "#2b8a3e" if done else "#e03131"
-    warnings = joined(html('<div style="color:#e8590c">▲ {}</div>', text) for text in found.warnings)
     return html(
-        '<div {}><div style="font-size:16px;font-weight:600;color:{};padding:2px 0">'
-        "{}</div>{}{}"
-        '<div style="opacity:.65;font-size:12px" title="{}">The floor is what noise and the model\'s own limits '
-        "leave: 1 on the ladder.</div>{}</div>",
+        '<div {}>{}{}{}<div style="opacity:.65;font-size:12px" title="{}">The floor is what noise and the model\'s own '
+        "limits leave: 1 on the ladder.</div>{}</div>",
         BOX,
-        colour,
-        first,
+        large(first, "good" if done else "bad"),
         joined(html("<div>{}</div>", text) for text in others),
-        warnings,
+        warned(found.warnings),
         FLOOR_NOTE,
-        table_of(per_recording(found), "Each recording"),
+        folded("Each recording", per_recording(found)),
     )

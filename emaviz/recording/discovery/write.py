@@ -12,14 +12,19 @@ import rerun.blueprint as rrb
 from numpy.typing import ArrayLike, NDArray
 
 from ema_model.discovery import Discovery, as_dict
+from ema_model.discovery.labels import rung_title
+from ema_model.discovery.tables import candidates
 from ema_model.discovery.tracks import PAUSE_S, Track, one_after_another, primary, tracks
-from ema_model.discovery.words import rung_title
 from ema_model.errors import InputError
 from ema_model.estimation.floor import BAND_SIGMAS
+from ema_model.estimation.words import calibration_table, convergence, warnings
+from ema_model.text import Lines, Note
 from emaviz.recording import series
-from emaviz.recording.discovery import documents, layout
+from emaviz.recording.configured import configured
+from emaviz.recording.discovery import layout
 from emaviz.recording.discovery.layout import CANDIDATES, LADDER, Step
 from emaviz.recording.errors import RecordingError
+from emaviz.recording.markdown import written
 from emaviz.recording.style import GROUP_COLOURS, ITERATION, plain, series_title
 from emaviz.recording.writer import RecordingWriter
 
@@ -44,9 +49,9 @@ def write_discovery(found: Discovery, path: str | Path, configuration: Mapping[s
     names = sorted(runs[0].measured, key=lambda name: name != primary(found)) if runs else []
     try:
         with DiscoveryWriter(path, found, names[:1]) as writer:
-            writer.config(documents.configuration(found, runs, times, shifts, configuration or {}))
+            writer.config(_configuration(found, runs, times, shifts, configuration or {}))
             writer.properties({"discovery": as_dict(found), "shift_s": shifts})
-            writer.document("verdict", documents.verdict(found))
+            writer.document("verdict", written("The verdict", found.document.blocks))
             writer.ladder()
             writer.candidates()
             for name in names:
@@ -55,6 +60,20 @@ def write_discovery(found: Discovery, path: str | Path, configuration: Mapping[s
         raise InputError(str(error)) from None
     if writer.failed is not None:
         raise InputError(writer.failed)
+
+
+def _configuration(
+    found: Discovery,
+    runs: Sequence[Track],
+    times: Sequence[Array],
+    shifts: Sequence[float],
+    settings: Mapping[str, Any],
+) -> str:
+    """What was fitted with which options, where each recording stands on sim_time, and the last calibration."""
+    said = configured({"actuator": found.actuator.name, **settings}, [one.name for one in runs], times, shifts)
+    fit, axes = found.calibration, found.actuator.axes
+    told = [Lines([convergence(fit)]), calibration_table(fit, axes), *map(Note, warnings(fit, axes))]
+    return written("Discovery", [said, *(one for one in told if one is not None)])
 
 
 def _write_signal(
@@ -133,7 +152,8 @@ class DiscoveryWriter(RecordingWriter):
         """The ranking as a table, and as bars in its order."""
         chosen = [one for one in self._found.ranked if not one.untestable_reason]
         with self._file.lock:
-            self._text(CANDIDATES, documents.candidates(self._found))
+            told = candidates(self._found) or Lines(["None was scored."])
+            self._text(CANDIDATES, written("Candidates", [told]))
             if chosen:
                 at = np.arange(1, len(chosen) + 1)
                 predicted = [one.predicted_drop for one in chosen]

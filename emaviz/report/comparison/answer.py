@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ema_model.comparison.result import Comparison
+from ema_model.comparison.words import verdict
 from emaviz.report.markup import bullets, escape, paragraph
 from emaviz.report.section import Figures, Section
 
@@ -16,10 +17,10 @@ class Answer(Section[Comparison]):
 
     def body(self, subject: Comparison, figures: Figures) -> str:
         """Always there."""
-        kind, verdict = ("good", "adequate") if subject.adequate else ("bad", "not adequate")
-        first, *others = subject.sentences or (f"The model is {verdict}.",)
+        kind, told = "good" if subject.adequate else "bad", verdict(subject)
+        first, *others = subject.sentences or (f"The model is {told}.",)
         return (
-            f'<p><span class="verdict {kind}">{escape(verdict)}</span></p>'
+            f'<p><span class="verdict {kind}">{escape(told)}</span></p>'
             + paragraph(first, "answer")
             + "".join(paragraph(sentence) for sentence in others)
             + bullets(subject.warnings, "warning")

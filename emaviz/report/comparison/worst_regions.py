@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
-
+from ema_model.comparison.regions import worst_moment
 from ema_model.comparison.result import Comparison, Region
+from ema_model.comparison.words import details
 from ema_model.quantities.numbers import number
-from ema_model.quantities.titles import in_sentence
 from ema_model.quantities.variables import variable_title
-from emaviz.figures import quantity, residual_against, residual_time
+from emaviz.figures import residual_against, residual_time
 from emaviz.figures.region_blocks import time_ranges
 from emaviz.report.markup import escape, link, paragraph
 from emaviz.report.section import Figures, Section, pair
@@ -32,7 +31,8 @@ class WorstRegions(Section[Comparison]):
 
 
 def _card(comparison: Comparison, figures: Figures, index: int, region: Region) -> str:
-    recording, time_s = worst_moment(comparison, region)
+    recording, block = worst_moment(comparison.residuals, region)
+    time_s = float(comparison.residuals.time_s[block])
     name = comparison.recordings[recording].name or f"recording {recording + 1}"
     variable = variable_title(region.variable)
     window = _around(comparison, region, recording, time_s)
@@ -47,20 +47,9 @@ def _card(comparison: Comparison, figures: Figures, index: int, region: Region) 
     )
     return (
         f'<div class="region" id="region-{index + 1}"><h3>{index + 1}. {escape(region.sentence)}</h3>'
-        + paragraph(_details(comparison, region), "dim")
+        + paragraph(details(comparison, region), "dim")
         + pair(figures.place(against, 300), figures.place(over_time, 300))
         + f'<p class="small">Seen in: {links}</p></div>'
-    )
-
-
-def _details(comparison: Comparison, region: Region) -> str:
-    axis = quantity.of_variable(comparison, region.variable).scaled([region.low, region.high])
-    shown = quantity.of_residual(comparison, region.signal).scaled(region.rmse)
-    low, high = (number(axis.factor * value) for value in (region.low, region.high))
-    return (
-        f"{axis.title} {low} … {high} {axis.unit}: {in_sentence(shown.title)} {shown.text(region.rmse)} rms, "
-        f"{shown.text(region.mean)} on average; {number(region.excess)} times the floor, "
-        f"in {np.count_nonzero(region.blocks)} of {len(region.blocks)} blocks."
     )
 
 
@@ -72,11 +61,3 @@ def _around(comparison: Comparison, region: Region, recording: int, time_s: floa
     width = max(_STAYS * max(stays, default=0.0), _LEAST_BLOCKS * comparison.residuals.block_s)
     start = min(max(time_s - 0.5 * width, first), max(last - width, first))
     return start, min(start + width, last)
-
-
-def worst_moment(comparison: Comparison, region: Region) -> tuple[int, float]:
-    """Recording and time, s, of the region's block that is furthest out of its floor."""
-    residuals = comparison.residuals
-    size = np.abs(residuals.values[region.signal]) / residuals.sigma[region.signal]
-    at = int(np.argmax(np.where(region.blocks & np.isfinite(size), size, -1.0)))
-    return int(residuals.recording[at]), float(residuals.time_s[at])

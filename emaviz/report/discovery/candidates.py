@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from ema_model.discovery.words import effect_title
+from ema_model.discovery import tables
 from emaviz.figures import candidates
 from emaviz.report.discovery.subject import Told
-from emaviz.report.markup import folded, paragraph, table
+from emaviz.report.markup import document_table, paragraph
 from emaviz.report.section import Figures, Section
 
 _NOTE = (
@@ -26,21 +26,8 @@ class Candidates(Section[Told]):
         found = subject.found
         if not found.candidates:
             return ""
-        rows = [
-            [
-                effect_title(one.name),
-                "–" if one.untestable_reason else f"{one.predicted_drop:.0f}",
-                "–" if one.refitted_drop is None else f"{one.refitted_drop:.0f}".replace("-", "−"),
-            ]
-            for one in found.ranked
-        ]
-        reasons: dict[str, list[str]] = {}
-        for one in found.candidates:
-            if one.untestable_reason:
-                reasons.setdefault(one.untestable_reason, []).append(effect_title(one.name))
         return (
             figures.place(candidates.figure(found), candidates.height(found), "candidate-bars")
             + paragraph(_NOTE, "small")
-            + "".join(paragraph(f"{', '.join(names)}: {why}.", "small") for why, names in reasons.items())
-            + folded("The ranking in numbers", table(["Effect", "predicted fall of χ²", "refitted"], rows))
+            + document_table(tables.candidates(found), "The ranking in numbers")
         )

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from ema_model.discovery.words import FLOOR_NOTE, per_recording, rung_title
-from ema_model.quantities.numbers import number
-from ema_model.quantities.shown import of_signal
+from ema_model.discovery.tables import ladder, ladder_by_signal, per_recording
+from ema_model.discovery.words import FLOOR_NOTE
 from emaviz.figures import error_ladder
 from emaviz.report.discovery.subject import Told
-from emaviz.report.markup import document_table, paragraph, table
+from emaviz.report.markup import document_table, paragraph, with_remarks
 from emaviz.report.section import Figures, Section
 
 
@@ -21,22 +20,10 @@ class Ladder(Section[Told]):
     def body(self, subject: Told, figures: Figures) -> str:
         """Always there."""
         found = subject.found
-        held = any(rung.holdout_rmse is not None for rung in found.ladder)
-        shown = {
-            name: of_signal(name, found.actuator.axes).scaled([rung.signals[name] for rung in found.ladder])
-            for name in found.ladder[0].signals
-        }
-        heads = ["Step", "fitted / floor", *(["held out / floor"] if held else [])]
-        heads += [f"{one.title}, rms" for one in shown.values()]
-        rows = []
-        for rung in found.ladder:
-            row = [rung_title(rung.change, found.actuator.axes), number(rung.rmse)]
-            if held:
-                row.append("–" if rung.holdout_rmse is None else number(rung.holdout_rmse))
-            rows.append([*row, *(one.text(rung.signals[name]) for name, one in shown.items())])
         return (
             figures.place(error_ladder.figure(found), 360, "error-ladder")
-            + table(heads, rows)
+            + with_remarks(ladder(found))
             + paragraph(FLOOR_NOTE, "small")
+            + document_table(ladder_by_signal(found), "Each signal")
             + document_table(per_recording(found), "Each recording")
         )

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from ema_model.actuator.naming import on_axes
-from ema_model.quantities.numbers import number
+from ema_model.estimation.words import calibration_table
 from emaviz.report.discovery.subject import Told
-from emaviz.report.markup import paragraph, table
+from emaviz.report.markup import paragraph, with_remarks
 from emaviz.report.section import Figures, Section
 
 _NOTE = (
@@ -26,15 +25,5 @@ class OutsideTolerance(Section[Told]):
         found = subject.found
         if not found.parameters_outside_tolerance:
             return ""
-        rows = []
-        for path in found.parameters_outside_tolerance:
-            one = found.calibration.parameters.get(path)
-            if one is None:
-                rows.append([on_axes(path, found.actuator.axes).title, "", "", "", ""])
-                continue
-            moved = f"{one.z:+.2f}".replace("-", "−")
-            rows.append(
-                [on_axes(path, found.actuator.axes).title, one.unit, number(one.initial), number(one.value), moved]
-            )
-        heads = ["Parameter", "unit", "file", "calibrated", "distance [σ]"]
-        return table(heads, rows, text_columns=2) + paragraph(_NOTE, "small")
+        told = calibration_table(found.calibration, found.actuator.axes, found.parameters_outside_tolerance)
+        return (with_remarks(told) if told is not None else "") + paragraph(_NOTE, "small")

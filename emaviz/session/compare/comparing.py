@@ -13,14 +13,7 @@ from ema_model.comparison.result import Comparison
 from ema_model.errors import InputError, quoted
 from ema_model.files.refusal import refusal, shown
 from ema_model.quantities.titles import in_sentence
-from ema_model.recordings import (
-    SIGNALS,
-    ColumnMapping,
-    Measurement,
-    prepared,
-    read,
-    write_side_file,
-)
+from ema_model.recordings import SIGNALS, ColumnMapping, Measurement, change_side_file, prepared, read
 from ema_model.recordings.formats.text_layout import Hints
 from ema_model.recordings.side_file.read import SideFile
 from emaviz.session import actuators as actuator_files
@@ -28,7 +21,7 @@ from emaviz.session.compare.keep import keep
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.described import number
 from emaviz.session.job import Job, Tell
-from emaviz.session.opened import Opened, guesses, measured, read_opened, side_file_of
+from emaviz.session.opened import Opened, guesses, measured, read_opened, side_file_of, side_with
 from emaviz.session.session import Session
 from emaviz.session.signal import Signal
 from emaviz.session.worker import Worker
@@ -126,9 +119,9 @@ class Comparing:
         opened = self.opened.get(name)
         if opened is None:
             return
-        side = self._side_of(opened, mapping=mapping)
-        self._opened(measured(replace(opened, mapping=mapping), self.actuator, side))
-        write_side_file(side, self.folder.beside(opened.path))  # last, so that nothing wrong is remembered
+        side = side_with(opened, self.folder, mapping=mapping)
+        found = measured(replace(opened, mapping=mapping), self.actuator, side)  # first: nothing wrong is remembered
+        self._remember(found, side, mapping=mapping)
 
     def _lay_out(self, name: str, hints: Hints) -> None:
         opened = self.opened.get(name)
@@ -136,20 +129,21 @@ class Comparing:
             return
         try:
             # Another header makes other columns, of which the mapping says nothing.
-            side = self._side_of(opened, text=hints, mapping=None)
+            side = side_with(opened, self.folder, text=hints, mapping=None)
             found = read_opened(name, opened.path, self.actuator, side)
             if found.problem:
                 raise refusal(name, found.problem)
         except InputError:
             self.events.refused()
             raise
-        self._opened(found)
-        write_side_file(side, self.folder.beside(opened.path))
+        self._remember(found, side, text=hints, mapping=None)
 
-    def _side_of(self, opened: Opened, **said: Any) -> SideFile:
-        """The recording's side file with what somebody has said now, which is kept beside the recording itself."""
-        known = side_file_of(opened.path, self.folder) or SideFile()
-        return replace(known, **said, path=str(self.folder.beside(opened.path)))
+    def _remember(self, found: Opened, side: SideFile, **said: Any) -> None:
+        """Puts what was said into the side file, and tells; where it cannot be written, it holds all the same."""
+        try:
+            change_side_file(self.folder.beside(found.path), side, **said)
+        finally:
+            self._opened(found)
 
     def _opened(self, opened: Opened) -> None:
         self.opened[opened.name] = opened

@@ -35,7 +35,7 @@ def run(arguments: argparse.Namespace) -> int:
         for kind, lines in _beside(actuator, arguments).items():
             found[kind] += lines
     print(_document(actuator, found, arguments).text)
-    output.write_json(arguments.json, {"name": actuator.name, **found}, 0, output.configuration(arguments))
+    output.write_json(arguments, {"name": actuator.name, **found})
     return 0
 
 

@@ -21,5 +21,5 @@ def run(arguments: argparse.Namespace) -> int:
     """Prints it."""
     print(markdown())
     rows = [asdict(row) for row in parameter_rows()]
-    output.write_json(arguments.json, {"parameters": rows}, 0, output.configuration(arguments))
+    output.write_json(arguments, {"parameters": rows})
     return 0

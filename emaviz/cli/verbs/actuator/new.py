@@ -71,9 +71,7 @@ def run(arguments: argparse.Namespace) -> int:
     print(f"{arguments.file}: {actuator.name}, controller {controller}, {len(actuator.tolerances)} parameters to fit")
     for line in (*found["missing"], *found["implausible"]):
         print(f"! {line}")
-    output.write_json(
-        arguments.json, {"file": arguments.file, "name": actuator.name, **found}, 0, output.configuration(arguments)
-    )
+    output.write_json(arguments, {"file": arguments.file, "name": actuator.name, **found})
     return 0
 
 

@@ -1,4 +1,4 @@
-"""A challenge's truth beside the answer."""
+"""A discovery beside the truth that a challenge hides, in words."""
 
 from __future__ import annotations
 
@@ -8,16 +8,14 @@ from numpy.typing import ArrayLike
 from ema_model.actuator.readings import sentences
 from ema_model.challenges.truth import Truth
 from ema_model.discovery import Discovery
+from ema_model.discovery.labels import effect_title, fitted_of, value
 from ema_model.discovery.result import Added
-from ema_model.discovery.words import effect_title, fitted_of, value
 from ema_model.effects import CATALOGUE, find
 from ema_model.faults import BY_NAME, NAMES
 from ema_model.quantities.numbers import amount
 from ema_model.quantities.titles import in_sentence
-from emaviz.text.html import Html, html, joined
-from emaviz.text.notes import BOX
+from ema_model.text import Document, Lines, Remark, Remarks, Severity
 
-_GOOD, _BAD = "#2b8a3e", "#e03131"
 _NEAR = 0.25  # of the true value, within which a strength counts as found where its interval misses it
 
 
@@ -43,7 +41,7 @@ def _invented(truth: Truth, found: Discovery) -> list[str]:
     return [name for name in found.faults if name not in truth.faults and name != "k7"]
 
 
-def _fault(fault: str, k: ArrayLike, found: Discovery) -> Html:
+def _fault(fault: str, k: ArrayLike, found: Discovery) -> Remark:
     index = NAMES.index(fault)
     what = f"{in_sentence(BY_NAME[fault].title)} fault: {sentences(k, found.plant.actuator)[index]}"
     if fault in found.faults:
@@ -55,10 +53,10 @@ def _fault(fault: str, k: ArrayLike, found: Discovery) -> Html:
     return _row(good, what, "its parameter is outside its tolerance" if good else "not found; try Identify")
 
 
-def reveal(truth: Truth, found: Discovery, added: tuple[Added, ...]) -> Html:
-    """The truth in words, then effect by effect."""
+def document_of(truth: Truth, found: Discovery, added: tuple[Added, ...]) -> Document:
+    """Whether they agree, the truth in words, then effect by effect."""
     good = agrees(truth, found, added)
-    verdict = "Your answer agrees." if good else "Your answer differs."
+    verdict = Remark(f"Your answer {'agrees' if good else 'differs'}", "this is what was hidden", _severity(good))
     rows = [_effect(name, given, found, added) for name, given in truth.effects.items()]
     rows += [_fault(fault, truth.k, found) for fault in truth.faults]
     for name in _invented(truth, found):
@@ -80,11 +78,10 @@ def reveal(truth: Truth, found: Discovery, added: tuple[Added, ...]) -> Html:
             rows.append(_row(False, in_sentence(effect_title(one.name)), why))
     if not rows:
         rows.append(_row(True, "nothing is hidden", "and you added nothing"))
-    head = html('<div style="font-size:16px;font-weight:600;color:{}">{}</div>', _GOOD if good else _BAD, verdict)
-    return html("<div {}>{}<div>{}</div>{}</div>", BOX, head, truth.answer, joined(rows))
+    return Document([Remarks([verdict]), Lines([truth.answer]), Remarks(rows)])
 
 
-def _effect(name: str, given: dict[str, float], found: Discovery, added: tuple[Added, ...]) -> Html:
+def _effect(name: str, given: dict[str, float], found: Discovery, added: tuple[Added, ...]) -> Remark:
     title = in_sentence(effect_title(name))
     order = given.get("order")
     own = [one for one in added if one.name == name]
@@ -102,12 +99,9 @@ def _effect(name: str, given: dict[str, float], found: Discovery, added: tuple[A
     return _row(near and (order is None or one.chosen.get("order") == order), title, told)
 
 
-def _row(good: bool | None, what: str, how: str) -> Html:
-    mark, colour = ("•", "inherit") if good is None else ("✓", _GOOD) if good else ("✗", _BAD)
-    return html(
-        '<div style="padding-top:3px"><span style="color:{}"><b>{}</b></span> <b>{}</b>: {}</div>',
-        colour,
-        mark,
-        what[:1].upper() + what[1:],
-        how,
-    )
+def _row(good: bool, what: str, how: str) -> Remark:
+    return Remark(what[:1].upper() + what[1:], how, _severity(good))
+
+
+def _severity(good: bool) -> Severity:
+    return "good" if good else "bad"

@@ -1,0 +1,31 @@
+"""What a result says, on the page: its document's blocks, and how an answer begins."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from ema_model.text import COLOURS, Block, Severity, Table
+from emaviz.text.html import Html, html, joined, unescaped
+
+
+def shown(block: Block | None) -> Html:
+    """A block of a document, escaped by itself; nothing for none."""
+    return Html() if block is None else unescaped(block.html)
+
+
+def folded(title: str, told: Table | None) -> Html:
+    """A table below its title, which opens it; nothing for none."""
+    if told is None:
+        return Html()
+    return html('<details><summary style="cursor:pointer">{}</summary>{}</details>', title, shown(told))
+
+
+def large(text: str, severity: Severity) -> Html:
+    """The answer in one line."""
+    style = f"font-size:16px;font-weight:600;color:{COLOURS[severity]};padding:4px 0"
+    return html('<div style="{}">{}</div>', style, text)
+
+
+def warned(warnings: Iterable[str]) -> Html:
+    """A line for each warning."""
+    return joined(html('<div style="color:{}">▲ {}</div>', COLOURS["warning"], text) for text in warnings)

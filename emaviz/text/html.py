@@ -13,7 +13,7 @@ from collections.abc import Iterable
 from html import escape as _escape
 from typing import TYPE_CHECKING, Any, LiteralString
 
-from ema_model.text import Table
+from ema_model.text import Document, Table
 
 if TYPE_CHECKING:
     import viser
@@ -74,6 +74,11 @@ def table_of(told: Table | None, title: str) -> Html:
         style,
         joined(lines),
     )
+
+
+def document_html(told: Document) -> Html:
+    """All that a result says, as a notebook shows it: its blocks escape what is not theirs."""
+    return html('<div style="padding:2px 12px;font-size:12.5px;overflow-x:auto">{}</div>', unescaped(told.html))
 
 
 def add_html(gui: viser.GuiApi, content: str = "", *, visible: bool = True) -> HtmlPiece:

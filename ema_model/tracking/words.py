@@ -28,6 +28,12 @@ def answer(result: Tracked) -> str:
     return "; ".join(_sentence(one) for one in drifting)
 
 
+def headline(result: Tracked) -> str:
+    """The same to stand above all else; the name of a k stays small."""
+    told = answer(result)
+    return told if told[:2] in faults.BY_NAME else told[:1].upper() + told[1:]
+
+
 def document_of(result: Tracked) -> Document:
     """All that the terminal and a notebook show."""
     usable = len(result.usable)

@@ -36,9 +36,9 @@ def figure(
         x, (middle, low, high) = [*levels], zip(*levels.values())
         edge = {"line": {"width": 0}, "mode": "lines", "hoverinfo": "skip"}
         band = {"x": [*x, *x[::-1]], "y": [*low, *high[::-1]], "fill": "toself", "fillcolor": _BAND}
-        chart.add_trace(go.Scatter(**band, **edge, name="level, 90 %"))
+        chart.add_trace(go.Scatter(**band, **edge, name="level, as known then"))
         line = {"color": MONITOR, "width": 1}
-        chart.add_trace(go.Scatter(x=x, y=middle, mode="lines", line=line, name="level, as known then"))
+        chart.add_trace(go.Scatter(x=x, y=middle, mode="lines", line=line, name="level", showlegend=False))
     names = [theme.plain(flight.name) for flight in result.usable]
     error = {"type": "data", "array": HALF_90 * one.sigma, "thickness": 0.7, "width": 0}
     dots = {"size": 4, "color": REFERENCE}
@@ -74,7 +74,7 @@ def figure(
         chart.add_trace(fan)
         middle = {"color": DIFFERENCE, "width": 1.5}
         x, y = [now, now + left.p50], [one.level, end]
-        chart.add_trace(go.Scatter(x=x, y=y, mode="lines", line=middle, name="to the threshold, median"))
+        chart.add_trace(go.Scatter(x=x, y=y, mode="lines", line=middle, name="to the threshold"))
     return chart
 
 

@@ -22,8 +22,9 @@ def figure(left: Remaining, *, came: int | None = None, dark: bool = False) -> g
     for share, at in ((0.05, left.p05), (0.5, left.p50), (0.95, left.p95)):
         mark = {"size": 8, "color": theme.MARK}
         label = [f"{share:.0%}: {at:.0f}"]
+        side = "top right" if share < 0.1 else "bottom right"  # inside of the axes
         chart.add_trace(
-            go.Scatter(x=[at], y=[share], mode="markers+text", text=label, textposition="bottom right", marker=mark,
+            go.Scatter(x=[at], y=[share], mode="markers+text", text=label, textposition=side, marker=mark,
                        showlegend=False)
         )  # fmt: skip
     if came is not None:

@@ -26,8 +26,8 @@ def page() -> Html:
     rules = unescaped(
         "<style>"
         # all tabs of the main panel in one line
-        "[data-dock-region=left] [data-dock-tab]{padding-left:4px!important;padding-right:4px!important;"
-        "font-size:12.5px!important}[data-dock-region=left] [data-dock-tab] *{font-size:inherit!important}"
+        "[data-dock-region=left] [data-dock-tab]{padding-left:3px!important;padding-right:3px!important;"
+        "font-size:11.5px!important}[data-dock-region=left] [data-dock-tab] *{font-size:inherit!important}"
         "[data-dock-region=left] [data-dock-tab] > div:has(svg){display:none!important}"
         # a slider's number in full: viser's box has room for five characters
         ".mantine-Slider-root ~ .mantine-NumberInput-root,"

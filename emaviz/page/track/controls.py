@@ -39,7 +39,7 @@ class TrackPanel:
             self._faults = {BY_NAME[name].label: name for name in TRACKED}
             self._fault: Any = gui.add_dropdown("Fault", tuple(self._faults))
             self._ends = gui.add_checkbox("has a threshold", False)
-            self._threshold = gui.add_number("Threshold", 0.5, min=0.0, max=1.0, step=0.01, disabled=True)
+            self._threshold = gui.add_number("Threshold", 0.5, min=0.0, max=1.0, step=0.001, disabled=True)
             self._all = add_html(gui)
         self._start = gui.add_button("Track", icon=viser.Icon.TIMELINE, disabled=True)
         self._line = JobLine(page, following.job, pauses="it")
@@ -52,7 +52,7 @@ class TrackPanel:
         self._ends.on_update(lambda event: event.client and post("threshold", self._take_threshold))
         self._threshold.on_update(lambda event: event.client and post("threshold", self._take_threshold))
         self._watch.on_update(lambda event: event.client and self._take_watch())
-        self._start.on_click(lambda _: page.begins(following.begin))
+        self._start.on_click(lambda _: post("track", lambda: page.begins(following.begin)))
         following.job.began.connect(lambda _: post("track began", lambda: self._busy(True)))
         following.job.ended.connect(lambda _: post("track ended", lambda: self._busy(False)))
         following.events.followed.connect(lambda history: post("followed", lambda: result.show(history)))
@@ -126,6 +126,7 @@ class TrackPanel:
                 control.disabled = busy
             self._threshold.disabled = busy or not self._ends.value
         self._show_left_out()
+        self.refresh()
 
     def _show_left_out(self) -> None:
         lines = [html('<div style="color:#e8590c;overflow-wrap:anywhere">▲ {}</div>', line)

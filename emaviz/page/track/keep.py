@@ -29,7 +29,9 @@ class TrackKeep:
             page.checked(lambda: following.save(".html"))
 
         report.on_click(save)
-        record.on_click(lambda _: page.checked(lambda: following.save(".rrd")))
+        record.on_click(
+            lambda _: page.screen.post("track record", lambda: page.checked(lambda: following.save(".rrd")))
+        )
         following.events.kept.connect(lambda path: page.screen.post("track kept", lambda: self._kept(path)))
 
     def clear(self) -> None:

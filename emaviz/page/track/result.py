@@ -12,7 +12,7 @@ from ema_model.tracking.flight import Flight
 from ema_model.tracking.history import History
 from ema_model.tracking.result import Tracked
 from ema_model.tracking.track import TRACKED
-from ema_model.tracking.words import answer, hindsight
+from ema_model.tracking.words import headline, hindsight
 from emaviz.figures import k_over_flights, predicted_life, remaining_life
 from emaviz.page.kept import Cleared
 from emaviz.page.page import Page
@@ -112,6 +112,8 @@ class TrackResult:
             for plot, figure in zip(self._plots, figures):
                 plot.figure = figure
             self._told.content = told
+            if self._flight.value != then.flights[-1].name:
+                self._flight.value = then.flights[-1].name
             self._document.content = document_html(then.document)
 
 
@@ -124,7 +126,6 @@ def levels(history: History, name: str, number: int) -> dict[int, tuple[float, f
 def said(then: Tracked, name: str, history: History) -> str:
     """The sentence of the day, and what came."""
     number = len(then.flights)
-    sentence = answer(then)
     later = hindsight(then.faults[name], history.came(number, name))
     drifts = then.trusted and any(one.trend for one in then.faults.values())
     colour = "#e8590c" if drifts or not then.trusted else "#2b8a3e"
@@ -132,7 +133,7 @@ def said(then: Tracked, name: str, history: History) -> str:
         '<div {}><div style="font-size:16px;font-weight:600;color:{};padding:4px 0">{}</div><div {}>{}</div>{}</div>',
         BOX,
         colour,
-        sentence[:1].upper() + sentence[1:],
+        headline(then),
         DIM,
         f"after {then.flights[-1].name}: {number} flights, {len(then.usable)} of them usable",
         html("<div>{}</div>", later[:1].upper() + later[1:]) if later else "",

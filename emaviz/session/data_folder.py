@@ -40,7 +40,8 @@ class DataFolder:
         """Makes the folder with `recordings`, `uploads`, `actuators`, `sessions` and `challenges` in it."""
         self.recordings, self.uploads, self.actuators = (folder / n for n in ("recordings", "uploads", "actuators"))
         self.sessions, self.challenges = folder / "sessions", folder / "challenges"
-        for made in (self.recordings, self.uploads, self.actuators, self.sessions, self.challenges):
+        self.own = (self.recordings, self.uploads, self.actuators, self.sessions, self.challenges)
+        for made in self.own:
             try:
                 made.mkdir(parents=True, exist_ok=True)
             except OSError as error:

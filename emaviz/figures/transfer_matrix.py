@@ -7,6 +7,7 @@ import plotly.graph_objects as go
 
 from ema_model.quantities.numbers import number
 from ema_model.quantities.shown import of_signal
+from ema_model.quantities.titles import in_sentence
 from ema_model.units.result import UnitsCompared
 from emaviz.figures import theme
 
@@ -18,7 +19,7 @@ def figure(result: UnitsCompared, *, dark: bool = False) -> go.Figure:
     moved, axes = result.transfer, result.actuator.axes
     shown = of_signal(moved.signal, axes).scaled(float(np.max(moved.error)))
     full = len(result.units) <= _IN_FULL
-    beside = f", and {shown.unit} rms of the {shown.label.lower()}" if full else ""
+    beside = f", and {shown.unit} rms of the {in_sentence(shown.title)}" if full else ""
     chart = theme.new(f"Error, × floor{beside}", "Recordings of", "Model of", dark=dark)
     names = [theme.plain(name) for name in result.units]
     errors = [[f"{number(shown.factor * value)} {shown.unit}" for value in row] for row in moved.error]
@@ -43,6 +44,6 @@ def figure(result: UnitsCompared, *, dark: bool = False) -> go.Figure:
             colorbar={"thickness": 10, "title": {"text": "× floor", "font": {"size": 11}}},
         )
     )
-    chart.update_yaxes(autorange="reversed", nticks=0)
+    chart.update_yaxes(autorange="reversed", nticks=0, title={"standoff": 12})
     chart.update_xaxes(nticks=0)
     return chart

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
@@ -15,7 +17,6 @@ from emaviz.figures import theme
 _TYPE = "rgba(134,142,150,0.30)"
 _COLUMNS = 2
 _HEAD_PX, _AXIS_PX, _ROW_PX = 46, 58, 17  # of the whole, below each chart, and of a unit in it
-_NEAR = 0.9  # share of a chart's width that the units take
 
 
 def figure(result: UnitsCompared, *, dark: bool = False) -> go.Figure:
@@ -25,15 +26,15 @@ def figure(result: UnitsCompared, *, dark: bool = False) -> go.Figure:
         return theme.missing("Parameters of each unit", "the recordings tell none of them", dark=dark)
     rows = -(-len(paths) // _COLUMNS)
     height = height_px(result)
-    grid = make_subplots(
+    grid: Any = make_subplots(
         rows=rows,
         cols=_COLUMNS,
         shared_yaxes=True,
         horizontal_spacing=0.06,
         vertical_spacing=min(_AXIS_PX / height, 0.9 / max(rows - 1, 1)),
     )
-    chart = theme.new("Parameters of each unit, alone (90 % intervals)", "", "", dark=dark)
-    grid.update_layout(template=chart.layout.template, title=chart.layout.title, margin=chart.layout.margin)
+    like: Any = theme.new("Parameters of each unit, alone (90 % intervals)", "", "", dark=dark).layout
+    grid.update_layout(template=like.template, title=like.title)
     names = [theme.plain(name) for name in result.units]
     for place, path in enumerate(paths):
         where = {"row": place // _COLUMNS + 1, "col": place % _COLUMNS + 1}
@@ -42,12 +43,11 @@ def figure(result: UnitsCompared, *, dark: bool = False) -> go.Figure:
         axis = Quantity(named.title, of_type.unit).scaled(one.value)
         differs = {difference.unit for difference in result.differences if path in difference.together}
         low, high = (axis.factor * (of_type.mean + side * HALF_90 * of_type.sigma) for side in (-1.0, 1.0))
-        grid.add_vrect(x0=low, x1=high, fillcolor=_TYPE, line_width=0, layer="below", **where)
         grid.add_trace(
             go.Scatter(
                 x=axis.factor * one.value,
                 y=names,
-                error_x={"array": axis.factor * HALF_90 * one.sigma, "thickness": 1.5, "width": 4},
+                error_x={"array": axis.factor * HALF_90 * one.sigma, "thickness": 1.5, "width": 4, "color": theme.EDGE},
                 mode="markers",
                 marker={"size": 7, "color": [DIFFERENCE if unit in differs else REFERENCE for unit in result.units]},
                 showlegend=False,
@@ -55,6 +55,7 @@ def figure(result: UnitsCompared, *, dark: bool = False) -> go.Figure:
             ),
             **where,
         )
+        grid.add_vrect(x0=low, x1=high, fillcolor=_TYPE, line_width=0, layer="below", **where)
         grid.update_xaxes(title={"text": theme.plain(axis.label), "font": {"size": 11}}, nticks=5, **where)
     grid.update_yaxes(autorange="reversed", nticks=0, tickfont={"size": 10})
     grid.update_layout(margin={"l": 48, "r": 14, "t": _HEAD_PX, "b": 0})

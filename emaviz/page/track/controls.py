@@ -52,7 +52,7 @@ class TrackPanel:
         self._ends.on_update(lambda event: event.client and post("threshold", self._take_threshold))
         self._threshold.on_update(lambda event: event.client and post("threshold", self._take_threshold))
         self._watch.on_update(lambda event: event.client and self._take_watch())
-        self._start.on_click(lambda _: post("track", lambda: page.begins(following.begin)))
+        self._start.on_click(lambda _: page.ask("track", lambda: page.begins(following.begin)))
         following.job.began.connect(lambda _: post("track began", lambda: self._busy(True)))
         following.job.ended.connect(lambda _: post("track ended", lambda: self._busy(False)))
         following.events.followed.connect(lambda history: post("followed", lambda: result.show(history)))

@@ -26,12 +26,10 @@ class TrackKeep:
 
         def save(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
             self._asked = event.client
-            page.checked(lambda: following.save(".html"))
+            page.ask("track report", lambda: following.save(".html"))
 
         report.on_click(save)
-        record.on_click(
-            lambda _: page.screen.post("track record", lambda: page.checked(lambda: following.save(".rrd")))
-        )
+        record.on_click(lambda _: page.ask("track record", lambda: following.save(".rrd")))
         following.events.kept.connect(lambda path: page.screen.post("track kept", lambda: self._kept(path)))
 
     def clear(self) -> None:

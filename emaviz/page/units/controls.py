@@ -37,7 +37,7 @@ class UnitsPanel:
         self._folder.on_update(lambda event: event.client and post("units", self._take_folder))
         self._rule.on_update(lambda event: event.client and post("units rule", self._take_rule))
         self._actuator.on_update(lambda event: event.client and post("units actuator", self._take_actuator))
-        self._start.on_click(lambda _: post("compare units", lambda: page.begins(comparing.begin)))
+        self._start.on_click(lambda _: page.ask("compare units", lambda: page.begins(comparing.begin)))
         comparing.job.began.connect(lambda _: post("units began", lambda: self._busy(True)))
         comparing.job.ended.connect(lambda _: post("units ended", lambda: self._busy(False)))
         comparing.events.compared.connect(lambda found: post("units compared", lambda: result.show(found)))

@@ -71,7 +71,7 @@ class UnitsResult:
 
     def _ask(self, client: viser.ClientHandle | None, suffix: str) -> None:
         self._asked = client
-        self._page.screen.post("units keep", lambda: self._page.checked(lambda: self._comparing.save(suffix)))
+        self._page.ask("units keep", lambda: self._comparing.save(suffix))
 
     def _kept(self, path: Path) -> None:
         name = self._comparing.folder.name_of(path)

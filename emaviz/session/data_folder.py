@@ -56,9 +56,12 @@ class DataFolder:
         return self._files(self.folder, tuple(FORMATS), most)
 
     def folders(self) -> dict[str, int]:
-        """The folders that hold measurements themselves, "." for this one, and how many; in order of their names."""
+        """The folders that hold measurements themselves, "." for this one, and how many; in order of their names.
+
+        What the app itself has recorded is left out.
+        """
         found = Counter(Path(name).parent.as_posix() for name in self.measurements(most=None))
-        return dict(sorted(found.items()))
+        return dict(sorted((name, count) for name, count in found.items() if name != self.recordings.name))
 
     def inner(self, name: str) -> Path:
         """The folder of that name, relative to this one."""

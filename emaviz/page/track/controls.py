@@ -7,9 +7,11 @@ from typing import Any
 import viser
 
 from ema_model.faults import BY_NAME
+from ema_model.quantities.titles import in_sentence
 from ema_model.tracking.track import TRACKED
 from emaviz.page.job_line import JobLine
 from emaviz.page.page import Page
+from emaviz.page.practice import PracticeButtons
 from emaviz.page.track import WORKSPACE
 from emaviz.page.track.result import TrackResult
 from emaviz.session.track.following import Following
@@ -35,6 +37,7 @@ class TrackPanel:
         self._folder: Any = gui.add_dropdown(
             "Flights", (_NONE,), hint="Folders of the data folder that hold recordings"
         )
+        self._practice = PracticeButtons(page, following.practice, self.choose)
         with gui.add_folder("The life ends where"):
             self._faults = {BY_NAME[name].label: name for name in TRACKED}
             self._fault: Any = gui.add_dropdown("Fault", tuple(self._faults))
@@ -88,6 +91,8 @@ class TrackPanel:
         if name is not None and name != self._following.chosen:
             if self._page.checked(lambda: self._following.choose(name)):
                 self._result.show(None)
+                self._practice.show(name)
+                self._show_thresholds()
                 self._line.say("")
                 self._show_left_out()
             else:
@@ -108,11 +113,24 @@ class TrackPanel:
             self._show_fault()
             return
         self._threshold.disabled = value is None
-        told = [html("<b>{}</b> {} at {:g}", one, BY_NAME[one].title.lower(), at) for one, at in sorted(
-            following.thresholds.items())]  # fmt: skip
-        self._all.content = boxed(joined(told, "<br>")) if told else ""
+        self._tell_thresholds()
         if following.history is not None and not following.job.running:
             self._page.begins(following.begin)  # what is identified stays, so that this takes a moment
+
+    def _show_thresholds(self) -> None:
+        """Of the chosen flights, which a challenge may bring."""
+        known = self._following.thresholds
+        if known and self._faults[str(self._fault.value)] not in known:
+            self._fault.value = BY_NAME[next(iter(known))].label
+        self._show_fault()
+        self._tell_thresholds()
+
+    def _tell_thresholds(self) -> None:
+        told = [
+            html("<b>{}</b> {} at {:g}", one, in_sentence(BY_NAME[one].title), at)
+            for one, at in sorted(self._following.thresholds.items())
+        ]
+        self._all.content = boxed(joined(told, "<br>")) if told else ""
 
     def _take_watch(self) -> None:
         self._following.watching = bool(self._watch.value)

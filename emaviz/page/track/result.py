@@ -16,6 +16,7 @@ from ema_model.tracking.words import headline, hindsight
 from emaviz.figures import k_over_flights, predicted_life, remaining_life
 from emaviz.page.kept import Cleared
 from emaviz.page.page import Page
+from emaviz.page.practice import Seal
 from emaviz.session.worker import Worker
 from emaviz.text.html import add_html, document_html, html
 from emaviz.text.notes import BOX, DIM, boxed
@@ -34,9 +35,10 @@ class TrackResult:
         page: Page,
         slow: Worker,
         lead: Callable[[Callable[[], Flight | None]], object],
+        seal: Callable[[], Seal],
         keep: Callable[[], Cleared],
     ) -> None:
-        """lead(chosen): adds the way to a flight's comparison; keep(): adds what saves the answer."""
+        """lead(chosen): adds the way to a flight's comparison; seal(): a challenge's; keep(): what saves the answer."""
         self._page, self._slow = page, slow
         self._history: History | None = None
         gui = page.server.gui
@@ -53,6 +55,7 @@ class TrackResult:
         with self._place:
             self._flight: Any = gui.add_dropdown("Flight", (_NONE,))
             lead(self._chosen)
+        self._seal = seal()
         self._words = gui.add_folder("All that is known today", visible=False, expand_by_default=False)
         with self._words:
             self._document = add_html(gui)
@@ -69,6 +72,8 @@ class TrackResult:
         last = history.last if history is not None else None
         for folder in (self._life, self._place, self._words, self._save):
             folder.visible = last is not None
+        if begun:
+            self._seal.show()
         if history is None or last is None:
             self._told.content = boxed(_NOTHING)
             return

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import viser
 
+from emaviz.page.practice import Seal
 from emaviz.page.tab import Shared, Tab
 from emaviz.page.track import WORKSPACE
 from emaviz.page.track.controls import TrackPanel
@@ -20,12 +21,13 @@ class TrackTab(Tab):
 
     def __init__(self, shared: Shared, right: viser.PanelHandle) -> None:
         super().__init__(shared, right)
-        self.following = Following(self.page.session, shared.comparing.folder, shared.files)
+        following = self.following = Following(self.page.session, shared.comparing.folder, shared.files)
         with right.add_tab("Flights", viser.Icon.TIMELINE):
             self.result = TrackResult(
                 self.page,
                 shared.slow_screen,
                 lambda chosen: FlightLead(self.page, shared.comparing, self.following, chosen),
+                lambda: Seal(self.page, following.practice, lambda: following.chosen, lambda: following.last),
                 lambda: TrackKeep(self.page, self.following, shared.viewer),
             )
 

@@ -6,6 +6,7 @@ from typing import Any
 
 from emaviz.page.job_line import JobLine
 from emaviz.page.page import Page
+from emaviz.page.practice import PracticeButtons
 from emaviz.page.units import WORKSPACE
 from emaviz.page.units.result import UnitsResult
 from emaviz.session.units.comparing_units import ComparingUnits
@@ -28,6 +29,7 @@ class UnitsPanel:
         gui, post = page.server.gui, page.screen.post
         add_html(gui, note(_ABOUT))
         self._folder: Any = gui.add_dropdown("Units", (_NONE,), hint="Folders of the data folder that hold units")
+        self._practice = PracticeButtons(page, comparing.practice, self.choose)
         self._rule = gui.add_text(
             "Hold out", comparing.rule, hint="Recordings of such a name judge what was found: *unseen*; empty for none"
         )
@@ -75,6 +77,7 @@ class UnitsPanel:
         name = self._names.get(str(self._folder.value))
         if name is not None and name != self._comparing.chosen:
             self._page.checked(lambda: self._comparing.choose(name))
+            self._practice.show(self._comparing.chosen)
             self._result.show(None)
             self._line.say("")
 

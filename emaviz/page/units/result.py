@@ -12,6 +12,7 @@ from ema_model.units.result import UnitsCompared
 from ema_model.units.words import document_of, lacking, notes, rests_on, sentences
 from emaviz.figures import transfer_matrix, unit_parameters
 from emaviz.page.page import Page
+from emaviz.page.practice import Seal
 from emaviz.session.units.comparing_units import REPORT, TYPE, ComparingUnits
 from emaviz.text.html import Html, add_html, document_html, html, joined
 from emaviz.text.notes import BOX, DIM, boxed
@@ -36,6 +37,7 @@ class UnitsResult:
         self._matrix = gui.add_folder("The model of one unit on another", visible=False)
         with self._matrix:
             self._transfer: Any = gui.add_plotly(go.Figure(), config=_CONFIG, aspect=0.6)
+        self._seal = Seal(page, comparing.practice, lambda: comparing.chosen, lambda: comparing.found)
         self._words = gui.add_folder("All of it in numbers", visible=False, expand_by_default=False)
         with self._words:
             self._document = add_html(gui)
@@ -58,6 +60,7 @@ class UnitsResult:
             for folder in (self._figures, self._matrix, self._words, self._save):
                 folder.visible = found is not None
             self._links.content = ""
+            self._seal.show()
             if found is None:
                 self._told.content = boxed(_NOTHING)
                 return

@@ -18,11 +18,13 @@ from ema_model.tracking.flight import Flight
 from ema_model.tracking.history import History
 from ema_model.tracking.identify import identified
 from ema_model.tracking.order import check_enough, check_order, flights_in, in_order
+from ema_model.tracking.result import Tracked
 from ema_model.tracking.track import check_thresholds
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.described import number
 from emaviz.session.job import Job, Run, Stopped
 from emaviz.session.opened import side_file_of
+from emaviz.session.practice import Practice
 from emaviz.session.session import Session
 from emaviz.session.signal import Signal
 from emaviz.session.track.keep import keep
@@ -48,6 +50,7 @@ class Following:
         self.session, self.folder, self._files = session, folder, files
         self.events = TrackEvents()
         self.job = Job(session.worker, on_divergence="check the recordings' units")
+        self.practice = Practice(self.job, folder, "life")
         self.chosen = ""  # the folder's name in the data folder
         self.watching = True
         self.thresholds: dict[str, float] = {}
@@ -74,6 +77,9 @@ class Following:
         if name != self.chosen or self._path != path:
             self.chosen, self.history, self.left_out = str(name), None, {}
             self._path, self._flights, self._watched = path, {}, Watched()
+            challenge = self.practice.held(self.chosen)
+            if challenge is not None:
+                self.thresholds |= challenge.thresholds
 
     def set_threshold(self, name: str, value: Any) -> None:
         """Where the life ends by a k; None for nowhere.  InputError for a value that is no threshold."""
@@ -82,6 +88,11 @@ class Following:
             others[name] = number(value, f"the threshold of {name}")
             check_thresholds(others)
         self.thresholds = others
+
+    @property
+    def last(self) -> Tracked | None:
+        """What is known after the last flight."""
+        return None if self.history is None else self.history.last
 
     def file_of(self, flight: Flight) -> str:
         """The name in the data folder of a flight's recording."""
@@ -122,7 +133,7 @@ class Following:
             self._follow(run)
 
         def done() -> str | None:
-            if self.history is not None and self.history.last is not None:
+            if self.history is not None and self.last is not None:
                 self.events.followed(self.history)
             elif not told:
                 told.append(f"{len(self._flights)} of the {LEAST_FLIGHTS} flights that a trend needs.")
@@ -197,7 +208,7 @@ class Following:
 
     def save(self, suffix: str) -> None:
         """Writes the last answer as a report (.html) or for Rerun (.rrd), soon; InputError before there is one."""
-        found = self.history.last if self.history is not None else None
+        found = self.last
         if found is None:
             raise InputError("nothing is followed yet; press Track first")
         self._files.post(

@@ -18,6 +18,7 @@ from emaviz.session import actuators as actuator_files
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.job import Job, Run
 from emaviz.session.opened import side_file_of
+from emaviz.session.practice import Practice
 from emaviz.session.session import Session
 from emaviz.session.signal import Signal
 from emaviz.session.worker import Worker
@@ -42,6 +43,7 @@ class ComparingUnits:
         self.session, self.folder, self._files = session, folder, files
         self.events = UnitsEvents()
         self.job = Job(session.worker, on_divergence="check the actuator's file and the recordings' units")
+        self.practice = Practice(self.job, folder, "units")
         self.chosen = ""  # the folder's name in the data folder
         self.rule = UNSEEN  # names of the recordings to hold out; "" for none
         self.actuator: Actuator = session.actuator
@@ -66,7 +68,7 @@ class ComparingUnits:
     def choose(self, name: Any) -> None:
         """A folder by its name; InputError where there is none."""
         self.folder.inner(str(name))
-        self.chosen = str(name)
+        self.chosen, self.found = str(name), None
 
     def choose_actuator(self, name: Any) -> None:
         """One of `actuators`; InputError for another, or a file that is no actuator."""
@@ -90,7 +92,10 @@ class ComparingUnits:
         fitted, held = _held_out(units, self.rule.strip())
         actuator = self.actuator
 
+        found: UnitsCompared | None = None
+
         def work(run: Run) -> None:
+            nonlocal found
             from ema_model.units.compare import compare_units  # here, since it brings all of scipy's optimisers
 
             told: list[str] = []
@@ -98,11 +103,12 @@ class ComparingUnits:
                 {name: [self._read(file, actuator, run, told) for file in files] for name, files in part.items()}
                 for part in (fitted, held)
             )
-            self.found = compare_units(given, actuator, holdout=unseen, on_progress=run)
+            found = compare_units(given, actuator, holdout=unseen, on_progress=run)
 
         def done() -> None:
-            assert self.found is not None, "it came to its end"
-            self.events.compared(self.found)
+            assert found is not None, "it came to its end"
+            self.found = found
+            self.events.compared(found)
 
         return self.job.begin("Comparing units", work, done)
 

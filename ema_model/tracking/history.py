@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 
 from ema_model import faults
@@ -27,7 +28,7 @@ class History:
         """InputError as `Tracker`."""
         self.thresholds, self._seed = dict(thresholds or {}), seed
         self.looks: dict[int, Tracked] = {}  # by how many flights there were
-        self._taken: list[Flight] = []
+        self.flights: list[Flight] = []  # in order of time
         self._tracker = Tracker(self.thresholds, seed)
 
     def follow(self, flights: Sequence[Flight]) -> Iterator[int]:
@@ -35,21 +36,27 @@ class History:
 
         What was taken before is looked at anew only where it is not how these begin.  InputError as `Tracker.add`.
         """
-        if [*map(id, self._taken)] != [*map(id, flights[: len(self._taken)])]:
-            self.looks, self._taken, self._tracker = {}, [], Tracker(self.thresholds, self._seed)
-        usable = sum(not one.excluded for one in self._taken)
-        for one in flights[len(self._taken) :]:
+        if [*map(id, self.flights)] != [*map(id, flights[: len(self.flights)])]:
+            self.looks, self.flights, self._tracker = {}, [], Tracker(self.thresholds, self._seed)
+        usable = sum(not one.excluded for one in self.flights)
+        for one in flights[len(self.flights) :]:
             self._tracker.add(one)
-            self._taken.append(one)
+            self.flights.append(one)
             usable += not one.excluded
             if usable >= LEAST_FLIGHTS:
-                self.looks[len(self._taken)] = self._tracker.look()
-            yield len(self._taken)
+                self.looks[len(self.flights)] = self._tracker.look()
+            yield len(self.flights)
+
+    def copy(self) -> History:
+        """As it is now; what follows changes this one alone."""
+        other = copy(self)
+        other.looks, other.flights = dict(self.looks), list(self.flights)
+        return other
 
     @property
     def last(self) -> Tracked | None:
         """After all of them; None before there are enough."""
-        return self.looks.get(len(self._taken))
+        return self.looks.get(len(self.flights))
 
     def crossed(self, name: str) -> int | None:
         """The number of the flight after which the level of a k had first reached its threshold."""
@@ -64,4 +71,4 @@ class History:
         """What came after so many flights; a part that is replaced ends nothing."""
         crossed = self.crossed(name)
         later = None if crossed is None or crossed < number else crossed - number
-        return Came(later, len(self._taken) - number)
+        return Came(later, len(self.flights) - number)

@@ -38,7 +38,7 @@ def figure(history: History, name: str, number: int, *, dark: bool = False) -> g
         chart.add_trace(go.Scatter(x=x, y=[crossed - x[0], 0], mode="lines", line=line, name="what came"))
     theme.moment(chart, number)
     tops = sorted(one.p95 for run in runs for _, one in run)
-    chart.update_yaxes(range=[0.0, 1.15 * tops[int(0.8 * (len(tops) - 1))]])  # the first ones say little
+    chart.update_yaxes(range=[0.0, 1.5 * max(tops[len(tops) // 2], 1.0)])  # the first ones say little
     return chart
 
 

@@ -67,8 +67,9 @@ class TrackResult:
 
     def show(self, history: History | None) -> None:
         """Followed flights, as they are known at their end; None for none."""
-        begun = history is not self._history
-        self._history = history
+        before, self._history = self._history, history
+        begun = before is None or history is None or before.flights[:1] != history.flights[:1]
+        asked = before is None or history is None or begun or before.thresholds != history.thresholds
         last = history.last if history is not None else None
         for folder in (self._life, self._place, self._words, self._save):
             folder.visible = last is not None
@@ -87,7 +88,7 @@ class TrackResult:
             if list(self._flight.options) != names:
                 self._flight.options = names
                 self._flight.value = names[0]
-            if begun:
+            if asked:
                 self._fault.value = BY_NAME[_first(last)].label
                 self._kept.clear()
         self._draw()

@@ -50,7 +50,7 @@ class UnitsPanel:
         """Reads the data folder's lists again; what is chosen stays as long as it exists."""
         comparing = self._comparing
         self._names = {
-            f"{'the data folder' if name == '.' else name} ({count} units)": name
+            f"{'the data folder' if name == '.' else name} ({count} unit{'s' if count > 1 else ''})": name
             for name, count in comparing.fleets().items()
         }
         options = tuple(self._names) or (_NONE,)

@@ -54,8 +54,10 @@ class Following:
         self.chosen = ""  # the folder's name in the data folder
         self.watching = True
         self.thresholds: dict[str, float] = {}
+        self._brought: dict[str, float] = {}  # by a challenge
         self.left_out: dict[str, str] = {}  # why a file is, by its name
-        self.history: History | None = None
+        self.history: History | None = None  # as it was followed last
+        self._growing: History | None = None
         self._path = folder.folder
         self._flights: dict[Path, Flight] = {}
         self._watched = Watched()
@@ -75,11 +77,12 @@ class Following:
         if self.job.running:
             raise InputError("flights are being identified; stop that first")
         if name != self.chosen or self._path != path:
-            self.chosen, self.history, self.left_out = str(name), None, {}
+            self.chosen, self.history, self._growing, self.left_out = str(name), None, None, {}
             self._path, self._flights, self._watched = path, {}, Watched()
             challenge = self.practice.held(self.chosen)
-            if challenge is not None:
-                self.thresholds |= challenge.thresholds
+            own = dict(self.thresholds.items() - self._brought.items())
+            self._brought = {} if challenge is None else challenge.thresholds
+            self.thresholds = own | self._brought
 
     def set_threshold(self, name: str, value: Any) -> None:
         """Where the life ends by a k; None for nowhere.  InputError for a value that is no threshold."""
@@ -165,10 +168,11 @@ class Following:
     def _follow(self, run: Run) -> None:
         """Looks after each flight, of all that are identified."""
         flights = [self._flights[path] for path in in_order(self._flights)]
-        if self.history is None or self.history.thresholds != self.thresholds:
-            self.history = History(self.thresholds)
-        for done in self.history.follow(flights):
+        if self._growing is None or self._growing.thresholds != self.thresholds:
+            self._growing = History(self.thresholds)
+        for done in self._growing.follow(flights):
             run.say(f"after flight {done}", done / len(flights))
+        self.history = self._growing.copy()
 
     # --- what arrives -----------------------------------------------------------------------------------------------
 

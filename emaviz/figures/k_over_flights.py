@@ -12,6 +12,7 @@ from ema_model.tracking.result import FaultTrack, Tracked
 from emaviz.colours import COMMAND, DIFFERENCE, MONITOR, REFERENCE
 from emaviz.figures import theme
 
+CLICKED = "flights"  # by which a page knows the chart, of which a point's text is its flight
 _BAND = "rgba(240,140,0,0.18)"
 _FAN = "rgba(224,49,49,0.18)"
 
@@ -30,8 +31,9 @@ def figure(
     it was known then, and the ends of its 90 % interval.
     """
     one = result.faults[name]
-    at = [i for i, flight in enumerate(result.flights, 1) if not flight.excluded]
     chart = theme.new(BY_NAME[name].label, "Flight", name, dark=dark)
+    chart.update_layout(meta=CLICKED)
+    at = [i for i, flight in enumerate(result.flights, 1) if not flight.excluded]
     if levels:
         x, (middle, low, high) = [*levels], zip(*levels.values())
         edge = {"line": {"width": 0}, "mode": "lines", "hoverinfo": "skip"}

@@ -71,6 +71,11 @@ def unseen(controls: Sequence[str]) -> Html:
     return unescaped(f"<style>{rows}{{display:none!important}}</style>")
 
 
+def unseen_field(field: str) -> Html:
+    """The same for a field of text, which its label alone names by its id."""
+    return unescaped(f"<style>.mantine-Flex-root:has(label[for='{field}']){{display:none!important}}</style>")
+
+
 def caption(text: str) -> Html:
     """A line of small print at the bottom of the strip."""
     return html(

@@ -14,6 +14,16 @@ from emaviz.page.track.tab import TrackTab
 
 pytestmark = pytest.mark.browser
 COUNT = 40
+# Where on the screen a flight's point is, once the chart is drawn.
+POINT = """(name) => {
+  const plot = Array.from(document.querySelectorAll('.js-plotly-plot')).find(one => one.layout?.meta === 'flights');
+  const trace = plot?._fullData?.find(one => one.text?.includes?.(name));
+  if (!trace || !plot.calcdata || !plot._fullLayout?.xaxis?.d2p || !plot.getBoundingClientRect().width) return null;
+  const at = Array.from(trace.text).indexOf(name), { xaxis, yaxis } = plot._fullLayout;
+  const box = plot.querySelector('.nsewdrag').getBoundingClientRect();
+  const point = plot.calcdata[trace.index][at];
+  return [box.x + xaxis.d2p(point.x), box.y + yaxis.d2p(point.y)];
+}"""
 LIFE = flights(0.02 * np.arange(COUNT + 1))  # k1, which reaches 0.5 in flight 26
 
 
@@ -56,7 +66,17 @@ def test_a_life_is_followed(page, app, monkeypatch):
     page.get_by_text("Also kept in the data folder: recordings/").locator("visible=true").wait_for()
     page.get_by_role("button", name="Compare this flight").click()
     page.wait_for_function("location.search.includes('view=compare')")
-    assert [*app.comparing.opened] == ["unit/flight_14.parquet"]
+    wait_until(lambda: [*app.comparing.opened] == ["unit/flight_14.parquet"])
+    app.comparing.job.stop()
+
+    page.get_by_role("tab", name="Track", exact=True).click()
+    x, y = page.wait_for_function(POINT, arg="flight_07").json_value()
+    page.mouse.move(x - 3, y)
+    page.mouse.move(x, y)
+    page.wait_for_function("document.querySelector('.hoverlayer .hovertext')")
+    page.mouse.click(x, y)
+    page.wait_for_function("location.search.includes('view=compare')")
+    wait_until(lambda: [*app.comparing.opened] == ["unit/flight_07.parquet"])
     app.comparing.job.stop()
 
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import plotly.graph_objects as go
+import viser
 
 from ema_model.faults import BY_NAME
 from ema_model.tracking.flight import Flight
@@ -17,6 +18,8 @@ from emaviz.figures import k_over_flights, predicted_life, remaining_life
 from emaviz.page.kept import Cleared
 from emaviz.page.page import Page
 from emaviz.page.practice import Seal
+from emaviz.page.track.click import FlightClicks
+from emaviz.page.track.leads import FlightLead
 from emaviz.session.worker import Worker
 from emaviz.text.html import add_html, document_html, html
 from emaviz.text.notes import BOX, DIM, boxed
@@ -34,7 +37,7 @@ class TrackResult:
         self,
         page: Page,
         slow: Worker,
-        lead: Callable[[Callable[[], Flight | None]], object],
+        lead: Callable[[Callable[[], Flight | None]], FlightLead],
         seal: Callable[[], Seal],
         keep: Callable[[], Cleared],
     ) -> None:
@@ -54,7 +57,8 @@ class TrackResult:
         self._place = gui.add_folder("A flight of it", visible=False)
         with self._place:
             self._flight: Any = gui.add_dropdown("Flight", (_NONE,))
-            lead(self._chosen)
+            self._lead = lead(self._chosen)
+            FlightClicks(page, self._clicked)
         self._seal = seal()
         self._words = gui.add_folder("All that is known today", visible=False, expand_by_default=False)
         with self._words:
@@ -96,6 +100,11 @@ class TrackResult:
     def _chosen(self) -> Flight | None:
         last = self._history.last if self._history is not None else None
         return next((one for one in last.flights if one.name == self._flight.value), None) if last else None
+
+    def _clicked(self, name: str, client: viser.ClientHandle | None) -> None:
+        if name in self._flight.options:
+            self._flight.value = name
+            self._lead.follow(client)
 
     def _draw(self) -> None:
         history = self._history

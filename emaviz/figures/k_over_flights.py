@@ -44,14 +44,17 @@ def figure(
     names = [theme.plain(flight.name) for flight in result.usable]
     error = {"type": "data", "array": HALF_90 * one.sigma, "thickness": 0.7, "width": 0}
     dots = {"size": 4, "color": REFERENCE}
-    chart.add_trace(go.Scatter(x=at, y=one.k, error_y=error, mode="markers", marker=dots, text=names, name="measured"))
+    said = "%{text}: %{y:.4f} ± %{error_y.array:.2g}<extra></extra>"
+    measured = {"x": at, "y": one.k, "error_y": error, "text": names, "hovertemplate": said}
+    chart.add_trace(go.Scatter(**measured, mode="markers", marker=dots, name="measured"))
     now = len(result.flights)
     if last is not None and len(last.flights) > now:
         since = [(i, flight.name) for i, flight in enumerate(last.flights, 1) if not flight.excluded]
         later = [(i, theme.plain(called), k) for (i, called), k in zip(since, last.faults[name].k) if i > now]
         x, called, k = zip(*later) if later else ((), (), ())
         pale = {"size": 4, "color": COMMAND, "opacity": 0.5}
-        chart.add_trace(go.Scatter(x=x, y=k, mode="markers", marker=pale, text=called, name="what came"))
+        chart.add_trace(go.Scatter(x=x, y=k, mode="markers", marker=pale, text=called, name="what came",
+                                   hovertemplate="%{text}: %{y:.4f}<extra></extra>"))  # fmt: skip
         theme.moment(chart, now + 0.5)
     if one.trend:
         start = _since(result, one)

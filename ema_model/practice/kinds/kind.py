@@ -1,4 +1,4 @@
-"""What a kind of challenge does with its truth, as the file in assets/challenges/truth tells it."""
+"""What a kind of challenge does with its truth, as its own file tells it."""
 
 from __future__ import annotations
 

@@ -23,7 +23,8 @@ _SCRIPT = """
     const plot = event.target.closest?.('.js-plotly-plot');
     if (plot?.layout?.meta !== chart) return;
     const name = plot._hoverdata?.[0]?.text;
-    const input = document.querySelector(`label[for="${field}"]`)?.closest('.mantine-Flex-root')?.querySelector('input');
+    const row = document.querySelector(`label[for="${field}"]`)?.closest('.mantine-Flex-root');
+    const input = row?.querySelector('input');
     if (!name || !input) return;
     Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, 'value').set.call(input, name + 'BETWEEN' + Date.now());
     input.dispatchEvent(new Event('input', { bubbles: true }));

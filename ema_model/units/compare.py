@@ -21,7 +21,7 @@ from ema_model.units.block import Block, pooled, starts_at, unit_of
 from ema_model.units.block import linearised as linearised_at
 from ema_model.units.criteria import MISFIT, REFUSED, SLOPE, TOLD, UNTOLD
 from ema_model.units.fit import Fitted, Together, fit, together
-from ema_model.units.pool import DIFFERENCE, Pair, Pool
+from ema_model.units.pool import Pair, Pool
 from ema_model.units.result import Alone, Difference, Need, OfType, UnitsCompared
 from ema_model.units.select import alike
 from ema_model.units.transfer import transfer
@@ -191,10 +191,10 @@ def _of_type(pool: Pool, actuator: Actuator, paths: Sequence[str]) -> dict[str, 
 
 
 def _alone(pool: Pool, actuator: Actuator, paths: Sequence[str]) -> dict[str, Alone]:
-    """Of each unit what its own block says, about what the type shares within what a difference may be."""
+    """Of each unit what its own block says, as far as units of the type are about what they share: the tolerances."""
     values, sigmas = [], []
     for block in pool.blocks:
-        covariance = np.linalg.inv(block.information + np.eye(pool.parameters) / DIFFERENCE**2)
+        covariance = np.linalg.inv(block.information + np.eye(pool.parameters))
         values.append(pool.shared + covariance @ (block.pull - block.information @ pool.shared))
         sigmas.append(np.sqrt(np.diag(covariance)))
     tolerance = [actuator.tolerances[path].sigma for path in paths]

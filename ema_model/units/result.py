@@ -53,7 +53,7 @@ class Alone:
     """A parameter of each unit as its own recordings tell it, the others' values aside."""
 
     value: Array  # (units,), in the parameter's unit
-    sigma: Array  # (units,), 1 σ of it; as wide as what is known of a difference beforehand where nothing is told
+    sigma: Array  # (units,), 1 σ of it; the file's tolerance where nothing is told
 
     def interval90(self, unit: int) -> Interval:
         """Of one unit, by its place."""

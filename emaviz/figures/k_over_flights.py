@@ -38,9 +38,9 @@ def figure(
         x, (middle, low, high) = [*levels], zip(*levels.values())
         edge = {"line": {"width": 0}, "mode": "lines", "hoverinfo": "skip"}
         band = {"x": [*x, *x[::-1]], "y": [*low, *high[::-1]], "fill": "toself", "fillcolor": _BAND}
-        chart.add_trace(go.Scatter(**band, **edge, name="level, as known then"))
+        chart.add_trace(go.Scatter(**band, **edge, name="level"))
         line = {"color": MONITOR, "width": 1}
-        chart.add_trace(go.Scatter(x=x, y=middle, mode="lines", line=line, name="level", showlegend=False))
+        chart.add_trace(go.Scatter(x=x, y=middle, mode="lines", line=line, name="level then", showlegend=False))
     names = [theme.plain(flight.name) for flight in result.usable]
     error = {"type": "data", "array": HALF_90 * one.sigma, "thickness": 0.7, "width": 0}
     dots = {"size": 4, "color": REFERENCE}
@@ -60,7 +60,7 @@ def figure(
         start = _since(result, one)
         line = {"color": MONITOR, "width": 2}
         back = one.level - one.drift * (now - start)
-        chart.add_trace(go.Scatter(x=[start, now], y=[back, one.level], mode="lines", line=line, name="trend of today"))
+        chart.add_trace(go.Scatter(x=[start, now], y=[back, one.level], mode="lines", line=line, name="trend"))
     for jump in one.jumps:
         number = next(i for i, flight in enumerate(result.flights, 1) if flight.name == jump.flight)
         chart.add_vline(x=number - 0.5, line={"width": 1, "dash": "dot", "color": DIFFERENCE})
@@ -79,7 +79,7 @@ def figure(
         chart.add_trace(fan)
         middle = {"color": DIFFERENCE, "width": 1.5}
         x, y = [now, now + left.p50], [one.level, end]
-        chart.add_trace(go.Scatter(x=x, y=y, mode="lines", line=middle, name="to the threshold"))
+        chart.add_trace(go.Scatter(x=x, y=y, mode="lines", line=middle, name="to threshold"))
     return chart
 
 

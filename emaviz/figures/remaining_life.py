@@ -29,7 +29,8 @@ def figure(left: Remaining, *, came: int | None = None, dark: bool = False) -> g
         )  # fmt: skip
     if came is not None:
         line = {"color": REFERENCE, "width": 2, "dash": "dash"}
-        chart.add_trace(go.Scatter(x=[came, came], y=[0.0, 1.0], mode="lines", line=line, name="what came"))
+        told = {"text": ["", f"came: {came}"], "textposition": "bottom left", "showlegend": False}
+        chart.add_trace(go.Scatter(x=[came, came], y=[0.0, 1.0], mode="lines+text", line=line, **told))
     return chart
 
 

@@ -11,11 +11,12 @@ from ema_model.quantities.titles import in_sentence
 from ema_model.units.result import UnitsCompared
 from emaviz.figures import theme
 
+_FAR = 1.5  # times the own model's error, from which on a cell is dark
 _IN_FULL, _IN_SHORT = 7, 12  # units, up to which a cell has both numbers, and up to which the floors alone
 
 
 def figure(result: UnitsCompared, *, dark: bool = False) -> go.Figure:
-    """A row for each model, a column for each unit's recordings; large is bad."""
+    """A row for each model, a column for each unit's recordings; the darker, the worse than that unit's own model."""
     moved, axes = result.transfer, result.actuator.axes
     shown = of_signal(moved.signal, axes).scaled(float(np.max(moved.error)))
     full = len(result.units) <= _IN_FULL
@@ -23,6 +24,7 @@ def figure(result: UnitsCompared, *, dark: bool = False) -> go.Figure:
     chart = theme.new(f"Error, × floor{beside}", "Recordings of", "Model of", dark=dark)
     names = [theme.plain(name) for name in result.units]
     errors = [[f"{number(shown.factor * value)} {shown.unit}" for value in row] for row in moved.error]
+    worse = moved.error / np.maximum(np.diag(moved.error), 1e-300)
     text = None
     if len(names) <= _IN_SHORT:
         text = [
@@ -31,17 +33,19 @@ def figure(result: UnitsCompared, *, dark: bool = False) -> go.Figure:
         ]
     chart.add_trace(
         go.Heatmap(
-            z=moved.floors,
+            z=worse,
+            zmin=1.0,
+            zmax=max(_FAR, float(np.max(worse))),
             x=names,
             y=names,
             text=text,
             texttemplate="%{text}" if text else None,
             customdata=errors,
-            hovertemplate="model of %{y} on %{x}: %{z:.2f} × floor, %{customdata}<extra></extra>",
+            hovertemplate="model of %{y} on %{x}: %{customdata}, %{z:.2f} × its own model's<extra></extra>",
             colorscale="Blues",
             xgap=1,
             ygap=1,
-            colorbar={"thickness": 10, "title": {"text": "× floor", "font": {"size": 11}}},
+            colorbar={"thickness": 10, "title": {"text": "× own", "font": {"size": 11}}},
         )
     )
     chart.update_yaxes(autorange="reversed", nticks=0, title={"standoff": 12})

@@ -27,7 +27,7 @@ from emaviz.text.notes import BOX, DIM, boxed
 _CONFIG = {"displayModeBar": False}
 _NONE = "–"
 _NOTHING = "Nothing is followed yet: choose a folder of flights on the left."
-_ASPECTS = (0.46, 0.34, 0.4)  # of the figures, height over width
+_ASPECTS = (0.6, 0.42, 0.48)  # of the figures, height over width
 
 
 class TrackResult:

@@ -52,8 +52,8 @@ class TrackPanel:
         self._left_out = add_html(gui)
         self._folder.on_update(lambda event: event.client and post("flights", self._take_folder))
         self._fault.on_update(lambda event: event.client and post("fault", self._show_fault))
-        self._ends.on_update(lambda event: event.client and post("threshold", self._take_threshold))
-        self._threshold.on_update(lambda event: event.client and post("threshold", self._take_threshold))
+        for control in (self._ends, self._threshold):
+            control.on_update(lambda event: event.client and self._ask_threshold())
         self._watch.on_update(lambda event: event.client and self._take_watch())
         self._start.on_click(lambda _: page.ask("track", lambda: page.begins(following.begin)))
         following.job.began.connect(lambda _: post("track began", lambda: self._busy(True)))
@@ -106,13 +106,17 @@ class TrackPanel:
         healthy = BY_NAME[name].healthy
         self._threshold.value = healthy + _HALFWAY * (1.0 - healthy) if known is None else known
 
-    def _take_threshold(self) -> None:
-        name, following = self._faults[str(self._fault.value)], self._following
+    def _ask_threshold(self) -> None:
+        """As the controls are now: a fault that was chosen just before has yet to be shown."""
         value = self._threshold.value if self._ends.value else None
-        if not self._page.checked(lambda: following.set_threshold(name, value)):
-            self._show_fault()
+        self._page.screen.post("threshold", lambda: self._take_threshold(value))
+
+    def _take_threshold(self, value: Any) -> None:
+        name, following = self._faults[str(self._fault.value)], self._following
+        taken = self._page.checked(lambda: following.set_threshold(name, value))
+        self._show_fault()
+        if not taken:
             return
-        self._threshold.disabled = value is None
         self._tell_thresholds()
         if following.history is not None and not following.job.running:
             self._page.begins(following.begin)  # what is identified stays, so that this takes a moment

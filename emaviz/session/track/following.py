@@ -30,7 +30,7 @@ from emaviz.session.signal import Signal
 from emaviz.session.track.keep import keep
 from emaviz.session.worker import Worker
 
-_LEAST_TOLD = 0.3  # share of the bar that following takes, after all are identified
+_FOLLOWING = 0.02  # share of the bar that following takes, after flights were identified
 
 
 @dataclass
@@ -133,7 +133,7 @@ class Following:
                     self._take(path, place, len(todo), run)
             except Stopped:
                 told.append(f"Stopped after {len(self._flights)} of {len(paths)} flights; Track goes on from there.")
-            self._follow(run)
+            self._follow(run, _FOLLOWING if todo else 1.0)
 
         def done() -> str | None:
             if self.history is not None and self.last is not None:
@@ -150,9 +150,9 @@ class Following:
 
         def told(at: Progress) -> None:
             done = place + at.iteration / max(at.iterations, 1)
-            run(text, (1.0 - _LEAST_TOLD * bool(self.history is None)) * done / count)
+            run(text, (1.0 - _FOLLOWING) * done / count)
 
-        run(text, place / count)
+        run(text, (1.0 - _FOLLOWING) * place / count)
         try:
             side = side_file_of(path, self.folder) or SideFile()
             recording = read(path, self.session.actuator, side=side)
@@ -165,13 +165,13 @@ class Following:
             return
         self._flights[path] = flight
 
-    def _follow(self, run: Run) -> None:
-        """Looks after each flight, of all that are identified."""
+    def _follow(self, run: Run, share: float) -> None:
+        """Looks after each flight, of all that are identified; share: of the bar."""
         flights = [self._flights[path] for path in in_order(self._flights)]
         if self._growing is None or self._growing.thresholds != self.thresholds:
             self._growing = History(self.thresholds)
         for done in self._growing.follow(flights):
-            run.say(f"after flight {done}", done / len(flights))
+            run.say(f"after flight {done}", 1.0 - share * (1.0 - done / len(flights)))
         self.history = self._growing.copy()
 
     # --- what arrives -----------------------------------------------------------------------------------------------

@@ -50,7 +50,7 @@ class TrackPanel:
             "Take up new flights", following.watching, hint="Files that arrive in the folder add a point each"
         )
         self._left_out = add_html(gui)
-        self._folder.on_update(lambda event: event.client and post("flights", self._take_folder))
+        self._folder.on_update(lambda event: event.client and self._ask_folder())
         self._fault.on_update(lambda event: event.client and post("fault", self._show_fault))
         for control in (self._ends, self._threshold):
             control.on_update(lambda event: event.client and self._ask_threshold())
@@ -75,7 +75,7 @@ class TrackPanel:
         if chosen is not None:
             self._folder.value = chosen
         elif self._names:
-            self._take_folder()
+            self._take_folder(options[0])
         self._start.disabled = self._following.job.running or not self._names
 
     # --- what is asked ----------------------------------------------------------------------------------------------
@@ -83,11 +83,17 @@ class TrackPanel:
     def choose(self, name: str) -> None:
         """A folder by its name; on the screen's thread."""
         self.refresh()
-        self._folder.value = next(title for title, one in self._names.items() if one == name)
-        self._take_folder()
+        self._take_folder(next(title for title, one in self._names.items() if one == name))
 
-    def _take_folder(self) -> None:
-        name = self._names.get(str(self._folder.value))
+    def _ask_folder(self) -> None:
+        """As it is chosen now: the list may be about to be read again."""
+        title = str(self._folder.value)
+        self._page.screen.post("flights", lambda: self._take_folder(title))
+
+    def _take_folder(self, title: str) -> None:
+        name = self._names.get(title)
+        if name is not None and self._folder.value != title:
+            self._folder.value = title
         if name is not None and name != self._following.chosen:
             if self._page.checked(lambda: self._following.choose(name)):
                 self._result.show(None)

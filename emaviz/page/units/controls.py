@@ -36,7 +36,7 @@ class UnitsPanel:
         self._actuator: Any = gui.add_dropdown("Actuator", (comparing.actuator_name,), hint="The units' type")
         self._start = gui.add_button("Compare units", icon=WORKSPACE.icon, disabled=True)
         self._line = JobLine(page, comparing.job, pauses="it")
-        self._folder.on_update(lambda event: event.client and post("units", self._take_folder))
+        self._folder.on_update(lambda event: event.client and self._ask_folder())
         self._rule.on_update(lambda event: event.client and post("units rule", self._take_rule))
         self._actuator.on_update(lambda event: event.client and post("units actuator", self._take_actuator))
         self._start.on_click(lambda _: page.ask("compare units", lambda: page.begins(comparing.begin)))
@@ -60,7 +60,7 @@ class UnitsPanel:
         if chosen is not None:
             self._folder.value = chosen
         elif self._names:
-            self._take_folder()
+            self._take_folder(options[0])
         actuators = tuple(comparing.actuators())
         if tuple(self._actuator.options) != actuators:
             self._actuator.options = actuators
@@ -70,11 +70,17 @@ class UnitsPanel:
     def choose(self, name: str) -> None:
         """A folder by its name; on the screen's thread."""
         self.refresh()
-        self._folder.value = next(title for title, one in self._names.items() if one == name)
-        self._take_folder()
+        self._take_folder(next(title for title, one in self._names.items() if one == name))
 
-    def _take_folder(self) -> None:
-        name = self._names.get(str(self._folder.value))
+    def _ask_folder(self) -> None:
+        """As it is chosen now: the list may be about to be read again."""
+        title = str(self._folder.value)
+        self._page.screen.post("units", lambda: self._take_folder(title))
+
+    def _take_folder(self, title: str) -> None:
+        name = self._names.get(title)
+        if name is not None and self._folder.value != title:
+            self._folder.value = title
         if name is not None and name != self._comparing.chosen:
             self._page.checked(lambda: self._comparing.choose(name))
             self._practice.show(self._comparing.chosen)

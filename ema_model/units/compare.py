@@ -175,7 +175,7 @@ def _of_type(pool: Pool, actuator: Actuator, paths: Sequence[str]) -> dict[str, 
     for place, path in enumerate(paths):
         sigma = actuator.tolerances[path].sigma
         mean = actuator.value(path) + sigma * float(pool.shared[place])
-        low = low_limit(path, actuator.controller.kind) if not path.startswith("effects.") else -np.inf
+        low = _low(path, actuator)
         known = sigma * float(pool.shared_sigma[place])
         half = HALF_90 * known
         scatter = sigma * float(pool.tau[place])
@@ -199,7 +199,13 @@ def _alone(pool: Pool, actuator: Actuator, paths: Sequence[str]) -> dict[str, Al
         sigmas.append(np.sqrt(np.diag(covariance)))
     tolerance = [actuator.tolerances[path].sigma for path in paths]
     value = np.array([actuator.value(path) for path in paths]) + np.array(values) * tolerance
+    value = np.maximum(value, [_low(path, actuator) for path in paths])  # as the type's mean
     return {path: Alone(value[:, i], np.array(sigmas)[:, i] * tolerance[i]) for i, path in enumerate(paths)}
+
+
+def _low(path: str, actuator: Actuator) -> float:
+    """What a parameter cannot be below."""
+    return -np.inf if path.startswith("effects.") else low_limit(path, actuator.controller.kind)
 
 
 def _type_actuator(actuator: Actuator, of_type: Mapping[str, OfType]) -> Actuator:

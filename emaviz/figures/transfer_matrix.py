@@ -11,6 +11,7 @@ from ema_model.quantities.titles import in_sentence
 from ema_model.units.result import UnitsCompared
 from emaviz.figures import theme
 
+_SHADES = [[0.0, "rgba(224,49,49,0.05)"], [1.0, "rgba(224,49,49,0.6)"]]  # text stays legible, on dark too
 _FAR = 1.5  # times the own model's error, from which on a cell is dark
 _IN_FULL, _IN_SHORT = 7, 12  # units, up to which a cell has both numbers, and up to which the floors alone
 
@@ -42,7 +43,8 @@ def figure(result: UnitsCompared, *, dark: bool = False) -> go.Figure:
             texttemplate="%{text}" if text else None,
             customdata=errors,
             hovertemplate="model of %{y} on %{x}: %{customdata}, %{z:.2f} × its own model's<extra></extra>",
-            colorscale="Blues",
+            colorscale=_SHADES,
+            textfont={"color": (theme.DARK if dark else theme.LIGHT).ink},
             xgap=1,
             ygap=1,
             colorbar={"thickness": 10, "title": {"text": "× own", "font": {"size": 11}}},

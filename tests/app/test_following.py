@@ -113,6 +113,7 @@ def test_what_arrives_adds_a_point_and_what_does_not_fit_is_said(following, aske
         (lambda unit: [one.unlink() for one in unit.glob("*_[01]?.*") if one.stem != "flight_01"], "1 flight tells no"),
         (lambda unit: shutil.copy(unit / "flight_01.parquet", unit / "x_01.parquet"), "same number or date"),
         (lambda unit: shutil.copy(unit / "flight_01.parquet", unit / "x.parquet"), "no number or date"),
+        (lambda unit: [one.unlink() for one in unit.iterdir()], "^unit: holds no recording"),
         (
             lambda unit: [(unit / f"flight_0{i}.toml").write_text(f'actuator = "{i}.toml"\n') for i in (1, 2)],
             "the flights are of one unit",
@@ -126,6 +127,19 @@ def test_bad_input_is_one_clear_line(following, change, words):
     with pytest.raises(InputError, match=words) as refused:
         following.begin()
     assert "\n" not in str(refused.value)
+
+
+def test_the_data_folder_itself_may_hold_the_flights(following, asked, tmp_path):
+    """What the app keeps in its own folders there is no flight."""
+    data = following.folder.folder
+    for path in (data / "unit").iterdir():
+        path.rename(data / path.name)
+    shutil.copy(tmp_path / "one.parquet", data / "recordings" / "kept_1.parquet")
+    assert following.folder.folders() == {".": COUNT}
+    following.choose(".")
+    followed(following)
+    assert len(asked) == COUNT
+    (data / "unit").rmdir()
 
 
 def test_too_few_are_waited_for(following):

@@ -111,10 +111,7 @@ class Following:
         """
         if not self.chosen:
             raise InputError("no folder of flights is chosen; put one into the data folder, and choose it")
-        paths = flights_in(self._path)
-        check_order(paths)
-        if not self.watching:
-            check_enough(paths, self.chosen)
+        paths = self._paths()
         self.left_out = {}  # it may have been mended
         self._watched.arrived(paths)
         started = self._start(paths, "Identifying flights")
@@ -122,6 +119,17 @@ class Following:
             self._watched.take(paths)
             self._watch()
         return started
+
+    def _paths(self) -> list[Path]:
+        """In order of time; the data folder itself has folders of the app beside its flights."""
+        try:
+            paths = in_order(recordings_in(self._path)) if self.chosen == "." else flights_in(self._path)
+            check_order(paths)
+        except InputError as error:
+            raise InputError(str(error).replace(f"{self.folder.folder}/", "")) from None
+        if not self.watching:
+            check_enough(paths, self.chosen)
+        return paths
 
     def _start(self, paths: list[Path], title: str) -> bool:
         todo = [path for path in paths if path not in self._flights and path.name not in self.left_out]

@@ -31,6 +31,12 @@ def sentences(result: UnitsCompared) -> list[str]:
     return [*told[:-1], f"{told[-1]}, nothing else"]
 
 
+def headline(result: UnitsCompared) -> str:
+    """All of them in one, to stand above all else; a unit's name stays as it is written."""
+    told = "; ".join(sentences(result))
+    return told if told.startswith(result.units) else told[:1].upper() + told[1:]
+
+
 def notes(result: UnitsCompared) -> list[str]:
     """What to mind: warnings, and differences that were taken back."""
     return [*result.warnings, *(_dropped(result, one) for one in result.dropped)]

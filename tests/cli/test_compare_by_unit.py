@@ -43,7 +43,7 @@ def test_folders_are_units_with_all_outputs(bench, capsys):
     ]
     told = capsys.readouterr().out
     assert re.match(r"right (differs|seems to differ) from the rest in motor dynamic friction \(\+6\d", told)
-    assert "The model of one unit on another" in page.read_text()
+    assert "The model of one unit on another" in page.read_text() and "<h1>right " in page.read_text()
     assert load_actuator(kept).value("motor.dynamic_friction_Nm") == pytest.approx(0.012, rel=0.05)
     assert found["transfer"]["floors"][0][2] > 2.0 * found["transfer"]["floors"][0][0]
 

@@ -27,6 +27,7 @@ FLOORS = {
         ["discovery", "tracking"],
         ["lives", "units"],
         ["fleets"],
+        ["practice"],
         ["campaign"],
         ["face"],
     ],

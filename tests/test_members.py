@@ -161,7 +161,7 @@ import viser
 
 from emaviz.page.workspaces import Workspace
 
-WORKSPACE = Workspace("notes", "Notes", viser.Icon.NOTE, 7)
+WORKSPACE = Workspace("notes", "Notes", viser.Icon.NOTE, 99)
 ''',
     "emaviz/page/notes/tab.py": '''
 """The Notes tab."""

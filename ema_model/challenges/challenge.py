@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from ema_model.errors import InputError, quoted
 from ema_model.files.shipped import shipped_folder
 
-_FILE = "challenge.toml"
+FILE = "challenge.toml"
+EFFECTS = "effects"  # what is hidden: physics; the other kinds are `ema_model.practice`'s
 
 
 @dataclass(frozen=True)
 class Challenge:
-    """Recordings of one actuator that is the thesis's but for tolerances, and for what may be hidden."""
+    """Recordings of actuators that are the thesis's but for tolerances, and for what may be hidden."""
 
     name: str  # of its folder
     title: str
@@ -23,6 +24,8 @@ class Challenge:
     training: tuple[Path, ...]  # to fit
     holdout: tuple[Path, ...]  # not to fit; must improve as well
     actuator: Path | None = None  # its file; the thesis's without one
+    kind: str = EFFECTS
+    thresholds: dict[str, float] = field(default_factory=dict)  # of k, where its life ends
     sealed: Path | None = None  # the file that holds all of these, which then are names in it: see `sealed_file`
 
 
@@ -31,19 +34,25 @@ def folder() -> Path:
     return shipped_folder("challenges")
 
 
-def challenges(where: Path | None = None) -> list[Challenge]:
-    """All challenges of a folder (the package's own without one), the easy ones first; InputError tells a mistake."""
-    found = [_read(path) for path in sorted((where or folder()).glob(f"*/{_FILE}"))]
-    return sorted(found, key=lambda one: (one.grade, one.name))
+def challenges(where: Path | None = None, kind: str | None = EFFECTS) -> list[Challenge]:
+    """The challenges of a folder (the package's own without one), the easy ones first; InputError tells a mistake.
+
+    kind: the one that is wanted; None for all.
+    """
+    found = [_read(path) for path in sorted((where or folder()).glob(f"*/{FILE}"))]
+    return sorted((one for one in found if kind in (None, one.kind)), key=lambda one: (one.grade, one.name))
 
 
 def _read(path: Path) -> Challenge:
     try:
         told = tomllib.loads(path.read_text(encoding="utf-8"))
-        training, holdout = (tuple(path.with_name(str(n)) for n in told[which]) for which in ("training", "holdout"))
+        kind = str(told.get("kind", EFFECTS))
+        given = [told[which] if kind == EFFECTS else [] for which in ("training", "holdout")]
+        training, holdout = (tuple(path.with_name(str(n)) for n in names) for names in given)
         title, grade, story = str(told["title"]), int(told["grade"]), str(told["story"]).strip()
-        found = Challenge(path.parent.name, title, grade, story, training, holdout)
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, TypeError, ValueError) as error:
+        thresholds = {str(name): float(value) for name, value in told.get("thresholds", {}).items()}
+        found = Challenge(path.parent.name, title, grade, story, training, holdout, kind=kind, thresholds=thresholds)
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, TypeError, ValueError, AttributeError) as error:
         raise InputError(f"{quoted(path)}: not a challenge: {quoted(error)}; mend it or remove its folder") from None
     except KeyError as error:
         raise InputError(f"{quoted(path)}: {error.args[0]} is missing; add it") from None

@@ -15,6 +15,7 @@ from ema_model.effects import find
 from ema_model.errors import InputError, quoted
 from ema_model.faults import vector
 
+KIND = "kind"  # in the truth of a challenge of another kind than effects, which `ema_model.practice` reads
 _KEYS = {"schema", "seed", "answer", "torque", "torque_parameters", "effects", "faults"}
 
 
@@ -37,14 +38,20 @@ class Truth:
 
 
 def truths(where: Path) -> list[Truth]:
-    """The truths of a folder of challenges, by name; InputError tells a mistake."""
-    return [read_truth(path) for path in sorted((where / "truth").glob("*.toml"))]
+    """The truths of a folder of challenges of effects, by name; InputError tells a mistake."""
+    found = {path: read_toml(path) for path in sorted((where / "truth").glob("*.toml"))}
+    return [truth_of(told, path.stem, str(path)) for path, told in found.items() if KIND not in told]
 
 
 def read_truth(path: Path) -> Truth:
     """One truth; InputError tells a mistake."""
+    return truth_of(read_toml(path), path.stem, str(path))
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """The text of a truth of any kind; InputError for what is none."""
     try:
-        return truth_of(tomllib.loads(path.read_text(encoding="utf-8")), path.stem, str(path))
+        return tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise InputError(f"{quoted(path)}: not a challenge's truth: {quoted(error)}") from None
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ema_model.actuator import Actuator
 from ema_model.identification.objective import Objective
-from ema_model.identification.run import identify
+from ema_model.identification.run import Progress, identify
 from ema_model.recordings import Measurement
 from ema_model.tracking.flight import Flight
 
@@ -16,9 +16,15 @@ UNTOLD = "this flight hardly tells k"
 _UNTOLD_OF = 4  # of the k, from which on a flight is of no use
 
 
-def identified(recording: Measurement, name: str, actuator: Actuator, seed: int = 0) -> Flight:
+def identified(
+    recording: Measurement,
+    name: str,
+    actuator: Actuator,
+    seed: int = 0,
+    on_iteration: Callable[[Progress], None] | None = None,
+) -> Flight:
     """One flight by the robust identification; excluded where the model does not fit it or it tells too little."""
-    sure = identify(Objective([recording], actuator), seed=seed).uncertainty
+    sure = identify(Objective([recording], actuator), seed=seed, on_iteration=on_iteration).uncertainty
     excluded = ""
     if not sure.adequate:
         excluded = UNFIT

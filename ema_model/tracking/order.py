@@ -11,6 +11,7 @@ from ema_model.errors import InputError, quoted
 from ema_model.recordings import actuators_of
 from ema_model.recordings.formats import FORMATS
 from ema_model.recordings.recording_set import recordings_in
+from ema_model.tracking.criteria import LEAST_FLIGHTS
 
 _NUMBER = re.compile(r"\d+")
 
@@ -52,6 +53,13 @@ def check_order(paths: Sequence[Path]) -> None:
             f"{quoted(second.name)}: is of the actuator {quoted(other)}, and {quoted(first.name)} of {quoted(one)}; "
             "the flights are of one unit"
         )
+
+
+def check_enough(paths: Sequence[Path], where: str) -> None:
+    """InputError for fewer flights than a trend needs; where: what was named."""
+    if len(paths) < LEAST_FLIGHTS:
+        flights = "1 flight tells" if len(paths) == 1 else f"{len(paths)} flights tell"
+        raise InputError(f"{quoted(where)}: {flights} no trend; give {LEAST_FLIGHTS} or more, or use `emaviz identify`")
 
 
 def _when(path: Path) -> tuple[int, ...]:

@@ -11,6 +11,7 @@ from ema_model.quantities.numbers import number
 from ema_model.quantities.titles import in_sentence
 from ema_model.text import Document, Lines, Note, Table
 from ema_model.tracking.criteria import AHEAD
+from ema_model.tracking.history import Came
 from ema_model.tracking.result import FaultTrack, Tracked
 
 _MOST_NAMED = 5
@@ -27,6 +28,12 @@ def answer(result: Tracked) -> str:
     return "; ".join(_sentence(one) for one in drifting)
 
 
+def headline(result: Tracked) -> str:
+    """The same to stand above all else; the name of a k stays small."""
+    told = answer(result)
+    return told if told[:2] in faults.BY_NAME else told[:1].upper() + told[1:]
+
+
 def document_of(result: Tracked) -> Document:
     """All that the terminal and a notebook show."""
     usable = len(result.usable)
@@ -41,6 +48,25 @@ def document_of(result: Tracked) -> Document:
     if lines := [*_jumps(result), *_trades(result), *_excluded(result)]:
         blocks.append(Lines(lines))
     return Document(blocks)
+
+
+def hindsight(then: FaultTrack, came: Came) -> str:
+    """What came of what was said of one k: whether it lay within the 90 % interval."""
+    if then.threshold is None or not came.seen:
+        return ""
+    reached = f"{_called(then.name)} reached {then.threshold:g}"
+    left = then.remaining
+    if came.crossed is None:
+        since = "1 flight" if came.seen == 1 else f"{came.seen} flights"
+        late = left is not None and came.seen > left.p95
+        told = f", which is longer than the 90 % interval ({_flights(left.p95)})" if left and late else ""
+        return f"what came: not so far, {since} later{told}"
+    when = f"{came.crossed} flights later" if came.crossed != 1 else "1 flight later"
+    if left is None:
+        return f"what came: {reached} {when}"
+    inside = left.p05 - 0.5 <= came.crossed <= left.p95 + 0.5  # whole flights are counted
+    side = "within" if inside else ("before" if came.crossed < left.p05 else "after")
+    return f"what came: {reached} {when}, {side} the 90 % interval"
 
 
 def _sentence(one: FaultTrack) -> str:

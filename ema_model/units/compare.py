@@ -22,7 +22,7 @@ from ema_model.units.block import linearised as linearised_at
 from ema_model.units.criteria import MISFIT, REFUSED, SLOPE, TOLD, UNTOLD
 from ema_model.units.fit import Fitted, Together, fit, together
 from ema_model.units.pool import Pair, Pool
-from ema_model.units.result import Difference, Need, OfType, UnitsCompared
+from ema_model.units.result import Alone, Difference, Need, OfType, UnitsCompared
 from ema_model.units.select import alike
 from ema_model.units.transfer import transfer
 
@@ -74,6 +74,7 @@ def compare_units(
         differences=tuple(_difference(pool, pair, actuator, names, paths, held) for pair in pool.pairs),
         dropped=dropped,
         of_type=of_type,
+        alone=_alone(pool, actuator, paths),
         transfer=moved,
         needs=tuple(_needs(found, names, paths, [[one.name for one in given] for given in units.values()])),
         errors=np.array([one.error for one in fits]),
@@ -174,7 +175,7 @@ def _of_type(pool: Pool, actuator: Actuator, paths: Sequence[str]) -> dict[str, 
     for place, path in enumerate(paths):
         sigma = actuator.tolerances[path].sigma
         mean = actuator.value(path) + sigma * float(pool.shared[place])
-        low = low_limit(path, actuator.controller.kind) if not path.startswith("effects.") else -np.inf
+        low = _low(path, actuator)
         known = sigma * float(pool.shared_sigma[place])
         half = HALF_90 * known
         scatter = sigma * float(pool.tau[place])
@@ -187,6 +188,24 @@ def _of_type(pool: Pool, actuator: Actuator, paths: Sequence[str]) -> dict[str, 
             told=bool(known < UNTOLD * sigma),
         )
     return found
+
+
+def _alone(pool: Pool, actuator: Actuator, paths: Sequence[str]) -> dict[str, Alone]:
+    """Of each unit what its own block says, as far as units of the type are about what they share: the tolerances."""
+    values, sigmas = [], []
+    for block in pool.blocks:
+        covariance = np.linalg.inv(block.information + np.eye(pool.parameters))
+        values.append(pool.shared + covariance @ (block.pull - block.information @ pool.shared))
+        sigmas.append(np.sqrt(np.diag(covariance)))
+    tolerance = [actuator.tolerances[path].sigma for path in paths]
+    value = np.array([actuator.value(path) for path in paths]) + np.array(values) * tolerance
+    value = np.maximum(value, [_low(path, actuator) for path in paths])  # as the type's mean
+    return {path: Alone(value[:, i], np.array(sigmas)[:, i] * tolerance[i]) for i, path in enumerate(paths)}
+
+
+def _low(path: str, actuator: Actuator) -> float:
+    """What a parameter cannot be below."""
+    return -np.inf if path.startswith("effects.") else low_limit(path, actuator.controller.kind)
 
 
 def _type_actuator(actuator: Actuator, of_type: Mapping[str, OfType]) -> Actuator:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
+from ema_model.quantities.interval import HALF_90
 from ema_model.text import InWords
 from ema_model.units.criteria import MISFIT
 
@@ -48,6 +49,19 @@ class OfType:
 
 
 @dataclass(frozen=True, eq=False)
+class Alone:
+    """A parameter of each unit as its own recordings tell it, the others' values aside."""
+
+    value: Array  # (units,), in the parameter's unit
+    sigma: Array  # (units,), 1 σ of it; the file's tolerance where nothing is told
+
+    def interval90(self, unit: int) -> Interval:
+        """Of one unit, by its place."""
+        half = HALF_90 * float(self.sigma[unit])
+        return float(self.value[unit]) - half, float(self.value[unit]) + half
+
+
+@dataclass(frozen=True, eq=False)
 class Transfer:
     """Each unit's own model on each unit's recordings."""
 
@@ -77,6 +91,7 @@ class UnitsCompared(InWords):
     differences: tuple[Difference, ...]
     dropped: tuple[Difference, ...]  # that held-out recordings contradict
     of_type: dict[str, OfType]
+    alone: dict[str, Alone]  # by parameter, as `of_type`
     transfer: Transfer
     needs: tuple[Need, ...]
     errors: Array  # (units,), of each unit's own model, in floors

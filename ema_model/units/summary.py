@@ -29,13 +29,29 @@ def as_dict(result: UnitsCompared) -> dict[str, Any]:
             "held_out_evidence": one.held_out,
         }
 
+    def alone(unit: int) -> dict[str, Any]:
+        return {
+            shown(path): {
+                "value": float(one.value[unit]),
+                "interval90": list(one.interval90(unit)),
+                "unit": result.of_type[path].unit,
+            }
+            for path, one in result.alone.items()
+        }
+
     moved = result.transfer
     return {
         "sentences": sentences(result),
         "warnings": list(result.warnings),
         "units": [
-            {"name": name, "recordings": list(given), "holdout": list(held), "error": float(error)}
-            for name, given, held, error in zip(result.units, result.recordings, result.held_out, result.errors)
+            {
+                "name": name,
+                "recordings": list(result.recordings[i]),
+                "holdout": list(result.held_out[i]),
+                "error": float(result.errors[i]),
+                "parameters": alone(i),
+            }
+            for i, name in enumerate(result.units)
         ],
         "differences": [difference(one) for one in result.differences],
         "contradicted": [difference(one) for one in result.dropped],

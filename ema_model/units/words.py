@@ -31,18 +31,36 @@ def sentences(result: UnitsCompared) -> list[str]:
     return [*told[:-1], f"{told[-1]}, nothing else"]
 
 
-def document_of(result: UnitsCompared) -> Document:
-    """All that the terminal and a notebook show."""
-    counted = sum(map(len, result.recordings))
+def headline(result: UnitsCompared) -> str:
+    """All of them in one, to stand above all else; a unit's name stays as it is written."""
+    told = "; ".join(sentences(result))
+    return told if told.startswith(result.units) else told[:1].upper() + told[1:]
+
+
+def notes(result: UnitsCompared) -> list[str]:
+    """What to mind: warnings, and differences that were taken back."""
+    return [*result.warnings, *(_dropped(result, one) for one in result.dropped)]
+
+
+def rests_on(result: UnitsCompared) -> str:
+    """'5 units, 15 recordings fitted, 5 held out'."""
     held = sum(map(len, result.held_out))
     aside = f", {held} held out" if held else ""
-    lead = f"{len(result.units)} units, {counted} recordings fitted{aside}"
-    blocks: list[Block] = [Lines([*sentences(result), lead]), *(Note(warning) for warning in result.warnings)]
-    blocks += [Note(_dropped(result, one)) for one in result.dropped]
+    return f"{len(result.units)} units, {sum(map(len, result.recordings))} recordings fitted{aside}"
+
+
+def lacking(result: UnitsCompared) -> list[str]:
+    """Which unit needs a recording of which kind, a sentence each."""
+    return [*_needed(result)]
+
+
+def document_of(result: UnitsCompared) -> Document:
+    """All that the terminal and a notebook show."""
+    blocks: list[Block] = [Lines([*sentences(result), rests_on(result)]), *map(Note, notes(result))]
     if result.differences:
         blocks.append(_differences(result))
     blocks += [_type(result), _transfer(result)]
-    if lines := [*_needed(result)]:
+    if lines := lacking(result):
         blocks.append(Lines(lines, "what the recordings do not tell"))
     return Document(blocks)
 

@@ -11,9 +11,10 @@ from ema_model.actuator import Actuator, save_actuator
 from ema_model.errors import InputError, quoted
 from ema_model.files.limits import FILE_BYTES
 from ema_model.files.refusal import listed
-from ema_model.recordings import Measurement, actuators_of, read_header
+from ema_model.recordings import Measurement, read_header
 from ema_model.recordings.formats.text_layout import Hints
 from ema_model.recordings.recording_set import RUN, files_of, held_out, is_pattern
+from ema_model.units.folders import check_same_type
 from emaviz.cli import given, output
 
 _BY_FOLDER = ("unit", "folder")
@@ -80,7 +81,7 @@ def read_units(arguments: argparse.Namespace, actuator: Actuator, progress: outp
     named = {Path(file).resolve() for file in unseen}
     files = [file for text in arguments.files for file in files_of(text, in_folders=True)]
     files = list(dict.fromkeys([*files, *unseen]))
-    _check_same_actuator(files)
+    check_same_type(files)
     column = _column(arguments, files)
     if column:
         arguments = copy(arguments)
@@ -146,14 +147,3 @@ def _named(text: str) -> tuple[str, str]:
     if not separator or not name or not pattern:
         raise InputError(f"--unit {quoted(text)}: write it as NAME=GLOB, for example left='*left*'")
     return name, pattern
-
-
-def _check_same_actuator(files: list[str]) -> None:
-    """InputError for recordings whose side files name different actuators: units are of one type."""
-    known = list(actuators_of(files).items())
-    if len(known) > 1:
-        (one, first), (other, second) = known[:2]
-        raise InputError(
-            f"{quoted(second.name)}: is of the actuator {quoted(other)}, and {quoted(first.name)} of {quoted(one)}; "
-            "units that are compared are of one type"
-        )

@@ -2,32 +2,65 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import plotly.graph_objects as go
 
 from ema_model.faults import BY_NAME
 from ema_model.quantities.interval import HALF_90
 from ema_model.tracking.result import FaultTrack, Tracked
-from emaviz.colours import DIFFERENCE, MONITOR, REFERENCE
+from emaviz.colours import COMMAND, DIFFERENCE, MONITOR, REFERENCE
 from emaviz.figures import theme
 
+CLICKED = "flights"  # by which a page knows the chart, of which a point's text is its flight
+_BAND = "rgba(240,140,0,0.18)"
 _FAN = "rgba(224,49,49,0.18)"
 
 
-def figure(result: Tracked, name: str, *, dark: bool = False) -> go.Figure:
-    """k by flight; a flight that was left out is a gap."""
+def figure(
+    result: Tracked,
+    name: str,
+    *,
+    last: Tracked | None = None,
+    levels: Mapping[int, tuple[float, float, float]] | None = None,
+    dark: bool = False,
+) -> go.Figure:
+    """k by flight; a flight that was left out is a gap.
+
+    last: what is known after all flights, of which those since `result` are drawn pale; levels: by flight, the level as
+    it was known then, and the ends of its 90 % interval.
+    """
     one = result.faults[name]
-    at = [i for i, flight in enumerate(result.flights, 1) if not flight.excluded]
     chart = theme.new(BY_NAME[name].label, "Flight", name, dark=dark)
+    chart.update_layout(meta=CLICKED)
+    at = [i for i, flight in enumerate(result.flights, 1) if not flight.excluded]
+    if levels:
+        x, (middle, low, high) = [*levels], zip(*levels.values())
+        edge = {"line": {"width": 0}, "mode": "lines", "hoverinfo": "skip"}
+        band = {"x": [*x, *x[::-1]], "y": [*low, *high[::-1]], "fill": "toself", "fillcolor": _BAND}
+        chart.add_trace(go.Scatter(**band, **edge, name="level"))
+        line = {"color": MONITOR, "width": 1}
+        chart.add_trace(go.Scatter(x=x, y=middle, mode="lines", line=line, name="level then", showlegend=False))
     names = [theme.plain(flight.name) for flight in result.usable]
     error = {"type": "data", "array": HALF_90 * one.sigma, "thickness": 0.7, "width": 0}
     dots = {"size": 4, "color": REFERENCE}
-    chart.add_trace(go.Scatter(x=at, y=one.k, error_y=error, mode="markers", marker=dots, text=names, name="measured"))
+    said = "%{text}: %{y:.4f} ± %{error_y.array:.2g}<extra></extra>"
+    measured = {"x": at, "y": one.k, "error_y": error, "text": names, "hovertemplate": said}
+    chart.add_trace(go.Scatter(**measured, mode="markers", marker=dots, name="measured"))
     now = len(result.flights)
+    if last is not None and len(last.flights) > now:
+        since = [(i, flight.name) for i, flight in enumerate(last.flights, 1) if not flight.excluded]
+        later = [(i, theme.plain(called), k) for (i, called), k in zip(since, last.faults[name].k) if i > now]
+        x, called, k = zip(*later) if later else ((), (), ())
+        pale = {"size": 4, "color": COMMAND, "opacity": 0.5}
+        chart.add_trace(go.Scatter(x=x, y=k, mode="markers", marker=pale, text=called, name="what came",
+                                   hovertemplate="%{text}: %{y:.4f}<extra></extra>"))  # fmt: skip
+        theme.moment(chart, now + 0.5)
     if one.trend:
         start = _since(result, one)
         line = {"color": MONITOR, "width": 2}
         back = one.level - one.drift * (now - start)
-        chart.add_trace(go.Scatter(x=[start, now], y=[back, one.level], mode="lines", line=line, name="trend of today"))
+        chart.add_trace(go.Scatter(x=[start, now], y=[back, one.level], mode="lines", line=line, name="trend"))
     for jump in one.jumps:
         number = next(i for i, flight in enumerate(result.flights, 1) if flight.name == jump.flight)
         chart.add_vline(x=number - 0.5, line={"width": 1, "dash": "dot", "color": DIFFERENCE})
@@ -46,7 +79,7 @@ def figure(result: Tracked, name: str, *, dark: bool = False) -> go.Figure:
         chart.add_trace(fan)
         middle = {"color": DIFFERENCE, "width": 1.5}
         x, y = [now, now + left.p50], [one.level, end]
-        chart.add_trace(go.Scatter(x=x, y=y, mode="lines", line=middle, name="to the threshold, median"))
+        chart.add_trace(go.Scatter(x=x, y=y, mode="lines", line=middle, name="to threshold"))
     return chart
 
 

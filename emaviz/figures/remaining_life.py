@@ -6,23 +6,34 @@ import numpy as np
 import plotly.graph_objects as go
 
 from ema_model.tracking.remaining import Remaining
-from emaviz.colours import MONITOR
+from emaviz.colours import MONITOR, REFERENCE
 from emaviz.figures import theme
 
 _POINTS = 400
+_TITLE = "Probability of crossing within the next flights"
 
 
-def figure(left: Remaining, *, dark: bool = False) -> go.Figure:
-    """Its cumulative distribution, with 5, 50 and 95 %."""
-    chart = theme.new("Probability of crossing within the next flights", "Flights from now", "probability", dark=dark)
-    x = np.linspace(0.0, max(1.0, 1.6 * left.p95), _POINTS)
+def figure(left: Remaining, *, came: int | None = None, dark: bool = False) -> go.Figure:
+    """Its cumulative distribution, with 5, 50 and 95 %; came: after how many flights it was crossed, where known."""
+    chart = theme.new(_TITLE, "Flights from now", "probability", dark=dark)
+    x = np.linspace(0.0, max(1.0, 1.6 * left.p95, 1.1 * (came or 0.0)), _POINTS)
     y = [left.within(one) for one in x]
     chart.add_trace(go.Scatter(x=x, y=y, mode="lines", line={"color": MONITOR, "width": 2}, showlegend=False))
     for share, at in ((0.05, left.p05), (0.5, left.p50), (0.95, left.p95)):
         mark = {"size": 8, "color": theme.MARK}
         label = [f"{share:.0%}: {at:.0f}"]
+        side = "top right" if share < 0.1 else "bottom right"  # inside of the axes
         chart.add_trace(
-            go.Scatter(x=[at], y=[share], mode="markers+text", text=label, textposition="bottom right", marker=mark,
+            go.Scatter(x=[at], y=[share], mode="markers+text", text=label, textposition=side, marker=mark,
                        showlegend=False)
         )  # fmt: skip
+    if came is not None:
+        line = {"color": REFERENCE, "width": 2, "dash": "dash"}
+        told = {"text": ["", f"came: {came}"], "textposition": "bottom left", "showlegend": False}
+        chart.add_trace(go.Scatter(x=[came, came], y=[0.0, 1.0], mode="lines+text", line=line, **told))
     return chart
+
+
+def none(why: str, *, dark: bool = False) -> go.Figure:
+    """Where nothing is said of the remaining life."""
+    return theme.missing(_TITLE, why, dark=dark)

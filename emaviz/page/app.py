@@ -145,6 +145,8 @@ class App:
     def close(self) -> None:
         """Ends everything that was started."""
         self.playback.close()
+        for one in self.shared.tabs.values():
+            one.close()
         self.discovering.close()
         self.comparing.close()
         self.session.close()

@@ -37,6 +37,14 @@ class Page:
             return False
         return True
 
+    def ask(self, kind: str, asked: Callable[[], Any]) -> None:
+        """Does what was asked soon, on the screen's thread; what is refused becomes a message."""
+
+        def checked() -> None:
+            self.checked(asked)
+
+        self.screen.post(kind, checked)
+
     def begins(self, begin: Callable[[], bool]) -> bool:
         """Begins a long run, or says why not.  begin(): whether nothing else runs; InputError: what is missing."""
         started = False

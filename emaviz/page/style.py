@@ -26,8 +26,8 @@ def page() -> Html:
     rules = unescaped(
         "<style>"
         # all tabs of the main panel in one line
-        "[data-dock-region=left] [data-dock-tab]{padding-left:4px!important;padding-right:4px!important;"
-        "font-size:12.5px!important}[data-dock-region=left] [data-dock-tab] *{font-size:inherit!important}"
+        "[data-dock-region=left] [data-dock-tab]{padding-left:3px!important;padding-right:3px!important;"
+        "font-size:11.5px!important}[data-dock-region=left] [data-dock-tab] *{font-size:inherit!important}"
         "[data-dock-region=left] [data-dock-tab] > div:has(svg){display:none!important}"
         # a slider's number in full: viser's box has room for five characters
         ".mantine-Slider-root ~ .mantine-NumberInput-root,"
@@ -69,6 +69,11 @@ def unseen(controls: Sequence[str]) -> Html:
     """Takes controls off the screen, by their ids, for scripts to press."""
     rows = ",".join(f"div:has(> [id='{one}'])" for one in controls)
     return unescaped(f"<style>{rows}{{display:none!important}}</style>")
+
+
+def unseen_field(field: str) -> Html:
+    """The same for a field of text, which its label alone names by its id."""
+    return unescaped(f"<style>.mantine-Flex-root:has(label[for='{field}']){{display:none!important}}</style>")
 
 
 def caption(text: str) -> Html:

@@ -85,6 +85,10 @@ class Tab(ABC):
         """The session's settings have changed: shows them."""
         return
 
+    def close(self) -> None:
+        """Ends what was started here."""
+        return
+
     def kept(self) -> dict[str, Part]:
         """What a session's file holds of it, by name."""
         return {}

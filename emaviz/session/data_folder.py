@@ -9,6 +9,7 @@ import filecmp
 import os
 import re
 import shutil
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import suppress
 from datetime import datetime
@@ -39,7 +40,8 @@ class DataFolder:
         """Makes the folder with `recordings`, `uploads`, `actuators`, `sessions` and `challenges` in it."""
         self.recordings, self.uploads, self.actuators = (folder / n for n in ("recordings", "uploads", "actuators"))
         self.sessions, self.challenges = folder / "sessions", folder / "challenges"
-        for made in (self.recordings, self.uploads, self.actuators, self.sessions, self.challenges):
+        self.own = (self.recordings, self.uploads, self.actuators, self.sessions, self.challenges)
+        for made in self.own:
             try:
                 made.mkdir(parents=True, exist_ok=True)
             except OSError as error:
@@ -49,9 +51,28 @@ class DataFolder:
         for at, _ in _walked(self.folder):
             remove_abandoned(at)
 
-    def measurements(self) -> list[str]:
-        """Names of the files that may hold measurements, relative to the folder, the newest first."""
-        return self._files(self.folder, tuple(FORMATS))
+    def measurements(self, most: int | None = _MOST_LISTED) -> list[str]:
+        """Names of the files that may hold measurements, relative to the folder, the newest first; most: of them."""
+        return self._files(self.folder, tuple(FORMATS), most)
+
+    def folders(self) -> dict[str, int]:
+        """The folders that hold measurements themselves, "." for this one, and how many; in order of their names.
+
+        What the app itself has recorded is left out.
+        """
+        found = Counter(Path(name).parent.as_posix() for name in self.measurements(most=None))
+        return dict(sorted((name, count) for name, count in found.items() if name != self.recordings.name))
+
+    def inner(self, name: str) -> Path:
+        """The folder of that name, relative to this one."""
+        try:
+            path = (self.folder / name).resolve()
+            fits = self.holds(path) and path.is_dir()
+        except (OSError, ValueError, RuntimeError):
+            fits = False
+        if not fits:
+            raise InputError(f"{shown(name, 100)}: no such folder in the data folder; choose one of the list")
+        return path
 
     def actuator_files(self) -> list[str]:
         """Names of the uploaded actuator files."""
@@ -206,7 +227,7 @@ class DataFolder:
             raise InputError(f"{shown(name)}: too many files have this name; rename it")
         return path
 
-    def _files(self, folder: Path, suffixes: tuple[str, ...]) -> list[str]:
+    def _files(self, folder: Path, suffixes: tuple[str, ...], most: int | None = _MOST_LISTED) -> list[str]:
         found: list[tuple[float, str]] = []
         for at, names in _walked(folder):
             for name in names:
@@ -215,7 +236,7 @@ class DataFolder:
                 if not hidden and path.is_file() and self.holds(path):
                     with suppress(OSError):
                         found.append((-path.stat().st_mtime, path.relative_to(self.folder).as_posix()))
-        return [name for _, name in sorted(found)[:_MOST_LISTED]]
+        return [name for _, name in sorted(found)[:most]]
 
 
 def _walked(folder: Path) -> Iterator[tuple[Path, list[str]]]:

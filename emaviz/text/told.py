@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from ema_model.text import COLOURS, Block, Severity, Table
+from ema_model.text import COLOURS, Block, Document, Severity, Table
 from emaviz.text.html import Html, html, joined, unescaped
 
 
 def shown(block: Block | None) -> Html:
     """A block of a document, escaped by itself; nothing for none."""
     return Html() if block is None else unescaped(block.html)
+
+
+def whole(told: Document) -> Html:
+    """All that a result says, as a notebook shows it: its blocks escape what is not theirs."""
+    return html('<div style="padding:2px 12px;font-size:12.5px;overflow-x:auto">{}</div>', unescaped(told.html))
 
 
 def folded(title: str, told: Table | None) -> Html:

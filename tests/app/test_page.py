@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from support.on_page import wait_until
 
+from emaviz.page.docked import LEFT_PX
 from emaviz.recording import read
 
 pytestmark = pytest.mark.browser
@@ -147,12 +148,15 @@ def test_sliders_answer_while_an_identification_runs(page, app):
     wait_until(lambda: not app.session.worker.busy)
 
 
-def test_six_tabs_stand_in_one_line_and_the_strip_holds_its_controls(page):
+def test_all_tabs_stand_in_one_line_at_any_width_and_the_strip_holds_its_controls(page):
     tabs = page.locator("[data-dock-region=left] [data-dock-tab]")
     assert [name.strip() for name in tabs.all_inner_texts()] == [
-        "Explore", "Identify", "Compare", "Discover", "Library", "Recordings"
+        "Explore", "Identify", "Compare", "Discover", "Units", "Track", "Library", "Recordings"
     ]  # fmt: skip
-    assert len({round(tab.bounding_box()["y"]) for tab in tabs.all()}) == 1
+    for width in (1100, 1400):
+        page.set_viewport_size({"width": width, "height": 900})
+        boxes = [tab.bounding_box() for tab in tabs.all()]
+        assert len({round(box["y"]) for box in boxes}) == 1 and boxes[-1]["x"] + boxes[-1]["width"] <= LEFT_PX
     strip = page.locator("[data-floating-window]:has(.emaviz-strip)")
     for name in ("Play", "Reset view"):
         assert strip.get_by_role("button", name=name, exact=True).bounding_box()["x"] < 1400

@@ -7,43 +7,19 @@ import shutil
 
 import numpy as np
 import pytest
+from support.bench_units import ACTUATOR, FRICTION, write_units
 from support.compared import compared, one_file
 
 from ema_model.actuator import load_actuator
-from ema_model.recordings import Measurement, write_measurement
 from emaviz.cli import main
-
-ACTUATOR = [
-    *("--controller=unknown", "--set=motor.torque_constant_Nm_A=0.05 fixed", "--set=motor.inertia_kgm2=1e-4±30%"),
-    *("--set=motor.dynamic_friction_Nm=0.01±50%", "--set=motor.viscous_friction_Nms_rad=0±1e-5"),
-]
-FRICTION = {"left": 0.012, "middle": 0.012, "right": 0.02}  # N·m
-RUNS = ("slow", "fast", "unseen")
-
-
-def motion(friction_Nm: float, seed: int) -> dict[str, np.ndarray]:
-    """A motor of 1.1e-4 kg·m², moved to and fro."""
-    random = np.random.default_rng(seed)
-    time = np.arange(0.0, 2.0, 2e-3)
-    position = 20.0 * np.sin(2.0 * np.pi * (0.6 + 0.2 * (seed % len(RUNS))) * time)
-    speed = np.gradient(position, time)
-    torque = 1.1e-4 * np.gradient(speed, time) + friction_Nm * np.sign(speed)
-    current = torque / 0.05 + 0.01 * random.standard_normal(len(time))
-    return {"time_s": time, "motor_position_rad": position, "current_A": current}
 
 
 @pytest.fixture(scope="module")
 def bench(tmp_path_factory):
     """A folder of three units' folders, one file of all of them with a column for the unit, and the actuator's file."""
     folder = tmp_path_factory.mktemp("bench")
-    parts = []
-    for i, (unit, friction) in enumerate(FRICTION.items()):
-        (folder / "units" / unit).mkdir(parents=True)
-        for j, run in enumerate(RUNS):
-            signals = motion(friction, len(RUNS) * i + j)
-            write_measurement(Measurement(signals), folder / "units" / unit / f"{unit}_{run}.csv")
-            parts += [{"serial": np.full(1000, i + 11.0), **signals}] if run == "slow" else []
-    one_file(folder / "all.csv", parts)
+    slow = write_units(folder / "units")
+    one_file(folder / "all.csv", [{"serial": np.full(1000, i + 11.0), **signals} for i, signals in enumerate(slow)])
     assert main(["actuator", "new", str(folder / "mine.toml"), *ACTUATOR]) == 0
     return folder
 
@@ -67,7 +43,7 @@ def test_folders_are_units_with_all_outputs(bench, capsys):
     ]
     told = capsys.readouterr().out
     assert re.match(r"right (differs|seems to differ) from the rest in motor dynamic friction \(\+6\d", told)
-    assert "The model of one unit on another" in page.read_text()
+    assert "The model of one unit on another" in page.read_text() and "<h1>right " in page.read_text()
     assert load_actuator(kept).value("motor.dynamic_friction_Nm") == pytest.approx(0.012, rel=0.05)
     assert found["transfer"]["floors"][0][2] > 2.0 * found["transfer"]["floors"][0][0]
 

@@ -49,7 +49,7 @@ def test_all_outputs(folder, tmp_path, monkeypatch, capsys):
 @pytest.mark.parametrize(
     ("names", "more", "words"),
     [
-        (["flight_1.csv"], [], "1 flight tell"),
+        (["flight_1.csv"], [], "1 flight tells no trend"),
         (["flight_2.csv", "flight_1.csv"], [], "give the flights in order"),
         (["flight_1.csv", "copy_1.csv"], [], "nothing tells which flew first"),
         (["flight_1.csv", "nameless.csv"], [], "no number or date"),

@@ -77,6 +77,16 @@ def test_the_type_is_an_actuator_file(differing, tmp_path):
     assert all(again.tolerances[path].sigma == ACTUATOR.tolerances[path].sigma for path in nothing)
 
 
+def test_each_unit_is_told_alone(differing):
+    own, mean = differing.alone[BACKLASH], differing.of_type[BACKLASH].mean
+    tolerance = ACTUATOR.tolerances[BACKLASH].sigma
+    assert own.value.shape == own.sigma.shape == (3,) and np.all((own.sigma > 0.0) & (own.sigma <= tolerance))
+    off = (own.value - mean) / tolerance
+    assert np.argmin(off) == 1 and off[1] < -0.4 and np.all(np.abs(off[[0, 2]]) < 0.2)
+    told = as_dict(differing)["units"][1]["parameters"][BACKLASH]
+    assert told["unit"] == "rad" and told["interval90"][0] < told["value"] < told["interval90"][1]
+
+
 def test_json_has_the_same(differing):
     told = as_dict(differing)
     assert told["differences"][0]["unit"] == "unit_02" and told["differences"][0]["same_as"] == []

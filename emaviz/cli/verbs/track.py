@@ -10,15 +10,15 @@ from pathlib import Path
 
 from ema_model.actuator import Actuator
 from ema_model.errors import InputError, quoted
+from ema_model.files.arriving import LOOK_S, Watched
 from ema_model.recordings.recording_set import recordings_in
 from ema_model.tracking.criteria import LEAST_FLIGHTS
 from ema_model.tracking.flight import Flight
 from ema_model.tracking.identify import identify_all
-from ema_model.tracking.order import check_order, flights_in, in_order
+from ema_model.tracking.order import check_enough, check_order, flights_in, in_order
 from ema_model.tracking.summary import as_dict
 from ema_model.tracking.track import check_thresholds, track
 from emaviz.cli import files, given, options, output
-from emaviz.cli.watching import LOOK_S, Watched
 
 HELP = "follow k over the flights of one unit: what drifts, and what life remains"
 PLACE = 6
@@ -151,9 +151,5 @@ def _paths(names: list[str]) -> list[Path]:
         raise InputError(f"{quoted(folders[0])}: is a folder; name one folder alone, or files")
     paths = flights_in(folders[0]) if folders else named
     check_order(paths)
-    if len(paths) < LEAST_FLIGHTS:
-        flights = "1 flight" if len(paths) == 1 else f"{len(paths)} flights"
-        raise InputError(
-            f"{quoted(names[0])}: {flights} tell no trend; give {LEAST_FLIGHTS} or more, or use `emaviz identify`"
-        )
+    check_enough(paths, names[0])
     return paths

@@ -4,4 +4,4 @@ import viser
 
 from emaviz.page.workspaces import Workspace
 
-WORKSPACE = Workspace("library", "Library", viser.Icon.BOOK, 5)
+WORKSPACE = Workspace("library", "Library", viser.Icon.BOOK, 7)

@@ -28,3 +28,12 @@ class Watched:
         new = {path: at for path, at in self._seen.items() if before.get(path) == at != self._arrived.get(path)}
         self._arrived |= new
         return [*new]
+
+    def take(self, paths: Iterable[Path]) -> None:
+        """These count as arrived, as they were seen last."""
+        self._arrived |= {path: self._seen[path] for path in paths if path in self._seen}
+
+    def forget(self, paths: Iterable[Path]) -> None:
+        """These arrive once more."""
+        for path in paths:
+            self._arrived.pop(path, None)

@@ -1,0 +1,80 @@
+"""`emaviz challenge`: recordings to practise on, whose truth is sealed."""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+from pathlib import Path
+
+from ema_model.challenges import Challenge
+from ema_model.challenges.challenge import EFFECTS, challenges, folder
+from ema_model.errors import InputError, quoted
+from ema_model.files.refusal import shown
+from ema_model.practice import made
+from emaviz.cli import files, output
+
+HELP = "list challenges to practise on, take one's recordings, open its seal"
+PLACE = 8
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """NAME, --out, --reveal."""
+    parser.add_argument("name", nargs="?", metavar="NAME", help="one of the list, which stands there without a name")
+    parser.add_argument("--out", type=files.Folder(), metavar="DIR", help="a new folder for its recordings")
+    parser.add_argument("--reveal", action="store_true", help="tell what is hidden in it")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Lists, writes or reveals."""
+    known = {one.name: one for one in challenges(kind=None)}
+    if arguments.name is None:
+        if arguments.out or arguments.reveal:
+            raise InputError(f"name a challenge: {', '.join(known)}")
+        for one in known.values():
+            print(f"{one.name:20} {'●' * one.grade:5}  {one.title}")
+        return 0
+    if arguments.name not in known:
+        raise InputError(f"no challenge {quoted(arguments.name)}; there are {', '.join(known)}")
+    one = known[arguments.name]
+    if arguments.out:
+        _write(one, Path(arguments.out))
+    elif not arguments.reveal:
+        print(f"{one.title}\n\n{one.story}\n\n--out DIR writes its recordings, --reveal opens the seal")
+    if arguments.reveal:
+        print("\n".join(_answer(one)))
+    return 0
+
+
+def _write(one: Challenge, where: Path) -> None:
+    if one.kind == EFFECTS:
+        command = _copy(one, where)
+    else:
+        progress = output.Progress()
+        try:
+            made.make(one, where, lambda text, share: progress.show(text))
+        finally:
+            progress.done()
+        command = made.command(one, str(where))
+    print(f"{one.title}\n\n{one.story}\n\nwritten to {where}; go on with\n  {command}")
+
+
+def _copy(one: Challenge, where: Path) -> str:
+    """The recordings that are shipped; the command line that goes on with them."""
+    try:
+        where.mkdir(parents=True, exist_ok=True)
+        if any(where.iterdir()):
+            raise InputError(f"{shown(where)}: is not empty; name another folder")
+        for file in (*one.training, *one.holdout):
+            shutil.copyfile(file, where / file.name)
+    except OSError as error:
+        raise InputError(f"{shown(where)}: cannot be written ({error.strerror}); name another folder") from None
+    named = " ".join(str(where / file.name) for file in one.training)
+    return f"emaviz discover {named} --holdout {' '.join(str(where / file.name) for file in one.holdout)}"
+
+
+def _answer(one: Challenge) -> list[str]:
+    if one.kind != EFFECTS:
+        return list(made.reveal(one).lines)
+    from ema_model.challenges.truth import read_truth
+
+    return [read_truth(folder() / "truth" / f"{one.name}.toml").answer]

@@ -1,0 +1,74 @@
+"""Each unit's parameters with their intervals, beside what the type shares: a small chart for each parameter."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from ema_model.actuator.naming import on_axes
+from ema_model.quantities.interval import HALF_90
+from ema_model.quantities.numbers import Quantity
+from ema_model.units.result import UnitsCompared
+from emaviz.colours import DIFFERENCE, REFERENCE
+from emaviz.figures import theme
+
+_TYPE = "rgba(134,142,150,0.30)"
+_COLUMNS = 2
+_HEAD_PX, _AXIS_PX, _ROW_PX = 46, 58, 17  # of the whole, below each chart, and of a unit in it
+
+
+def figure(result: UnitsCompared, *, dark: bool = False) -> go.Figure:
+    """Those that the recordings tell, what differs first; units that differ are red, the type is the grey band."""
+    paths = shown(result)
+    if not paths:
+        return theme.missing("Parameters of each unit", "the recordings tell none of them", dark=dark)
+    rows = -(-len(paths) // _COLUMNS)
+    height = height_px(result)
+    grid: Any = make_subplots(
+        rows=rows,
+        cols=_COLUMNS,
+        shared_yaxes=True,
+        horizontal_spacing=0.06,
+        vertical_spacing=min(_AXIS_PX / height, 0.9 / max(rows - 1, 1)),
+    )
+    like: Any = theme.new("Parameters of each unit, alone (90 % intervals)", "", "", dark=dark).layout
+    grid.update_layout(template=like.template, title=like.title)
+    names = [theme.plain(name) for name in result.units]
+    for place, path in enumerate(paths):
+        where = {"row": place // _COLUMNS + 1, "col": place % _COLUMNS + 1}
+        one, of_type = result.alone[path], result.of_type[path]
+        named = on_axes(path, result.actuator.axes)
+        axis = Quantity(named.title, of_type.unit).scaled(one.value)
+        differs = {difference.unit for difference in result.differences if path in difference.together}
+        low, high = (axis.factor * (of_type.mean + side * HALF_90 * of_type.sigma) for side in (-1.0, 1.0))
+        grid.add_trace(
+            go.Scatter(
+                x=axis.factor * one.value,
+                y=names,
+                error_x={"array": axis.factor * HALF_90 * one.sigma, "thickness": 1.5, "width": 4, "color": theme.EDGE},
+                mode="markers",
+                marker={"size": 7, "color": [DIFFERENCE if unit in differs else REFERENCE for unit in result.units]},
+                showlegend=False,
+                hovertemplate="%{y}: %{x:.5g} ± %{error_x.array:.2g}<extra></extra>",
+            ),
+            **where,
+        )
+        grid.add_vrect(x0=low, x1=high, fillcolor=_TYPE, line_width=0, layer="below", **where)
+        grid.update_xaxes(title={"text": theme.plain(axis.label), "font": {"size": 11}}, nticks=5, **where)
+    grid.update_yaxes(autorange="reversed", nticks=0, tickfont={"size": 10})
+    grid.update_layout(margin={"l": 48, "r": 14, "t": _HEAD_PX, "b": 0})
+    return grid
+
+
+def shown(result: UnitsCompared) -> list[str]:
+    """The parameters that are told, those in which units differ first."""
+    differ = list(dict.fromkeys(path for one in result.differences for path in one.together))
+    return [*differ, *(path for path, one in result.of_type.items() if one.told and path not in differ)]
+
+
+def height_px(result: UnitsCompared) -> int:
+    """As all of it is legible."""
+    rows = -(-max(len(shown(result)), 1) // _COLUMNS)
+    return _HEAD_PX + rows * (_AXIS_PX + _ROW_PX * (len(result.units) + 1))

@@ -1,0 +1,162 @@
+"""The Track tab: a folder of flights, thresholds, and the run."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import viser
+
+from ema_model.faults import BY_NAME
+from ema_model.quantities.titles import in_sentence
+from ema_model.tracking.track import TRACKED
+from emaviz.page.job_line import JobLine
+from emaviz.page.page import Page
+from emaviz.page.practice import PracticeButtons
+from emaviz.page.track import WORKSPACE
+from emaviz.page.track.result import TrackResult
+from emaviz.session.track.following import Following
+from emaviz.text.html import add_html, html, joined
+from emaviz.text.notes import boxed, note
+
+_NONE = "–"
+_HALFWAY = 0.5  # from healthy to the end of a k's range, where a threshold begins
+_ABOUT = (
+    "A folder of recordings of one unit, a flight each, whose names tell their order (flight_0001, 2026-05-03 …), "
+    "inside the data folder."
+)
+
+
+class TrackPanel:
+    """The tab's controls.  `result` is the panel on the right."""
+
+    def __init__(self, page: Page, following: Following, result: TrackResult) -> None:
+        self._page, self._following, self._result = page, following, result
+        self._names: dict[str, str] = {}
+        gui, post = page.server.gui, page.screen.post
+        add_html(gui, note(_ABOUT))
+        self._folder: Any = gui.add_dropdown(
+            "Flights", (_NONE,), hint="Folders of the data folder that hold recordings"
+        )
+        self._practice = PracticeButtons(page, following.practice, self.choose)
+        with gui.add_folder("The life ends where"):
+            self._faults = {BY_NAME[name].label: name for name in TRACKED}
+            self._fault: Any = gui.add_dropdown("Fault", tuple(self._faults))
+            self._ends = gui.add_checkbox("has a threshold", False)
+            self._threshold = gui.add_number("Threshold", 0.5, min=0.0, max=1.0, step=0.001, disabled=True)
+            self._all = add_html(gui)
+        self._start = gui.add_button("Track", icon=viser.Icon.TIMELINE, disabled=True)
+        self._line = JobLine(page, following.job, pauses="it")
+        self._watch = gui.add_checkbox(
+            "Take up new flights", following.watching, hint="Files that arrive in the folder add a point each"
+        )
+        self._left_out = add_html(gui)
+        self._folder.on_update(lambda event: event.client and self._ask_folder())
+        self._fault.on_update(lambda event: event.client and post("fault", self._show_fault))
+        for control in (self._ends, self._threshold):
+            control.on_update(lambda event: event.client and self._ask_threshold())
+        self._watch.on_update(lambda event: event.client and self._take_watch())
+        self._start.on_click(lambda _: page.ask("track", lambda: page.begins(following.begin)))
+        following.job.began.connect(lambda _: post("track began", lambda: self._busy(True)))
+        following.job.ended.connect(lambda _: post("track ended", lambda: self._busy(False)))
+        following.events.followed.connect(lambda history: post("followed", lambda: result.show(history)))
+        following.events.left_out.connect(lambda: post("left out", self._show_left_out))
+        page.workspaces.entered.connect(lambda name: name == WORKSPACE.name and self.refresh())
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Reads the data folder's list again; the chosen one stays as long as it exists."""
+        found = self._following.folder.folders()
+        self._names = {f"{name} ({count})" if name != "." else f"the data folder ({count})": name
+                       for name, count in found.items()}  # fmt: skip
+        options = tuple(self._names) or (_NONE,)
+        chosen = next((title for title, name in self._names.items() if name == self._following.chosen), None)
+        if tuple(self._folder.options) != options:
+            self._folder.options = options
+        if chosen is not None:
+            self._folder.value = chosen
+        elif self._names:
+            self._take_folder(options[0])
+        self._start.disabled = self._following.job.running or not self._names
+
+    # --- what is asked ----------------------------------------------------------------------------------------------
+
+    def choose(self, name: str) -> None:
+        """A folder by its name; on the screen's thread."""
+        self.refresh()
+        self._take_folder(next(title for title, one in self._names.items() if one == name))
+
+    def _ask_folder(self) -> None:
+        """As it is chosen now: the list may be about to be read again."""
+        title = str(self._folder.value)
+        self._page.screen.post("flights", lambda: self._take_folder(title))
+
+    def _take_folder(self, title: str) -> None:
+        name = self._names.get(title)
+        if name is not None and self._folder.value != title:
+            self._folder.value = title
+        if name is not None and name != self._following.chosen:
+            if self._page.checked(lambda: self._following.choose(name)):
+                self._result.show(None)
+                self._practice.show(name)
+                self._show_thresholds()
+                self._line.say("")
+                self._show_left_out()
+            else:
+                self.refresh()
+
+    def _show_fault(self) -> None:
+        name = self._faults[str(self._fault.value)]
+        known = self._following.thresholds.get(name)
+        self._ends.value = known is not None
+        self._threshold.disabled = known is None
+        healthy = BY_NAME[name].healthy
+        self._threshold.value = healthy + _HALFWAY * (1.0 - healthy) if known is None else known
+
+    def _ask_threshold(self) -> None:
+        """As the controls are now: a fault that was chosen just before has yet to be shown."""
+        value = self._threshold.value if self._ends.value else None
+        self._page.screen.post("threshold", lambda: self._take_threshold(value))
+
+    def _take_threshold(self, value: Any) -> None:
+        name, following = self._faults[str(self._fault.value)], self._following
+        taken = self._page.checked(lambda: following.set_threshold(name, value))
+        self._show_fault()
+        if not taken:
+            return
+        self._tell_thresholds()
+        if following.history is not None and not following.job.running:
+            self._page.begins(following.begin)  # what is identified stays, so that this takes a moment
+
+    def _show_thresholds(self) -> None:
+        """Of the chosen flights, which a challenge may bring."""
+        known = self._following.thresholds
+        if known and self._faults[str(self._fault.value)] not in known:
+            self._fault.value = BY_NAME[next(iter(known))].label
+        self._show_fault()
+        self._tell_thresholds()
+
+    def _tell_thresholds(self) -> None:
+        told = [
+            html("<b>{}</b> {} at {:g}", one, in_sentence(BY_NAME[one].title), at)
+            for one, at in sorted(self._following.thresholds.items())
+        ]
+        self._all.content = boxed(joined(told, "<br>")) if told else ""
+
+    def _take_watch(self) -> None:
+        self._following.watching = bool(self._watch.value)
+
+    # --- the run ----------------------------------------------------------------------------------------------------
+
+    def _busy(self, busy: bool) -> None:
+        with self._page.server.atomic():
+            self._start.disabled = busy
+            for control in (self._folder, self._fault, self._ends):
+                control.disabled = busy
+            self._threshold.disabled = busy or not self._ends.value
+        self._show_left_out()
+        self.refresh()
+
+    def _show_left_out(self) -> None:
+        lines = [html('<div style="color:#e8590c;overflow-wrap:anywhere">▲ {}</div>', line)
+                 for line in self._following.left_out.values()]  # fmt: skip
+        self._left_out.content = boxed(joined(lines)) if lines else ""

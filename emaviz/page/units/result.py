@@ -1,0 +1,109 @@
+"""Units' panel on the right: what differs in words, each unit's parameters, which model suits which, what lacks."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import plotly.graph_objects as go
+import viser
+
+from ema_model.units.result import UnitsCompared
+from ema_model.units.words import document_of, lacking, notes, rests_on, sentences
+from emaviz.figures import transfer_matrix, unit_parameters
+from emaviz.page.page import Page
+from emaviz.page.practice import Seal
+from emaviz.session.units.comparing_units import REPORT, TYPE, ComparingUnits
+from emaviz.text.html import Html, add_html, html, joined
+from emaviz.text.notes import BOX, DIM, boxed
+from emaviz.text.told import whole
+
+_CONFIG = {"displayModeBar": False}
+_NOTHING = "No units are compared yet: choose a folder of units on the left."
+_WIDTH_PX = 540  # of a figure on a usual panel, by which its share of height is made
+_HEAD_PX, _ROW_PX, _FEWEST_ROWS = 110, 34, 4  # of the matrix
+
+
+class UnitsResult:
+    """Everything here is built and changed on the screen's thread."""
+
+    def __init__(self, page: Page, comparing: ComparingUnits) -> None:
+        self._page, self._comparing = page, comparing
+        self._asked: viser.ClientHandle | None = None  # who is sent what is saved
+        gui = page.server.gui
+        self._told = add_html(gui, boxed(_NOTHING))
+        self._figures = gui.add_folder("Parameters of each unit", visible=False)
+        with self._figures:
+            self._parameters: Any = gui.add_plotly(go.Figure(), config=_CONFIG, aspect=1.0)
+        self._matrix = gui.add_folder("The model of one unit on another", visible=False)
+        with self._matrix:
+            self._transfer: Any = gui.add_plotly(go.Figure(), config=_CONFIG, aspect=0.6)
+        self._seal = Seal(page, comparing.practice, lambda: comparing.chosen, lambda: comparing.found)
+        self._words = gui.add_folder("All of it in numbers", visible=False, expand_by_default=False)
+        with self._words:
+            self._document = add_html(gui)
+        self._save = gui.add_folder("Keep it", visible=False)
+        with self._save:
+            report = gui.add_button("Save report", icon=viser.Icon.FILE_TEXT, hint="One HTML file that opens offline")
+            type_file = gui.add_button(
+                "Save the type as an actuator",
+                icon=viser.Icon.DEVICE_FLOPPY,
+                hint="Means as values, and how far a further unit may be from them as tolerances",
+            )
+            self._links = add_html(gui)
+        report.on_click(lambda event: self._ask(event.client, REPORT))
+        type_file.on_click(lambda event: self._ask(event.client, TYPE))
+        comparing.events.kept.connect(lambda path: page.screen.post("units kept", lambda: self._kept(path)))
+
+    def show(self, found: UnitsCompared | None) -> None:
+        """An answer; None for none."""
+        with self._page.server.atomic():
+            for folder in (self._figures, self._matrix, self._words, self._save):
+                folder.visible = found is not None
+            self._links.content = ""
+            self._seal.show()
+            if found is None:
+                self._told.content = boxed(_NOTHING)
+                return
+            self._told.content = said(found)
+            self._parameters.figure = unit_parameters.figure(found)
+            self._parameters.aspect = unit_parameters.height_px(found) / _WIDTH_PX
+            self._transfer.figure = transfer_matrix.figure(found)
+            rows = max(len(found.units), _FEWEST_ROWS)
+            self._transfer.aspect = (_HEAD_PX + _ROW_PX * rows) / _WIDTH_PX
+            self._document.content = whole(document_of(found))
+
+    def _ask(self, client: viser.ClientHandle | None, suffix: str) -> None:
+        self._asked = client
+        self._page.ask("units keep", lambda: self._comparing.save(suffix))
+
+    def _kept(self, path: Path) -> None:
+        name = self._comparing.folder.name_of(path)
+        self._links.content = html(
+            '<div style="padding:2px 10px;font-size:13px">Also kept in the data folder: {}</div>', name
+        )
+        if self._asked is not None:
+            self._asked.send_file_download(path.name, path.read_bytes(), save_immediately=True)
+
+
+def said(found: UnitsCompared) -> Html:
+    """The sentences, what the answer rests on, warnings, and which recordings lack."""
+    colour = "#e8590c" if found.differences or found.scattering else "#2b8a3e"
+    return html(
+        '<div {}><div style="font-size:16px;font-weight:600;color:{};padding:4px 0">{}</div><div {}>{}</div>{}{}</div>',
+        BOX,
+        colour,
+        joined(html("<div>{}</div>", line) for line in sentences(found)),
+        DIM,
+        rests_on(found),
+        joined(html('<div style="color:#e8590c">▲ {}</div>', line) for line in notes(found)),
+        _listed(lacking(found)),
+    )
+
+
+def _listed(lines: list[str]) -> Html:
+    if not lines:
+        return Html()
+    items = joined(html("<div>{}</div>", line) for line in lines)
+    return html('<details style="padding-top:4px"><summary style="cursor:pointer">{}</summary>{}</details>',
+                "What the recordings do not tell", items)  # fmt: skip

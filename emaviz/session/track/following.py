@@ -1,0 +1,229 @@
+"""The flights of a folder: identified one after another, followed, and taken up as they arrive."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ema_model.errors import InputError
+from ema_model.files.arriving import LOOK_S, Watched
+from ema_model.identification.run import Progress
+from ema_model.recordings import read
+from ema_model.recordings.recording_set import recordings_in
+from ema_model.recordings.side_file.read import SideFile
+from ema_model.tracking.criteria import LEAST_FLIGHTS
+from ema_model.tracking.flight import Flight
+from ema_model.tracking.history import History
+from ema_model.tracking.identify import identified
+from ema_model.tracking.order import check_enough, check_order, flights_in, in_order
+from ema_model.tracking.result import Tracked
+from ema_model.tracking.track import check_thresholds
+from emaviz.session.data_folder import DataFolder
+from emaviz.session.described import number
+from emaviz.session.job import Job, Run, Stopped
+from emaviz.session.opened import side_file_of
+from emaviz.session.practice import Practice
+from emaviz.session.session import Session
+from emaviz.session.signal import Signal
+from emaviz.session.track.keep import keep
+from emaviz.session.worker import Worker
+
+_FOLLOWING = 0.02  # share of the bar that following takes, after flights were identified
+
+
+@dataclass
+class TrackEvents:
+    """What the screen listens to, besides the job; called on the threads that work, so listeners only hand over."""
+
+    followed: Signal[[History]] = field(default_factory=Signal)
+    left_out: Signal[[]] = field(default_factory=Signal)  # what cannot be used has changed
+    kept: Signal[[Path]] = field(default_factory=Signal)  # a report or a recording is written
+
+
+class Following:
+    """The chosen folder, the thresholds, the flights that are identified, and what was known after each."""
+
+    def __init__(self, session: Session, folder: DataFolder, files: Worker) -> None:
+        """files: writes what stays."""
+        self.session, self.folder, self._files = session, folder, files
+        self.events = TrackEvents()
+        self.job = Job(session.worker, on_divergence="check the recordings' units")
+        self.practice = Practice(self.job, folder, "life")
+        self.chosen = ""  # the folder's name in the data folder
+        self.watching = True
+        self.thresholds: dict[str, float] = {}
+        self._brought: dict[str, float] = {}  # by a challenge
+        self.left_out: dict[str, str] = {}  # why a file is, by its name
+        self.history: History | None = None  # as it was followed last
+        self._growing: History | None = None
+        self._path = folder.folder
+        self._flights: dict[Path, Flight] = {}
+        self._watched = Watched()
+        self._closed = threading.Event()
+        self._looks: threading.Thread | None = None
+
+    def close(self) -> None:
+        """Ends the threads."""
+        self._closed.set()
+        self.job.stop()
+
+    # --- what is asked ----------------------------------------------------------------------------------------------
+
+    def choose(self, name: Any) -> None:
+        """A folder by its name; what was known of another one is forgotten.  InputError where there is none."""
+        path = self.folder.inner(str(name))
+        if self.job.running:
+            raise InputError("flights are being identified; stop that first")
+        if name != self.chosen or self._path != path:
+            self.chosen, self.history, self._growing, self.left_out = str(name), None, None, {}
+            self._path, self._flights, self._watched = path, {}, Watched()
+            challenge = self.practice.held(self.chosen)
+            own = dict(self.thresholds.items() - self._brought.items())
+            self._brought = {} if challenge is None else challenge.thresholds
+            self.thresholds = own | self._brought
+
+    def set_threshold(self, name: str, value: Any) -> None:
+        """Where the life ends by a k; None for nowhere.  InputError for a value that is no threshold."""
+        others = {other: at for other, at in self.thresholds.items() if other != name}
+        if value is not None:
+            others[name] = number(value, f"the threshold of {name}")
+            check_thresholds(others)
+        self.thresholds = others
+
+    @property
+    def last(self) -> Tracked | None:
+        """What is known after the last flight."""
+        return None if self.history is None else self.history.last
+
+    def file_of(self, flight: Flight) -> str:
+        """The name in the data folder of a flight's recording."""
+        return next(self.folder.name_of(path) for path, one in self._flights.items() if one is flight)
+
+    # --- the run ----------------------------------------------------------------------------------------------------
+
+    def begin(self) -> bool:
+        """Identifies the flights that are not yet, and follows all; False while another long run goes on.
+
+        InputError for a folder without flights, out of which no order can be made, or of several units; and for too
+        few of them, unless more are waited for.
+        """
+        if not self.chosen:
+            raise InputError("no folder of flights is chosen; put one into the data folder, and choose it")
+        paths = self._paths()
+        self.left_out = {}  # it may have been mended
+        self._watched.arrived(paths)
+        started = self._start(paths, "Identifying flights")
+        if started:
+            self._watched.take(paths)
+            self._watch()
+        return started
+
+    def _paths(self) -> list[Path]:
+        """In order of time; the data folder itself has folders of the app beside its flights."""
+        try:
+            paths = in_order(recordings_in(self._path)) if self.chosen == "." else flights_in(self._path)
+            check_order(paths)
+        except InputError as error:
+            raise InputError(str(error).replace(f"{self.folder.folder}/", "")) from None
+        if not self.watching:
+            check_enough(paths, self.chosen)
+        return paths
+
+    def _start(self, paths: list[Path], title: str) -> bool:
+        todo = [path for path in paths if path not in self._flights and path.name not in self.left_out]
+        told: list[str] = []
+
+        def work(run: Run) -> None:
+            try:
+                for place, path in enumerate(todo):
+                    self._take(path, place, len(todo), run)
+            except Stopped:
+                told.append(f"Stopped after {len(self._flights)} of {len(paths)} flights; Track goes on from there.")
+            self._follow(run, _FOLLOWING if todo else 1.0)
+
+        def done() -> str | None:
+            if self.history is not None and self.last is not None:
+                self.events.followed(self.history)
+            elif not told:
+                told.append(f"{len(self._flights)} of the {LEAST_FLIGHTS} flights that a trend needs.")
+            return " ".join(told) or None
+
+        return self.job.begin(title if todo else "Following k", work, done)
+
+    def _take(self, path: Path, place: int, count: int, run: Run) -> None:
+        """Identifies one; what cannot be used is left out, and said."""
+        text = f"flight {place + 1} of {count}"
+
+        def told(at: Progress) -> None:
+            done = place + at.iteration / max(at.iterations, 1)
+            run(text, (1.0 - _FOLLOWING) * done / count)
+
+        run(text, (1.0 - _FOLLOWING) * place / count)
+        try:
+            side = side_file_of(path, self.folder) or SideFile()
+            recording = read(path, self.session.actuator, side=side)
+            if recording.reading.told and not self._flights:
+                self.session.events.told("Columns were guessed", f"{path.name}: {recording.reading.told}")
+            flight = identified(recording, path.stem, self.session.actuator, on_iteration=told)
+        except InputError as error:
+            self.left_out[path.name] = str(error).replace(f"{self.folder.folder}/", "")
+            self.events.left_out()
+            return
+        self._flights[path] = flight
+
+    def _follow(self, run: Run, share: float) -> None:
+        """Looks after each flight, of all that are identified; share: of the bar."""
+        flights = [self._flights[path] for path in in_order(self._flights)]
+        if self._growing is None or self._growing.thresholds != self.thresholds:
+            self._growing = History(self.thresholds)
+        for done in self._growing.follow(flights):
+            run.say(f"after flight {done}", 1.0 - share * (1.0 - done / len(flights)))
+        self.history = self._growing.copy()
+
+    # --- what arrives -----------------------------------------------------------------------------------------------
+
+    def _watch(self) -> None:
+        if self._looks is None:
+            self._looks = threading.Thread(target=self._look_on, name="emaviz-flights", daemon=True)
+            self._looks.start()
+
+    def _look_on(self) -> None:
+        while not self._closed.wait(LOOK_S):
+            if self.watching and self.chosen and not self.session.worker.busy:
+                try:
+                    self.take_up(self._watched.arrived(recordings_in(self._path)))
+                except (InputError, OSError) as error:
+                    self.session.events.told("The folder cannot be watched", str(error))
+                    self.watching = False
+
+    def take_up(self, new: list[Path]) -> None:
+        """Files that have arrived, or were replaced; each that cannot be put among the others is left out, and said."""
+        if not new:
+            return
+        for path in new:
+            self._flights.pop(path, None)
+            self.left_out.pop(path.name, None)
+        good = list(self._flights)
+        for path in new:
+            try:
+                check_order(in_order([*good, path]))
+                good.append(path)
+            except InputError as error:
+                self.left_out[path.name] = str(error)
+                self.events.left_out()
+        if len(good) > len(self._flights) and not self._start(in_order(good), "Taking up flights"):
+            self._watched.forget(new)  # something else has just begun: at the next look
+
+    # --- what stays -------------------------------------------------------------------------------------------------
+
+    def save(self, suffix: str) -> None:
+        """Writes the last answer as a report (.html) or for Rerun (.rrd), soon; InputError before there is one."""
+        found = self.last
+        if found is None:
+            raise InputError("nothing is followed yet; press Track first")
+        self._files.post(
+            f"track {suffix}",
+            lambda: self.events.kept(keep(found, self.session.actuator.name, self.folder, suffix)),
+        )

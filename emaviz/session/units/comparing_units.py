@@ -1,0 +1,159 @@
+"""The units of a folder: read, compared on the compute thread, and what is kept of the answer."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from ema_model.actuator import Actuator, save_actuator
+from ema_model.errors import InputError, quoted
+from ema_model.recordings import Measurement, read
+from ema_model.recordings.side_file.read import SideFile
+from ema_model.units.folders import check_same_type, units_in
+from ema_model.units.result import UnitsCompared
+from emaviz.session import actuators as actuator_files
+from emaviz.session.data_folder import DataFolder
+from emaviz.session.job import Job, Run
+from emaviz.session.opened import side_file_of
+from emaviz.session.practice import Practice
+from emaviz.session.session import Session
+from emaviz.session.signal import Signal
+from emaviz.session.worker import Worker
+
+UNSEEN = "*unseen*"  # what recordings to hold out are often called
+REPORT, TYPE = ".html", ".toml"
+
+
+@dataclass
+class UnitsEvents:
+    """What the screen listens to, besides the job; called on the threads that work, so listeners only hand over."""
+
+    compared: Signal[[UnitsCompared]] = field(default_factory=Signal)
+    kept: Signal[[Path]] = field(default_factory=Signal)  # a report or an actuator file is written
+
+
+class ComparingUnits:
+    """What is chosen, and the last answer."""
+
+    def __init__(self, session: Session, folder: DataFolder, files: Worker) -> None:
+        """files: writes what stays."""
+        self.session, self.folder, self._files = session, folder, files
+        self.events = UnitsEvents()
+        self.job = Job(session.worker, on_divergence="check the actuator's file and the recordings' units")
+        self.practice = Practice(self.job, folder, "units")
+        self.chosen = ""  # the folder's name in the data folder
+        self.rule = UNSEEN  # names of the recordings to hold out; "" for none
+        self.actuator: Actuator = session.actuator
+        self.actuator_name = session.actuator.name
+        self.found: UnitsCompared | None = None
+
+    def fleets(self) -> dict[str, int]:
+        """The folders of the data folder in which two folders or more hold recordings, and how many do."""
+        own = {one.name for one in self.folder.own}
+        found: dict[str, int] = {}
+        for name in self.folder.folders():
+            path = PurePosixPath(name)
+            above = path.parent.as_posix()
+            if name != "." and not (above == "." and path.name in own):
+                found[above] = found.get(above, 0) + 1
+        return {name: count for name, count in found.items() if count > 1 or name != "."}
+
+    def actuators(self) -> list[str]:
+        """The one that the app was started with, those that come with it, and the uploaded ones."""
+        return list(dict.fromkeys([self.session.actuator.name, *actuator_files.names(self.folder)]))
+
+    def choose(self, name: Any) -> None:
+        """A folder by its name; InputError where there is none."""
+        self.folder.inner(str(name))
+        self.chosen, self.found = str(name), None
+
+    def choose_actuator(self, name: Any) -> None:
+        """One of `actuators`; InputError for another, or a file that is no actuator."""
+        own = self.session.actuator
+        self.actuator = own if name == own.name else actuator_files.named(str(name), self.folder)
+        self.actuator_name = str(name)
+
+    def begin(self) -> bool:
+        """Begins with what is chosen; False while another long run goes on.
+
+        InputError for a folder without units, one unit only, several types, or a rule that leaves nothing to fit.
+        """
+        if not self.chosen:
+            raise InputError("no folder of units is chosen; put one into the data folder, a folder in it for each unit")
+        units = units_in(self.folder.inner(self.chosen))
+        own = {one.name for one in self.folder.own} if self.chosen == "." else set()
+        units = {name: files for name, files in units.items() if name not in own}
+        if len(units) == 1:
+            raise InputError(f"one unit only ({quoted(next(iter(units)), 60)}): two or more are needed to compare")
+        check_same_type([file for files in units.values() for file in files])
+        fitted, held = _held_out(units, self.rule.strip())
+        actuator = self.actuator
+
+        found: UnitsCompared | None = None
+
+        def work(run: Run) -> None:
+            nonlocal found
+            from ema_model.units.compare import compare_units  # here, since it brings all of scipy's optimisers
+
+            told: list[str] = []
+            given, unseen = (
+                {name: [self._read(file, actuator, run, told) for file in files] for name, files in part.items()}
+                for part in (fitted, held)
+            )
+            found = compare_units(given, actuator, holdout=unseen, on_progress=run)
+
+        def done() -> None:
+            assert found is not None, "it came to its end"
+            self.found = found
+            self.events.compared(found)
+
+        return self.job.begin("Comparing units", work, done)
+
+    def _read(self, file: Path, actuator: Actuator, run: Run, told: list[str]) -> Measurement:
+        """One recording; the first guess at columns is told."""
+        run(f"reading {file.parent.name}, {file.name}")
+        one = read(file, actuator, side=side_file_of(file, self.folder) or SideFile())
+        if one.reading.told and not told:
+            told.append(one.reading.told)
+            self.session.events.told("Columns were guessed", f"{file.name}: {one.reading.told}")
+        return one
+
+    def save(self, suffix: str) -> None:
+        """Writes the last answer as a report, or the type as an actuator file, soon; InputError before there is one."""
+        found = self.found
+        if found is None:
+            raise InputError("no units are compared yet; press Compare units first")
+        self._files.post(f"units {suffix}", lambda: self._keep(found, suffix))
+
+    def _keep(self, found: UnitsCompared, suffix: str) -> None:
+        if suffix == REPORT:
+            from emaviz.report import write_units_report  # plotly takes half a second to import
+
+            path = self.folder.fresh(self.folder.recordings, "units", suffix)
+            write_units_report(found, path)
+        else:
+            path = self.folder.fresh(self.folder.actuators, "type", suffix)
+            save_actuator(found.type_actuator, path)
+        self.events.kept(path)
+
+
+def _held_out(units: dict[str, list[Path]], rule: str) -> tuple[dict[str, list[Path]], dict[str, list[Path]]]:
+    """The files of each unit to fit and to hold out; a rule that names none holds none out, unless it was written."""
+    fitted: dict[str, list[Path]] = {}
+    held: dict[str, list[Path]] = {}
+    for name, files in units.items():
+        held[name] = [file for file in files if rule and fnmatchcase(file.stem, rule)]
+        fitted[name] = [file for file in files if file not in held[name]]
+        if not fitted[name]:
+            raise InputError(f"unit {quoted(name, 60)}: no recording of it is left to fit; hold out fewer")
+    if rule not in ("", UNSEEN) and not any(held.values()):
+        raise InputError(f"hold out {quoted(rule, 60)}: no recording has such a name (there are {_stems(units)})")
+    return fitted, held
+
+
+def _stems(units: dict[str, list[Path]]) -> str:
+    names: Sequence[str] = list(dict.fromkeys(file.stem for files in units.values() for file in files))
+    return ", ".join(names[:6]) + (" …" if len(names) > 6 else "")

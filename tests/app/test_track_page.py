@@ -1,0 +1,97 @@
+"""Track on the page: a life is followed, today is dragged back along it, a flight is compared, a new one arrives."""
+
+from __future__ import annotations
+
+import shutil
+
+import numpy as np
+import pytest
+from support.flights import flights
+from support.known_flights import FOLLOWING, known, write_flights
+from support.on_page import choose, fill, wait_until
+
+from emaviz.page.track.tab import TrackTab
+
+pytestmark = pytest.mark.browser
+COUNT = 40
+# Where on the screen a flight's point is, once the chart is drawn.
+POINT = """(name) => {
+  const plot = Array.from(document.querySelectorAll('.js-plotly-plot')).find(one => one.layout?.meta === 'flights');
+  const trace = plot?._fullData?.find(one => one.text?.includes?.(name));
+  if (!trace || !plot.calcdata || !plot._fullLayout?.xaxis?.d2p || !plot.getBoundingClientRect().width) return null;
+  plot.scrollIntoView();
+  const at = Array.from(trace.text).indexOf(name), { xaxis, yaxis } = plot._fullLayout;
+  const box = plot.querySelector('.nsewdrag').getBoundingClientRect();
+  const point = plot.calcdata[trace.index][at];
+  return [box.x + xaxis.d2p(point.x), box.y + yaxis.d2p(point.y)];
+}"""
+LIFE = flights(0.02 * np.arange(COUNT + 1))  # k1, which reaches 0.5 in flight 26
+
+
+@pytest.fixture
+def page(shared_page):
+    return shared_page
+
+
+def click_on(page, name):
+    """As a person does: once the point shows its name under the mouse; the panel takes its width a moment later."""
+    for _ in range(50):
+        x, y = page.wait_for_function(POINT, arg=name).json_value()
+        page.mouse.move(x - 3, y)
+        page.mouse.move(x, y)
+        page.wait_for_timeout(300)
+        if page.locator(".hoverlayer .hovertext").filter(has_text=name).count():
+            break
+    page.mouse.click(x, y)
+
+
+def test_a_life_is_followed(page, app, monkeypatch):
+    monkeypatch.setattr(f"{FOLLOWING}.identified", known(LIFE, []))
+    monkeypatch.setattr(f"{FOLLOWING}.LOOK_S", 0.1)
+    unit = app.comparing.folder.folder / "unit"
+    one = write_flights(unit, COUNT).rename(unit.with_name("one.part"))
+    tab = app.tab(TrackTab)
+    page.get_by_role("tab", name="Track", exact=True).click()
+    page.get_by_text("Nothing is followed yet").wait_for()
+    choose(page, "Flights", f"unit ({COUNT})")
+    page.get_by_label("has a threshold", exact=True).check()
+    fill(page, "Threshold", 0.5)
+    page.get_by_text("k1 friction at 0.5").wait_for()
+    page.get_by_role("button", name="Track", exact=True).click()
+    page.get_by_text("k1 friction drifts by 0.02").first.wait_for()
+    page.get_by_text(f"after flight_39: {COUNT} flights, {COUNT} of them usable").wait_for()
+    assert page.locator(".js-plotly-plot:visible").count() == 3
+
+    fill(page, "Today, after flight", 15)
+    page.get_by_text("What came: k1 friction reached 0.5").wait_for()
+    page.get_by_text("after flight_14: 15 flights, 15 of them usable").wait_for()
+    crossed = tab.following.history.crossed("k1")
+    page.get_by_text(f"reached 0.5 {crossed - 15} flights later").wait_for()
+    drawn = [plot.figure.layout.title.text for plot in tab.result._plots]
+    assert [text.startswith(f"<b>{begins}") for text, begins in zip(drawn, ("k1", "Probability", "Remaining life"))]
+
+    shutil.copy(one, unit / "flight_40.parquet")  # today stays where it was dragged to
+    wait_until(lambda: len(tab.following.last.flights) == COUNT + 1, 30.0)
+    page.get_by_text(f"unit ({COUNT + 1})").first.wait_for(state="attached")
+    page.get_by_text("after flight_14: 15 flights, 15 of them usable").wait_for()
+
+    page.get_by_role("button", name="Compare this flight").click()
+    page.wait_for_function("location.search.includes('view=compare')")
+    wait_until(lambda: [*app.comparing.opened] == ["unit/flight_14.parquet"])
+    app.comparing.job.stop()
+
+    page.get_by_role("tab", name="Track", exact=True).click()
+    click_on(page, "flight_07")
+    page.wait_for_function("location.search.includes('view=compare')")
+    wait_until(lambda: [*app.comparing.opened] == ["unit/flight_07.parquet"])
+    app.comparing.job.stop()
+
+
+def test_what_is_missing_is_said_in_one_line(page, app):
+    lonely = app.comparing.folder.folder / "lonely"
+    write_flights(lonely, 1)
+    page.get_by_role("tab", name="Track", exact=True).click()
+    choose(page, "Flights", "lonely (1)")
+    page.get_by_label("Take up new flights", exact=True).uncheck()
+    page.get_by_role("button", name="Track", exact=True).click()
+    page.get_by_text("1 flight tells no trend").wait_for()

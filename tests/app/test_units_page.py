@@ -1,0 +1,67 @@
+"""Units on the page: what differs in words and figures, the type as an actuator file, a report; and what is refused."""
+
+from __future__ import annotations
+
+import pytest
+from support.bench_units import ACTUATOR, FRICTION, write_units
+from support.on_page import choose, fill, wait_until
+
+from ema_model.actuator import load_actuator
+from emaviz.cli import main
+from emaviz.page.units.tab import UnitsTab
+
+pytestmark = pytest.mark.browser
+
+
+@pytest.fixture
+def page(shared_page):
+    return shared_page
+
+
+def test_units_are_compared(page, app):
+    folder = app.comparing.folder
+    write_units(folder.folder / "bench")
+    assert main(["actuator", "new", str(folder.actuators / "mine.toml"), *ACTUATOR]) == 0
+    tab = app.tab(UnitsTab)
+    page.get_by_role("tab", name="Units", exact=True).first.click()
+    page.get_by_text("No units are compared yet").wait_for()
+    choose(page, "Units", "bench (3 units)")
+    choose(page, "Actuator", "uploaded: actuators/mine.toml")
+    fill(page, "Hold out", "*nothing*")
+    page.get_by_role("button", name="Compare units").click()
+    page.get_by_text("no recording has such a name").wait_for()
+    fill(page, "Hold out", "*unseen*")
+    page.get_by_role("button", name="Compare units").click()
+    page.get_by_text("from the rest in motor dynamic friction").first.wait_for()
+    page.get_by_text("3 units, 6 recordings fitted, 3 held out").first.wait_for()
+    found = tab.comparing.found
+    assert [one.unit for one in found.differences] == ["right"]
+    own = found.alone["motor.dynamic_friction_Nm"]
+    assert all(abs(value - true) < 1e-3 for value, true in zip(own.value, FRICTION.values()))
+    parameters, matrix = tab.result._parameters.figure, tab.result._transfer.figure
+    assert list(parameters.data[0].marker.color).count("#e03131") == 1, "the unit that differs is red"
+    assert matrix.data[0].text[0][2].endswith("A") and "×" in matrix.data[0].text[0][2]
+    page.get_by_role("button", name="Save the type as an actuator").click()
+    wait_until(lambda: len(folder.actuator_files()) == 2)
+    page.get_by_text("Also kept in the data folder: actuators/").wait_for()
+    (kept,) = [name for name in folder.actuator_files() if "type" in name]
+    assert load_actuator(folder.actuator(kept)).value("motor.dynamic_friction_Nm") == pytest.approx(0.012, rel=0.05)
+    page.get_by_role("button", name="Save report").locator("visible=true").click()
+    page.get_by_text("Also kept in the data folder: recordings/").locator("visible=true").wait_for()
+
+
+@pytest.mark.long
+def test_units_of_several_types_and_one_unit_are_refused(page, app):
+    folder = app.comparing.folder.folder
+    write_units(folder / "mixed")
+    for unit, name in (("left", "a"), ("right", "b")):
+        (folder / "mixed" / unit / f"{unit}_slow.toml").write_text(f'actuator = "{name}.toml"\n')
+    (folder / "alone").mkdir()
+    (folder / "mixed" / "middle").rename(folder / "alone" / "middle")
+    page.get_by_role("tab", name="Units", exact=True).first.click()
+    choose(page, "Units", "mixed (2 units)")
+    page.get_by_role("button", name="Compare units").click()
+    page.get_by_text("units that are compared are of one type").wait_for()
+    choose(page, "Units", "alone (1 unit)")
+    page.get_by_role("button", name="Compare units").click()
+    page.get_by_text("one unit only (middle)").wait_for()

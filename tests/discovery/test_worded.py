@@ -38,7 +38,12 @@ def test_parameters_that_masked_an_effect_are_named_as_on_the_page(tmp_path):
 def test_an_effect_that_is_a_parameter_does_not_mask_itself():
     found = with_cogging()
     (one,) = found.effects
-    itself = replace(one, name="viscous_friction", stands_for="motor.viscous_friction_Nms_rad", stood_in=(StoodIn("motor.viscous_friction_Nms_rad", 2.0, 0.0),))
+    itself = replace(
+        one,
+        name="viscous_friction",
+        stands_for="motor.viscous_friction_Nms_rad",
+        stood_in=(StoodIn("motor.viscous_friction_Nms_rad", 2.0, 0.0),),
+    )
     assert masked([itself], found.actuator.axes) == []
 
 

@@ -168,7 +168,7 @@ class IdentifyPanel:
     def _draw(self, race: Race) -> None:
         lines = []
         for name, track in race.tracks.items():
-            if not track.rmse:
+            if not track.rmse or len(race.tracks) == 1:  # of one alone the job's own line tells as much
                 continue
             at = f"iteration {len(track.rmse) - 1} of {track.iterations}"
             if track.answer is not None:
@@ -187,8 +187,8 @@ class IdentifyPanel:
         lines = []
         for answer in race.answers:
             star = "★ " if best is not None and len(race.tracks) > 1 and answer is best.answer else ""
-            told = " · ".join(facts(answer))
-            lines.append(_line(html("{}{} · {} · <b>{}</b>", star, _title(answer.algorithm), told, verdict(answer))))
+            told = [*facts(answer), *([verdict(answer)] if len(race.tracks) > 1 else [])]
+            lines.append(_line(html("{}{} · {}", star, _title(answer.algorithm), " · ".join(told))))
         if best is not None and best.answer is not None and len(race.answers) > 1:
             others = [answer for answer in race.answers if answer is not best.answer]
             lines.append(_line(html('<span style="opacity:.75">★ {}</span>', why_best(best.answer, others))))

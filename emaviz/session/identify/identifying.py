@@ -115,6 +115,7 @@ def readable(settings: Settings) -> dict[str, Any]:
         **{name: value for name, value in settings.run().command.settings().items()},
         "duration_s": settings.duration_s,
         "load_torque_Nm": settings.load_torque_Nm,
+        "load_shape": settings.load_shape,
         "current_noise_A": settings.current_noise_A,
         "encoder_bits": settings.encoder_bits,
         "hidden_effects": "; ".join(

@@ -34,7 +34,7 @@ class LoadProfile:
             if not (math.isfinite(value) and value > 0.0):
                 raise InputError(f"the load's {name} must be above 0, not {value:g}")
 
-    def at(self, time_s: Array) -> Array:
+    def at(self, time_s: NDArray[np.floating]) -> Array:
         """Shares of the torque at these times, −1 … 1, (n,)."""
         return _SHAPES[self.shape](np.asarray(time_s, dtype=float), self)
 

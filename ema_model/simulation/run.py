@@ -45,7 +45,7 @@ class Run:
     duration_s: float = 0.5
     sample_rate_Hz: float = 10_000.0
     load_torque_Nm: float = 0.0  # on the user shaft, positive opposes positive motion
-    load: LoadProfile = LoadProfile()  # how that goes over time
+    load: LoadProfile = field(default_factory=LoadProfile)  # how that goes over time
 
     def __post_init__(self) -> None:
         if not 1e-3 <= self.duration_s <= _LONGEST_S:
@@ -71,7 +71,7 @@ class Run:
         """Times of the samples, (samples + 1,)."""
         return np.arange(self.samples + 1) / self.sample_rate_Hz
 
-    def load_at(self, time_s: Array) -> Array:
+    def load_at(self, time_s: NDArray[np.floating]) -> Array:
         """The load at these times, N·m, (n,)."""
         return self.load_torque_Nm * self.load.at(time_s)
 
@@ -157,7 +157,9 @@ def simulate_monitor(
     start_rad: float | None = None,
 ) -> Measurement:
     """The Monitor Model's signals; raises as `simulate_reference`."""
-    return simulate_monitors(run, actuator, [actuator.k if k is None else k], effects, circuit, start_rad=start_rad)[0]
+    return simulate_monitors(
+        run, actuator, np.asarray(actuator.k if k is None else k)[None], effects, circuit, start_rad=start_rad
+    )[0]
 
 
 def simulate_monitors(

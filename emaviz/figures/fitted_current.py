@@ -13,7 +13,7 @@ from ema_model.identification.run import ALGORITHMS as TITLES
 from emaviz.colours import REFERENCE
 from emaviz.figures.convergence import colour
 from emaviz.figures.decimate import envelope
-from emaviz.figures.signals import CURSOR, PADDING, POINTS, legend, time_axis, value_axis
+from emaviz.figures.signals import CURSOR, PADDING, PLANT_LINE, POINTS, legend, time_axis, value_axis
 from emaviz.text.html import add_html
 
 Array = NDArray[np.float64]
@@ -23,7 +23,7 @@ def _line(label: str, drawn: str, width: float = 1.5) -> Any:
     return {"label": label, "stroke": drawn, "width": width, "points": {"show": False}}
 
 
-MEASURED: Any = _line("measured", REFERENCE + "90", 4.5)  # broad, so that a model's line upon it leaves it to be seen
+MEASURED: Any = {**PLANT_LINE, "label": "measured"}
 
 
 class LiveFit:

@@ -118,6 +118,7 @@ def _text(x: float, y: float, text: str, anchor: str, more: str = "") -> str:
 def _picture(parts: Sequence[str], height: int) -> Html:
     """Parts: drawn from numbers and colours of ours, and from `_text`."""
     return unescaped(
-        f'<div style="padding:0 6px"><svg viewBox="0 0 {_WIDTH} {height}" width="100%" font-size="11" style="{_FITS}" '
+        f'<div class="emaviz-picture" style="padding:0 6px"><svg viewBox="0 0 {_WIDTH} {height}" '
+        f'width="100%" font-size="11" style="{_FITS}" '
         f'font-family="system-ui,sans-serif">{"".join(parts)}</svg></div>'
     )

@@ -33,6 +33,9 @@ def page() -> Html:
         ".mantine-Slider-root ~ .mantine-NumberInput-root,"
         "div:has(> .mantine-Slider-root) + .mantine-NumberInput-root,"
         "div:has(> * .mantine-Slider-root) > .mantine-NumberInput-root{width:3.9rem!important}"
+        # handles for docking panels elsewhere, which nobody needs; what folds a panel away stays
+        "[data-dock-region-handle]{cursor:default!important}[data-dock-region-handle] > div:first-child,"
+        "[data-dock-region] [data-dock-griphandle]{display:none!important}"
         # what stands last in a panel ends above its edge
         "[data-dock-region=right] .mantine-ScrollArea-viewport{padding-bottom:14px}"
         f"div:has(> div > .emaviz-long) {_LABEL}{{width:10.4em!important}}"

@@ -70,7 +70,7 @@ _SCRIPT = """
     front: (before, after) => {
       for (const from of document.querySelectorAll('[role=tab][aria-selected=true]')) {
         const to = [...from.parentElement.children].find(t => t.textContent.trim() === after);
-        if (from.textContent.trim() === before && to && to.offsetParent) press(to);
+        if ((!before || from.textContent.trim() === before) && to && to.offsetParent) press(to);
       }
     },
     end: () => { seen.disconnect(); clearInterval(timer); },
@@ -132,7 +132,7 @@ class Workspaces:
             self._inside.run(f"window.emavizViews?.go({json.dumps(name)})", client.client_id)
 
     def bring_forward(self, name: str, before: str, after: str) -> None:
-        """In windows that are at this workspace, where its tab `before` is in front, puts `after` there."""
+        """In windows at this workspace whose tab `before` is in front (any, for none), puts `after` there."""
         with self._changing:
             there = [client for client, at in self._at.items() if at == name]
         for client in there:

@@ -36,10 +36,10 @@ class DataFolder:
     """Recordings, uploads and actuator files below one folder.  Raises InputError, one line, for what is refused."""
 
     def __init__(self, folder: Path) -> None:
-        """Makes the folder with `recordings`, `uploads`, `actuators`, `sessions` and `challenges` in it."""
+        """Makes the folder with `recordings`, `uploads`, `actuators`, `sessions`, `challenges` and `scenes` in it."""
         self.recordings, self.uploads, self.actuators = (folder / n for n in ("recordings", "uploads", "actuators"))
-        self.sessions, self.challenges = folder / "sessions", folder / "challenges"
-        for made in (self.recordings, self.uploads, self.actuators, self.sessions, self.challenges):
+        self.sessions, self.challenges, self.scenes = (folder / n for n in ("sessions", "challenges", "scenes"))
+        for made in (self.recordings, self.uploads, self.actuators, self.sessions, self.challenges, self.scenes):
             try:
                 made.mkdir(parents=True, exist_ok=True)
             except OSError as error:
@@ -179,6 +179,13 @@ class DataFolder:
     def name_of(self, path: Path) -> str:
         """As `measurements` lists it."""
         return path.resolve().relative_to(self.folder).as_posix()
+
+    def scene(self, name: str) -> bytes | None:
+        """The page of a scene that the app has written, or None."""
+        try:
+            return self._existing(f"{self.scenes.name}/{name}", (".html",)).read_bytes()
+        except (InputError, OSError):
+            return None
 
     def _existing(self, name: str, suffixes: tuple[str, ...]) -> Path:
         try:

@@ -34,13 +34,15 @@ class Page:
     def checked(self, change: Callable[[], Any], control: Any = None) -> bool:
         """Applies a change of settings; a bad value becomes a message and leaves the old one.
 
-        control: beside which it is said, too, and stays until a change of it is good.
+        control: beside which that stands until it is changed; a message that goes away is for what has no place.
         """
         try:
             change()
         except InputError as error:
-            self.notify("Input refused", str(error))
-            self._beside(control, str(error))
+            if control is None:
+                self.notify("Input refused", str(error))
+            else:
+                self._beside(control, str(error))
             return False
         if control is not None and id_of(control) in self._refused:
             self._beside(control, "")
@@ -51,8 +53,11 @@ class Page:
             (self._refused.add if text else self._refused.discard)(id_of(control))
             say_beside(Inside(self.server), control, text)
 
-    def begins(self, begin: Callable[[], bool]) -> bool:
-        """Begins a long run, or says why not.  begin(): whether nothing else runs; InputError: what is missing."""
+    def begins(self, begin: Callable[[], bool], button: Any = None) -> bool:
+        """Begins a long run, or says why not, below the button that asks for it.
+
+        begin(): whether nothing else runs; InputError: what is missing.
+        """
         started = False
 
         def tried() -> None:
@@ -62,7 +67,7 @@ class Page:
             elif not (started := begin()):
                 self.one_at_a_time()
 
-        return self.checked(tried) and started
+        return self.checked(tried, button) and started
 
     def one_at_a_time(self) -> None:
         """Says that another long run goes on."""

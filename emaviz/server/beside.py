@@ -9,17 +9,19 @@ from emaviz.server.viser_private import Inside, id_of
 
 _SAY = r"""
 ((id, text) => {
-  const row = document.getElementById(id)?.closest('.mantine-Flex-root') ?? document.getElementById(id)?.parentElement;
-  if (!row) return;
-  let line = row.parentElement.querySelector(':scope > .emaviz-beside');
+  const field = document.getElementById(id);
+  if (!field) return;
+  const button = field.tagName === 'BUTTON';
+  const home = button ? field.parentElement : (field.closest('.mantine-Flex-root') ?? field).parentElement;
+  let line = home.querySelector(':scope > .emaviz-beside');
   if (!text) { line?.remove(); return; }
   if (!line) {
     line = document.createElement('div');
     line.className = 'emaviz-beside';
     line.setAttribute('role', 'alert');
     line.style.cssText = 'color:#e03131;font-size:12px;line-height:1.35;padding:2px 2px 0;overflow-wrap:anywhere';
-    row.parentElement.append(line);
-    row.addEventListener('input', () => line.remove(), { once: true });
+    home.append(line);
+    home.addEventListener(button ? 'click' : 'input', () => line.remove(), { once: true });
   }
   line.textContent = text;
 })(ID, TEXT)

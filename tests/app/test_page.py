@@ -110,7 +110,7 @@ def test_identify_runs_ends_and_is_recorded(new_page, app):
     assert abs(found.best[-1][0] - 0.25) < 0.02
     assert recording.truth[0] == pytest.approx(0.25)
 
-    page.get_by_role("tab", name="Recordings").click()
+    page.get_by_role("tab", name="Runs").click()
     page.get_by_role("link", name=recordings[0].name).wait_for()
 
 
@@ -150,7 +150,7 @@ def test_sliders_answer_while_an_identification_runs(page, app):
 def test_six_tabs_stand_in_one_line_and_the_strip_holds_its_controls(page):
     tabs = page.locator("[data-dock-region=left] [data-dock-tab]")
     assert [name.strip() for name in tabs.all_inner_texts()] == [
-        "Explore", "Identify", "Compare", "Discover", "Library", "Recordings"
+        "Explore", "Identify", "Compare", "Discover", "Library", "Runs"
     ]  # fmt: skip
     assert len({round(tab.bounding_box()["y"]) for tab in tabs.all()}) == 1
     strip = page.locator("[data-floating-window]:has(.emaviz-strip)")

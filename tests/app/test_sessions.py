@@ -253,7 +253,7 @@ def test_a_session_is_saved_and_loaded_with_all_that_is_on_the_page(page, app, t
     saved = changed_settings().saved() | {"source": "uploads/bench.csv", "fitness": "filtered"}
     settings.restore(saved)
     app.comparing.calibrate = False
-    page.get_by_role("tab", name="Recordings").click()
+    page.get_by_role("tab", name="Runs").click()
     slider(page, "Session name").fill("mine")
     page.wait_for_timeout(300)
     with page.expect_download() as download:

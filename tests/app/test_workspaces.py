@@ -23,7 +23,7 @@ RIGHT = {
     "Compare": "Comparison",
     "Discover": "Discovery",
     "Library": "Effect",
-    "Recordings": "Rerun",
+    "Runs": "Rerun",
 }
 
 

@@ -58,7 +58,7 @@ class ResultPanel:
         self._preview: Any = None
         self._buttons: list[Any] = []
         gui = page.server.gui
-        self._headline = add_html(gui, html("<div {}>Nothing is compared yet: upload a recording.</div>", _BOX))
+        self._headline = add_html(gui, html("<div {}>Nothing is compared yet: upload a measurement.</div>", _BOX))
         self._place = gui.add_folder("Preview of the columns", visible=False)
         with self._place:
             self._lines = lines()
@@ -249,7 +249,7 @@ def headline(comparison: Comparison) -> Html:
         warnings,
         head,
         joined(rows),
-        table_of(per_recording(comparison), "Each recording"),
+        table_of(per_recording(comparison), "Each measurement"),
     )
 
 

@@ -27,7 +27,7 @@ from emaviz.text.html import Html, add_html, html, joined, table_of
 from emaviz.text.notes import BOX, boxed
 
 _RESTING = Html(
-    "Choose recordings on the left, and press <b>Start</b>: the model is calibrated, and what it leaves is held "
+    "Choose measurements on the left, and press <b>Start</b>: the model is calibrated, and what it leaves is held "
     "against every effect of the library."
 )
 
@@ -188,5 +188,5 @@ def answer(look: Look) -> Html:
         joined(html("<div>{}</div>", text) for text in others),
         warnings,
         FLOOR_NOTE,
-        table_of(per_recording(found), "Each recording"),
+        table_of(per_recording(found), "Each measurement"),
     )

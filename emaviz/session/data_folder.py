@@ -21,7 +21,7 @@ from ema_model.files.refusal import shown
 from ema_model.files.user_file import check_user_file
 from ema_model.files.whole_file import new_draft, remove_abandoned, whole_file
 from ema_model.recordings import side_path
-from ema_model.recordings.formats import FORMATS
+from ema_model.recordings.formats import FORMATS, robot_dataset
 
 ACTUATOR_SUFFIX = ".toml"
 SESSION_SUFFIX = ".emaviz"
@@ -216,9 +216,8 @@ class DataFolder:
     def _files(self, folder: Path, suffixes: tuple[str, ...]) -> list[str]:
         found: list[tuple[float, str]] = []
         for at, names in _walked(folder):
-            for name in names:
-                path = at / name
-                hidden = name.startswith(".") or path.suffix.lower() not in suffixes
+            for path in _episodes(at) or [at / name for name in names]:
+                hidden = path.name.startswith(".") or path.suffix.lower() not in suffixes
                 if not hidden and path.is_file() and self.holds(path):
                     with suppress(OSError):
                         found.append((-path.stat().st_mtime, path.relative_to(self.folder).as_posix()))
@@ -229,8 +228,15 @@ def _walked(folder: Path) -> Iterator[tuple[Path, list[str]]]:
     """The folder and those below it that are looked into, each with the names in it."""
     for at, folders, names in os.walk(folder):
         depth = len(Path(at).relative_to(folder).parts)
+        if _episodes(Path(at)):  # which lie deeper
+            folders.clear()
         folders[:] = [f for f in sorted(folders) if not f.startswith(".") and depth + 1 < _DEEPEST]
         yield Path(at), names
+
+
+def _episodes(folder: Path) -> list[Path]:
+    """The files of a robot's dataset, where the folder is one."""
+    return [Path(file) for file in robot_dataset.files_in(str(folder))]
 
 
 def sanitised(filename: str) -> str:

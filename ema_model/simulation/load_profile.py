@@ -39,6 +39,18 @@ class LoadProfile:
         return _SHAPES[self.shape](np.asarray(time_s, dtype=float), self)
 
 
+@dataclass(frozen=True, eq=False)
+class RecordedLoad:
+    """Shares of the run's load torque as they were recorded, (n,) each; the last one stays."""
+
+    time_s: Array
+    shares: Array
+
+    def at(self, time_s: NDArray[np.floating]) -> Array:
+        """As `LoadProfile.at`."""
+        return np.interp(time_s, self.time_s, self.shares)
+
+
 def _constant(time_s: Array, _: LoadProfile) -> Array:
     return np.ones_like(time_s)
 

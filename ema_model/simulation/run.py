@@ -16,7 +16,7 @@ from ema_model.errors import InputError, quoted
 from ema_model.physics.rows import LANES
 from ema_model.quantities.axes import Axes
 from ema_model.recordings import Measurement
-from ema_model.simulation.load_profile import LoadProfile
+from ema_model.simulation.load_profile import LoadProfile, RecordedLoad
 from ema_model.simulation.one_stack import stack_at_hand
 from ema_model.simulation.pack import initial_reference_state, initial_state, monitor_rows, reference_rows
 from ema_model.simulation.precompile import wait_for
@@ -45,7 +45,7 @@ class Run:
     duration_s: float = 0.5
     sample_rate_Hz: float = 10_000.0
     load_torque_Nm: float = 0.0  # on the user shaft, positive opposes positive motion
-    load: LoadProfile = field(default_factory=LoadProfile)  # how that goes over time
+    load: LoadProfile | RecordedLoad = field(default_factory=LoadProfile)  # how that goes over time
 
     def __post_init__(self) -> None:
         if not 1e-3 <= self.duration_s <= _LONGEST_S:

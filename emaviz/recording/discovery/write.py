@@ -16,6 +16,7 @@ from ema_model.discovery.tracks import PAUSE_S, Track, one_after_another, primar
 from ema_model.discovery.words import rung_title
 from ema_model.errors import InputError
 from ema_model.estimation.floor import BAND_SIGMAS
+from emaviz import colours
 from emaviz.recording import series
 from emaviz.recording.discovery import documents, layout
 from emaviz.recording.discovery.layout import CANDIDATES, LADDER, Step
@@ -26,8 +27,8 @@ from emaviz.recording.writer import RecordingWriter
 Array = NDArray[np.float64]
 
 _LINES = {
-    "fitted": GROUP_COLOURS["reference"],
-    "held out": GROUP_COLOURS["monitor"],
+    "fitted": (*colours.rgb(colours.FITTED), 255),
+    "held out": (*colours.rgb(colours.HELD_OUT), 255),
     "floor": GROUP_COLOURS["floor_low"],
 }
 _WIDTH = 0.36  # of a bar, in steps

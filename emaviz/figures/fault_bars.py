@@ -95,7 +95,7 @@ def _unseen(index: int, ends: np.ndarray, phrase: str, adequate: bool) -> str:
     """What is said of a k that has no alarm of its own."""
     name = FAULTS[index].name
     if not adequate:
-        return "cannot be told: the model does not fit"
+        return "not identifiable: the model does not fit"
     if index == _PHASE:
         return "no angle without an eccentricity"
     if HEALTHY[index] == 0.0:

@@ -21,7 +21,7 @@ class AskedControls:
     def __init__(self, page: Page, comparing: Comparing, uploads: Uploads) -> None:
         self._page, self._comparing = page, comparing
         gui = page.server.gui
-        with gui.add_folder("What is compared"):
+        with gui.add_folder("Weights and window"):
             self._signals = {name: self._signal(name) for name in COMPARABLE}
             self._windowed = gui.add_checkbox("Only a window of time", False)
             self._from = gui.add_number("From [s]", 0.0, step=0.01, visible=False)

@@ -78,7 +78,7 @@ class ExplorePanel:
         )
         with gui.add_folder("Monitor model"):
             self.monitor = gui.add_dropdown(
-                "Its faults", MONITORS, initial_value="healthy", hint="Whose faults the monitor model is drawn with"
+                "Its faults", MONITORS, initial_value="healthy", hint="The faults that the monitor model has here"
             )
         settings = page.session.settings
         self._preset.on_update(lambda event: event.client and page.screen.post("preset", self._take_preset))

@@ -50,8 +50,9 @@ class DataFolder:
             remove_abandoned(at)
 
     def measurements(self) -> list[str]:
-        """Names of the files that may hold measurements, relative to the folder, the newest first."""
-        return self._files(self.folder, tuple(FORMATS))
+        """Names of the files that may hold measurements, relative to the folder, the newest first; no runs of ours."""
+        own = f"{self.recordings.name}/"
+        return [name for name in self._files(self.folder, tuple(FORMATS)) if not name.startswith(own)]
 
     def actuator_files(self) -> list[str]:
         """Names of the uploaded actuator files."""

@@ -139,7 +139,12 @@ def test_from_a_file_to_the_region_where_the_model_fails(compare, app, rig_file)
     turned = 0.5 * one.measured["motor_position_rad"][at]
     wait_until(lambda: np.allclose(app.scene._rotor.wxyz, (np.cos(turned), np.sin(turned), 0.0, 0.0), atol=0.02))
 
-    for tab, title in (("Against", "against"), ("Orders", "orders"), ("Explained by", "explains"), ("Calibration", "Calibrated")):
+    for tab, title in (
+        ("Against", "against"),
+        ("Orders", "orders"),
+        ("Explained by", "explains"),
+        ("Calibration", "Calibrated"),
+    ):
         page.get_by_role("tab", name=tab, exact=True).click()
         wait_until(lambda title=title: any(title in drawn for drawn, _ in figures(page)))
 

@@ -88,6 +88,7 @@ def test_links_that_lead_outside_are_neither_listed_nor_read(folder, outside, tm
     (folder.folder / "linked").symlink_to(tmp_path / "more")
     (folder.uploads / "circle.csv").symlink_to(folder.uploads / "circle.csv")
     (folder.uploads / "own.csv").write_text(ROWS)
+    (folder.recordings / "20261123-robust.rrd").write_bytes(b"a run, which Runs lists")
     assert folder.measurements() == ["uploads/own.csv"]
     for name in ("uploads/link.csv", "linked/far.csv", "uploads/circle.csv"):
         with pytest.raises(InputError):

@@ -79,7 +79,7 @@ def test_the_command_and_its_settings_reach_the_plant(page, app):
 def test_a_bad_value_is_told_and_the_page_goes_on(page, app):
     page.get_by_label("End time [s]", exact=True).fill("0")
     page.get_by_label("End time [s]", exact=True).press("Enter")
-    page.get_by_text("end_time_s must be above 0").wait_for(timeout=10_000)
+    page.locator(".emaviz-beside", has_text="end_time_s must be above 0").wait_for(timeout=10_000)
     assert app.session.settings.run().command.settings()["end_time_s"] == 0.5
     set_slider(page, "k2", 0.5)
     wait_until(lambda: app.session.settings.k[1] == 0.5)

@@ -71,7 +71,7 @@ class ResultPanel:
             leads()
         self._plots_folder = gui.add_folder("Plots", visible=False)
         with self._plots_folder:
-            self._recording = gui.add_dropdown("Recording", ["–"], visible=False)
+            self._recording = gui.add_dropdown("Measurement", ["–"], visible=False)
             self._plots = ComparePlots(page)
         self._save = gui.add_folder("Keep it", visible=False)
         with self._save:

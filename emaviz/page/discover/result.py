@@ -64,7 +64,7 @@ class DiscoveryPanel:
             self._equation = add_html(gui)
         self._before_folder = gui.add_folder("Before and after", visible=False)
         with self._before_folder:
-            self._recording = gui.add_dropdown("Recording", ["–"])
+            self._recording = gui.add_dropdown("Measurement", ["–"])
             self._signal = gui.add_dropdown("Signal", ["–"])
             self._actuator = ActuatorSwitch(page, discovering, self._track, strip)
             self._residual: Any = gui.add_plotly(go.Figure(), config=CONFIG, aspect=0.5, visible=False)

@@ -15,7 +15,7 @@ from emaviz.figures.decimate import envelope
 from emaviz.figures.signals import CURSOR, PADDING, POINTS, charts, legend, time_axis, value_axis
 from emaviz.text.html import add_html
 
-SHADES = ("#f9c07a", "#f59f4a", "#e8742c", "#c2410c", "#7c2d12")  # the model's colour, ever darker
+SHADES = ("#fcc487", "#f59f4a", "#ea7317", "#c94f0a", "#a13a06")  # the model's colour, ever darker
 _SHOWN = ("current_A", "user_position_rad", "motor_speed_rad_s")
 
 

@@ -29,7 +29,7 @@ MEASURED: Any = {**PLANT_LINE, "label": "measured"}
 class LiveFit:
     """Two charts on one time base: the currents, and monitor − measured."""
 
-    def __init__(self, gui: viser.GuiApi, height: int = 150) -> None:
+    def __init__(self, gui: viser.GuiApi, height: int = 190) -> None:
         empty = np.array([0.0, 1.0])
         self._algorithms: tuple[str, ...] = ()
         self._legend: Any = add_html(gui)

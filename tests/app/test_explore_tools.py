@@ -125,6 +125,7 @@ def test_a_refused_value_is_said_beside_its_field_until_it_is_changed(page):
 
 @pytest.mark.browser
 def test_keys_step_and_list_themselves(page, app):
+    page.evaluate("document.activeElement?.blur()")  # in a field one types
     app.strip.play(True)
     page.locator("body").press("ArrowLeft")
     wait_until(lambda: not app.playback.playing, 10.0)
@@ -137,6 +138,8 @@ def test_keys_step_and_list_themselves(page, app):
     wait_until(lambda: app.session.settings.k[0] > 0.0, 10.0)
     assert app.playback.time_s == moment, "an arrow on a slider moves that alone"
     slider.blur()
+    page.keyboard.press("Control+z")
+    wait_until(lambda: app.session.settings.k[0] == 0.0, 10.0)
     page.keyboard.press("?")
     page.get_by_text("List these keys").wait_for(timeout=10_000)
     page.keyboard.press("Escape")

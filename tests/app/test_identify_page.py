@@ -216,6 +216,8 @@ def test_a_race_is_watched_paused_and_looked_back_at(page, app):
     curves = np.array(page.evaluate(CHART, "Convergence"))
     assert np.all(np.diff(curves[1:], axis=1) <= 1e-9) and np.all(curves[1:] > 0.0)
 
+    page.locator("[role=tab][aria-selected=true]", has_text="Answer").wait_for(timeout=30_000)
+    page.get_by_role("tab", name="Search", exact=True).click()
     last = page.evaluate(pictures)
     box = page.locator('label:text-is("Iteration")')
     box = box.locator("xpath=ancestor::div[contains(@class,'mantine-Flex-root')][1]").locator(

@@ -67,7 +67,7 @@ class DiscoverPanel:
 
     def _listen(self) -> None:
         discovering, post = self._discovering, self._page.screen.post
-        self._start.on_click(lambda _: self.ask(discovering.start))
+        self._start.on_click(lambda _: self._page.begins(discovering.start, self._start))
         self._undo.on_click(lambda _: self._page.screen.post("undo", self._step_back))
         self._all.on_click(lambda _: self.ask(discovering.find_all))
         for i, button in enumerate(self._removes):
@@ -93,7 +93,7 @@ class DiscoverPanel:
     def ask(self, begin: Callable[[], bool]) -> None:
         """Begins a step, or says why not."""
 
-        self._page.begins(begin, self._start)
+        self._page.begins(begin)
 
     def _step_back(self) -> None:
         self._page.checked(self._discovering.undo)

@@ -67,7 +67,7 @@ class DiscoverPanel:
 
     def _listen(self) -> None:
         discovering, post = self._discovering, self._page.screen.post
-        self._start.on_click(lambda _: self._page.begins(discovering.start, self._start))
+        self._start.on_click(lambda _: self._begin())
         self._undo.on_click(lambda _: self._page.screen.post("undo", self._step_back))
         self._all.on_click(lambda _: self.ask(discovering.find_all))
         for i, button in enumerate(self._removes):
@@ -94,6 +94,9 @@ class DiscoverPanel:
         """Begins a step, or says why not."""
 
         self._page.begins(begin)
+
+    def _begin(self) -> None:
+        self._page.begins(self._discovering.start, self._start)
 
     def _step_back(self) -> None:
         self._page.checked(self._discovering.undo)

@@ -5,6 +5,7 @@ MONITOR = "#f08c00"
 DIFFERENCE = "#e03131"
 COMMAND = "#868e96"
 FAULT = "#ff5a00"  # on the actuator: what is broken, and nothing else
+FITTED, HELD_OUT = "#1098ad", "#9c36b5"  # what was fitted, and what was not
 TRUTH = "#2b8a3e"
 GHOST = "#9c6ade"  # a frozen run
 PHASES = ("#ec403a", "#28be5a", "#3878ff")  # A, B, C, in the charts and in the windings

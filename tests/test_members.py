@@ -261,4 +261,4 @@ def test_an_optimiser(copied):
 
 
 def test_a_tab(copied):
-    assert copied("-c", PAGE).count("'Recordings', 'Notes']") == 1
+    assert copied("-c", PAGE).count("'Runs', 'Notes']") == 1

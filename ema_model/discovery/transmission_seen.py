@@ -30,7 +30,7 @@ _SLIDES = 0.02  # of the highest speed, below which a direction is not known
 _ROUNDS = 3  # in which a delay between the two is found
 _LEAST_SAMPLES, _MOST_SAMPLES = 100, 5000
 _CAUSES = {
-    "acceleration": "It goes with the acceleration, as the twist of a shaft that gives does.",
+    "acceleration": "It follows the acceleration, as the twist of a shaft that gives does.",
     "direction": "It turns over with the direction, as play does.",
 }
 

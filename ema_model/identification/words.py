@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ema_model import faults
-from ema_model.actuator.readings import sentences
+from ema_model.actuator.readings import between, sentences
 from ema_model.identification.landscape import Landscape, Way
 from ema_model.identification.run import ALGORITHMS, Identification
 from ema_model.quantities.numbers import amount
@@ -22,6 +22,14 @@ def verdict(answer: Identification) -> str:
     if not sure.adequate:
         return "the model does not fit: no fault can be told"
     return "healthy" if sure.healthy else f"not healthy: {', '.join(sure.alarms) or 'no single k stands out'}"
+
+
+def in_one_line(answer: Identification) -> str:
+    """The verdict with its values: 'Not healthy: backlash 703 ± 1.1 µrad.'"""
+    phrases = between(answer.k, answer.uncertainty.interval90, answer.actuator)
+    seen = [phrase for name, phrase in zip(faults.NAMES, phrases) if name in answer.uncertainty.alarms]
+    said = f"not healthy: {', '.join(seen)}" if seen and answer.uncertainty.adequate else verdict(answer)
+    return f"{said[:1].upper()}{said[1:]}."
 
 
 def document_of(answer: Identification) -> Document:

@@ -13,6 +13,8 @@ from ema_model.quantities.si import BY_SHOWN
 
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _SMALLEST = 0.09995  # reads as 0.1, and is shown as it is; what is smaller gets the next prefix
+_FINE = 1e-3  # an error that takes the next prefix
+_FINE_AT = 0.1  # from which on its value keeps three digits
 _LARGEST = 9995.0  # likewise, from which on a kilo is taken
 
 
@@ -83,7 +85,17 @@ class Quantity:
 def with_uncertainty(value: float, half: float, unit: str) -> str:
     """'12.2 ± 0.70 mN·m': half the width of an interval with two digits."""
     shown = Quantity("", unit).scaled(value)
-    return f"{number(shown.factor * value)} ± {number(shown.factor * half, 2)} {shown.unit}".rstrip()
+    if 0.0 < shown.factor * half < _FINE:  # 703.000 ± 0.087 µrad, not 0.703 ± 8.7·10⁻⁵ mrad
+        shown = Quantity("", unit).scaled(1e-3 * value)
+    error = number(shown.factor * half, 2)
+    decimals = len(error.partition(".")[2])
+    digits = 3 if "·" in error or shown.factor * half >= _FINE_AT else decimals + _before(shown.factor * value)
+    return f"{number(shown.factor * value, max(digits, 3))} ± {error} {shown.unit}".rstrip()
+
+
+def _before(value: float) -> int:
+    """Digits before the point; none or less for what is smaller than one."""
+    return math.floor(math.log10(abs(value))) + 1 if value else 0
 
 
 def amount(value: float, unit: str) -> str:

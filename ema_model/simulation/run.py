@@ -16,6 +16,7 @@ from ema_model.errors import InputError, quoted
 from ema_model.physics.rows import LANES
 from ema_model.quantities.axes import Axes
 from ema_model.recordings import Measurement
+from ema_model.simulation.load_profile import LoadProfile, RecordedLoad
 from ema_model.simulation.one_stack import stack_at_hand
 from ema_model.simulation.pack import initial_reference_state, initial_state, monitor_rows, reference_rows
 from ema_model.simulation.precompile import wait_for
@@ -44,6 +45,7 @@ class Run:
     duration_s: float = 0.5
     sample_rate_Hz: float = 10_000.0
     load_torque_Nm: float = 0.0  # on the user shaft, positive opposes positive motion
+    load: LoadProfile | RecordedLoad = field(default_factory=LoadProfile)  # how that goes over time
 
     def __post_init__(self) -> None:
         if not 1e-3 <= self.duration_s <= _LONGEST_S:
@@ -68,6 +70,10 @@ class Run:
     def time_s(self) -> Array:
         """Times of the samples, (samples + 1,)."""
         return np.arange(self.samples + 1) / self.sample_rate_Hz
+
+    def load_at(self, time_s: NDArray[np.floating]) -> Array:
+        """The load at these times, N·m, (n,)."""
+        return self.load_torque_Nm * self.load.at(time_s)
 
 
 def steps_per_sample(period_s: float, step_s: float = MONITOR_STEP_S) -> int:
@@ -116,7 +122,7 @@ def simulate_reference(
     dt = 1.0 / run.sample_rate_Hz / period
     times = np.arange(run.samples * period + 1) * dt
     demand = run.command.at(times)
-    load = np.full_like(times, run.load_torque_Nm)
+    load = run.load_at(times)
     start = float(demand[0]) if start_rad is None else start_rad
     result = np.empty((run.samples, 11))
     wait_for(stack, "run")
@@ -151,30 +157,48 @@ def simulate_monitor(
     start_rad: float | None = None,
 ) -> Measurement:
     """The Monitor Model's signals; raises as `simulate_reference`."""
+    return simulate_monitors(
+        run, actuator, np.asarray(actuator.k if k is None else k)[None], effects, circuit, start_rad=start_rad
+    )[0]
+
+
+def simulate_monitors(
+    run: Run,
+    actuator: Actuator,
+    k: ArrayLike,
+    effects: Effects | None = None,
+    circuit: str = "reduced",
+    *,
+    start_rad: float | None = None,
+) -> tuple[Measurement, ...]:
+    """The Monitor Model's signals for every k of (n, 8), in one run of the population; as `simulate_monitor`."""
+    k = np.atleast_2d(np.asarray(k, dtype=float))
     effects = {name: find(name, actuator.axes).settings(dict(given)) for name, given in (effects or {}).items()}
     if actuator.controller.kind in WITHOUT_DRIVE:
         raise InputError(f"{quoted(actuator.name)}: its controller is not known, so that no command can be simulated")
     stack = stack_at_hand(actuator, effects, circuit, "traces")
     period = _steps_per_sample(run, actuator.step_s)
     dt = 1.0 / run.sample_rate_Hz / period
-    demand = run.command.at(np.arange(run.samples * period + 1) * dt)
+    times = np.arange(run.samples * period + 1) * dt
+    demand = run.command.at(times)
     start = float(demand[0]) if start_rad is None else start_rad
-    result = np.empty((1, run.samples, 4, LANES))
+    blocks = -(-len(k) // LANES)
+    result = np.empty((blocks, run.samples, 4, LANES))
     wait_for(stack, "traces")
     exclusive(
         stack.monitor.traces,
-        initial_state(actuator, 1, start, stack=stack),
-        monitor_rows(actuator, actuator.k if k is None else k, stack, effects),
+        initial_state(actuator, blocks, start, stack=stack),
+        monitor_rows(actuator, k, stack, effects),
         demand,
-        np.full_like(demand, run.load_torque_Nm),
+        run.load_at(times),
         np.ones_like(demand),
         period,
         1,
         dt,
         result,
     )
-    signals = _signals(run, actuator, result[0, :, :, 0], start)
-    return Measurement(_finite(signals, "the monitor model", actuator.axes), name="monitor model")
+    runs = (_signals(run, actuator, result[i // LANES, :, :, i % LANES], start) for i in range(len(k)))
+    return tuple(Measurement(_finite(one, "the monitor model", actuator.axes), name="monitor model") for one in runs)
 
 
 def _signals(run: Run, actuator: Actuator, result: Array, start_rad: float) -> dict[str, Array]:
@@ -197,7 +221,7 @@ def _signals(run: Run, actuator: Actuator, result: Array, start_rad: float) -> d
         "current_A": column(0, 0.0),
     }
     if run.load_torque_Nm:
-        signals["load_torque_Nm"] = np.full_like(time, run.load_torque_Nm)
+        signals["load_torque_Nm"] = run.load_at(time)
     return signals
 
 

@@ -20,6 +20,7 @@ from ema_model.recordings import Measurement, read
 from ema_model.recordings.formats.text_layout import Hints
 from ema_model.recordings.read import COMMAND_ALONE, INPUT_ALONE, Needs
 from ema_model.recordings.recording_set import column_of_runs, episodes_of, files_of, held_out, is_pattern, runs_of
+from ema_model.simulation.load_profile import LoadProfile
 from ema_model.simulation.run import Run
 from emaviz.cli.options import COMMAND_OR_FILE
 from emaviz.cli.output import Progress
@@ -160,7 +161,8 @@ def run_of(arguments: argparse.Namespace, actuator: Actuator, sample_rate_Hz: fl
     """The run that the options ask for."""
     demand, length = _command(arguments, actuator)
     duration = arguments.duration if arguments.duration is not None else length
-    return Run(demand, duration, sample_rate_Hz, arguments.load_torque)
+    load = LoadProfile(arguments.load_shape, arguments.load_time, arguments.load_frequency)
+    return Run(demand, duration, sample_rate_Hz, arguments.load_torque, load)
 
 
 def _command(arguments: argparse.Namespace, actuator: Actuator) -> tuple[Command, float]:

@@ -8,6 +8,7 @@ from pathlib import Path
 from ema_model.commands import COMMANDS
 from ema_model.errors import quoted
 from ema_model.recordings.formats.text_layout import known_encoding
+from ema_model.simulation.load_profile import SHAPES, LoadProfile
 from emaviz.cli import files
 from emaviz.cli.numbers import FINITE, SEED, whole
 
@@ -145,6 +146,13 @@ def add_run(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--duration", type=FINITE, metavar="s", help="0.5 s, or the whole of a recorded command")
     parser.add_argument(
         "--load-torque", type=FINITE, default=0.0, metavar="N_m", help="on the user shaft, against positive motion"
+    )
+    parser.add_argument("--load-shape", choices=SHAPES, default="constant", help="of the load torque over time")
+    parser.add_argument(
+        "--load-time", type=FINITE, default=LoadProfile.time_s, metavar="s", help="of its step, or of its chirp's rise"
+    )
+    parser.add_argument(
+        "--load-frequency", type=FINITE, default=LoadProfile.frequency_Hz, metavar="Hz", help="of its sine, or chirp"
     )
     parser.add_argument("--noise-current", type=FINITE, default=0.0, metavar="A", help="rms noise of the sensors")
     parser.add_argument(

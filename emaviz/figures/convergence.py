@@ -26,7 +26,7 @@ class LiveConvergence:
         self._legend: Any = add_html(gui)
         self._handle: Any = gui.add_uplot(
             data=(np.array([0.0, 1.0]), np.array([1.0, 1.0])),
-            series=({"label": "iteration"}, _line("")),
+            series=({"label": "iteration"}, _UNSEEN),
             title="Convergence",
             scales=_scales(150),
             axes=axes,
@@ -69,6 +69,9 @@ def _to_length(rmse: Sequence[float], count: int) -> np.ndarray:
 
 def _line(algorithm: str) -> Any:
     return {"label": f"{algorithm} [A]", "stroke": colour(algorithm), "width": 2, "points": {"show": False}}
+
+
+_UNSEEN: Any = {**_line(""), "stroke": "#00000000"}  # before anything is searched
 
 
 def _scales(iterations: int) -> Any:

@@ -9,9 +9,9 @@ import plotly.graph_objects as go
 from ema_model.discovery import Discovery
 from ema_model.discovery.labels import rung_title
 from ema_model.quantities.numbers import number
+from emaviz.colours import FITTED, HELD_OUT
 from emaviz.figures import theme
 
-FITTED, HELD_OUT = theme.MEASURED, theme.MODEL
 _WIDE = 15.0  # times the floor, from which on the scale is logarithmic
 
 

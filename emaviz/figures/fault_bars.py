@@ -9,11 +9,12 @@ from ema_model.actuator import Actuator
 from ema_model.actuator.readings import between, sentences
 from ema_model.faults import FAULTS, HEALTHY
 from ema_model.quantities.numbers import number
-from emaviz.colours import DIFFERENCE, MONITOR, TRUTH
+from emaviz.colours import FAULT, TRUTH
 from emaviz.text.html import Html, html, joined
 
 _LEAST_LIMIT = 1e-9
 _ECCENTRICITY, _PHASE = 5, 6
+_INK = "currentColor"
 
 
 def fault_bars(
@@ -37,33 +38,36 @@ def fault_bars(
     rows = []
     for i, (fault, phrase) in enumerate(zip(FAULTS, phrases)):
         told = fault.name in alarms or (i == _PHASE and FAULTS[_ECCENTRICITY].name in alarms)
-        marks = [_limit(HEALTHY[i], limits[i]), _box(HEALTHY[i] - 0.002, 0.004, 0, 18, "currentColor", 0.35)]
+        marks = [_limit(HEALTHY[i], limits[i]), _box(HEALTHY[i] - 0.002, 0.004, 0, 18, _INK, 0.35)]
         if truth is not None:
             marks.append(_box(np.asarray(truth)[i] - 0.004, 0.008, 1, 16, TRUTH, 1.0))
-        if ends is not None:
+        unknown = i == _PHASE and ends is not None and not told
+        if ends is not None and not unknown:
             low, high = ends[i]
-            marks.append(_box(low, max(high - low, 0.004), 8, 2, "currentColor", 0.85))
-        marks.append(_dot(k[i], DIFFERENCE if told else MONITOR))
+            marks.append(_box(low, max(high - low, 0.004), 8, 2, _INK, 0.85))
+        if not unknown:
+            marks.append(_dot(k[i], FAULT if told else _INK))
         words = phrase if ends is None or told else _unseen(i, ends[i], phrase, adequate)
         rows.append(
             html(
-                "<tr>"
+                '<tr title="{}">'
                 '<td style="white-space:nowrap;padding:1px 6px 1px 0"><b>{}</b> {}</td>'
                 '<td style="width:30%"><div style="position:relative;height:18px;background:#8686861c;'
                 'border-radius:3px">{}</div></td>'
-                '<td style="text-align:right;padding:0 6px;font-variant-numeric:tabular-nums">{:.3f}</td>'
+                '<td style="text-align:right;padding:0 6px;font-variant-numeric:tabular-nums">{}</td>'
                 '<td style="font-size:11.5px;{}">{}</td>'
                 "</tr>",
+                _values(i, k[i], None if ends is None else ends[i], limits[i]),
                 fault.name,
                 fault.title,
                 joined(marks),
-                k[i],
+                "–" if unknown else f"{k[i]:.3f}",
                 "font-weight:600" if told else "opacity:.8",
                 words,
             )
         )
-    legend = html('<span style="color:{}">●</span> identified', MONITOR)
-    legend += html(' &nbsp;<span style="color:{}">●</span> fault', DIFFERENCE) if alarms else ""
+    legend = html("● identified")
+    legend += html(' &nbsp;<span style="color:{}">●</span> fault', FAULT) if alarms else ""
     legend += html(' &nbsp;<span style="color:{}">▮</span> truth', TRUTH) if truth is not None else ""
     legend += html(" &nbsp;━ 90 % interval") if ends is not None else ""
     legend += html(" &nbsp;│ healthy")
@@ -76,11 +80,22 @@ def fault_bars(
     )
 
 
+def _values(index: int, k: float, ends: np.ndarray | None, limit: float) -> str:
+    """What the row draws, in numbers, for the cursor."""
+    said = [f"{FAULTS[index].name} = {k:.4f}"]
+    if ends is not None:
+        said.append(f"90 % interval {ends[0]:.4f} … {ends[1]:.4f}")
+    said.append(f"healthy {HEALTHY[index]:g}")
+    if limit > _LEAST_LIMIT:
+        said.append(f"a change below {limit:.2g} cannot be seen")
+    return ", ".join(said)
+
+
 def _unseen(index: int, ends: np.ndarray, phrase: str, adequate: bool) -> str:
     """What is said of a k that has no alarm of its own."""
     name = FAULTS[index].name
     if not adequate:
-        return "cannot be told: the model does not fit"
+        return "not identifiable: the model does not fit"
     if index == _PHASE:
         return "no angle without an eccentricity"
     if HEALTHY[index] == 0.0:

@@ -13,16 +13,23 @@ from ema_model.identification.run import ALGORITHMS as TITLES
 from emaviz.colours import REFERENCE
 from emaviz.figures.convergence import colour
 from emaviz.figures.decimate import envelope
-from emaviz.figures.signals import CURSOR, PADDING, POINTS, legend, time_axis, value_axis
+from emaviz.figures.signals import CURSOR, PADDING, PLANT_LINE, POINTS, legend, time_axis, value_axis
 from emaviz.text.html import add_html
 
 Array = NDArray[np.float64]
 
 
+def _line(label: str, drawn: str, width: float = 1.5) -> Any:
+    return {"label": label, "stroke": drawn, "width": width, "points": {"show": False}}
+
+
+MEASURED: Any = {**PLANT_LINE, "label": "measured"}
+
+
 class LiveFit:
     """Two charts on one time base: the currents, and monitor − measured."""
 
-    def __init__(self, gui: viser.GuiApi, height: int = 150) -> None:
+    def __init__(self, gui: viser.GuiApi, height: int = 190) -> None:
         empty = np.array([0.0, 1.0])
         self._algorithms: tuple[str, ...] = ()
         self._legend: Any = add_html(gui)
@@ -34,7 +41,7 @@ class LiveFit:
         }
         self._currents: Any = gui.add_uplot(
             data=(empty, empty),
-            series=({"label": "t [s]"}, _line("measured", REFERENCE)),
+            series=({"label": "t [s]"}, MEASURED),
             title="Measured and fitted current",
             axes=(time_axis(False), value_axis("A")),
             height=height,
@@ -61,7 +68,7 @@ class LiveFit:
             self._left.data = (blank,) * (1 + len(names))
             self._currents.series = (
                 {"label": "t [s]"},
-                _line("measured", REFERENCE),
+                MEASURED,
                 *(_line(name, drawn) for name, drawn in names),
             )
             self._left.series = ({"label": "t [s]"}, *(_line(name, drawn) for name, drawn in names))
@@ -71,7 +78,3 @@ class LiveFit:
         fitted = list(fitted_A.values())
         self._currents.data = envelope(time_s, [measured_A, *fitted], POINTS)
         self._left.data = envelope(time_s, [one - measured_A for one in fitted], POINTS)
-
-
-def _line(label: str, drawn: str) -> Any:
-    return {"label": label, "stroke": drawn, "width": 1.5, "points": {"show": False}}

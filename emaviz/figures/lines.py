@@ -72,7 +72,8 @@ def _at(series: Sequence[Array], part: NDArray[np.intp]) -> tuple[Array, ...]:
 
 
 def _joined(parts: Sequence[Array | list[float]]) -> Single:
-    return np.asarray(np.concatenate(parts) if parts else [], dtype=np.float32)
+    with np.errstate(over="ignore"):  # of a model that diverges, which no chart can show
+        return np.asarray(np.concatenate(parts) if parts else [], dtype=np.float32)
 
 
 def scattered(x: Array, y: Array, points: int) -> NDArray[np.intp]:

@@ -138,11 +138,13 @@ def _points(chart: go.Figure, x: np.ndarray, y: np.ndarray, name: str, marker: d
 
 def _mean(chart: go.Figure, bins: Binned, axis: Quantity, shown: Quantity, name: str, colour: str) -> None:
     many = len(bins.mean) > 60
+    apart = 1 + np.flatnonzero(bins.low[1:] > bins.high[:-1] + 1e-9 * np.ptp(bins.high))  # no line where nothing is
+    x, y, error = (np.insert(one, apart, np.nan) for one in (bins.centre, bins.mean, bins.error))
     chart.add_trace(
         go.Scatter(
-            x=bins.centre * axis.factor,
-            y=bins.mean * shown.factor,
-            error_y={"array": bins.error * shown.factor, "thickness": 1, "width": 0 if many else 2},
+            x=x * axis.factor,
+            y=y * shown.factor,
+            error_y={"array": error * shown.factor, "thickness": 1, "width": 0 if many else 2},
             mode="lines+markers",
             name=name,
             line={"color": colour, "width": 1.8},

@@ -12,7 +12,7 @@ from ema_model.quantities.shown import of_residual
 from emaviz.figures import floor_band, theme
 from emaviz.figures.lines import line
 
-BEFORE, AFTER = theme.MODEL, theme.MEASURED
+BEFORE, AFTER = theme.INITIAL, theme.RESIDUAL
 
 
 def figure(track: Track, signal: str, first: int = 0, last: int = -1, *, dark: bool = False) -> go.Figure:

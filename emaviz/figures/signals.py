@@ -60,6 +60,7 @@ def charts(axes: Axes = ROTARY) -> tuple[SignalChart, ...]:
     )
 
 
+_SHOWN = ((REFERENCE, "plant"), (MONITOR, "monitor"), (DIFFERENCE, "monitor − plant, right axis"), (COMMAND, "command"))
 PHASE_SIGNALS = ("phase_a_current_A", "phase_b_current_A", "phase_c_current_A")
 
 
@@ -77,16 +78,8 @@ class LiveSignals:
 
     def __init__(self, gui: viser.GuiApi, axes: Axes, height: int = 132) -> None:
         empty = np.array([0.0, 1.0])
-        add_html(
-            gui,
-            legend(
-                (REFERENCE, "plant"),
-                (MONITOR, "monitor"),
-                (DIFFERENCE, "monitor − plant, right axis"),
-                (COMMAND, "command"),
-                (GHOST, "frozen"),
-            ),
-        )
+        self._legend: Any = add_html(gui, legend(*_SHOWN))
+        self._frozen = False
         self._charts: list[tuple[SignalChart, Any]] = []
         every = charts(axes)
         for chart in every:
@@ -109,6 +102,9 @@ class LiveSignals:
         self, reference: Measurement, monitor: Measurement, ghost: Measurement | None, window_s: tuple[float, float]
     ) -> None:
         """Draws a run of both models on one time base, and the frozen one, from and to these times."""
+        if self._frozen != (ghost is not None):
+            self._frozen = ghost is not None
+            self._legend.content = legend(*_SHOWN, *([(GHOST, "frozen")] if self._frozen else []))
         shown = _within(reference.time_s, window_s)
         time = reference.time_s[shown]
         for chart, handle in self._charts:
@@ -126,10 +122,13 @@ class LiveSignals:
             handle.data = (*drawn, frame)
 
 
+_EQUIVALENT = ((REFERENCE, "equivalent current of the phases, plant"), (MONITOR, "monitor"))
+
+
 class LivePhases:
     """Phase currents, and the equivalent current that they make."""
 
-    def __init__(self, gui: viser.GuiApi, height: int = 250) -> None:
+    def __init__(self, gui: viser.GuiApi, height: int = 290) -> None:
         empty = np.array([0.0, 1.0])
         add_html(gui, legend(*((colour, f"phase {name}, plant") for colour, name in zip(PHASES, "ABC"))))
         common = {
@@ -146,13 +145,14 @@ class LivePhases:
             height=height,
             **common,  # type: ignore[arg-type]
         )
-        add_html(gui, legend((REFERENCE, "I₃eq of the phases, plant"), (MONITOR, "monitor"), (GHOST, "frozen")))
+        self._legend: Any = add_html(gui, legend(*_EQUIVALENT))
+        self._frozen = False
         self._equivalent: Any = gui.add_uplot(
             data=(empty,) * 4,
             series=(
                 {"label": "t [s]"},
                 _GHOST_LINE,
-                _line("reference", REFERENCE),
+                PLANT_LINE,
                 _line("monitor", MONITOR),
             ),
             title="Equivalent single-phase current",
@@ -165,6 +165,9 @@ class LivePhases:
         self, reference: Measurement, monitor: Measurement, ghost: Measurement | None, window_s: tuple[float, float]
     ) -> None:
         """As `LiveSignals.show`."""
+        if self._frozen != (ghost is not None):
+            self._frozen = ghost is not None
+            self._legend.content = legend(*_EQUIVALENT, *([(GHOST, "frozen")] if self._frozen else []))
         shown = _within(reference.time_s, window_s)
         time = reference.time_s[shown]
         self._phases.data = envelope(time, [reference[name][shown] for name in PHASE_SIGNALS], POINTS)
@@ -220,6 +223,8 @@ def _line(label: str, colour: str) -> Any:
     return {"label": label, "stroke": colour, "width": 1.5, "points": {"show": False}}
 
 
+# Broad and pale, so that the monitor's line upon it does not hide it.
+PLANT_LINE: Any = {**_line("plant", REFERENCE + "a0"), "width": 3.5}
 _GHOST_LINE: Any = {**_line("frozen", GHOST), "dash": [5, 3]}
 
 
@@ -228,7 +233,7 @@ def _series(chart: SignalChart) -> Any:
         {"label": "t [s]"},
         {**_line("difference", DIFFERENCE + "b0"), "width": 1, "scale": "difference"},
         _GHOST_LINE,
-        _line("reference", REFERENCE),
+        PLANT_LINE,
         _line("monitor", MONITOR),
     ]
     if chart.with_command:

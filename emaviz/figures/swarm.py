@@ -17,6 +17,8 @@ Array = NDArray[np.floating]
 _WIDTH, _PLANE_HEIGHT, _LINES_HEIGHT = 460, 330, 330
 _LEFT, _RIGHT, _TOP, _BOTTOM = 44, 14, 10, 36
 _MOST_DRAWN = 150  # candidates of one swarm
+# of a window: with what stands above it, the picture is seen whole; its letters grow no larger than others
+_FITS = "max-height:min(calc(100vh - 560px),430px);min-height:200px"
 _INK = 'fill="currentColor"'
 
 
@@ -116,6 +118,7 @@ def _text(x: float, y: float, text: str, anchor: str, more: str = "") -> str:
 def _picture(parts: Sequence[str], height: int) -> Html:
     """Parts: drawn from numbers and colours of ours, and from `_text`."""
     return unescaped(
-        f'<div style="padding:0 6px"><svg viewBox="0 0 {_WIDTH} {height}" width="100%" font-size="11" '
+        f'<div class="emaviz-picture" style="padding:0 6px"><svg viewBox="0 0 {_WIDTH} {height}" '
+        f'width="100%" font-size="11" style="{_FITS}" '
         f'font-family="system-ui,sans-serif">{"".join(parts)}</svg></div>'
     )

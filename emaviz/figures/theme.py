@@ -12,14 +12,14 @@ from typing import Any
 import plotly.graph_objects as go
 
 from ema_model.estimation.floor import BAND_SIGMAS
-from emaviz.colours import ALGORITHMS, COMMAND, DIFFERENCE, MONITOR, REFERENCE
+from emaviz.colours import COMMAND, DIFFERENCE, MONITOR, REFERENCE
 
 MEASURED = REFERENCE
 MODEL = MONITOR
 INITIAL = COMMAND
 RESIDUAL = DIFFERENCE
-FORWARD, BACKWARD = REFERENCE, ALGORITHMS["ssa"]
-MODULATORS = {"1": REFERENCE, "current": MONITOR, "sign_speed": ALGORITHMS["ssa"]}
+FORWARD, BACKWARD = "#1098ad", "#9c36b5"
+MODULATORS = {"1": DIFFERENCE, "current": "#1098ad", "sign_speed": "#9c36b5"}
 FLOOR = "rgba(134,142,150,0.30)"
 EDGE = "#868e96"
 SHADE = "rgba(224,49,49,0.16)"

@@ -16,7 +16,9 @@ import viser
 from ema_model.actuator import load_actuator
 from ema_model.simulation import plant
 from emaviz.page import compare, explore
+from emaviz.page.chart_tools import add_chart_tools
 from emaviz.page.docked import LEFT_PX, Docked
+from emaviz.page.explore.tab import ExploreTab
 from emaviz.page.keys import add_keys
 from emaviz.page.members import tabs
 from emaviz.page.page import Page
@@ -67,7 +69,9 @@ class App:
         given = [data.take_in(file) for file in files]
         recordings = data.recordings
         self.viewer: ViewerHost | None = None
-        self.server = open_server(host, port, self.door, lambda: self.viewer.address if self.viewer else None)
+        self.server = open_server(
+            host, port, self.door, lambda: self.viewer.address if self.viewer else None, data.scene
+        )
         self.viewer, no_viewer = _viewer(recordings)
         self.session = Session(actuator, recordings)
         self.screen = Worker("emaviz-screen", self._on_screen_error, rest_s=_FASTEST_REDRAW_S)
@@ -127,7 +131,9 @@ class App:
             with group.add_tab(kind.workspace.title, kind.workspace.icon):
                 one.build()
         self.shared.uploads.add_drop(",".join(self.shared.taken()))
-        add_keys(self.page, self.strip, [kind.workspace for kind in kinds])
+        add_chart_tools(Inside(self.server))
+        undo = self.tab(ExploreTab).panel.undo
+        add_keys(self.page, self.strip, [kind.workspace for kind in kinds], undo)
 
     def tab(self, kind: type[AnyTab]) -> AnyTab:
         """One of the page's tabs."""

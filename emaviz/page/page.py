@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import viser
 
 from ema_model.errors import InputError
 from emaviz.page.workspaces import Workspaces
+from emaviz.server.beside import say_beside
+from emaviz.server.viser_private import Inside, id_of
 from emaviz.session.session import Session
 from emaviz.session.worker import Worker
 
@@ -22,19 +24,28 @@ class Page:
     session: Session
     screen: Worker  # draws, at a pace that browsers can follow
     workspaces: Workspaces  # which windows are where
+    _refused: set[str] = field(default_factory=set)  # controls beside which something is said
 
     def notify(self, title: str, text: str, colour: Any = "red") -> None:
         """A message in every open browser."""
         for client in self.server.get_clients().values():
             client.add_notification(title, text, auto_close_seconds=8.0, color=colour)
 
-    def checked(self, change: Callable[[], Any]) -> bool:
-        """Applies a change of settings; a bad value becomes a message and leaves the old one."""
+    def checked(self, change: Callable[[], Any], control: Any = None) -> bool:
+        """Applies a change of settings; a bad value becomes a message and leaves the old one.
+
+        control: beside which that stands until it is changed; a message that goes away is for what has no place.
+        """
         try:
             change()
         except InputError as error:
-            self.notify("Input refused", str(error))
+            if control is None:
+                self.notify("Input refused", str(error))
+            else:
+                self._beside(control, str(error))
             return False
+        if control is not None and id_of(control) in self._refused:
+            self._beside(control, "")
         return True
 
     def ask(self, kind: str, asked: Callable[[], Any]) -> None:
@@ -45,8 +56,16 @@ class Page:
 
         self.screen.post(kind, checked)
 
-    def begins(self, begin: Callable[[], bool]) -> bool:
-        """Begins a long run, or says why not.  begin(): whether nothing else runs; InputError: what is missing."""
+    def _beside(self, control: Any, text: str) -> None:
+        if control is not None:
+            (self._refused.add if text else self._refused.discard)(id_of(control))
+            say_beside(Inside(self.server), control, text)
+
+    def begins(self, begin: Callable[[], bool], button: Any = None) -> bool:
+        """Begins a long run, or says why not, below the button that asks for it.
+
+        begin(): whether nothing else runs; InputError: what is missing.
+        """
         started = False
 
         def tried() -> None:
@@ -56,7 +75,7 @@ class Page:
             elif not (started := begin()):
                 self.one_at_a_time()
 
-        return self.checked(tried) and started
+        return self.checked(tried, button) and started
 
     def one_at_a_time(self) -> None:
         """Says that another long run goes on."""

@@ -9,7 +9,10 @@ import msgspec
 import viser
 
 from ema_model.actuator import Actuator
+from emaviz.colours import rgb
+from emaviz.figures.theme import DARK, LIGHT
 from emaviz.page.page import Page
+from emaviz.page.picture import send_picture
 from emaviz.page.style import STRIP, caption, figures
 from emaviz.page.style import page as style
 from emaviz.scene.actuator import ActuatorScene
@@ -56,6 +59,9 @@ class PlaybackStrip:
             self._labels = gui.add_checkbox("Labels", usual.labels)
             self._dark = gui.add_checkbox("Dark", usual.dark)
             self._view = gui.add_button("Reset view", icon=viser.Icon.FOCUS_CENTERED, color="gray")
+            self._picture = gui.add_button(
+                "Picture", icon=viser.Icon.CAMERA, color="gray", hint="Saves what is seen of the actuator as PNG"
+            )
             self._figures = add_html(gui)
             self._caption = add_html(gui)
             page.workspaces.connect()
@@ -68,6 +74,12 @@ class PlaybackStrip:
         self._dark.on_update(lambda _: self._set_dark())
         page.workspaces.entered.connect(self._enter)
 
+        @self._picture.on_click
+        def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
+            if event.client is not None:
+                dark = DARK.paper if self._dark.value else LIGHT.paper
+                send_picture(event.client, rgb(dark))
+
         @self._view.on_click
         def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
             if event.client is not None:
@@ -77,6 +89,13 @@ class PlaybackStrip:
         """Lets the picture move or rest."""
         self.playback.play(playing)
         self._show_playing()
+
+    def step(self, steps: int) -> None:
+        """Rests so many hundredths of the run later."""
+        self.play(False)
+        shown = self.playback.motion
+        if shown is not None:
+            self.playback.seek(min(self.playback.time_s + 0.01 * steps * shown.duration_s, shown.duration_s))
 
     def _show_playing(self) -> None:
         playing = self.playback.playing

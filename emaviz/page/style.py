@@ -33,6 +33,12 @@ def page() -> Html:
         ".mantine-Slider-root ~ .mantine-NumberInput-root,"
         "div:has(> .mantine-Slider-root) + .mantine-NumberInput-root,"
         "div:has(> * .mantine-Slider-root) > .mantine-NumberInput-root{width:3.9rem!important}"
+        # five tabs of a narrow panel on the right in one line, too
+        "[data-dock-region=right] [data-dock-tab]{padding-left:9px!important;padding-right:9px!important}"
+        "@media (max-width: 1250px){[data-dock-region=right] [data-dock-tab] > div:has(svg){display:none!important}}"
+        # handles for docking panels elsewhere, which nobody needs; what folds a panel away stays
+        "[data-dock-region-handle]{cursor:default!important}[data-dock-region-handle] > div:first-child,"
+        "[data-dock-region] [data-dock-griphandle]{display:none!important}"
         # what stands last in a panel ends above its edge
         "[data-dock-region=right] .mantine-ScrollArea-viewport{padding-bottom:14px}"
         f"div:has(> div > .emaviz-long) {_LABEL}{{width:10.4em!important}}"
@@ -62,7 +68,12 @@ def _strip() -> Html:
         f"{row} > div:nth-of-type(4){{flex:1 1 auto}}"
         f"{row} > div:nth-of-type(5){{width:200px}}"
     )
-    return unescaped(f"<style>@media (min-width: 900px){{{rules}}}</style>")
+    narrow = (
+        f"{row} > div:nth-of-type(5){{width:175px}}{row} button{{padding:0 6px!important;font-size:12px!important}}"
+    )
+    narrow += f"{row} > div:has(> button){{width:84px}}{row} .mantine-Button-section{{display:none}}"
+    wide, less = "@media (min-width: 900px)", "(max-width: 1250px)"
+    return unescaped(f"<style>{wide}{{{rules}}}{wide} and {less}{{{narrow}}}</style>")
 
 
 def unseen(controls: Sequence[str]) -> Html:

@@ -67,6 +67,12 @@ _SCRIPT = """
   const timer = setInterval(() => { if (told === null || wanted !== null) look(); fit(); }, 100);
   window.emavizViews = {
     go: (name) => { wanted = name; look(); },
+    front: (before, after) => {
+      for (const from of document.querySelectorAll('[role=tab][aria-selected=true]')) {
+        const to = [...from.parentElement.children].find(t => t.textContent.trim() === after);
+        if ((!before || from.textContent.trim() === before) && to && to.offsetParent) press(to);
+      }
+    },
     end: () => { seen.disconnect(); clearInterval(timer); },
   };
 })();
@@ -124,6 +130,13 @@ class Workspaces:
         """Takes one window there, as a click on the tab would; without a window, nothing happens."""
         if client is not None and name in self._members:
             self._inside.run(f"window.emavizViews?.go({json.dumps(name)})", client.client_id)
+
+    def bring_forward(self, name: str, before: str, after: str) -> None:
+        """In windows at this workspace whose tab `before` is in front (any, for none), puts `after` there."""
+        with self._changing:
+            there = [client for client, at in self._at.items() if at == name]
+        for client in there:
+            self._inside.run(f"window.emavizViews?.front({json.dumps(before)}, {json.dumps(after)})", client)
 
     def anyone(self, name: str) -> bool:
         """Whether a window shows this workspace."""

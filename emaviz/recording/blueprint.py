@@ -9,7 +9,10 @@ import rerun as rr
 import rerun.blueprint as rrb
 import rerun_bindings
 
+from emaviz.recording import dashboard
+from emaviz.recording.dashboard import Chart
 from emaviz.recording.style import (
+    ANSWER,
     APPLICATION,
     COMPARISON,
     GROUPS,
@@ -44,6 +47,10 @@ class Contents:
     signals: dict[str, list[str]] = field(default_factory=dict)
     algorithms: dict[str, Algorithm] = field(default_factory=dict)
     config: bool = False
+    charts: dict[str, Chart] = field(default_factory=dict)  # signals drawn beside the model of each iteration
+    curves: dict[str, Chart] = field(default_factory=dict)  # signals drawn over time, for any timeline
+    answer: bool = False
+    truth: bool = False
     findings: list[str] = field(default_factory=list)  # of a comparison: names of documents below /comparison
 
     def groups_with(self, name: str) -> list[str]:
@@ -58,8 +65,11 @@ class Contents:
 def build(contents: Contents) -> rrb.Blueprint:
     """The layout: tabs Signals, More signals, Identification, Configuration, as far as there is something in them.
 
-    A comparison has Overlay, Residuals and Where it fails in the place of Signals.
+    A comparison has Where it fails, Overlay and Residuals in the place of Signals.  An identification with curves of
+    its iterations opens on a dashboard of them, all its algorithms in one.
     """
+    if contents.charts:
+        return _identification(contents)
     tabs: list[rrb.Container | rrb.View] = []
     if contents.findings:
         tabs += _comparison_tabs(contents)
@@ -80,17 +90,85 @@ def build(contents: Contents) -> rrb.Blueprint:
     return arranged(contents, tabs)
 
 
-def arranged(contents: Contents, tabs: Sequence[rrb.Container | rrb.View], active: int = 0) -> rrb.Blueprint:
-    """A layout of these tabs, its panels folded away."""
+def _identification(contents: Contents) -> rrb.Blueprint:
+    tabs: list[rrb.Container | rrb.View] = [_dashboard(contents)]
+    if contents.curves:
+        views = [
+            dashboard.view(f"{signal_title(name)}: measured, the answer's model", [f"{dashboard.CURVES}/{name}/**"])
+            for name in contents.curves
+        ]
+        tabs.append(rrb.Grid(*views, grid_columns=2, name="Signals"))
+    results = [
+        rrb.TextDocumentView(origin=f"{algorithm_path(name)}/result", name=name)
+        for name, one in contents.algorithms.items()
+        if one.result
+    ]
+    if results:
+        tabs.append(rrb.Horizontal(*results, name="Results"))
+    if contents.config:
+        tabs.append(rrb.TextDocumentView(origin="/config", name="Settings"))
+    over_time = _signals_tab(contents)
+    if over_time is not None:
+        over_time.name = "Over time (below, choose the timeline: sim_time)"
+        tabs.append(over_time)
+    return arranged(contents, tabs, timeline=ITERATION)
+
+
+def _dashboard(contents: Contents) -> rrb.Container:
+    """Measured and model of the iteration that is chosen, convergence, all k, and the answer in words."""
+    names = list(contents.algorithms)
+    fits = [
+        dashboard.view(
+            f"{signal_title(signal)}: measured, and the best model of this iteration",
+            [
+                f"{dashboard.axes_path(signal)}/**",
+                *(f"{algorithm_path(name)}/fit/{signal}/**" for name in names),
+            ],
+        )
+        for signal in contents.charts
+    ]
+    errors = [f"{algorithm_path(name)}/log10_rmse" for name in names]
+    convergence = plot("Convergence: log10 of best RMSE [A]", errors, legend=len(names) > 1, linked=False)
+    kinds = ["best", "interval"]
+    kinds += ["truth"] if contents.truth else []
+    kinds += ["population"] if len(names) == 1 else []  # of several it would hide all else
+    views = [
+        plot(
+            K_TITLES[k],
+            [f"{algorithm_path(name)}/{kind}/{k}" for name in names for kind in kinds],
+            legend=False,
+            linked=False,
+            range_=(-0.05, 1.05),
+        )
+        for k in K_NAMES
+    ]
+    right: list[rrb.Container | rrb.View] = [rrb.Grid(*views, grid_columns=2)]
+    if contents.answer:
+        right.insert(0, rrb.TextDocumentView(origin=ANSWER, name="The answer"))
+    return rrb.Horizontal(
+        rrb.Vertical(*fits, convergence, row_shares=[3.0] * len(fits) + [2.0]),
+        rrb.Vertical(*right, row_shares=[3.0, 5.0][-len(right) :]),
+        column_shares=[5, 4],
+        name="Identification",
+    )
+
+
+def arranged(
+    contents: Contents,
+    tabs: Sequence[rrb.Container | rrb.View],
+    active: int = 0,
+    timeline: str | None = None,
+) -> rrb.Blueprint:
+    """A layout of these tabs, its panels folded away; timeline: that it opens on, at its end."""
     return rrb.Blueprint(
         rrb.Tabs(*tabs, active_tab=active if tabs else None),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
         rrb.TimePanel(
             state="collapsed",
-            timeline=SIM_TIME if contents.signals else ITERATION,
-            # A sequence timeline would start to play on its own.
-            play_state="Paused",
+            timeline=timeline or (SIM_TIME if contents.signals else ITERATION),
+            # A sequence timeline would start to play on its own; one that follows stands at its end.
+            play_state="Following" if timeline else "Paused",
         ),
         auto_views=False,
         auto_layout=False,
@@ -130,12 +208,11 @@ def _signals_tab(contents: Contents) -> rrb.Container | None:
 def _comparison_tabs(contents: Contents) -> list[rrb.Container | rrb.View]:
     compared = _compared(contents)
     text = [rrb.TextDocumentView(origin=f"{COMPARISON}/{name}", name=name.capitalize()) for name in contents.findings]
-    tabs: list[rrb.Container | rrb.View] = []
+    first = [_residual_view(contents, name) for name in compared[:1]]
+    tabs: list[rrb.Container | rrb.View] = [rrb.Horizontal(rrb.Vertical(*text), *first, name="Where it fails")]
     if compared:
         tabs.append(rrb.Vertical(*(signal_view(contents, name) for name in compared), name="Overlay"))
         tabs.append(rrb.Vertical(*(_residual_view(contents, name) for name in compared), name="Residuals"))
-    first = [_residual_view(contents, name) for name in compared[:1]]
-    tabs.append(rrb.Horizontal(rrb.Vertical(*text), *first, name="Where it fails"))
     return tabs
 
 

@@ -18,6 +18,8 @@ class Entry:
     settings: dict[str, Any] = field(default_factory=dict)  # of an identification; empty for others
     found: dict[str, dict[str, Any]] = field(default_factory=dict)  # its answers by algorithm
     best: str | None = None  # the algorithm to believe
+    kind: str = "run"  # identification, discovery, comparison …
+    says: str = ""  # what came of it, in a line
 
     @property
     def answer(self) -> dict[str, Any] | None:

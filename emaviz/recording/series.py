@@ -29,6 +29,8 @@ def iteration_style(path: str) -> Style:
         return rr.SeriesPoints(
             names=f"population {name}", colors=[style.POPULATION_COLOUR], markers="circle", marker_sizes=[1.3]
         )
+    if kind == "interval":
+        return rr.SeriesPoints(names=f"90 % interval {name}", colors=[colour], markers="diamond", marker_sizes=[5.0])
     if kind == "best":
         return line(f"{algorithm} best {name} [-]", colour, 2.5)
     if kind == "truth":

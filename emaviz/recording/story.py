@@ -10,19 +10,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model import faults
-from ema_model.actuator.readings import sentences
+from ema_model.actuator.readings import between, sentences
 from ema_model.commands import Recorded
 from ema_model.identification.objective import Objective
 from ema_model.identification.run import Identification, Progress
-from ema_model.identification.words import verdict
+from ema_model.identification.words import facts, in_one_line, verdict, why_best
 from ema_model.quantities.numbers import amount
 from ema_model.recordings import Measurement
+from ema_model.simulation.load_profile import RecordedLoad
 from ema_model.simulation.run import Run, simulate_monitor
 from emaviz.recording.writer import RecordingWriter
 
 _RESIDUAL = ("current_A", "user_position_rad", "motor_position_rad", "motor_speed_rad_s")
 _FITTED = ("command_rad", "user_position_rad", "motor_position_rad", "motor_speed_rad_s", "current_A")
-_KEPT_MONITORS = 6  # of the search's best monitor currents, spread over the iterations
+_SHOWN = ("current_A", "user_position_rad")  # on the dashboard
+_EACH_UNTIL, _THEN_EVERY = 20, 5  # iterations whose best model is drawn, where it has changed
+_LONGEST_S = 3.0  # of a measurement of which every iteration's model is simulated
 
 
 class IdentificationStory:
@@ -44,6 +47,9 @@ class IdentificationStory:
         """
         self.path = Path(path)
         self._writer = RecordingWriter(path)
+        self._fits: list[str] = []  # signals drawn beside each iteration's model
+        self._drawn: dict[str, NDArray[np.float64]] = {}  # the k that was drawn last, by algorithm
+        self._last: dict[str, int] = {}  # iteration, by algorithm
         self._outside = objective.actuator.axes.outside  # the names that files have
         self._objective = objective
         self._measurement = measurement
@@ -54,6 +60,7 @@ class IdentificationStory:
         if truth is not None:
             self._writer.truth(truth)
         if algorithms:
+            self._begin_fits(algorithms)
             residual = [name for name in _RESIDUAL if name in measurement]
             groups = {source: _signals(measurement), "monitor": _FITTED, "residual": residual}
             expected = {group: list(self._outside(dict.fromkeys(names))) for group, names in groups.items()}
@@ -65,18 +72,38 @@ class IdentificationStory:
         return self._writer.failed
 
     def iteration(self, at: Progress) -> None:
-        """One iteration: convergence, best k, population, and now and then the best monitor's current."""
+        """One iteration: convergence, best k, population, and the best model's curves where that has changed."""
         self._writer.iteration(at.algorithm, at.iteration, at.rmse, at.k, at.population, at.population_rmse)
-        every = max(1, at.iterations // _KEPT_MONITORS)
-        if at.iteration % every == 0 or at.iteration == at.iterations:
-            window = self._objective.windows[0]
-            current = self._objective.currents(at.k)[0, : window.blocks]
-            time = self._measurement.time_s[0] + window.block_s * (1.0 + np.arange(len(current)))
-            self._writer.monitor_iteration(at.algorithm, at.iteration, time, current)
+        self._last[at.algorithm] = at.iteration
+        due = at.iteration <= _EACH_UNTIL or at.iteration % _THEN_EVERY == 0 or at.iteration == at.iterations
+        drawn = self._drawn.get(at.algorithm)
+        if self._fits and due and (drawn is None or not np.array_equal(drawn, at.k)):
+            self._drawn[at.algorithm] = at.k.copy()
+            self._draw_fit(at.algorithm, at.iteration, at.k)
+
+    def _begin_fits(self, algorithms: Sequence[str]) -> None:
+        """The measured curves, beside which each iteration's model is drawn."""
+        for name in _SHOWN:
+            if name in self._measurement:
+                self._writer.fit(self._named(name), self._measurement.time_s, self._measurement[name], algorithms)
+                self._fits.append(name)
+        for name in (name for name in _RESIDUAL if name in self._measurement):
+            self._writer.curve(self._named(name), "measured", self._measurement.time_s, self._measurement[name])
+
+    def _draw_fit(self, algorithm: str, index: int, k: NDArray[np.float64]) -> None:
+        if self._measurement.duration_s > _LONGEST_S and index:
+            return  # a simulation of it would hold the search up
+        model = self._fitted(k)
+        for name in self._fits:
+            self._writer.fit_iteration(algorithm, index, self._named(name), model.time_s, model[name])
+
+    def _named(self, name: str) -> str:
+        """A signal's name as files have it."""
+        return next(iter(self._outside({name: None})))
 
     def finish(self, best: Identification, *others: Identification) -> None:
         """The fitted monitor and the residual of the best answer, the result of each; closes the file."""
-        monitor = self._fitted(best)
+        monitor = self._fitted(best.k)
         time = self._measurement.time_s
         self._writer.signals("monitor", time[: monitor.samples], self._outside(_signals(monitor)))
         residual = {
@@ -85,7 +112,17 @@ class IdentificationStory:
             if name in self._measurement
         }
         self._writer.signals("residual", time[: monitor.samples], self._outside(residual))
+        for name in (name for name in _RESIDUAL if name in self._measurement):
+            self._writer.curve(self._named(name), "model", monitor.time_s, monitor[name])
+        self._writer.answer(_in_words(best, others))
         for answer in (best, *others):
+            if self._fits and answer.algorithm in self._last:
+                last = self._last[answer.algorithm] + 1  # the answer stands one on: it is a fit from there
+                model = self._fitted(answer.k)
+                for name in self._fits:
+                    self._writer.fit_iteration(answer.algorithm, last, self._named(name), model.time_s, model[name])
+                self._writer.iteration(answer.algorithm, last, answer.rmse, answer.k)
+                self._writer.interval(answer.algorithm, last, answer.uncertainty.interval90)
             self._writer.result(_result(answer, self._objective), answer.algorithm)
         found = {answer.algorithm: _facts(answer) for answer in (best, *others)}
         self._writer.properties({"settings": self._configuration, "found": found, "best": best.algorithm})
@@ -95,21 +132,24 @@ class IdentificationStory:
         """Closes the file as it is."""
         self._writer.close()
 
-    def _fitted(self, answer: Identification) -> Measurement:
-        """The monitor's signals at the answer, on the recording's own time base."""
+    def _fitted(self, k: NDArray[np.float64]) -> Measurement:
+        """The monitor's signals at this k (8,), on the recording's own time base."""
         m = self._measurement
         load = m.get("load_torque_Nm")
+        heaviest = 0.0 if load is None else float(np.max(np.abs(load)))
+        shares = None if load is None or not heaviest else RecordedLoad(m.time_s, load / heaviest)
         run = Run(
             Recorded(m.time_s, m["command_rad"]),
             duration_s=m.duration_s,
             sample_rate_Hz=1.0 / m.sample_period_s,
-            load_torque_Nm=0.0 if load is None else float(load.mean()),
+            load_torque_Nm=heaviest,
+            **({} if shares is None else {"load": shares}),
         )
         objective = self._objective
         return simulate_monitor(
             run,
             objective.actuator,
-            answer.k,
+            k,
             objective.effects,
             objective.stack.circuit,
             start_rad=objective.windows[0].user_rad,
@@ -118,6 +158,19 @@ class IdentificationStory:
 
 def _signals(measurement: Measurement) -> dict[str, NDArray[np.float64]]:
     return {name: values for name, values in measurement.signals.items() if name != "time_s"}
+
+
+def _in_words(best: Identification, others: Sequence[Identification]) -> str:
+    """The answer as the dashboard shows it."""
+    phrases = between(best.k, best.uncertainty.interval90, best.actuator)
+    told = best.uncertainty.adequate
+    rows = [
+        f"| {'**' + name + '**' if name in best.uncertainty.alarms else name} | {phrase if told else '–'} |"
+        for name, phrase in zip(faults.NAMES, phrases)
+    ]
+    more = [f"\n★ {best.algorithm}: {why_best(best, others)}"] if others else []
+    facts_line = " · ".join(facts(best))
+    return "\n".join([f"# {in_one_line(best)}", "", facts_line, *more, "", "| k | 90 % |", "|---|---|", *rows])
 
 
 def _configuration(configuration: Mapping[str, Any]) -> str:

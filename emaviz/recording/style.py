@@ -25,6 +25,7 @@ K_NAMES = tuple(fault.name for fault in FAULTS)
 K_TITLES = {fault.name: f"{fault.name} {fault.title[0].lower()}{fault.title[1:]} [-]" for fault in FAULTS}
 
 COMPARISON = "/comparison"
+ANSWER = "/answer"
 GROUPS = ("reference", "monitor", "measurement", "initial", "residual", "floor_high", "floor_low")
 GROUP_TITLES = {"reference": "RM", "monitor": "MM", "measurement": "Measured", "residual": "Residual"}
 # Of a comparison: the model before calibration, and the edges between which a perfect one would leave its residual.
@@ -36,7 +37,7 @@ GROUP_TITLES |= {
 GROUP_COLOURS: dict[str, Colour] = {
     "reference": _rgba(colours.REFERENCE, 200),
     "monitor": _rgba(colours.MONITOR),
-    "measurement": _rgba(colours.COMMAND),
+    "measurement": _rgba(colours.REFERENCE, 150),
     "residual": _rgba(colours.DIFFERENCE),
     "initial": _rgba(colours.TRUTH, 160),
     "floor_high": _rgba(colours.COMMAND),

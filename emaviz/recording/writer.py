@@ -14,8 +14,9 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import ArrayLike, NDArray
 
-from emaviz.recording import series, style
+from emaviz.recording import dashboard, series, style
 from emaviz.recording.blueprint import Algorithm, Contents, build, send
+from emaviz.recording.dashboard import Chart
 from emaviz.recording.file import RrdFile
 from emaviz.recording.iterations import IterationBuffer
 from emaviz.recording.markdown import table
@@ -23,6 +24,7 @@ from emaviz.recording.paths import MIN_FREE_BYTES
 
 _ROWS_PER_CHUNK = 25
 _FLUSH_EVERY_S = 0.25
+_MODEL = style.GROUP_COLOURS["monitor"]
 
 
 class RecordingWriter:
@@ -111,7 +113,7 @@ class RecordingWriter:
         """The true k (8,), if known: static values, and a line beside every identified k from now on."""
         truth = _column("k", k, len(style.K_NAMES))
         with self._file.lock:
-            self._truth = truth
+            self._truth, self._contents.truth = truth, True
             for name, value in zip(style.K_NAMES, truth, strict=True):
                 scalar = rr.Scalars(value)
                 self._file.do(lambda stream, n=name, s=scalar: stream.log(f"/truth/{n}", s, static=True))
@@ -150,6 +152,49 @@ class RecordingWriter:
             self._algorithm(algorithm).monitor = True
             self._send(style.monitor_iteration_path(algorithm, index), series.monitor_style(index), time, current)
 
+    def fit(self, signal: str, time_s: ArrayLike, measured: ArrayLike, algorithms: Sequence[str]) -> None:
+        """The measured curve (n,) of a signal that `fit_iteration` draws a model beside, and its axes."""
+        chart = Chart.of(signal, time_s, measured)
+        drawn = dashboard.measured(chart.strip(time_s, measured))
+        with self._file.lock:
+            self._contents.charts[style.plain(signal)] = chart
+            self._file.do(lambda stream: chart.log_axes(stream, dashboard.axes_path(signal)))
+            for path in [dashboard.fit_path(name, signal, "measured") for name in algorithms]:
+                self._file.do(lambda stream, path=path: stream.log(path, drawn, static=True))
+
+    def fit_iteration(self, algorithm: str, index: int, signal: str, time_s: ArrayLike, values: ArrayLike) -> None:
+        """The best individual's curve (n,) on this iteration; `fit` has given the signal its axes."""
+        colour = style.algorithm_colour(algorithm)
+        columns = dashboard.model_columns(self._contents.charts[signal].strip(time_s, values), colour)
+        path, time = dashboard.fit_path(algorithm, signal, "model"), [rr.TimeColumn(style.ITERATION, sequence=[index])]
+        self._file.do(lambda stream: stream.send_columns(path, time, columns))
+
+    def curve(self, signal: str, which: str, time_s: ArrayLike, values: ArrayLike) -> None:
+        """A signal over time as a static curve, "measured" or "model"; the first of a signal gives it its axes."""
+        with self._file.lock:
+            chart = self._contents.curves.get(signal)
+            if chart is None:
+                chart = self._contents.curves[style.plain(signal)] = Chart.of(signal, time_s, values)
+                self._file.do(lambda stream: chart.log_axes(stream, f"{dashboard.CURVES}/{signal}"))
+            points = chart.strip(time_s, values)
+            drawn = dashboard.measured(points) if which == "measured" else dashboard.model(points, _MODEL)
+            self._file.do(lambda stream: stream.log(f"{dashboard.CURVES}/{signal}/{which}", drawn, static=True))
+
+    def answer(self, markdown: str) -> None:
+        """The answer in words, on the dashboard."""
+        with self._file.lock:
+            self._contents.answer = True
+            self._text(style.ANSWER, markdown)
+
+    def interval(self, algorithm: str, index: int, ends: ArrayLike) -> None:
+        """The interval (8, 2) of each k at the last iteration."""
+        ends = np.asarray(ends, dtype=float)
+        time = [rr.TimeColumn(style.ITERATION, sequence=[index])]
+        for row, k in enumerate(style.K_NAMES):
+            path = f"{style.algorithm_path(algorithm)}/interval/{k}"
+            columns = rr.Scalars.columns(scalars=ends[row]).partition([2])
+            self._send_columns(path, series.iteration_style(path), time, columns)
+
     def result(self, values: Mapping[str, Any], algorithm: str | None = None) -> None:
         """The answer, as a table; `algorithm` can be left out if its iterations came before."""
         with self._file.lock:
@@ -167,8 +212,12 @@ class RecordingWriter:
         with self._file.lock:
             self._expected = Contents(
                 signals={group: list(names) for group, names in signals.items()},
-                algorithms={name: Algorithm(iterations=True, monitor=True, result=True) for name in algorithms},
+                algorithms={name: Algorithm(iterations=True, result=True) for name in algorithms},
                 config=self._contents.config,
+                charts=dict(self._contents.charts),
+                curves=dict(self._contents.charts | self._contents.curves),
+                answer=True,
+                truth=self._contents.truth,
             )
             self._file.do(lambda stream: send(stream, build(self._expected or Contents())))
 

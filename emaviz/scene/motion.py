@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -57,6 +57,19 @@ class Motion:
     load_says: str = ""
     drive_says: str = ""
     says: str = ""  # what its glow means, beyond `sentence`
+
+    def without_faults(self) -> Motion:
+        """The same motion of a healthy machine under no load."""
+        return replace(
+            self,
+            play=np.zeros_like(self.play),
+            turns=(1.0, 1.0, 1.0),
+            eccentricity=0.0,
+            room=0.0,
+            callouts=(),
+            load=None,
+            load_says="",
+        )
 
     @property
     def duration_s(self) -> float:

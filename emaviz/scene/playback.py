@@ -28,7 +28,8 @@ _TOLD_PER_S = 8.0  # play-heads are redrawn at this pace
 SPEEDS = {"1 : 1": 1.0, "1 : 5": 0.2, "1 : 10": 0.1, "1 : 20": 0.05, "1 : 50": 0.02, "1 : 200": 0.005}
 
 
-FIRST = "explore"  # the reel that is played at first, and in place of an empty one
+FIRST = "explore"  # the reel that is played at first
+_OF_SLIDERS = (FIRST, "identify")  # reels of the plant that the sliders make, as long as they have nothing else
 
 
 @dataclass(eq=False)
@@ -53,6 +54,7 @@ class Playback:
         self.reels: dict[str, Reel] = {FIRST: Reel()}
         self._reel = self.reels[FIRST]
         self.on = FIRST  # the name of the reel that is played
+        self._whole: Motion | None = None  # Explore's run on a healthy actuator, where there is nothing else to play
         self._stale = False  # what the scene shows is not the run at the clock
         self._damaged: Motion | None = None  # whose faults the scene shows
         self._came_s: deque[float] = deque([-1e9] * 6, maxlen=6)  # when the last runs came
@@ -70,7 +72,7 @@ class Playback:
     @property
     def motion(self) -> Motion | None:
         """The run that is shown."""
-        return self._reel.motion or self.reels[FIRST].motion
+        return self._reel.motion or (self.reels[FIRST].motion if self.on in _OF_SLIDERS else self._whole)
 
     def enter(self, on: str) -> None:
         """Goes on with another reel, from where its clock stood."""
@@ -88,6 +90,8 @@ class Playback:
         with self._posing:
             reel = self.reels.setdefault(on, Reel(playing=False))
             reel.motion = shown
+            if on == FIRST:
+                self._whole = None if shown is None else shown.without_faults()
             if reel is self._reel or self._reel.motion is None:
                 self._stale = True
                 self._came_s.append(time.monotonic())

@@ -14,6 +14,7 @@ from websockets.asyncio.server import ServerConnection
 from websockets.exceptions import ConnectionClosed
 
 from emaviz.server import messages
+from emaviz.server.beside import say_beside
 from emaviz.server.complaints import Complaints
 from emaviz.server.values import Refused, checked
 from emaviz.server.viser_private import Inside
@@ -110,6 +111,7 @@ class Gate:
         if page is not None:
             text = f"{control.label}: {reason}; the value before it stays."
             page.add_notification("Value refused", text, auto_close_seconds=8.0, color="red")
+            say_beside(self._inside, control, f"{reason}; the value before it stays", page.client_id)
 
     def _forget(self) -> None:
         for waiting in self._waiting.values():

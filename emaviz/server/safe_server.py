@@ -14,6 +14,7 @@ import socket
 import threading
 from collections.abc import Awaitable, Callable
 from typing import Any
+from urllib.parse import unquote, urlsplit
 
 import viser
 import websockets.asyncio.server
@@ -29,16 +30,21 @@ from emaviz.server.messages import LARGEST_FRAME
 from emaviz.server.policy import protect
 from emaviz.server.viser_private import keep_icons
 
+SCENES = "/scenes/"  # below which the actuator's saved scenes are served
 _opening = threading.Lock()
 
 
 def open_server(
-    host: str, port: int, door: Door | None = None, viewer: Callable[[], str | None] = lambda: None
+    host: str,
+    port: int,
+    door: Door | None = None,
+    viewer: Callable[[], str | None] = lambda: None,
+    scene: Callable[[str], bytes | None] = lambda _: None,
 ) -> viser.ViserServer:
     """A viser server on exactly this address; InputError if it cannot be had.
 
     door: who gets an answer, by default this machine alone; viewer: the address of the Rerun viewer, which the page
-    may show, once there is one.
+    may show, once there is one; scene(name): a page below `SCENES`, or None.
     """
     door = Door(host) if door is None else door
     _check_free(host, port)
@@ -50,7 +56,7 @@ def open_server(
 
         def guarded(handler: Any, *arguments: Any, process_request: Any = None, **options: Any) -> Any:
             options |= {"max_size": LARGEST_FRAME, "logger": complain.log()}
-            guard = _guard(process_request, door, viewer)
+            guard = _guard(process_request, door, viewer, scene)
             return plain(_listening(handler, opened, complain), *arguments, process_request=guard, **options)
 
         websockets.asyncio.server.serve = guarded  # type: ignore[assignment]
@@ -109,14 +115,21 @@ def _listening(
 
 
 def _guard(
-    inner: Callable[..., Any] | None, door: Door, viewer: Callable[[], str | None]
+    inner: Callable[..., Any] | None,
+    door: Door,
+    viewer: Callable[[], str | None],
+    scene: Callable[[str], bytes | None],
 ) -> Callable[..., Awaitable[Response | None]]:
     async def process_request(connection: ServerConnection, request: Request) -> Response | None:
         port = connection.local_address[1]
         refusal = door.refusal(request.path, request.headers, port)
         if refusal is not None:
             return _refused(refusal)
-        response = None if inner is None else inner(connection, request)
+        path = unquote(urlsplit(request.path).path)
+        if path.startswith(SCENES):
+            response = _page(await asyncio.to_thread(scene, path.removeprefix(SCENES)))
+        else:
+            response = None if inner is None else inner(connection, request)
         if inspect.isawaitable(response):
             response = await response
         if response is not None:
@@ -127,6 +140,16 @@ def _guard(
         return response
 
     return process_request
+
+
+def _page(body: bytes | None) -> Response:
+    """A page of ours, or that there is none."""
+    status, kind = (http.HTTPStatus.OK, "text/html") if body is not None else (http.HTTPStatus.NOT_FOUND, "text/plain")
+    body = b"There is no such scene.\n" if body is None else body
+    headers = Headers(
+        {"Content-Type": f"{kind}; charset=utf-8", "Content-Length": str(len(body)), "Connection": "close"}
+    )
+    return Response(status, status.phrase, headers, body)
 
 
 def _refused(reason: str) -> Response:

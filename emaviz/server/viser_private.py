@@ -91,8 +91,12 @@ class Inside:
         placed = gui._next_layout_counter(), gui._layout_run_id
         self._push(client, _messages.GuiSetPanelWidthMessage(panel._placement_uuid, width_px, *placed))
 
+    def pages(self) -> tuple[int, ...]:
+        """The pages that are open, by their numbers."""
+        return tuple(self._server.get_clients())
+
     def run(self, source: str, client: int | None = None) -> None:
-        """Runs JavaScript in one page, or in every page that is or will be open; `source` is never a user's text."""
+        """Runs JavaScript in one page, or in every page that is or will be open; texts go into `source` as JSON."""
         message = _messages.RunJavascriptMessage(source=source)
         if client is None:
             self._server.gui._websock_interface.queue_message(message)

@@ -11,6 +11,7 @@ from ema_model.errors import InputError
 from ema_model.files.refusal import shown
 from emaviz.recording.entry import Entry
 from emaviz.session.data_folder import sanitised
+from emaviz.session.run_summary import summary
 
 if TYPE_CHECKING:
     from emaviz.recording.read import Recording
@@ -66,7 +67,7 @@ class Recorded:
         path = self.path(name)
         stem = str(wanted).strip().removesuffix(_ENDING)
         if not stem:
-            raise InputError("a recording needs a name; type one first")
+            raise InputError("a run needs a name; type one first")
         new = sanitised(stem + _ENDING)
         target = self.folder / new
         if new == name:
@@ -96,22 +97,23 @@ class Recorded:
         except OSError:  # longer than any name
             listed = False
         if not listed:
-            raise InputError(f"{shown(name)}: no such recording; choose one of the list")
+            raise InputError(f"{shown(name)}: no such run; choose one of the list")
         return path
 
 
 def _properties(path: Path) -> dict[str, Any]:
-    """Settings, answers and the best of an identification; nothing of other or damaged files."""
+    """What it is and came to; settings, answers and the best of an identification; nothing of damaged files."""
     try:
         from emaviz.recording.read import properties
 
         said = properties(path)
     except (OSError, ImportError):
         return {}
+    kind, says = summary(said)
     settings, found, best = said.get("settings"), said.get("found"), said.get("best")
     if not (isinstance(settings, dict) and isinstance(found, dict) and isinstance(best, str)):
-        return {}
-    return {"settings": settings, "found": found, "best": best}
+        return {"kind": kind, "says": says}
+    return {"settings": settings, "found": found, "best": best, "kind": kind, "says": says}
 
 
 def recovered(recordings: Path) -> list[str]:

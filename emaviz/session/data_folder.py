@@ -22,7 +22,7 @@ from ema_model.files.refusal import shown
 from ema_model.files.user_file import check_user_file
 from ema_model.files.whole_file import new_draft, remove_abandoned, whole_file
 from ema_model.recordings import side_path
-from ema_model.recordings.formats import FORMATS
+from ema_model.recordings.formats import FORMATS, robot_dataset
 
 ACTUATOR_SUFFIX = ".toml"
 SESSION_SUFFIX = ".emaviz"
@@ -37,10 +37,10 @@ class DataFolder:
     """Recordings, uploads and actuator files below one folder.  Raises InputError, one line, for what is refused."""
 
     def __init__(self, folder: Path) -> None:
-        """Makes the folder with `recordings`, `uploads`, `actuators`, `sessions` and `challenges` in it."""
+        """Makes the folder with `recordings`, `uploads`, `actuators`, `sessions`, `challenges` and `scenes` in it."""
         self.recordings, self.uploads, self.actuators = (folder / n for n in ("recordings", "uploads", "actuators"))
-        self.sessions, self.challenges = folder / "sessions", folder / "challenges"
-        self.own = (self.recordings, self.uploads, self.actuators, self.sessions, self.challenges)
+        self.sessions, self.challenges, self.scenes = (folder / n for n in ("sessions", "challenges", "scenes"))
+        self.own = (self.recordings, self.uploads, self.actuators, self.sessions, self.challenges, self.scenes)
         for made in self.own:
             try:
                 made.mkdir(parents=True, exist_ok=True)
@@ -52,8 +52,12 @@ class DataFolder:
             remove_abandoned(at)
 
     def measurements(self, most: int | None = _MOST_LISTED) -> list[str]:
-        """Names of the files that may hold measurements, relative to the folder, the newest first; most: of them."""
-        return self._files(self.folder, tuple(FORMATS), most)
+        """Names of the files that may hold measurements, relative to the folder, the newest first; no runs of ours.
+
+        most: of them.
+        """
+        own = f"{self.recordings.name}/"
+        return [name for name in self._files(self.folder, tuple(FORMATS), most) if not name.startswith(own)]
 
     def folders(self) -> dict[str, int]:
         """The folders that hold measurements themselves, "." for this one, and how many; in order of their names.
@@ -201,6 +205,13 @@ class DataFolder:
         """As `measurements` lists it."""
         return path.resolve().relative_to(self.folder).as_posix()
 
+    def scene(self, name: str) -> bytes | None:
+        """The page of a scene that the app has written, or None."""
+        try:
+            return self._existing(f"{self.scenes.name}/{name}", (".html",)).read_bytes()
+        except (InputError, OSError):
+            return None
+
     def _existing(self, name: str, suffixes: tuple[str, ...]) -> Path:
         try:
             path = (self.folder / name).resolve()
@@ -230,9 +241,8 @@ class DataFolder:
     def _files(self, folder: Path, suffixes: tuple[str, ...], most: int | None = _MOST_LISTED) -> list[str]:
         found: list[tuple[float, str]] = []
         for at, names in _walked(folder):
-            for name in names:
-                path = at / name
-                hidden = name.startswith(".") or path.suffix.lower() not in suffixes
+            for path in _episodes(at) or [at / name for name in names]:
+                hidden = path.name.startswith(".") or path.suffix.lower() not in suffixes
                 if not hidden and path.is_file() and self.holds(path):
                     with suppress(OSError):
                         found.append((-path.stat().st_mtime, path.relative_to(self.folder).as_posix()))
@@ -243,8 +253,15 @@ def _walked(folder: Path) -> Iterator[tuple[Path, list[str]]]:
     """The folder and those below it that are looked into, each with the names in it."""
     for at, folders, names in os.walk(folder):
         depth = len(Path(at).relative_to(folder).parts)
+        if _episodes(Path(at)):  # which lie deeper
+            folders.clear()
         folders[:] = [f for f in sorted(folders) if not f.startswith(".") and depth + 1 < _DEEPEST]
         yield Path(at), names
+
+
+def _episodes(folder: Path) -> list[Path]:
+    """The files of a robot's dataset, where the folder is one."""
+    return [Path(file) for file in robot_dataset.files_in(str(folder))]
 
 
 def sanitised(filename: str) -> str:

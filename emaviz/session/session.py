@@ -22,6 +22,7 @@ from ema_model.identification.run import warm_up
 from ema_model.recordings import Measurement
 from ema_model.simulation import plant
 from ema_model.simulation.run import simulate_monitor
+from emaviz.session.fan import Fan, fan_of
 from emaviz.session.identify.identifying import Identifying
 from emaviz.session.settings import Settings
 from emaviz.session.signal import Signal
@@ -50,6 +51,7 @@ class Events:
     simulated: Signal[[Simulation]] = field(default_factory=Signal)
     told: Signal[[str, str]] = field(default_factory=Signal)  # title, one line
     status: Signal[[str]] = field(default_factory=Signal)
+    fanned: Signal[[Fan]] = field(default_factory=Signal)
     plants: Signal[[]] = field(default_factory=Signal)  # the plant is another model's
 
 
@@ -111,6 +113,18 @@ class Session:
     def refresh(self) -> None:
         """Simulates the current settings soon; of several requests the last one counts."""
         self.worker.post("simulate", self._simulate)
+
+    def show_fan(self, fault: int) -> None:
+        """Simulates five severities of one fault (0 … 7) soon, which `fanned` tells."""
+        self.worker.post("fan", lambda: self._fan(fault))
+
+    def _fan(self, fault: int) -> None:
+        if not self.ready.is_set() or not plant.can_be_explored(self.actuator):
+            return
+        try:
+            self.events.fanned(fan_of(copy.deepcopy(self.settings), self.actuator, fault))
+        except FloatingPointError as error:
+            raise InputError(str(error)) from None
 
     def _simulate(self) -> None:
         if not self.ready.is_set() or not plant.can_be_explored(self.actuator):

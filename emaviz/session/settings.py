@@ -16,6 +16,7 @@ from ema_model.faults import HEALTHY, physical
 from ema_model.identification.run import ALGORITHMS
 from ema_model.quantities.axes import ROTARY, Axes
 from ema_model.quantities.sides import MOTOR, USER
+from ema_model.simulation.load_profile import SHAPES, LoadProfile
 from ema_model.simulation.plant import FITNESSES
 from ema_model.simulation.run import Run
 from ema_model.simulation.sensors import Sensors
@@ -24,6 +25,7 @@ from emaviz.session.described import checked, number, setting
 SLIDERS = ""
 MONITORS = ("healthy", "same faults", "identified")
 LONGEST_S = 5.0
+_SMALL = {"step": {"final_rad": 0.005}, "ramp": {"slope_rad_s": 0.02}}  # as far as the current does not saturate
 
 
 def _faults(value: Any, _: Axes) -> NDArray[np.float64]:
@@ -73,10 +75,13 @@ class Settings(msgspec.Struct, eq=False):
     k: Annotated[NDArray[np.float64], setting("k", made=_faults)] = msgspec.field(default_factory=HEALTHY.copy)
     command: Annotated[str, setting("command", one_of=COMMANDS)] = "chirp"
     command_settings: Annotated[dict[str, dict[str, Any]], setting("commands", made=_command_settings)] = msgspec.field(
-        default_factory=lambda: {name: {} for name in COMMANDS}
+        default_factory=lambda: {name: dict(_SMALL.get(name, {})) for name in COMMANDS}
     )
     duration_s: Annotated[float, setting("the duration", 0.01, LONGEST_S, unit="s")] = 0.5
     load_torque_Nm: Annotated[float, setting("the load", -1000.0, 1000.0, unit="N·m", side=USER)] = 0.0
+    load_shape: Annotated[str, setting("the load's shape", one_of=SHAPES)] = "constant"
+    load_time_s: Annotated[float, setting("the load's time", 0.001, LONGEST_S, unit="s")] = 0.1
+    load_frequency_Hz: Annotated[float, setting("the load's frequency", 0.1, 200.0, unit="Hz")] = 5.0
     current_noise_A: Annotated[float, setting("the current noise", 0.0, 999.0, unit="A rms")] = 0.0
     encoder_bits: Annotated[int, setting("the encoder's bits", 0, 32)] = 0  # per motor turn; 0 is a perfect one
     # Of the user, from where the command starts, for both models.
@@ -147,6 +152,7 @@ class Settings(msgspec.Struct, eq=False):
             command(self.command, self.command_settings[self.command]),
             self.duration_s,
             load_torque_Nm=self.load_torque_Nm,
+            load=LoadProfile(self.load_shape, self.load_time_s, self.load_frequency_Hz),
         )
 
     def start_rad(self) -> float:

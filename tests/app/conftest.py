@@ -68,7 +68,7 @@ def watched(browser: Any, app: App) -> Iterator[Any]:
     asked: list[str] = []
     tab.on("requestfinished", lambda request: asked.append(request.url))
     tab.goto(app.address)
-    tab.get_by_role("tab", name="Recordings").wait_for(timeout=60_000)
+    tab.get_by_role("tab", name="Runs").wait_for(timeout=60_000)
     yield tab
     seen = tab.inner_text("body")
     tab.close()

@@ -124,7 +124,7 @@ def test_what_the_list_says_of_a_row(data):
 def test_a_row_is_chosen_and_opened_on_the_page(watched, app, tmp_path):
     page = watched
     computed(app.session.folder.parent / "campaigns" / "<b>here", tmp_path)
-    page.get_by_role("tab", name="Recordings").click()
+    page.get_by_role("tab", name="Runs").click()
     page.get_by_text("Campaigns", exact=True).click()
     page.get_by_role("button", name="Look for campaigns again").click()
     page.get_by_text("2 of 2 tasks have a row").wait_for()

@@ -83,7 +83,7 @@ def compare(page, app):
     for name in list(app.comparing.opened):
         app.comparing.remove(name)
     page.get_by_role("tab", name="Compare", exact=True).click()
-    page.get_by_role("button", name="Upload a recording").wait_for()
+    page.get_by_role("button", name="Upload a measurement").wait_for()
     wait_until(lambda: not app.comparing.running)
     page.set_default_timeout(60_000)
     return page
@@ -139,7 +139,12 @@ def test_from_a_file_to_the_region_where_the_model_fails(compare, app, rig_file)
     turned = 0.5 * one.measured["motor_position_rad"][at]
     wait_until(lambda: np.allclose(app.scene._rotor.wxyz, (np.cos(turned), np.sin(turned), 0.0, 0.0), atol=0.02))
 
-    for tab, title in (("Against", "against"), ("Turn", "orders"), ("Why", "explains"), ("Fit", "Calibrated")):
+    for tab, title in (
+        ("Against", "against"),
+        ("Orders", "orders"),
+        ("Explained by", "explains"),
+        ("Calibration", "Calibrated"),
+    ):
         page.get_by_role("tab", name=tab, exact=True).click()
         wait_until(lambda title=title: any(title in drawn for drawn, _ in figures(page)))
 
@@ -260,7 +265,7 @@ def test_too_large_an_upload_is_refused(compare, app, tmp_path, monkeypatch):
     before = set(app.comparing.folder.uploads.iterdir())
     upload(page, large)
     page.get_by_text("over the page's limit of 0.1 MB").wait_for()
-    page.get_by_role("button", name="Upload a recording").click(trial=True)  # enabled again
+    page.get_by_role("button", name="Upload a measurement").click(trial=True)  # enabled again
     # viser says so itself, and would take it away after 4 s only
     wait_until(lambda: page.get_by_text("uploaded successfully").count() == 0, seconds=2.5)
     assert set(app.comparing.folder.uploads.iterdir()) == before
@@ -301,7 +306,7 @@ def test_files_of_the_command_line_open_on_compare(browser, recording, tmp_path)
         assert app.wait_for_first_picture(120.0)
         page = browser.new_page(viewport={"width": 1400, "height": 900})
         page.goto(app.address)
-        page.get_by_role("button", name="Upload a recording").wait_for(timeout=60_000)
+        page.get_by_role("button", name="Upload a measurement").wait_for(timeout=60_000)
         page.get_by_text("Compared in").wait_for(timeout=60_000)
         page.get_by_text("Where the model fails", exact=True).wait_for()
         page.close()

@@ -332,7 +332,7 @@ def test_what_makes_no_sense_is_one_line(comparing, heard, recording, change, li
 
 
 def test_nothing_to_compare_is_told(comparing):
-    with pytest.raises(InputError, match="no recording is chosen"):
+    with pytest.raises(InputError, match="no measurement is chosen"):
         comparing.compare()
 
 

@@ -286,7 +286,7 @@ def test_what_does_not_fit_is_taken_to_discover(page, app):
     assert not race.best.answer.uncertainty.adequate
     page.get_by_text("no fault can be told").wait_for()
     page.get_by_role("button", name="Look for the missing physics").click()
-    page.get_by_text("Discover has the recording").wait_for()
+    page.get_by_text("Discover has the measurement").wait_for()
     wait_until(lambda: "uploads/identified plant.csv" in app.discovering.source.compared)
     assert app.discovering.source.challenge is None and list(app.comparing.opened) == ["uploads/identified plant.csv"]
     opened = app.comparing.opened["uploads/identified plant.csv"].measurement
@@ -324,14 +324,14 @@ def test_a_recording_is_chosen_and_watched_while_it_grows(page, app):
     names = [path.name for path in sorted(session.folder.glob("*.rrd"), key=lambda path: path.stat().st_mtime_ns)]
     assert len(names) >= 2
     (session.folder / names[0]).rename(session.folder / "moved by hand.rrd")
-    show(page, "Recordings")
+    show(page, "Runs")
     page.get_by_role("button", name="Read the folder again").click()
     page.get_by_text("moved by hand.rrd").first.wait_for()
-    choose(page, "Recording", "moved by hand.rrd")
+    choose(page, "Run", "moved by hand.rrd")
     wait_until(lambda: field(page, "New name").input_value() == "moved by hand")
     choose(page, "With", names[1])
     page.get_by_role("button", name="On the same axes").click()
-    show(page, "Two recordings")
+    show(page, "Two runs")
     choose(page, "Signal", "motor_speed_rad_s")
     page.wait_for_function(
         "[...document.querySelectorAll('.js-plotly-plot')].some(p => JSON.stringify(p.layout).includes('rad/s'))"
@@ -357,7 +357,7 @@ def test_a_recording_is_chosen_and_watched_while_it_grows(page, app):
 
 
 def test_a_session_is_dropped_on_the_page(page, app, tmp_path):
-    show(page, "Recordings")
+    show(page, "Runs")
     app.session.settings.set_fault(3, 0.45)
     field(page, "Session name").fill("dropped")
     page.wait_for_timeout(300)

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
+from support.robot_datasets import write_robot_dataset
 
+from ema_model.actuator import load_actuator
 from ema_model.errors import InputError
+from ema_model.recordings.side_file.read import SideFile
 from emaviz.session.data_folder import DataFolder, sanitised
+from emaviz.session.opened import read_opened
 
 ROWS = "time_s,current_A\n" + "\n".join(f"{i * 1e-3},{i % 3}" for i in range(200)) + "\n"
 
@@ -83,6 +88,7 @@ def test_links_that_lead_outside_are_neither_listed_nor_read(folder, outside, tm
     (folder.folder / "linked").symlink_to(tmp_path / "more")
     (folder.uploads / "circle.csv").symlink_to(folder.uploads / "circle.csv")
     (folder.uploads / "own.csv").write_text(ROWS)
+    (folder.recordings / "20261123-robust.rrd").write_bytes(b"a run, which Runs lists")
     assert folder.measurements() == ["uploads/own.csv"]
     for name in ("uploads/link.csv", "linked/far.csv", "uploads/circle.csv"):
         with pytest.raises(InputError):
@@ -120,3 +126,20 @@ def test_files_of_the_command_line_are_copied_in_once(folder, outside):
     assert folder.take_in(first) == first
     with pytest.raises(InputError, match=r"none\.csv: no such file"):
         folder.take_in(outside.with_name("none.csv"))
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_a_robots_dataset_is_listed_and_opens(folder, outside, version):
+    frames = np.arange(300) / 30.0
+    episode = {"observation.state": np.sin(frames)[:, None], "action": np.sin(frames + 0.1)[:, None]}
+    names = {"observation.state": ["shoulder.pos"], "action": ["shoulder.pos"]}
+    write_robot_dataset(folder.uploads / "arm", version, 30.0, names, [episode] * 3)
+    (folder.uploads / "arm" / "data" / "chunk-000" / "stolen.parquet").symlink_to(outside)
+    listed = folder.measurements()
+    stem = "uploads/arm/data/chunk-000/"
+    assert sorted(listed) == (
+        [f"{stem}episode_{i:06d}.parquet" for i in range(3)] if version == 2 else [f"{stem}file-000.parquet"]
+    )
+    opened = read_opened(listed[0], folder.measurement(listed[0]), load_actuator(), SideFile())
+    assert any("shoulder.pos" in name for name in opened.columns)
+    assert len(next(iter(opened.columns.values()))) == (300 if version == 2 else 900)

@@ -34,14 +34,14 @@ def discover(page, app):
     """The page on its Discover tab."""
     app.strip.play(False)
     page.get_by_role("tab", name="Discover", exact=True).click()
-    page.get_by_label("Recordings", exact=True).wait_for()
+    page.get_by_label("Measurements", exact=True).wait_for()
     page.set_default_timeout(60_000)
     return page
 
 
 def begin(page, app, title):
     """Chooses a challenge and waits for its cards."""
-    page.get_by_label("Recordings", exact=True).click()
+    page.get_by_label("Measurements", exact=True).click()
     page.get_by_role("option", name=title).click()
     start = page.get_by_role("button", name="Start", exact=True)
     again = page.get_by_role("button", name="Start again")  # where the same was chosen before
@@ -210,7 +210,7 @@ def test_stop_works_and_a_session_brings_the_ladder_back(discover, app):
 
     add(page, app, "Cogging torque")
     fitted, held = errors(app)
-    page.get_by_role("tab", name="Recordings", exact=True).click()
+    page.get_by_role("tab", name="Runs", exact=True).click()
     box(page, "Session name").fill("ladder")
     page.wait_for_timeout(300)
     with page.expect_download():
@@ -219,16 +219,16 @@ def test_stop_works_and_a_session_brings_the_ladder_back(discover, app):
     page.get_by_role("button", name="Undo the last step").click()
     wait_until(lambda: not app.discovering.look.added and not app.discovering.running)
     page.get_by_role("button", name="Remove Cogging torque").wait_for(state="hidden")
-    page.get_by_label("Recordings", exact=True).click()
+    page.get_by_label("Measurements", exact=True).click()
     page.get_by_role("option", name="Two suspects").click()
     wait_until(lambda: "suspects" in app.discovering.source.chosen)
-    page.get_by_role("tab", name="Recordings", exact=True).click()
+    page.get_by_role("tab", name="Runs", exact=True).click()
     page.get_by_role("button", name="Load session").click()
     page.get_by_role("tab", name="Discover", exact=True).click()
     page.get_by_text("Taking the session's steps again").first.wait_for(timeout=60_000)
     wait_until(lambda: not app.discovering.running)
     page.get_by_role("button", name="Remove Cogging torque").wait_for()
-    assert page.get_by_label("Recordings", exact=True).input_value().endswith("First bench run")
+    assert page.get_by_label("Measurements", exact=True).input_value().endswith("First bench run")
     again = errors(app)
     assert again[0] == pytest.approx(fitted, rel=0.01) and again[1] == pytest.approx(held, rel=0.01)
     wait_until(lambda: drawn(page, "Error after each step") == 2)

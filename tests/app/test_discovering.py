@@ -31,7 +31,7 @@ def discovering(tmp_path_factory):
     """With the easy challenge calibrated, and nothing added."""
     rig = Rig(tmp_path_factory.mktemp("data"))
     made = rig.discovering
-    with pytest.raises(InputError, match="no recording to fit is chosen"):
+    with pytest.raises(InputError, match="no measurement to fit is chosen"):
         made.start()
     made.source.choose(EASY)
     assert made.start()
@@ -269,7 +269,7 @@ def test_recordings_of_compare_can_be_held_out(discovering):
     assert [one.name for one in given.held] == [source.compared[names[0]].name] and len(given.fitted) == 1
     source.hold_out(names[1], True)
     assert not source.ready
-    with pytest.raises(InputError, match="no recording to fit"):
+    with pytest.raises(InputError, match="no measurement to fit"):
         source.recipe()
     for name in names:
         source.hold_out(name, False)

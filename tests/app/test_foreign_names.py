@@ -101,7 +101,7 @@ def test_identify(page, app):
 @pytest.mark.long
 def test_discover(page, app):
     tab(page, "Discover")
-    choose(page, "Recordings", f"Sealed: {IMAGE}.challenge")
+    choose(page, "Measurements", f"Sealed: {IMAGE}.challenge")
     seen(page, IMAGE, f"{FRAME} {MARKDOWN}")
     page.get_by_role("button", name="Start", exact=True).click()
     wait_until(lambda: not app.discovering.running)
@@ -112,14 +112,14 @@ def test_discover(page, app):
 
 @pytest.mark.long
 def test_recordings_and_sessions(page, app):
-    tab(page, "Recordings")
+    tab(page, "Runs")
     page.get_by_role("button", name="Read the folder again", exact=True).click()
     seen(page, *(f"{name}.rrd" for name in hostile.NAMES), f"whole {FRAME}.rrd")
     for name in hostile.NAMES:
-        choose(page, "Recording", f"{name}.rrd")
+        choose(page, "Run", f"{name}.rrd")
         seen(page, f"Open {name}.rrd in Rerun", f"not healthy: {', '.join(hostile.NAMES)}")
     page.get_by_role("button", name="On the same axes", exact=True).click()
-    tab(page, "Two recordings")
+    tab(page, "Two runs")
     seen(page, "simulations", f"A {MARKDOWN}.rrd")
     choose(page, "Saved", f"sessions/{FRAME}.emaviz")
     page.get_by_role("button", name="Load session", exact=True).click()

@@ -216,6 +216,8 @@ def test_a_race_is_watched_paused_and_looked_back_at(page, app):
     curves = np.array(page.evaluate(CHART, "Convergence"))
     assert np.all(np.diff(curves[1:], axis=1) <= 1e-9) and np.all(curves[1:] > 0.0)
 
+    page.locator("[role=tab][aria-selected=true]", has_text="Answer").wait_for(timeout=30_000)
+    page.get_by_role("tab", name="Search", exact=True).click()
     last = page.evaluate(pictures)
     box = page.locator('label:text-is("Iteration")')
     box = box.locator("xpath=ancestor::div[contains(@class,'mantine-Flex-root')][1]").locator(
@@ -232,7 +234,28 @@ def test_a_race_is_watched_paused_and_looked_back_at(page, app):
     wait_until(lambda: np.array(page.evaluate(CHART, "Monitor − measured")).shape[0] == 4)
     left = np.array(page.evaluate(CHART, "Monitor − measured"))[1:]
     assert np.all(np.isfinite(left)) and np.abs(left).max() < 5.0
-    page.get_by_role("tab", name="Runs").click()
+    page.get_by_role("tab", name="History").click()
     page.get_by_text("population 30, 60 iterations, filtered, seed 3").wait_for()
     page.get_by_role("button", name="Clear the table").click()
     page.get_by_text("Nothing has been identified yet").wait_for()
+
+
+@pytest.mark.browser
+def test_the_answer_is_said_once_and_comes_forward(shared_page, app):
+    page, settings = shared_page, app.session.settings
+    settings.restore({**Settings().saved(), "k": list(vector({"k2": 0.7}))})
+    page.get_by_role("tab", name="Identify", exact=True).click()
+    page.get_by_role("tab", name="Search", exact=True).wait_for()
+    page.get_by_role("button", name="Identify", exact=True).click()
+    page.get_by_text("Not healthy: backlash 70").wait_for(timeout=120_000)
+    page.locator("[role=tab][aria-selected=true]", has_text="Answer").wait_for(timeout=20_000)
+    left = page.locator("[data-dock-region=left]").inner_text()
+    assert left.count("ot healthy") == 1 and left.count("simulations in") == 1 and "done in" not in left, left
+    row = page.locator("tr", has_text="k2 Backlash")
+    assert "healthy 0" in row.get_attribute("title") and "90 % interval 0.7" in row.get_attribute("title")
+    assert "µrad" in row.inner_text() and "·10" not in row.inner_text()
+    assert "–" in page.locator("tr", has_text="k7 Eccentricity phase").inner_text()
+    assert [one.fault for one in app.playback.reels["identify"].motion.callouts] == ["k2"], (
+        "an eccentricity that is not seen has no direction"
+    )
+    settings.restore(Settings().saved())

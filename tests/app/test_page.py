@@ -80,7 +80,7 @@ def test_the_command_and_its_settings_reach_the_plant(page, app):
 def test_a_bad_value_is_told_and_the_page_goes_on(page, app):
     page.get_by_label("End time [s]", exact=True).fill("0")
     page.get_by_label("End time [s]", exact=True).press("Enter")
-    page.get_by_text("end_time_s must be above 0").wait_for(timeout=10_000)
+    page.locator(".emaviz-beside", has_text="end_time_s must be above 0").wait_for(timeout=10_000)
     assert app.session.settings.run().command.settings()["end_time_s"] == 0.5
     set_slider(page, "k2", 0.5)
     wait_until(lambda: app.session.settings.k[1] == 0.5)
@@ -111,7 +111,7 @@ def test_identify_runs_ends_and_is_recorded(new_page, app):
     assert abs(found.best[-1][0] - 0.25) < 0.02
     assert recording.truth[0] == pytest.approx(0.25)
 
-    page.get_by_role("tab", name="Recordings").click()
+    page.get_by_role("tab", name="Runs").click()
     page.get_by_role("link", name=recordings[0].name).wait_for()
 
 
@@ -151,7 +151,7 @@ def test_sliders_answer_while_an_identification_runs(page, app):
 def test_all_tabs_stand_in_one_line_at_any_width_and_the_strip_holds_its_controls(page):
     tabs = page.locator("[data-dock-region=left] [data-dock-tab]")
     assert [name.strip() for name in tabs.all_inner_texts()] == [
-        "Explore", "Identify", "Compare", "Discover", "Units", "Track", "Library", "Recordings"
+        "Explore", "Identify", "Compare", "Discover", "Units", "Track", "Library", "Runs"
     ]  # fmt: skip
     for width in (1100, 1400):
         page.set_viewport_size({"width": width, "height": 900})

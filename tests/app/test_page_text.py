@@ -16,7 +16,7 @@ from emaviz.figures import signature, theme, two_recordings
 from emaviz.page.app import App
 from emaviz.page.discover.tab import DiscoverTab
 from emaviz.page.explore.tab import ExploreTab
-from emaviz.page.recordings.controls import _card
+from emaviz.page.runs.controls import _card
 from emaviz.session.archive import Recorded, recovered
 from emaviz.text.html import Html, escape, html, joined, said
 

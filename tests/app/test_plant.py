@@ -99,7 +99,7 @@ def test_the_page_says_what_it_cannot_show(browser, tmp_path, name, capfd):
             wait_until(lambda: app.session.simulation is not before)
         else:
             app.tab(ExploreTab).panel.set_faults(replace_first(HEALTHY, 0.8))
-        for tab in ("Identify", "Compare", "Recordings", "Explore"):
+        for tab in ("Identify", "Compare", "Runs", "Explore"):
             page.get_by_role("tab", name=tab, exact=True).click()
         page.wait_for_timeout(500)
         page.close()

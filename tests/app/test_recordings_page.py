@@ -199,13 +199,13 @@ def test_recordings_are_opened_compared_renamed_and_deleted(watched, app):
     first = identify(session).path
     session.settings.set_fault(1, 0.5)
     second = identify(session).path
-    page.get_by_role("tab", name="Recordings").click()
-    wait_until(lambda: page.get_by_label("Recording", exact=True).input_value() == second.name)
+    page.get_by_role("tab", name="Runs").click()
+    wait_until(lambda: page.get_by_label("Run", exact=True).input_value() == second.name)
     assert page.get_by_label("With", exact=True).input_value() == first.name
     page.get_by_text("iterations 8").first.wait_for()
 
     page.get_by_role("button", name="On the same axes").click()
-    page.get_by_role("tab", name="Two recordings").click()
+    page.get_by_role("tab", name="Two runs").click()
     page.locator(".js-plotly-plot").first.wait_for(timeout=60_000)
     page.get_by_text("k2 backlash").last.wait_for()
 
@@ -219,11 +219,11 @@ def test_recordings_are_opened_compared_renamed_and_deleted(watched, app):
     page.get_by_text("Rename or delete").click()
     field(page, "New name").fill("kept")
     page.get_by_role("button", name="Rename").click()
-    wait_until(lambda: page.get_by_label("Recording", exact=True).input_value() == "kept.rrd")
+    wait_until(lambda: page.get_by_label("Run", exact=True).input_value() == "kept.rrd")
     page.get_by_role("button", name="Delete…").click()
     page.get_by_role("button", name="Keep it").click()
     page.get_by_role("button", name="Delete…").click()
     page.get_by_role("button", name="Delete it").click()
     wait_until(lambda: not (session.folder / "kept.rrd").exists())
-    wait_until(lambda: page.get_by_label("Recording", exact=True).input_value() == first.name)
+    wait_until(lambda: page.get_by_label("Run", exact=True).input_value() == first.name)
     session.settings.set_fault(1, 0.0)

@@ -61,7 +61,7 @@ def test_the_page_works_under_its_policy_and_reaches_no_other_port(browser, app,
     page.goto(app.address)
     page.get_by_role("tab", name="Explore").wait_for(timeout=60_000)
     page.wait_for_function("Object.keys(window.__viserTestpoints?.uplots ?? {}).length >= 4", timeout=60_000)
-    for tab in ("Identify", "Compare", "Discover", "Library", "Recordings", "Explore"):
+    for tab in ("Identify", "Compare", "Discover", "Library", "Runs", "Explore"):
         page.get_by_role("tab", name=tab, exact=True).click()
     page.get_by_label("Dark", exact=True).check()
     page.get_by_label("Dark", exact=True).uncheck()

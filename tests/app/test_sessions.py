@@ -36,6 +36,9 @@ def changed_settings():
     settings.set_command_setting("chirp", "end_Hz", 20.0)
     settings.set("duration_s", 0.3)
     settings.set("load_torque_Nm", 4.0)
+    settings.set("load_shape", "sine")
+    settings.set("load_time_s", 0.2)
+    settings.set("load_frequency_Hz", 7.0)
     settings.set("current_noise_A", 0.25)
     settings.set("encoder_bits", 12)
     settings.set("start_offset_rad", 0.01)
@@ -253,7 +256,7 @@ def test_a_session_is_saved_and_loaded_with_all_that_is_on_the_page(page, app, t
     saved = changed_settings().saved() | {"source": "uploads/bench.csv", "fitness": "filtered"}
     settings.restore(saved)
     app.comparing.calibrate = False
-    page.get_by_role("tab", name="Recordings").click()
+    page.get_by_role("tab", name="Runs").click()
     slider(page, "Session name").fill("mine")
     page.wait_for_timeout(300)
     with page.expect_download() as download:

@@ -13,7 +13,7 @@ import pytest
 from emaviz.page.app import App
 
 pytestmark = pytest.mark.browser
-TABS = ("Explore", "Identify", "Compare", "Recordings")
+TABS = ("Explore", "Identify", "Compare", "Runs")
 WARM_UP = 0.4  # of the rounds
 MORE_MEMORY = 1.10
 

@@ -12,6 +12,7 @@ from support.comparison_by_hand import comparison as by_hand
 
 from ema_model.errors import InputError
 from emaviz.recording import read
+from emaviz.recording.blueprint import Contents, build
 from emaviz.recording.comparison import write_comparison
 
 
@@ -87,12 +88,16 @@ def test_what_was_found_is_read_back(comparison, written):
     assert [region["sentence"] for region in told["worst_regions"]] == [r.sentence for r in comparison.worst_regions]
 
 
-def test_it_opens_on_the_overlay_with_residuals_and_words(written):
+def test_it_opens_on_the_verdict_with_overlay_and_residuals(written):
     reader = RrdReader(written)
     (layout,) = reader.blueprints()
     texts = " ".join(str(chunk.to_record_batch().columns) for chunk in reader.stream(store=layout))
     for title in ("Overlay", "Residuals", "Where it fails", "More signals", "Configuration", "/comparison/regions"):
         assert title in texts
+    tabs = [
+        one.name for one in build(Contents({"residual": ["current_A"]}, findings=["answer"])).root_container.contents
+    ]
+    assert tabs[:3] == ["Where it fails", "Overlay", "Residuals"]
     documents = {
         str(chunk.entity_path): str(chunk.to_record_batch().columns)
         for chunk in reader.stream()

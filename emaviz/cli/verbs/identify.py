@@ -176,7 +176,13 @@ class _Recorder:
         source = "measurement" if arguments.files else "reference"
         try:
             self._story = IdentificationStory(
-                arguments.record, objective, measurements[0], source, truth, output.configuration(arguments)
+                arguments.record,
+                objective,
+                measurements[0],
+                source,
+                truth,
+                output.configuration(arguments),
+                (arguments.algorithm,),
             )
         except RecordingError as error:
             raise InputError(str(error)) from None

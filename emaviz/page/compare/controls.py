@@ -32,11 +32,11 @@ class ComparePanel:
         self._shown: str | None = None
         self._again = False
         gui = page.server.gui
-        gui.add_markdown("Upload a recording of a test bench, or **drop it anywhere** on the page.")
-        uploads.add_button("Upload a recording", ",".join(FORMATS), icon=viser.Icon.UPLOAD)
+        gui.add_markdown("Upload a measurement of a test bench, or **drop it anywhere** on the page.")
+        uploads.add_button("Upload a measurement", ",".join(FORMATS), icon=viser.Icon.UPLOAD)
         self._choice = gui.add_dropdown("Data folder", [_NONE])
         add = gui.add_button("Add this file", icon=viser.Icon.PLUS, color="gray")
-        with gui.add_folder("Recordings"):
+        with gui.add_folder("Measurements"):
             self._list = add_html(gui, recordings_list([]))
             self._which = gui.add_dropdown("Shown", [_NONE], visible=False)
             self._columns = gui.add_button("Columns…", icon=viser.Icon.TABLE, color="gray", visible=False)

@@ -17,7 +17,7 @@ def leads(page: Page, discovering: Discovering) -> Leads:
     def to_identify() -> None:
         names = [name for name, one in comparing.opened.items() if one.measurement is not None]
         if not names:
-            raise InputError("no recording is open here any more; add one first")
+            raise InputError("no measurement is open here any more; add one first")
         if comparing.actuator != session.actuator:
             raise InputError(
                 f"Identify knows {session.actuator.name}, the actuator that the app was started with; start it with "
@@ -31,14 +31,14 @@ def leads(page: Page, discovering: Discovering) -> Leads:
             Lead(
                 "Find what is missing",
                 viser.Icon.BULB,
-                "Takes these recordings to Discover",
+                "Takes these measurements to Discover",
                 "discover",
                 lambda: discovering.choose(""),
             ),
             Lead(
                 "Identify faults",
                 viser.Icon.SEARCH,
-                "Takes the first of these recordings to Identify",
+                "Takes the first of these measurements to Identify",
                 "identify",
                 to_identify,
             ),

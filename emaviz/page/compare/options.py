@@ -21,7 +21,7 @@ class AskedControls:
     def __init__(self, page: Page, comparing: Comparing, uploads: Uploads) -> None:
         self._page, self._comparing = page, comparing
         gui = page.server.gui
-        with gui.add_folder("What is compared"):
+        with gui.add_folder("Weights and window"):
             self._signals = {name: self._signal(name) for name in COMPARABLE}
             self._windowed = gui.add_checkbox("Only a window of time", False)
             self._from = gui.add_number("From [s]", 0.0, step=0.01, visible=False)
@@ -79,7 +79,7 @@ class AskedControls:
         box = self._page.server.gui.add_number(SIGNALS[name].title, weight, min=0.0, step=0.1, hint=hint, disabled=True)
 
         def changed(_: Any) -> None:
-            self._page.checked(lambda: self._comparing.set_weight(name, box.value))
+            self._page.checked(lambda: self._comparing.set_weight(name, box.value), box)
 
         box.on_update(changed)
         return box
@@ -95,7 +95,7 @@ class AskedControls:
     def _set_window(self) -> None:
         self._from.visible = self._to.visible = bool(self._windowed.value)
         if self._windowed.value:
-            self._page.checked(lambda: self._comparing.set_window(self._from.value, self._to.value))
+            self._page.checked(lambda: self._comparing.set_window(self._from.value, self._to.value), self._to)
         else:
             self._comparing.window_s = None
 

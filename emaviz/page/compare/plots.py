@@ -72,14 +72,14 @@ class ComparePlots:
         with tabs.add_tab("Against", viser.Icon.CHART_DOTS):
             self._variable = gui.add_dropdown("Variable", [_EMPTY])
             self._against = [self._add(self._draw_against, 0.66)]
-        with tabs.add_tab("Turn", viser.Icon.ROTATE_CLOCKWISE):
+        with tabs.add_tab("Orders", viser.Icon.ROTATE_CLOCKWISE):
             self._turn = [
                 self._add(lambda v: order_spectrum.figure(v.comparison, highlight=v.region), 0.42),
                 self._add(lambda v: residual_polar.figure(v.comparison, self._chosen(), highlight=v.region), 0.8),
             ]
-        with tabs.add_tab("Why", viser.Icon.QUESTION_MARK):
+        with tabs.add_tab("Explained by", viser.Icon.QUESTION_MARK):
             self._why = [self._add(lambda v: explained.figure(v.comparison, highlight=v.region), 0.7)]
-        with tabs.add_tab("Fit", viser.Icon.TARGET):
+        with tabs.add_tab("Calibration", viser.Icon.TARGET):
             self._fit = [self._add(lambda v: calibration_scores.figure(v.comparison), 0.8)]
             self._numbers = add_html(gui)
         self._signal.on_update(lambda event: event.client and self._post([*self._time, *self._against, *self._turn]))

@@ -58,7 +58,7 @@ class ResultPanel:
         self._preview: Any = None
         self._buttons: list[Any] = []
         gui = page.server.gui
-        self._headline = add_html(gui, html("<div {}>Nothing is compared yet: upload a recording.</div>", _BOX))
+        self._headline = add_html(gui, html("<div {}>Nothing is compared yet: upload a measurement.</div>", _BOX))
         self._place = gui.add_folder("Preview of the columns", visible=False)
         with self._place:
             self._lines = lines()
@@ -71,7 +71,7 @@ class ResultPanel:
             leads()
         self._plots_folder = gui.add_folder("Plots", visible=False)
         with self._plots_folder:
-            self._recording = gui.add_dropdown("Recording", ["–"], visible=False)
+            self._recording = gui.add_dropdown("Measurement", ["–"], visible=False)
             self._plots = ComparePlots(page)
         self._save = gui.add_folder("Keep it", visible=False)
         with self._save:
@@ -210,5 +210,5 @@ def headline(comparison: Comparison) -> Html:
         joined(html("<div>{}</div>", text) for text in others if text not in regions),
         warned(comparison.warnings),
         shown(errors(comparison)),
-        folded("Each recording", errors_by_recording(comparison, comparison.primary)),
+        folded("Each measurement", errors_by_recording(comparison, comparison.primary)),
     )

@@ -128,8 +128,8 @@ def about(effect: Effect, equation: bool = True) -> Html:
 
 
 def typical(effect: Effect) -> str:
-    """'Amplitude 6, 12, 24 mN·m: slight, clear, strong.'"""
+    """'Amplitude 6, 12, 24 mN·m: low, medium, high.'"""
     first = effect.parameters[0]
     shown = Quantity("", first.unit).scaled(effect.severities)
     values = ", ".join(number(shown.factor * one, 2) for one in effect.severities)
-    return f"{first.title} {values} {shown.unit}".rstrip() + ": slight, clear, strong"
+    return f"{first.title} {values} {shown.unit}".rstrip() + ": low, medium, high"

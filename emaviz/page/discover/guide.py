@@ -20,7 +20,12 @@ def step(look: Look | None, running: bool, opened: str | None, revealed: bool) -
     """The number of the step, 1 … STEPS, and what to do."""
     if look is None and not running:
         return 1, Html(
-            "Read the challenge's story below. Then press <b>Start</b>: the model is calibrated to the recordings."
+            "Read the challenge's story below. Then press <b>Start</b>: the model is calibrated to the measurements."
+        )
+    if look is not None and look.added and look.assessment is None:
+        return 4, Html(
+            "The effect is in the model, and all its parameters are fitted anew; what that leaves is compared with "
+            "the library again."
         )
     if look is None or look.assessment is None:
         return 2, Html(
@@ -46,12 +51,12 @@ def step(look: Look | None, running: bool, opened: str | None, revealed: bool) -
         )
     if not revealed:
         return 5, Html(
-            "The ladder on the right has fallen <b>to the floor</b>, on the recording that was not fitted as well. "
+            "The ladder on the right has fallen <b>to the floor</b>, on the measurement that was not fitted as well. "
             "Press <b>Reveal the truth</b> on the right to compare."
         )
     return 6, Html(
         "That is the whole story: see where a model fails, learn what is missing, add it, watch the error fall. "
-        "Choose the next challenge, or open recordings of your own on <b>Compare</b>."
+        "Choose the next challenge, or open measurements of your own on <b>Compare</b>."
     )
 
 

@@ -29,7 +29,7 @@ from emaviz.text.notes import BOX, boxed
 from emaviz.text.told import folded, large, shown, warned
 
 _RESTING = Html(
-    "Choose recordings on the left, and press <b>Start</b>: the model is calibrated, and what it leaves is held "
+    "Choose measurements on the left, and press <b>Start</b>: the model is calibrated, and what it leaves is held "
     "against every effect of the library."
 )
 
@@ -66,7 +66,7 @@ class DiscoveryPanel:
             self._equation = add_html(gui)
         self._before_folder = gui.add_folder("Before and after", visible=False)
         with self._before_folder:
-            self._recording = gui.add_dropdown("Recording", ["–"])
+            self._recording = gui.add_dropdown("Measurement", ["–"])
             self._signal = gui.add_dropdown("Signal", ["–"])
             self._actuator = ActuatorSwitch(page, discovering, self._track, strip)
             self._residual: Any = gui.add_plotly(go.Figure(), config=CONFIG, aspect=0.5, visible=False)
@@ -186,5 +186,5 @@ def answer(look: Look) -> Html:
         joined(html("<div>{}</div>", text) for text in others),
         warned(found.warnings),
         FLOOR_NOTE,
-        folded("Each recording", per_recording(found)),
+        folded("Each measurement", per_recording(found)),
     )

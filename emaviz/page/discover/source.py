@@ -44,7 +44,7 @@ class SourceControls:
         }
         self._names = self._listed()
         gui, post = page.server.gui, page.screen.post
-        self._source = gui.add_dropdown("Recordings", tuple(self._names), hint="Of Compare, or of a challenge")
+        self._source = gui.add_dropdown("Measurements", tuple(self._names), hint="Of Compare, or of a challenge")
         uploads.add_button("Open a sealed challenge", CHALLENGE_SUFFIX, icon=viser.Icon.LOCK_OPEN, color="gray")
         self._about = add_html(gui)
         self._held = gui.add_folder("Hold out, to judge by", visible=False, expand_by_default=False)
@@ -114,9 +114,9 @@ class SourceControls:
             self._about.content = about(challenge, folded=look is not None)
         else:
             self._about.content = note(
-                "The recordings and the actuator that Compare has."
+                "The measurements and the actuator that Compare has."
                 if opened
-                else "Open recordings on Compare first, or choose a challenge."
+                else "Open measurements on Compare first, or choose a challenge."
             )
         self._held.visible = challenge is None and len(opened) > 1
         for box in self._boxes:

@@ -10,6 +10,7 @@ import viser
 from emaviz.colours import GHOST, MONITOR, REFERENCE
 from emaviz.figures.run_metrics import differences, metrics, table
 from emaviz.figures.signals import PHASE_SIGNALS, LivePhases, LiveSignals
+from emaviz.page.explore.fan import FanView
 from emaviz.page.page import Page
 from emaviz.page.playback import PlaybackStrip
 from emaviz.page.style import TIME_CHARTS, play_head
@@ -51,6 +52,7 @@ class ChartsPanel:
         with panel.add_tab("Phases", viser.Icon.WAVE_SINE):
             add_html(gui, TIME_CHARTS)
             self._phases = LivePhases(gui)
+        self.fan = FanView(page, panel)
         with panel.add_tab("Metrics", viser.Icon.TABLE):
             self._table: Any = add_html(gui)
         with panel.add_tab("Export", viser.Icon.DOWNLOAD):

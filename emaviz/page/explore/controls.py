@@ -8,15 +8,16 @@ from dataclasses import fields
 from functools import partial
 from typing import Any
 
+import numpy as np
 import viser
 
 from ema_model.actuator.readings import sentences
 from ema_model.commands import COMMANDS
 from ema_model.faults import FAULTS, HEALTHY
-from ema_model.quantities.shown import of_signal
 from ema_model.quantities.sides import USER
 from ema_model.quantities.titles import labelled
 from emaviz.page.explore.first_visit import StartHere
+from emaviz.page.explore.load import LoadControls
 from emaviz.page.explore.plant import PlantControls
 from emaviz.page.explore.presets import CUSTOM, PRESETS, name_of
 from emaviz.page.page import Page
@@ -24,6 +25,7 @@ from emaviz.page.style import LONG_LABELS
 from emaviz.session.described import limits
 from emaviz.session.session import Simulation
 from emaviz.session.settings import MONITORS, Settings
+from emaviz.session.undo import Undo
 from emaviz.text.html import add_html, html, said
 
 _DECIMALS = 6  # that a command's settings may have
@@ -32,8 +34,11 @@ _DECIMALS = 6  # that a command's settings may have
 class ExplorePanel:
     """Presets and sliders of the faults, the command and its settings, the load, and what the plant hides."""
 
-    def __init__(self, page: Page) -> None:
+    def __init__(self, page: Page, fan: Callable[[int], None]) -> None:
+        """fan(fault): shows five severities of it."""
         self._page = page
+        self._undo = Undo(page.session.settings)
+        self._touched = 0  # the fault that was moved last
         self._reads: list[tuple[Any, Callable[[], Any]]] = []  # controls, and what the session holds for them
         gui = page.server.gui
         self.status = add_html(gui, said("Starting…"))
@@ -46,7 +51,18 @@ class ExplorePanel:
             self._preset = gui.add_dropdown("Preset", (*PRESETS, CUSTOM), initial_value=known)
             self._sliders = [self._fault(i) for i in range(len(FAULTS))]
             reset = gui.add_button("Reset to healthy", icon=viser.Icon.HEART)
-            reset.on_click(lambda _: self.set_faults(HEALTHY))
+            self._back: Any = gui.add_button(
+                "Undo", icon=viser.Icon.ARROW_BACK_UP, color="gray", disabled=True, hint="The last change here; Ctrl+Z"
+            )
+            fanned = gui.add_button(
+                "Fan of severities",
+                icon=viser.Icon.CHART_AREA_LINE,
+                color="gray",
+                hint="Five severities of the fault that was moved last, beside each other",
+            )
+        reset.on_click(lambda _: page.screen.post("preset", lambda: self._move_all(HEALTHY)))
+        self._back.on_click(lambda _: page.screen.post("undo", self.undo))
+        fanned.on_click(lambda _: page.screen.post("fan asked", lambda: fan(self._touched)))
         with gui.add_folder("Command"):
             self._command = gui.add_dropdown(
                 "Command", [cls.title for cls in COMMANDS.values()], initial_value=COMMANDS["chirp"].title
@@ -54,25 +70,20 @@ class ExplorePanel:
             self._groups = {name: self._command_settings(name) for name in COMMANDS}
             self._show_group()
             duration = gui.add_number("Duration [s]", 0.5, **limits(Settings, "duration_s"), step=0.01)
-            load = gui.add_number(
-                of_signal("load_torque_Nm", page.session.actuator.axes).label,
-                0.0,
-                **limits(Settings, "load_torque_Nm"),
-                step=1.0,
-            )
+        with gui.add_folder("Load"):
+            self._load = LoadControls(page, self._listen)
         self._plant = PlantControls(page)
         self._own = gui.add_dropdown(
             "Plant's model", tuple(page.session.plants), visible=False, hint="What Discover has improved may play it"
         )
         with gui.add_folder("Monitor model"):
             self.monitor = gui.add_dropdown(
-                "Its faults", MONITORS, initial_value="healthy", hint="Whose faults the monitor model is drawn with"
+                "Its faults", MONITORS, initial_value="healthy", hint="The faults that the monitor model has here"
             )
         settings = page.session.settings
         self._preset.on_update(lambda event: event.client and page.screen.post("preset", self._take_preset))
-        self._command.on_update(lambda _: self._choose_command())
+        self._command.on_update(lambda event: event.client and self._choose_command())
         self._listen(duration, partial(settings.set, "duration_s"), lambda: settings.duration_s)
-        self._listen(load, partial(settings.set, "load_torque_Nm"), lambda: settings.load_torque_Nm)
         # Set by the session as well, after which nothing is to be simulated again.
         self.monitor.on_update(lambda event: event.client and self._take_monitor())
         self._own.on_update(lambda event: event.client and page.screen.post("plant's model", self._take_plant))
@@ -106,7 +117,24 @@ class ExplorePanel:
     def _take_preset(self) -> None:
         k = PRESETS.get(str(self._preset.value))
         if k is not None:
-            self.set_faults(k)
+            self._move_all(k)
+
+    def _move_all(self, k: Any) -> None:
+        moved = np.flatnonzero(np.asarray(k) != HEALTHY)
+        self._touched = int(moved[0]) if len(moved) else self._touched
+        self._keep(None)
+        self.set_faults(k)
+
+    def undo(self) -> None:
+        """Takes the last change of a control back; on the screen's thread."""
+        if self._undo.back():
+            self.show_settings()
+        self._back.disabled = not self._undo
+
+    def _keep(self, control: Any) -> None:
+        self._undo.keep(control)
+        if self._back.disabled:
+            self._back.disabled = False
 
     def show_preset(self) -> None:
         """Names the preset that the sliders make; on the screen's thread."""
@@ -154,6 +182,7 @@ class ExplorePanel:
         with self._page.server.atomic():
             self._command.value = COMMANDS[settings.command].title
             self._show_group()
+            self._load.show()
             for entry, read in self._reads:
                 entry.value = _written(read()) if isinstance(entry.value, str) else read()
         self._plant.show_settings()
@@ -179,7 +208,8 @@ class ExplorePanel:
     def _slide(self, index: int) -> None:
         slider = self._sliders[index]
         settings = self._page.session.settings
-        if self._change(lambda: settings.set_fault(index, slider.value)):
+        self._touched = index
+        if self._change(lambda: settings.set_fault(index, slider.value), slider):
             label = self._label(index)
             if slider.label != label:
                 slider.label = label
@@ -187,7 +217,7 @@ class ExplorePanel:
     def _command_settings(self, name: str) -> list[Any]:
         inputs = []
         for f in fields(COMMANDS[name]):
-            default: Any = f.default
+            default: Any = self._command_setting(name, f.name, f.default)
             label = labelled(self._page.session.actuator.axes.name(f.name, USER))
             if isinstance(default, tuple):
                 entry = self._page.server.gui.add_text(label, "+".join(f"{value:g}" for value in default))
@@ -195,7 +225,7 @@ class ExplorePanel:
                 entry = self._page.server.gui.add_number(label, float(default), step=_step(float(default)))
                 entry.precision = _DECIMALS  # the step's own would show 0.448 Hz as 0
             setter = partial(self._page.session.settings.set_command_setting, name, f.name)
-            self._listen(entry, setter, partial(self._command_setting, name, f.name, entry.value))
+            self._listen(entry, setter, partial(self._command_setting, name, f.name, f.default))
             inputs.append(entry)
         return inputs
 
@@ -206,14 +236,15 @@ class ExplorePanel:
         """A control's new value goes through its setter, then both models run; read() is what the session holds."""
         self._reads.append((entry, read))
 
-        def changed(_: Any) -> None:
-            self._change(lambda: setter(entry.value))
+        def changed(event: Any) -> None:
+            if event.client is not None:
+                self._change(lambda: setter(entry.value), entry)
 
         entry.on_update(changed)
 
     def _choose_command(self) -> None:
         name = next((n for n, cls in COMMANDS.items() if cls.title == self._command.value), None)
-        if self._change(lambda: self._page.session.settings.set("command", name)):
+        if self._change(lambda: self._page.session.settings.set("command", name), self._command):
             self._show_group()
 
     def _show_group(self) -> None:
@@ -222,8 +253,9 @@ class ExplorePanel:
             for entry in inputs:
                 entry.visible = name == chosen
 
-    def _change(self, change: Callable[[], Any]) -> bool:
-        good = self._page.checked(change)
+    def _change(self, change: Callable[[], Any], control: Any = None) -> bool:
+        self._keep(control)
+        good = self._page.checked(change, control)
         if good:
             self._page.session.refresh()
         return good

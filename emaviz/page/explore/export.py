@@ -15,8 +15,10 @@ from emaviz.page.explore.charts import ChartsPanel
 from emaviz.page.page import Page
 from emaviz.page.playback import PlaybackStrip
 from emaviz.page.style import WIDE_MODAL
+from emaviz.server.safe_server import SCENES
+from emaviz.session.data_folder import DataFolder
 from emaviz.session.session import Simulation
-from emaviz.text.html import add_html
+from emaviz.text.html import add_html, html, said
 
 _FRAMES, _FRAME_S = 120, 0.04  # of an exported scene
 _NAME = "emaviz-run"
@@ -25,17 +27,21 @@ _NAME = "emaviz-run"
 class ExportControls:
     """Buttons; what each makes is sent to the browser that has asked."""
 
-    def __init__(self, page: Page, strip: PlaybackStrip, charts: ChartsPanel) -> None:
+    def __init__(self, page: Page, strip: PlaybackStrip, charts: ChartsPanel, folder: DataFolder) -> None:
+        self._folder = folder
         self._page, self._playback, self._charts = page, strip.playback, charts
         gui = page.server.gui
         gui.add_markdown("The run as it stands, in the format that *Compare* reads.")
         self._whose = gui.add_dropdown("Signals of", ("plant", "monitor"), initial_value="plant")
         self._button("Data as CSV", viser.Icon.FILE_SPREADSHEET, lambda client: self._send_data(client, ".csv"))
         self._button("Data as Parquet", viser.Icon.TABLE, lambda client: self._send_data(client, ".parquet"))
-        gui.add_markdown("The charts, large; the camera above the figure saves it as **PNG**.")
+        gui.add_markdown("Any chart saves itself: **PNG** at its corner. All four as one figure:")
         self._button("Plot (PNG)…", viser.Icon.PHOTO, self._show_plot)
-        gui.add_markdown("The actuator with its motion, in one **HTML** file that opens offline.")
+        gui.add_markdown(
+            "The actuator with its motion, in one **HTML** file that opens offline, and a link to it here."
+        )
         self._button("Scene as HTML", viser.Icon.CUBE, self._send_scene)
+        self._link = add_html(gui)
 
     def _button(self, label: str, icon: viser.IconName, act: Callable[[viser.ClientHandle], None]) -> None:
         button = self._page.server.gui.add_button(label, icon=icon, color="gray")
@@ -93,3 +99,10 @@ class ExportControls:
                 serializer.insert_sleep(_FRAME_S)
             page = serializer.as_html()
         client.send_file_download("emaviz-actuator.html", page.encode(), save_immediately=True)
+        path = self._folder.fresh(self._folder.scenes, "actuator", ".html")
+        try:
+            path.write_bytes(page.encode())
+        except OSError as error:
+            self._page.notify("No link to the scene", f"{path.name}: cannot be written ({error.strerror})")
+            return
+        self._link.content = said(html('<a href="{}{}" target="_blank">Open {} ↗</a>', SCENES, path.name, path.name))

@@ -14,7 +14,7 @@ _TEXT = """
 1. **Break it**: choose a preset, or drag a fault's slider. The 3D actuator and the charts show what changes.
 2. **Watch it**: play, slow down or scrub below; the line in every chart is the same moment.
 3. **Find it**: *Identify* recovers the faults from the current, each with an interval.
-4. **Correct it**: *Compare* shows where the model fails on your own recordings, *Discover* which physics it lacks.
+4. **Correct it**: *Compare* shows where the model fails on your own measurements, *Discover* which physics it lacks.
    New here? Begin with *Discover*'s guided challenge.
 """
 

@@ -146,10 +146,10 @@ class PlantControls:
     def _listen(self, entry: Any, setter: Callable[[Any], None], read: Callable[[], Any] | None = None) -> None:
         if read is not None:
             self._reads.append((entry, read))
-        entry.on_update(lambda _: self._change(lambda: setter(entry.value)))
+        entry.on_update(lambda event: event.client and self._change(lambda: setter(entry.value), entry))
 
-    def _change(self, change: Callable[[], Any]) -> bool:
-        good = self._page.checked(change)
+    def _change(self, change: Callable[[], Any], control: Any = None) -> bool:
+        good = self._page.checked(change, control)
         if good:
             self._page.session.refresh()
         return good

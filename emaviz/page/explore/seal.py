@@ -14,7 +14,7 @@ from emaviz.session.discover.sealing import Sealing
 _TEXT = (
     "The plant as it is set here, its hidden effects and faults, is recorded four times: a chirp, a small step, a slow "
     "sine, and a sine to hold out. Its parameters are off within their tolerances, at random. The load and the noise "
-    "are those set here; perfect sensors are replaced by those of a usual rig. The story and the recordings can be "
+    "are those set here; perfect sensors are replaced by those of a usual rig. The story and the measurements can be "
     "read, the answer only by *Reveal* on the Discover tab."
 )
 
@@ -60,6 +60,6 @@ class SealControls:
         self._button.disabled = busy
 
     def _sealed(self, path: Path) -> None:
-        self._page.notify("Challenge sealed", f"{path.name}: Discover lists it among the recordings.", "green")
+        self._page.notify("Challenge sealed", f"{path.name}: Discover lists it among the measurements.", "green")
         if self._asked is not None:
             self._asked.send_file_download(path.name, path.read_bytes(), save_immediately=True)

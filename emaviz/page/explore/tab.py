@@ -30,14 +30,14 @@ class ExploreTab(Tab):
             shared.slow_screen,
             right,
             shared.strip,
-            lambda charts: ExportControls(self.page, shared.strip, charts),
+            lambda charts: ExportControls(self.page, shared.strip, charts, shared.comparing.folder),
         )
 
     def build(self) -> None:
         """A note where the actuator needs one, the controls, and sealing."""
         if text := plant.note(self.page.session.actuator):
             add_html(self.page.server.gui, html('<div style="{}">{}</div>', _NOTE, text))
-        self.panel = ExplorePanel(self.page)
+        self.panel = ExplorePanel(self.page, self.charts.fan.ask_for)
         SealControls(self.page, self.shared.discovering.sealing)
         self.panel.note("\n".join(recovered(self.shared.comparing.folder.recordings)))
         events, post = self.page.session.events, self.page.screen.post

@@ -46,7 +46,7 @@ class IdentifyPanel:
         self._open_viewer, self._to_discover = open_viewer, to_discover
         gui, settings, of = page.server.gui, page.session.settings, partial(limits, Settings)
         self._source: Any = gui.add_dropdown(
-            "Identify", (PLANT,), hint="The sliders' plant, whose faults are known, or a recording of the data folder"
+            "Identify", (PLANT,), hint="The sliders' plant, whose faults are known, or a measurement of the data folder"
         )
         with gui.add_folder("Algorithms, one or several at once"):
             self._ticks = {
@@ -73,14 +73,14 @@ class IdentifyPanel:
             icon=viser.Icon.EYE,
             color="gray",
             visible=False,
-            hint="The recording while it is written, on the right",
+            hint="The run while it is written, on the right",
         )
         self._missing = gui.add_button(
             "Look for the missing physics",
             icon=viser.Icon.BULB,
             color="orange",
             visible=False,
-            hint="The model does not fit: takes the same recording to Discover",
+            hint="The model does not fit: takes the same measurement to Discover",
         )
         self._source.on_update(lambda event: event.client and page.screen.post("identify source", self._take_source))
         for tick in self._ticks.values():
@@ -121,26 +121,26 @@ class IdentifyPanel:
     def _take_source(self) -> None:
         name = str(self._source.value)
         settings = self._page.session.settings
-        if not self._page.checked(lambda: settings.set("source", SLIDERS if name == PLANT else name)):
+        if not self._page.checked(lambda: settings.set("source", SLIDERS if name == PLANT else name), self._source):
             self.refresh_sources()
 
     def _take_algorithms(self) -> None:
         settings = self._page.session.settings
-        chosen = [name for name, tick in self._ticks.items() if tick.value]
-        if not self._page.checked(lambda: settings.set("algorithms", chosen)):
+        chosen, last = [name for name, tick in self._ticks.items() if tick.value], [*self._ticks.values()][-1]
+        if not self._page.checked(lambda: settings.set("algorithms", chosen), last):
             for name, tick in self._ticks.items():
                 tick.value = name in settings.algorithms
 
     def _listen(self, entry: Any, setter: Callable[[Any], None]) -> None:
         def changed(_: Any) -> None:
-            self._page.checked(lambda: setter(entry.value))
+            self._page.checked(lambda: setter(entry.value), entry)
 
         entry.on_update(changed)
 
     # --- the race ---------------------------------------------------------------------------------------------------
 
     def _begin(self) -> None:
-        self._page.begins(self._page.session.identify)
+        self._page.begins(self._page.session.identify, self._start)
 
     def _began(self) -> None:
         self._start.disabled = True
@@ -154,7 +154,7 @@ class IdentifyPanel:
         race = self._race
         if self._viewer is not None and race is not None and race.growing is not None:
             self._open_viewer(self._viewer.url_of(race.growing.name), race.growing.name)
-            self._page.workspaces.go("recordings", client)
+            self._page.workspaces.go("runs", client)
 
     def _look_for_missing(self, client: viser.ClientHandle | None) -> None:
         race = self._race
@@ -168,7 +168,7 @@ class IdentifyPanel:
     def _draw(self, race: Race) -> None:
         lines = []
         for name, track in race.tracks.items():
-            if not track.rmse:
+            if not track.rmse or len(race.tracks) == 1:  # of one alone the job's own line tells as much
                 continue
             at = f"iteration {len(track.rmse) - 1} of {track.iterations}"
             if track.answer is not None:
@@ -187,8 +187,8 @@ class IdentifyPanel:
         lines = []
         for answer in race.answers:
             star = "★ " if best is not None and len(race.tracks) > 1 and answer is best.answer else ""
-            told = " · ".join(facts(answer))
-            lines.append(_line(html("{}{} · {} · <b>{}</b>", star, _title(answer.algorithm), told, verdict(answer))))
+            told = [*facts(answer), *([verdict(answer)] if len(race.tracks) > 1 else [])]
+            lines.append(_line(html("{}{} · {}", star, _title(answer.algorithm), " · ".join(told))))
         if best is not None and best.answer is not None and len(race.answers) > 1:
             others = [answer for answer in race.answers if answer is not best.answer]
             lines.append(_line(html('<span style="opacity:.75">★ {}</span>', why_best(best.answer, others))))

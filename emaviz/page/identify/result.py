@@ -6,9 +6,10 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import viser
 
-from ema_model.faults import HEALTHY
+from ema_model.faults import HEALTHY, NAMES
 from ema_model.identification.next_experiment import Suggestion
 from ema_model.identification.run import ALGORITHMS
 from emaviz.figures.convergence import LiveConvergence
@@ -21,12 +22,13 @@ from emaviz.page.identify.swarm import SwarmView
 from emaviz.page.page import Page
 from emaviz.page.playback import PlaybackStrip
 from emaviz.scene.motion import PLAYED, motion
-from emaviz.session.identify.race import Race
+from emaviz.session.identify.race import Race, Track
 from emaviz.session.worker import Worker
 from emaviz.text.html import add_html
 from emaviz.text.identification import sure_words
 
 _BEST = "the best"
+_SEARCH, _ANSWER = "Search", "Answer"  # tabs: the second comes forward once it is there
 _LEAST_S = 0.1  # between two pictures of a swarm, which browsers in software draw slowly
 _MOST_ROWS = 200
 
@@ -50,10 +52,10 @@ class IdentifyResult:
         self._drawn_at = 0.0
         self.rows: list[Row] = []
         gui = page.server.gui
-        with panel.add_tab("Search", viser.Icon.CHART_DOTS):
+        with panel.add_tab(_SEARCH, viser.Icon.CHART_DOTS):
             self._convergence = LiveConvergence(gui)
             self._swarm = SwarmView(page)
-        with panel.add_tab("Answer", viser.Icon.TARGET_ARROW):
+        with panel.add_tab(_ANSWER, viser.Icon.TARGET_ARROW):
             self._whose = gui.add_dropdown("Algorithm shown", (_BEST, *ALGORITHMS.values()))
             self._bars = add_html(gui, fault_bars(HEALTHY, page.session.actuator))
             self._sure = add_html(gui)
@@ -67,7 +69,7 @@ class IdentifyResult:
             self._fit = LiveFit(gui)
         with panel.add_tab("Landscape", viser.Icon.MAP_2):
             self._landscape = LandscapeView(page, slow)
-        with panel.add_tab("Runs", viser.Icon.TABLE):
+        with panel.add_tab("History", viser.Icon.TABLE):
             self._table = add_html(gui, table([]))
             clear = gui.add_button("Clear the table", icon=viser.Icon.ERASER, color="gray")
         self._try.on_click(lambda event: page.screen.post("separating", lambda: self._try_separating(event.client)))
@@ -99,7 +101,8 @@ class IdentifyResult:
         self._landscape.answered(race)
         best = race.best
         if best is not None and best.k is not None and all(name in race.measurement for name in PLAYED):
-            self._strip.put(motion(race.measurement, best.k, self._page.session.actuator), WORKSPACE.name)
+            self._strip.put(motion(race.measurement, _seen(best), self._page.session.actuator), WORKSPACE.name)
+        self._page.workspaces.bring_forward(WORKSPACE.name, _SEARCH, _ANSWER)
         performance = race.performance()
         number = 1 + max((row.race for row in self.rows), default=0)
         settings = race.settings
@@ -173,3 +176,12 @@ class IdentifyResult:
             self._separating = sure.separated_by if sure is not None else None
             self._try.visible = self._separating is not None
             self._fit.show(race.time_s, race.measured_A, fitted)
+
+
+def _seen(track: Track) -> np.ndarray:
+    """k (8,) as the actuator shows it: an eccentricity that was not seen has no direction."""
+    assert track.k is not None, "it has searched"
+    k = track.k.copy()
+    if track.answer is not None and NAMES[5] not in track.answer.uncertainty.alarms:
+        k[6] = HEALTHY[6]
+    return k

@@ -16,7 +16,7 @@ from emaviz.page.identify import WORKSPACE
 from emaviz.page.identify.controls import IdentifyPanel
 from emaviz.page.identify.result import IdentifyResult
 from emaviz.page.identify.to_discover import take_to_discover
-from emaviz.page.recordings.tab import RecordingsTab
+from emaviz.page.runs.tab import RunsTab
 from emaviz.page.tab import Shared, Tab
 from emaviz.session.described import taken
 from emaviz.session.saved import Part
@@ -45,7 +45,7 @@ class IdentifyTab(Tab):
             shared.comparing,
             shared.viewer,
             self.result,
-            open_viewer=lambda url, name: shared.tab(RecordingsTab).result.open(url, name),
+            open_viewer=lambda url, name: shared.tab(RunsTab).result.open(url, name),
             to_discover=partial(take_to_discover, self.page, shared.discovering),
         )
 

@@ -35,4 +35,4 @@ def take_to_discover(page: Page, discovering: Discovering, race: Race) -> None:
         comparing.remove(other)
     comparing.add(name)
     discovering.choose("")
-    page.notify("Discover has the recording", f"{name}: press Start.", "green")
+    page.notify("Discover has the measurement", f"{name}: press Start.", "green")

@@ -18,7 +18,7 @@ from emaviz.text.html import add_html, unescaped
 from emaviz.text.notes import note
 
 _CARD = (
-    "height:auto!important;min-height:52px;padding:4px 130px 4px 9px;font-weight:400;font-size:12px;"
+    "height:auto!important;min-height:52px;padding:4px 9px;font-weight:400;font-size:12px;"
     "background-color:rgba(134,142,150,.10)!important;color:inherit!important;"
 )
 _LABEL = "display:block;height:auto;overflow:visible;white-space:pre-line;text-align:left;line-height:1.3;width:100%"
@@ -81,6 +81,7 @@ class LibraryPanel:
             if picture:
                 picture = f'background-image:url("{picture}")!important;background-repeat:no-repeat!important;'
                 picture += "background-position:right 6px center!important;background-size:120px 44px!important;"
+                picture += "padding-right:130px!important;"
             rules.append(f"{one}{{{_CARD}{picture}}}{one} .mantine-Button-inner{{justify-content:flex-start}}")
             rules.append(f"{one} .mantine-Button-label{{{_LABEL}}}{one} .mantine-Button-label::first-line")
             rules.append("{font-weight:600;font-size:13.5px}")

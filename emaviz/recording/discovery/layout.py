@@ -44,7 +44,7 @@ def _ladder() -> rrb.Container:
     bars = rrb.BarChartView(
         origin="/",
         contents=[f"{LADDER}/fitted", f"{LADDER}/held_out", f"{LADDER}/floor"],
-        name="Error over floor after each step (blue: fitted, orange: held out, grey: the floor, 1)",
+        name="Error over floor after each step (teal: fitted, purple: held out, grey: the floor, 1)",
         plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop),
     )
     words = rrb.TextDocumentView(origin=VERDICT, name="What was found")

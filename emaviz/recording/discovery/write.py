@@ -19,6 +19,7 @@ from ema_model.errors import InputError
 from ema_model.estimation.floor import BAND_SIGMAS
 from ema_model.estimation.words import calibration_table, convergence, warnings
 from ema_model.text import Lines, Note
+from emaviz import colours
 from emaviz.recording import series
 from emaviz.recording.configured import configured
 from emaviz.recording.discovery import layout
@@ -31,8 +32,8 @@ from emaviz.recording.writer import RecordingWriter
 Array = NDArray[np.float64]
 
 _LINES = {
-    "fitted": GROUP_COLOURS["reference"],
-    "held out": GROUP_COLOURS["monitor"],
+    "fitted": (*colours.rgb(colours.FITTED), 255),
+    "held out": (*colours.rgb(colours.HELD_OUT), 255),
     "floor": GROUP_COLOURS["floor_low"],
 }
 _WIDTH = 0.36  # of a bar, in steps

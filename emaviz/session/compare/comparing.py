@@ -59,7 +59,7 @@ class Comparing:
         self.free: set[str] = set()
         self.weights: dict[str, float] = dict(USUAL)  # of the signals to fit
         self.window_s: tuple[float, float] | None = None
-        advice = "check the actuator's file and the recording's units"
+        advice = "check the actuator's file and the measurement's units"
         self.job = Job(session.worker, on_divergence=advice)
         # Reading a large file takes seconds, in which the sliders of the other tabs shall answer.
         self._files = Worker("emaviz-files", self._on_error)
@@ -108,7 +108,7 @@ class Comparing:
     def _open(self, name: str) -> None:
         path = self.folder.measurement(name)
         if name not in self.opened and len(self.opened) >= MOST_RECORDINGS:
-            raise InputError(f"{MOST_RECORDINGS} recordings are the most to compare at once; remove one first")
+            raise InputError(f"{MOST_RECORDINGS} measurements are the most to compare at once; remove one first")
         side = side_file_of(path, self.folder)
         refused = self._take_actuator(side) if side is not None else None
         self._opened(read_opened(name, path, self.actuator, side or SideFile()))
@@ -229,7 +229,7 @@ class Comparing:
             raise InputError(f"{quoted(waiting.name)}: its {todo}")
         measurements = [o.measurement for o in self.opened.values() if o.measurement is not None]
         if not measurements:
-            raise InputError("no recording is chosen; upload one, or choose one of the data folder")
+            raise InputError("no measurement is chosen; upload one, or choose one of the data folder")
         if not self.weights:
             wanted = ", ".join(in_sentence(SIGNALS[name].title) for name in COMPARABLE)
             raise InputError(f"no signal to fit is chosen; choose one or more of {wanted}")

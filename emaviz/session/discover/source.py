@@ -18,8 +18,8 @@ from ema_model.recordings import Measurement, read
 from emaviz.session.compare.comparing import USUAL, Comparing
 from emaviz.session.discover.saved_story import Recipe
 
-COMPARED = "The recordings of Compare"
-NOTHING = "no recording to fit is chosen; open one on Compare, or choose a challenge"
+COMPARED = "The measurements of Compare"
+NOTHING = "no measurement to fit is chosen; open one on Compare, or choose a challenge"
 
 
 @dataclass(frozen=True)

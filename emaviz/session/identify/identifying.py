@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from ema_model.actuator import Actuator
 from ema_model.identification.objective import Objective
 from ema_model.identification.run import Identification, Progress
+from ema_model.identification.words import in_one_line
 from ema_model.recordings import Measurement
 from emaviz.session.identify.race import OpenFile, Race, begin, run, target
 from emaviz.session.job import Job, Run
@@ -50,7 +51,10 @@ class Identifying:
             yield from self._race(race, measurement, asked)
 
         def done() -> str | None:
-            return None if race is None or race.ran_whole else "Stopped; the best so far is kept."
+            if race is None or race.best is None or race.best.answer is None:
+                return None
+            said = in_one_line(race.best.answer)
+            return said if race.ran_whole else f"Stopped; the best so far is kept. {said}"
 
         return self.job.begin("Identifying", work, done)
 
@@ -111,6 +115,7 @@ def readable(settings: Settings) -> dict[str, Any]:
         **{name: value for name, value in settings.run().command.settings().items()},
         "duration_s": settings.duration_s,
         "load_torque_Nm": settings.load_torque_Nm,
+        "load_shape": settings.load_shape,
         "current_noise_A": settings.current_noise_A,
         "encoder_bits": settings.encoder_bits,
         "hidden_effects": "; ".join(

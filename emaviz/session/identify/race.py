@@ -14,6 +14,7 @@ from ema_model.actuator import Actuator
 from ema_model.faults import performance_coefficient
 from ema_model.identification.objective import Objective
 from ema_model.identification.run import Identification, Progress, steps
+from ema_model.quantities.numbers import amount
 from ema_model.recordings import Measurement
 from ema_model.simulation import plant
 from emaviz.session.job import Run
@@ -114,6 +115,8 @@ class Race:
     def said(self) -> str:
         """What goes on."""
         going = [track for track in self.tracks.values() if track.answer is None]
+        if len(self.tracks) == 1 and going and going[0].fitting is None and going[0].rmse:
+            return f"iteration {len(going[0].rmse) - 1} of {going[0].iterations}, rmse {amount(going[0].rmse[-1], 'A')}"
         fitting = next((track.fitting[0] for track in going if track.fitting is not None), "fitting the answer")
         return "searching" if any(track.fitting is None for track in going) else fitting
 

@@ -1,7 +1,9 @@
-"""The Recordings tab: past recordings with what they were and what they found; reopen, rename, delete, compare."""
+"""The Runs tab: past runs (.rrd) with what they were and what they found; reopen, rename, delete, compare."""
 
 from __future__ import annotations
 
+import threading
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -12,7 +14,8 @@ from ema_model.identification.run import ALGORITHMS
 from emaviz.figures.convergence import colour
 from emaviz.page.identify.controls import recording_link
 from emaviz.page.page import Page
-from emaviz.page.recordings.result import RecordingsResult
+from emaviz.page.runs import WORKSPACE
+from emaviz.page.runs.result import RunsResult
 from emaviz.recording.entry import Entry, as_text
 from emaviz.recording.viewer import ViewerHost
 from emaviz.session.archive import Recorded
@@ -21,21 +24,22 @@ from emaviz.text.html import Html, add_html, html, joined, said
 
 NONE = "–"
 _SHOWN = 25
+_LOOK_S = 2.0  # between two looks at the folder
 _BOX = Html('style="padding:2px 10px;font-size:12.5px;line-height:1.45"')
 
 
-class RecordingsPanel:
+class RunsPanel:
     """The tab's controls.  `result` is the panel on the right; files are read on the worker `files`."""
 
     def __init__(
-        self, page: Page, viewer: ViewerHost | None, recorded: Recorded, files: Worker, result: RecordingsResult
+        self, page: Page, viewer: ViewerHost | None, recorded: Recorded, files: Worker, result: RunsResult
     ) -> None:
         self._page, self._viewer, self._recorded = page, viewer, recorded
         self._files, self._result = files, result
         self._by_hand = False  # chosen; else the newest is shown
         gui = page.server.gui
-        self._choice: Any = gui.add_dropdown("Recording", (NONE,))
-        self._card = add_html(gui, _empty("None yet: identify something, or record a comparison."))
+        self._choice: Any = gui.add_dropdown("Run", (NONE,))
+        self._card = add_html(gui, _empty("None yet: identify something, or record a comparison or a discovery."))
         self._open = gui.add_button("Open in Rerun, here", icon=viser.Icon.PLAYER_PLAY, disabled=True)
         self._link = add_html(gui)
         with gui.add_folder("Compare two"):
@@ -55,7 +59,18 @@ class RecordingsPanel:
         self._delete.on_click(lambda event: event.client and self._ask(event.client))
         again.on_click(lambda _: self._post(self.refresh))
         page.session.identifying.identified.connect(lambda _: self.refresh_soon())
+        page.workspaces.entered.connect(lambda name: name == WORKSPACE.name and self.refresh_soon())
+        threading.Thread(target=self._watch, name="emaviz-runs", daemon=True).start()
         self.refresh_soon()
+
+    def _watch(self) -> None:
+        """Another program's runs are seen, too, while somebody looks."""
+        known: list[str] = []
+        while not self._files.closing:
+            time.sleep(_LOOK_S)
+            if self._page.workspaces.anyone(WORKSPACE.name) and (names := self._recorded.names()) != known:
+                known = names
+                self.refresh_soon()
 
     def refresh_soon(self) -> None:
         """Reads the folder again; from any thread."""
@@ -127,7 +142,7 @@ class RecordingsPanel:
     def _compare_two(self) -> None:
         names = [str(entry.value) for entry in (self._choice, self._other)]
         if names[0] == names[1]:
-            raise InputError("these are the same recording; choose another one below")
+            raise InputError("these are the same run; choose another one below")
         self._result.compare(*((self._recorded.entry(name), self._recorded.read(name)) for name in names))
 
     def _rename_chosen(self) -> None:
@@ -138,7 +153,7 @@ class RecordingsPanel:
 
     def _ask(self, client: viser.ClientHandle) -> None:
         name = str(self._choice.value)
-        modal = client.gui.add_modal("Delete this recording?")
+        modal = client.gui.add_modal("Delete this run?")
         with modal:
             add_html(client.gui, said(html("<b>{}</b> is removed from the disk.", name)))
             yes = client.gui.add_button("Delete it", icon=viser.Icon.TRASH, color="red")
@@ -168,7 +183,8 @@ def _card(entry: Entry) -> Html:
     """Settings and results of one recording."""
     size = f"{entry.at:%Y-%m-%d %H:%M:%S} · {entry.size_bytes / 1e6:.1f} MB"
     if not entry.found:
-        return html("<div {}>{}<br>A recording without an identification's result.</div>", _BOX, size)
+        said = f"{entry.says}" if entry.says else "Signals without a result."
+        return html("<div {}>{}<br><b>{}</b> {}</div>", _BOX, size, entry.kind.capitalize(), said)
     results = joined(
         html(
             '<div><b style="color:{}">{}</b> {}{}</div>',
@@ -207,17 +223,19 @@ def _listed(entries: list[Entry]) -> Html:
     rows = []
     for entry in entries:
         answer = entry.answer
-        error = "" if not answer or answer.get("error_percent") is None else f"{answer['error_percent']:.2f} %"
-        rmse = "" if not answer else f"{answer['rmse_A']:.3f} A"
-        cells = joined(html('<td style="text-align:right;padding-left:6px">{}</td>', cell) for cell in (error, rmse))
-        rows.append(html('<tr><td style="overflow-wrap:anywhere">{}</td>{}</tr>', entry.name, cells))
-    return html(
-        '<div {}><table style="width:100%;border-collapse:collapse;font-variant-numeric:tabular-nums">'
-        '<tr><td></td><th style="text-align:right">Err</th><th style="text-align:right">rmse</th></tr>{}'
-        "</table></div>",
-        _BOX,
-        joined(rows),
-    )
+        facts = [] if not answer else [f"rmse {answer['rmse_A']:.3f} A"]
+        if answer and answer.get("error_percent") is not None:
+            facts.append(f"Err {answer['error_percent']:.2f} %")
+        says = " · ".join(filter(None, (entry.kind, entry.says, *facts)))
+        rows.append(
+            html(
+                '<div style="padding:2px 0;overflow-wrap:anywhere">{}<div style="opacity:.75;font-size:11.5px">{}</div>'
+                "</div>",
+                entry.name,
+                says,
+            )
+        )
+    return html("<div {}>{}</div>", _BOX, joined(rows))
 
 
 def _empty(text: str) -> Html:

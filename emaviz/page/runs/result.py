@@ -1,4 +1,4 @@
-"""Recordings' panel on the right: the Rerun viewer in the page, and two recordings on the same axes."""
+"""The Runs tab's panel on the right: the Rerun viewer in the page, and two recordings on the same axes."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from emaviz.text.html import Html, add_html, html
 _CONFIG = {"displayModeBar": False}
 
 
-class RecordingsResult:
+class RunsResult:
     """Called on the files' thread."""
 
     def __init__(self, page: Page, panel: viser.PanelHandle) -> None:
@@ -24,9 +24,9 @@ class RecordingsResult:
         self._tab = panel.add_tab("Rerun", viser.Icon.PLAYER_PLAY)
         gui = page.server.gui
         with self._tab:
-            self._frame = add_html(gui, _hint("Open a recording on the left."))
+            self._frame = add_html(gui, _hint("Open a run on the left."))
             self._close = gui.add_button("Close the viewer", icon=viser.Icon.X, color="gray", visible=False)
-        with panel.add_tab("Two recordings", viser.Icon.ARROWS_DIFF):
+        with panel.add_tab("Two runs", viser.Icon.ARROWS_DIFF):
             self._names = add_html(gui, _hint("Choose two on the left."))
             self._signal: Any = gui.add_dropdown("Signal", ("current_A",), visible=False)
             self._place = gui.add_folder("Signals and search", visible=False)
@@ -49,7 +49,7 @@ class RecordingsResult:
 
     def close_viewer(self) -> None:
         """Takes the viewer off the page, which frees its memory."""
-        self._frame.content = _hint("Open a recording on the left.")
+        self._frame.content = _hint("Open a run on the left.")
         self._close.visible = False
 
     def compare(self, first: tuple[Entry, Any], second: tuple[Entry, Any]) -> None:

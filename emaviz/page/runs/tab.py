@@ -1,4 +1,4 @@
-"""The Recordings tab: past runs, campaigns, and everything on the page as one file."""
+"""The Runs tab: past runs, campaigns, and everything on the page as one file."""
 
 from __future__ import annotations
 
@@ -10,33 +10,34 @@ import viser
 from ema_model.faults import HEALTHY
 from ema_model.recordings import Measurement
 from emaviz.page.campaigns.controls import CampaignControls
-from emaviz.page.recordings import WORKSPACE
-from emaviz.page.recordings.controls import RecordingsPanel
-from emaviz.page.recordings.result import RecordingsResult
-from emaviz.page.recordings.sessions import SessionControls
+from emaviz.page.runs import WORKSPACE
+from emaviz.page.runs.controls import RunsPanel
+from emaviz.page.runs.result import RunsResult
+from emaviz.page.runs.sessions import SessionControls
 from emaviz.page.tab import Shared, Tab
 from emaviz.scene.motion import motion
 from emaviz.session.archive import Recorded
 from emaviz.session.data_folder import SESSION_SUFFIX
 
 
-class RecordingsTab(Tab):
+class RunsTab(Tab):
     """Takes sessions from the browser."""
 
     workspace = WORKSPACE
 
     def __init__(self, shared: Shared, right: viser.PanelHandle) -> None:
         super().__init__(shared, right)
-        self.result = RecordingsResult(self.page, right)
+        self.result = RunsResult(self.page, right)
 
     def build(self) -> None:
         """The recordings, sessions and campaigns."""
         shared, page = self.shared, self.page
         recorded = Recorded(shared.comparing.folder.recordings)
-        self.panel = RecordingsPanel(page, shared.viewer, recorded, shared.files, self.result)
+        self.panel = RunsPanel(page, shared.viewer, recorded, shared.files, self.result)
         self.sessions = SessionControls(page, shared.comparing, shared.files, shared.kept)
         CampaignControls(page, shared.campaigns, shared.files, self.right, self._show)
-        shared.comparing.events.kept.connect(lambda _: self.panel.refresh_soon())
+        for events in (shared.comparing.events, shared.discovering.events):
+            events.kept.connect(lambda _: self.panel.refresh_soon())
 
     def takes(self) -> dict[str, Callable[[Path], None]]:
         """Sessions."""

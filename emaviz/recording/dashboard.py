@@ -1,0 +1,130 @@
+"""Curves over seconds that follow the timeline `iteration`: measured and model, drawn as line strips in 2D views.
+
+One timeline serves all views of a recording, so that curves over time beside what happens over iterations cannot be
+plots over time.  A 2D view keeps x and y alike and its y points down: what is drawn is scaled by hand.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+from numpy.typing import ArrayLike, NDArray
+
+from emaviz import colours
+from emaviz.recording.style import Colour, algorithm_path, signal_title
+
+Array = NDArray[np.float64]
+
+AXES = "/identification_axes"
+CURVES = "/curves"  # of the answer, for the tab of signals
+POINTS = 600  # of a curve, about
+_WIDTH, _HEIGHT = 2.3, 1.0  # as wide as a dashboard's views
+_AIR = 0.08  # of the range, above and below
+_GRID, _INK = [215, 215, 215], [90, 90, 90]
+_BACKGROUND = [255, 255, 255]
+_MEASURED, _MODEL_WIDTH = (2.6, 1.3), 1.3  # ui points: light and broad beneath, as in the app
+
+
+@dataclass(frozen=True)
+class Chart:
+    """A signal's axes: from and to in s and in its unit."""
+
+    signal: str
+    from_s: float
+    to_s: float
+    low: float
+    high: float
+
+    @staticmethod
+    def of(signal: str, time_s: ArrayLike, values: ArrayLike) -> Chart:
+        """Axes that hold a measured curve (n,), with air for a model that is off."""
+        time, y = np.asarray(time_s, dtype=float), np.asarray(values, dtype=float)
+        low, high = float(np.min(y)), float(np.max(y))
+        air = _AIR * ((high - low) or abs(high) or 1.0)
+        return Chart(signal, float(time[0]), float(time[-1]), low - air, high + air)
+
+    def strip(self, time_s: ArrayLike, values: ArrayLike) -> Array:
+        """A curve's points in the view, (m, 2); what lies beyond the axes is drawn at their edge."""
+        time, y = (np.asarray(one, dtype=float) for one in (time_s, values))
+        kept = _peaks(y)
+        x = (time[kept] - self.from_s) / ((self.to_s - self.from_s) or 1.0) * _WIDTH
+        up = (np.clip(y[kept], self.low, self.high) - self.low) / (self.high - self.low)
+        return np.stack([x, (0.5 - up) * _HEIGHT], axis=1)
+
+    def log_axes(self, stream: rr.RecordingStream, root: str) -> None:
+        """The grid and its numbers, static."""
+        at, up = _round(self.from_s, self.to_s), _round(self.low, self.high)
+        lines = [self._line([x, x], [self.low, self.high]) for x in at]
+        lines += [self._line([self.from_s, self.to_s], [y, y]) for y in up]
+        grid = rr.LineStrips2D(lines, colors=[_GRID], radii=rr.Radius.ui_points(0.5), draw_order=-1.0)
+        stream.log(f"{root}/grid", grid, static=True)
+        unit = signal_title(self.signal).rpartition("[")[2].rstrip("]")
+        spots = [(float(line[0][0]), 0.5 * _HEIGHT + 0.08) for line in lines[: len(at)]]
+        spots += [(-0.15, float(line[0][1])) for line in lines[len(at) :]]
+        names = [f"{x:.3g} s" for x in at] + [f"{y:.3g} {unit}" for y in up]
+        ticks = rr.Points2D(spots, labels=names, show_labels=True, colors=[_INK], radii=rr.Radius.ui_points(0.0))
+        stream.log(f"{root}/ticks", ticks, static=True)
+
+    def _line(self, x: Sequence[float], y: Sequence[float]) -> Array:
+        across = (np.array(x) - self.from_s) / ((self.to_s - self.from_s) or 1.0) * _WIDTH
+        up = (np.array(y) - self.low) / (self.high - self.low)
+        return np.stack([across, (0.5 - up) * _HEIGHT], axis=1)
+
+
+def measured(points: Array) -> rr.LineStrips2D:
+    """The measured curve, broad and pale beneath the model's."""
+    colour = [*colours.rgb(colours.REFERENCE), 150]
+    return rr.LineStrips2D([points], colors=[colour], radii=rr.Radius.ui_points(_MEASURED[0]), draw_order=0.0)
+
+
+def model(points: Array, colour: Colour) -> rr.LineStrips2D:
+    """A model's curve."""
+    return rr.LineStrips2D([points], colors=[colour], radii=rr.Radius.ui_points(_MODEL_WIDTH), draw_order=1.0)
+
+
+def model_columns(points: Array, colour: Colour) -> Any:
+    """The same for `send_columns`, in one row; a negative radius is in ui points."""
+    return rr.LineStrips2D.columns(strips=[points], colors=[colour], radii=[-_MODEL_WIDTH], draw_order=[1.0])
+
+
+def fit_path(algorithm: str, signal: str, which: str) -> str:
+    """'/identification/hba/fit/current_A/model'."""
+    return f"{algorithm_path(algorithm)}/fit/{signal}/{which}"
+
+
+def axes_path(signal: str) -> str:
+    """Where a signal's grid is."""
+    return f"{AXES}/{signal}"
+
+
+def view(title: str, paths: Sequence[str]) -> rrb.Spatial2DView:
+    """Entities of one signal in one picture."""
+    bounds = rrb.VisualBounds2D(x_range=(-0.3, _WIDTH + 0.08), y_range=(-0.58, 0.7))
+    return rrb.Spatial2DView(origin="/", contents=list(paths), name=title, background=_BACKGROUND, visual_bounds=bounds)
+
+
+def _round(low: float, high: float) -> Array:
+    """Round numbers from low to high, 1, 2 or 5 times a power of ten apart; three to six."""
+    rough = (high - low) / 5.0 or 1.0
+    size = 10.0 ** np.floor(np.log10(rough))
+    step = next(one for one in (size, 2.0 * size, 5.0 * size, 10.0 * size) if one >= 0.999 * rough)
+    first, last = np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9)
+    return step * np.arange(first, last + 1.0) + 0.0
+
+
+def _peaks(values: Array) -> NDArray[np.intp]:
+    """About POINTS places that keep a curve's peaks: of each stretch its least and its largest, in their order."""
+    if len(values) <= POINTS:
+        return np.arange(len(values))
+    edges = np.linspace(0, len(values), POINTS // 2 + 1).astype(int)
+    kept = {0, len(values) - 1}
+    for first, last in pairwise(edges):
+        part = values[first:last]
+        kept |= {first + int(np.argmin(part)), first + int(np.argmax(part))}
+    return np.array(sorted(kept), dtype=np.intp)

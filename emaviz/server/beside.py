@@ -1,0 +1,35 @@
+"""An error beside its field: a line below the control, in the page, that stays until the control is changed again."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from emaviz.server.viser_private import Inside, id_of
+
+_SAY = r"""
+((id, text) => {
+  const field = document.getElementById(id);
+  if (!field) return;
+  const button = field.tagName === 'BUTTON';
+  const home = button ? field.parentElement : (field.closest('.mantine-Flex-root') ?? field).parentElement;
+  let line = home.querySelector(':scope > .emaviz-beside');
+  if (!text) { line?.remove(); return; }
+  if (!line) {
+    line = document.createElement('div');
+    line.className = 'emaviz-beside';
+    line.setAttribute('role', 'alert');
+    line.style.cssText = 'color:#e03131;font-size:12px;line-height:1.35;padding:2px 2px 0;overflow-wrap:anywhere';
+    home.append(line);
+    home.addEventListener(button ? 'click' : 'input', () => line.remove(), { once: true });
+  }
+  line.textContent = text;
+})(ID, TEXT)
+"""
+
+
+def say_beside(inside: Inside, control: Any, text: str, client: int | None = None) -> None:
+    """Says it in one page, or in all that are open; no text takes it away."""
+    source = _SAY.replace("(ID, TEXT)", f"({json.dumps(id_of(control))}, {json.dumps(text)})")
+    for one in inside.pages() if client is None else (client,):
+        inside.run(source, one)

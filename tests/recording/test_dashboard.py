@@ -1,0 +1,78 @@
+"""An identification's recording opens on its answer: curves that follow the iterations, a race in one overlay."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from rerun.chunk import RrdReader
+
+from emaviz.recording import RecordingWriter
+from emaviz.recording.blueprint import Contents, build
+from emaviz.recording.dashboard import POINTS, Chart, axes_path, fit_path
+
+TIME = np.linspace(0.0, 0.5, 5001)
+CURRENT = 4.0 * np.sin(40.0 * TIME)
+RACE = ("robust", "do")
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    path = tmp_path_factory.mktemp("runs") / "race.rrd"
+    with RecordingWriter(path) as writer:
+        writer.fit("current_A", TIME, CURRENT, RACE)
+        writer.curve("current_A", "measured", TIME, CURRENT)
+        writer.truth(np.full(8, 0.1))
+        for name in RACE:
+            for i in range(3):
+                writer.iteration(name, i, 1.0 / (i + 1.0), np.full(8, 0.1 * i), np.full((4, 8), 0.1))
+                writer.fit_iteration(name, i, "current_A", TIME, CURRENT * (0.5 + 0.1 * i))
+            writer.interval(name, 3, np.tile([0.0, 0.2], (8, 1)))
+            writer.result({"k1": 0.1}, name)
+        writer.answer("# Not healthy: friction × 1.20 ± 0.01.")
+    assert writer.failed is None
+    return path
+
+
+def test_curves_are_on_the_iterations_and_what_stays_is_static(written):
+    timelines, static = {}, set()
+    for chunk in RrdReader(written).stream():
+        path = str(chunk.entity_path)
+        if chunk.is_static:
+            static.add(path)
+        else:
+            timelines.setdefault(path, set()).update(chunk.timeline_names)
+    for name in RACE:
+        assert timelines[fit_path(name, "current_A", "model")] == {"iteration"}
+        assert timelines[f"/identification/{name}/interval/k1"] == {"iteration"}
+        assert fit_path(name, "current_A", "measured") in static
+    assert {"/answer", "/curves/current_A/measured", f"{axes_path('current_A')}/grid"} <= static
+    assert {one for names in timelines.values() for one in names} == {"iteration"}
+
+
+def test_it_opens_on_one_dashboard_at_the_last_iteration(written):
+    (layout,) = RrdReader(written).blueprints()
+    texts = " ".join(str(c.to_record_batch().columns) for c in RrdReader(written).stream(store=layout))
+    assert "The answer" in texts and "iteration" in texts
+    assert "Identification robust" not in texts and "Identification do" not in texts, "a race is one overlay"
+    assert "Signals" in texts and "/identification/do/fit/current_A" in texts
+
+
+def test_what_was_not_recorded_has_no_view():
+    tabs = [
+        one.name
+        for one in build(
+            Contents(charts={"current_A": Chart("current_A", 0.0, 1.0, -1.0, 1.0)})
+        ).root_container.contents
+    ]
+    assert tabs == ["Identification"]
+
+
+def test_a_curve_keeps_its_peaks_within_its_axes():
+    values = CURRENT.copy()
+    values[1234] = 9.0
+    chart = Chart.of("current_A", TIME, CURRENT)
+    strip = chart.strip(TIME, values)
+    assert len(strip) <= POINTS + 2 and strip[0, 0] == 0.0 and strip[:, 0].max() == pytest.approx(2.3)
+    assert strip[:, 1].min() == pytest.approx(-0.5), "what is off the axes stands at their edge"
+    flat = Chart.of("current_A", TIME, np.zeros_like(TIME))
+    assert np.all(np.isfinite(flat.strip(TIME, np.zeros_like(TIME))))

@@ -28,6 +28,7 @@ _CORRELATED = 50  # values of a signal that may share their error
 _SCORE = 0.4  # of what a refit gives, that a score may have fallen short of predicting
 _RECENTRED = 4  # times that a refit begins anew from where its first guess held it back
 _HELD_BACK = 2.0  # σ of that guess, from which on it did
+_FOUND = (*ANGLES, "order")  # what no guess holds back: any angle is as likely, a pitch is as exact as the travel
 _UNMOVED = 1.0  # σ
 _FAINT = 0.1  # of the suggested strength, from which a fit that went astray begins anew
 
@@ -130,7 +131,7 @@ def _held_back(found: Fit, effects: Mapping[str, Mapping[str, float]]) -> bool:
     for name in effects:
         for parameter in find(name, found.actuator.axes).parameters:
             one = found.calibration.parameters.get(f"effects.{name}.{parameter.name}")
-            if one is None or abs(one.z) < _HELD_BACK or parameter.name in ANGLES:
+            if one is None or abs(one.z) < _HELD_BACK or parameter.name in _FOUND:
                 continue
             near = 0.01 * abs(one.value)
             if parameter.low + near < one.value < parameter.high - near:

@@ -167,6 +167,7 @@ def previewed(discovering, text, values):
     return told[0]
 
 
+@pytest.mark.long
 def test_a_torque_shows_what_its_values_would_change_before_it_is_fitted(fresh):
     look, text = fresh.look, "A*sin(14*theta) + B*cos(14*theta)"
     previewed(fresh, text, {"A": 0.0, "B": 0.0})  # compiled

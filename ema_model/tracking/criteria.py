@@ -3,6 +3,7 @@
 FALSE_TREND = 0.01  # probability of a trend that is none, of a unit's whole life, all k and all looks together
 ONSET_EVERY = 4  # flights between two onsets that are looked at
 SLOPES = (1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2)  # of k in a flight, spread of what a trend may be
+GROWN_BY = 10  # flights before one, by which it is told how far its sensitivities have grown with k
 NOISE_PRIOR = 3.0  # flights, by which the stated noise counts beside the one that is seen
 
 JUMP_BACK = 6.0  # of the differences' spread: towards healthy, a part replaced

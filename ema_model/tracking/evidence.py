@@ -1,6 +1,7 @@
 """Evidence for a trend of each k that may be looked at after each flight.
 
-Without a trend k̂_t = c + s_t · u + e_t: c any constant, u the base parameters (σ = 1 each), e_t the flight's own noise.
+Without a trend k̂_t = c + s_t · u + e_t: c any constant, u the base parameters (σ = 1 each), e_t the flight's own noise;
+s_t is stated for one state of wear (`tracking.sensitivity`).
 With one, a slope is added from an onset on.  The marginal likelihoods' ratio, c flat in both (the ratio is then one of
 the differences alone, whatever c), averaged over onsets and slopes, is a martingale without a trend: the probability
 that it ever reaches 1/α is α at most (Ville; Ramdas et al., Statistical Science 38, 2023, for such e-processes).

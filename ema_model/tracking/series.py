@@ -7,10 +7,11 @@ from math import log
 import numpy as np
 from numpy.typing import NDArray
 
-from ema_model.tracking.criteria import FALSE_TREND, JUMP_AFTER, JUMP_LEAST, JUMP_WINDOW
+from ema_model.tracking.criteria import FALSE_TREND, GROWN_BY, JUMP_AFTER, JUMP_LEAST, JUMP_WINDOW
 from ema_model.tracking.evidence import Evidence
 from ema_model.tracking.flight import Flight
 from ema_model.tracking.jumps import jump
+from ema_model.tracking.sensitivity import growth
 
 Array = NDArray[np.float64]
 
@@ -64,6 +65,17 @@ class Series:
         for place in range(self.start(i), len(self.at)):
             self._weigh(place, np.array([i]))
 
+    def _at_begin(self, place: int) -> Array:
+        """(8,), the share of a flight's sensitivities that was there in each k's first flight since its last jump.
+
+        Told by the flights before it: by its own k̂ the noise of that would stand in the sensitivity as well.
+        """
+        last = np.stack([one.k for one in self.flights[max(0, place - GROWN_BY) : place]] or [self.flights[0].k])
+        begin = [self.start(i) for i in range(len(self._healthy))]
+        first = np.array([self.flights[at].k[i] for i, at in enumerate(begin)])
+        before = [last[-(place - at) :, i].mean() if place > at else first[i] for i, at in enumerate(begin)]
+        return growth(first) / growth(before)
+
     def _may_have_jumped(self, i: int) -> bool:
         """Whether the last flights stand far enough from those before them; asked of all, so it must be quick."""
         last = [float(one.k[i]) for one in self.flights[-2 * JUMP_AFTER :]]
@@ -74,7 +86,8 @@ class Series:
     def _weigh(self, place: int, which: NDArray[np.int64]) -> None:
         flight = self.flights[place]
         own = np.diagonal(flight.own)
-        self.log_evidence[which] = self._evidence.add(self.at[place], flight.k, own, flight.common, which)
+        common = flight.common * self._at_begin(place)[:, None]
+        self.log_evidence[which] = self._evidence.add(self.at[place], flight.k, own, common, which)
         for i in which:
             # After each jump half of the probability of a false trend is spent, so that all together stay below it.
             needed = log(len(self._healthy) / FALSE_TREND) + (len(self.jumps[i]) + 1) * log(2.0)

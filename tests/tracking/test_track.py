@@ -50,6 +50,33 @@ def test_what_the_unit_adds_moves_no_trend():
     assert seen.trend or seen.jumps, "not told, it would be taken for one"
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_sensitivities_that_grow_with_the_command_move_no_trend(seed):
+    """Harder commands over the life: k̂ rises with what the unit adds, while nothing wears."""
+
+    def common(i):
+        row = np.zeros((8, 2))
+        row[0], row[1] = (0.02 + 0.04 * i / 119, 0.004 * (i % 3)), (0.0002 + 0.0004 * i / 119, 0.0)
+        return row
+
+    life = flights(np.zeros(120), sigma=0.003, seed=seed, common=common)
+    assert not any(one.trend for one in track(life).faults.values())
+
+
+@pytest.mark.parametrize(("law", "seed"), [("accelerating", 7), ("onset", 3), ("onset", 5)])
+def test_backlash_is_told_though_its_sensitivity_grows_with_it(law, seed):
+    """A play that is 15 % off adds to k2 in proportion to it; a unit that is 7 σ off is no reason for all its wear."""
+    life = worn_life(law, seed, fault="k2")
+    begin = life.repaired or 0
+    onset, end = max(life.onset, begin), life.flights
+    tracker, first = Tracker({"k2": life.threshold}), end
+    for i, flight in enumerate(drawn(life)):
+        tracker.add(flight)
+        if i >= begin + 5 and first == end and tracker.has_trend("k2"):
+            first = i
+    assert onset - 1 <= first < onset + 0.2 * (end - onset)
+
+
 def test_a_replaced_part_is_seen_and_judged_anew():
     k1 = np.concatenate([0.003 * np.arange(80), 0.003 * np.arange(60)])
     result = track(flights(k1), {"k1": 0.4})

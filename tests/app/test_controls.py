@@ -222,6 +222,7 @@ def test_the_search_is_looked_at_from_all_sides_and_its_landscape_drawn(page, ap
     app.tab(IdentifyTab).panel.show_settings()
     show(page, "Identify")
     race = raced(app, page)
+    page.locator("[role=tab][aria-selected=true]", has_text="Answer").wait_for(timeout=20_000)  # it comes forward
     show(page, "Search")
     choose(page, "Population view", "points over two k")
     choose(page, "Across", "k2 backlash")
@@ -284,7 +285,7 @@ def test_what_does_not_fit_is_taken_to_discover(page, app):
     show(page, "Identify")
     race = raced(app, page)
     assert not race.best.answer.uncertainty.adequate
-    page.get_by_text("no fault can be told").wait_for()
+    page.get_by_text("no fault can be told").first.wait_for()
     page.get_by_role("button", name="Look for the missing physics").click()
     page.get_by_text("Discover has the measurement").wait_for()
     wait_until(lambda: "uploads/identified plant.csv" in app.discovering.source.compared)

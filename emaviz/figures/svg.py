@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.quantities.numbers import Quantity, number
+from ema_model.quantities.round_numbers import round_numbers
 from emaviz.text.html import Html, escape, unescaped
 
 Array = NDArray[np.float64]
@@ -75,13 +75,8 @@ class _Axis:
 
     @property
     def ticks(self) -> list[float]:
-        """Round numbers: 1, 2 or 5 times a power of ten apart; parts of a turn where these are degrees."""
-        rough = ((self.high - self.low) or 1.0) / _TICKS
-        size = 10.0 ** math.floor(math.log10(rough))
-        steps = (30.0, 60.0, 90.0) if self.is_turn else (size, 2.0 * size, 5.0 * size, 10.0 * size)
-        step = next(one for one in steps if one >= 0.999 * rough)
-        first, last = math.ceil(self.low / step - 1e-9), math.floor(self.high / step + 1e-9)
-        return [step * i for i in range(first, last + 1)]
+        """Round numbers; parts of a turn where these are degrees."""
+        return round_numbers(self.low, self.high, _TICKS, (30.0, 60.0, 90.0) if self.is_turn else ())
 
 
 def _grid(x: _Axis, y: _Axis) -> str:

@@ -16,6 +16,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import ArrayLike, NDArray
 
+from ema_model.quantities.round_numbers import round_numbers
 from emaviz import colours
 from emaviz.recording.style import Colour, algorithm_path, signal_title
 
@@ -25,6 +26,7 @@ AXES = "/identification_axes"
 CURVES = "/curves"  # of the answer, for the tab of signals
 POINTS = 600  # of a curve, about
 _WIDTH, _HEIGHT = 2.3, 1.0  # as wide as a dashboard's views
+_TICKS = 5.0  # of an axis, about
 _AIR = 0.08  # of the range, above and below
 _GRID, _INK = [215, 215, 215], [90, 90, 90]
 _BACKGROUND = [255, 255, 255]
@@ -59,7 +61,7 @@ class Chart:
 
     def log_axes(self, stream: rr.RecordingStream, root: str) -> None:
         """The grid and its numbers, static."""
-        at, up = _round(self.from_s, self.to_s), _round(self.low, self.high)
+        at, up = round_numbers(self.from_s, self.to_s, _TICKS), round_numbers(self.low, self.high, _TICKS)
         lines = [self._line([x, x], [self.low, self.high]) for x in at]
         lines += [self._line([self.from_s, self.to_s], [y, y]) for y in up]
         grid = rr.LineStrips2D(lines, colors=[_GRID], radii=rr.Radius.ui_points(0.5), draw_order=-1.0)
@@ -107,15 +109,6 @@ def view(title: str, paths: Sequence[str]) -> rrb.Spatial2DView:
     """Entities of one signal in one picture."""
     bounds = rrb.VisualBounds2D(x_range=(-0.3, _WIDTH + 0.08), y_range=(-0.58, 0.7))
     return rrb.Spatial2DView(origin="/", contents=list(paths), name=title, background=_BACKGROUND, visual_bounds=bounds)
-
-
-def _round(low: float, high: float) -> Array:
-    """Round numbers from low to high, 1, 2 or 5 times a power of ten apart; three to six."""
-    rough = (high - low) / 5.0 or 1.0
-    size = 10.0 ** np.floor(np.log10(rough))
-    step = next(one for one in (size, 2.0 * size, 5.0 * size, 10.0 * size) if one >= 0.999 * rough)
-    first, last = np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9)
-    return step * np.arange(first, last + 1.0) + 0.0
 
 
 def _peaks(values: Array) -> NDArray[np.intp]:

@@ -12,7 +12,7 @@ from ema_model.recordings.file import hints_of, read_columns, read_head, read_he
 from ema_model.recordings.measurement import Measurement
 from ema_model.recordings.prepared import prepared
 from ema_model.recordings.read import read
-from ema_model.recordings.side_file.read import SideFile, actuators_of, find_side_file, read_side_file, side_path
+from ema_model.recordings.side_file.read import SideFile, check_one_actuator, find_side_file, read_side_file, side_path
 from ema_model.recordings.side_file.write import change_side_file, write_side_file
 from ema_model.recordings.write import check_target, write_measurement
 
@@ -24,11 +24,11 @@ __all__ = [
     "Reading",
     "SideFile",
     "Signal",
-    "actuators_of",
     "apply_mapping",
     "can_have_current",
     "change_side_file",
     "check_needed",
+    "check_one_actuator",
     "check_target",
     "find_side_file",
     "guess_mapping",

@@ -8,7 +8,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from ema_model.errors import InputError, quoted
-from ema_model.recordings import actuators_of
+from ema_model.recordings import check_one_actuator
 from ema_model.recordings.formats import FORMATS
 from ema_model.recordings.recording_set import recordings_in
 from ema_model.tracking.criteria import LEAST_FLIGHTS
@@ -46,13 +46,7 @@ def check_order(paths: Sequence[Path]) -> None:
                 f"{quoted(after.name)}: comes after {quoted(before.name)}, though its name says that it flew before; "
                 "give the flights in order of time"
             )
-    known = list(actuators_of(paths).items())
-    if len(known) > 1:
-        (one, first), (other, second) = known[:2]
-        raise InputError(
-            f"{quoted(second.name)}: is of the actuator {quoted(other)}, and {quoted(first.name)} of {quoted(one)}; "
-            "the flights are of one unit"
-        )
+    check_one_actuator(paths, "the flights are of one unit")
 
 
 def check_enough(paths: Sequence[Path], where: str) -> None:

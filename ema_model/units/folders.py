@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from ema_model.errors import InputError, quoted
-from ema_model.recordings import actuators_of
+from ema_model.recordings import check_one_actuator
 from ema_model.recordings.recording_set import recordings_in
 
 
@@ -23,10 +23,4 @@ def units_in(folder: Path) -> dict[str, list[Path]]:
 
 def check_same_type(files: Iterable[str | os.PathLike[str]]) -> None:
     """InputError for recordings whose side files name different actuators: units are of one type."""
-    known = list(actuators_of(files).items())
-    if len(known) > 1:
-        (one, first), (other, second) = known[:2]
-        raise InputError(
-            f"{quoted(second.name)}: is of the actuator {quoted(other)}, and {quoted(first.name)} of {quoted(one)}; "
-            "units that are compared are of one type"
-        )
+    check_one_actuator(files, "units that are compared are of one type")

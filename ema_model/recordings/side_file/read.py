@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any, Literal, cast
 
-from ema_model.errors import InputError
+from ema_model.errors import InputError, quoted
 from ema_model.files.limits import TEXT_BYTES
 from ema_model.files.refusal import listed, reason, refusal, shown
 from ema_model.files.toml_text import toml_of
@@ -78,6 +78,17 @@ def find_side_file(path: str | os.PathLike[str]) -> Path | None:
     own = side_path(path)
     # Whatever else has the name, a pipe as well, is for `read_side_file` to refuse.
     return next((side for side in (own, own.with_name(OF_A_FOLDER)) if side.exists() and not side.is_dir()), None)
+
+
+def check_one_actuator(paths: Iterable[str | os.PathLike[str]], why: str) -> None:
+    """InputError for recordings whose side files name different actuators; why: what they have in common."""
+    known = list(actuators_of(paths).items())
+    if len(known) > 1:
+        (one, first), (other, second) = known[:2]
+        raise InputError(
+            f"{quoted(second.name)}: is of the actuator {quoted(other)}, and {quoted(first.name)} of {quoted(one)}; "
+            f"{why}"
+        )
 
 
 def actuators_of(paths: Iterable[str | os.PathLike[str]]) -> dict[str, Path]:

@@ -110,7 +110,8 @@ def _within(before: Fit, after: Fit, key: str) -> str:
 def _bent(before: Fit, after: Fit, key: str) -> str:
     """A parameter of the effect at its bound, or one of the actuator that is not there in the fit before.
 
-    Far above the floor tolerances count for nothing until the model has settled: there `before` is `after` itself.
+    Far above the floor tolerances count for nothing until the model has settled.  There `before` is `after` itself, and
+    any parameter of the actuator at its bound speaks against it.
     """
     parameters = after.calibration.parameters
     for path, one in parameters.items():

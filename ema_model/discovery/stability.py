@@ -49,7 +49,7 @@ def disagreement(data: Data, found: Fit, key: str) -> Disagreement | None:
         is_phase = names[i].endswith(ANGLES)
         limit = PHASES_APART if is_phase else APART * abs(one.value)
         if names[i].endswith("delay_s"):
-            limit = max(limit, LATE_BY * _sample_s(data))
+            limit = max(limit, LATE_BY * max(one.sample_period_s for one in data.measurements))
         tell = [(value, error) for value, error in tell if error < max(limit, _TELLS * abs(one.value))]
         if not (is_phase or names[i] == strength):  # a step of its own size is beyond what is straight
             tell = [(value, error) for value, error in tell if abs(value - one.value) < abs(one.value)]
@@ -62,11 +62,6 @@ def disagreement(data: Data, found: Fit, key: str) -> Disagreement | None:
         if chance < least and float(np.max(np.abs(values - one.value))) > limit:
             worst, least = Disagreement(names[i], tuple(float(value) for value in values)), chance
     return worst
-
-
-def _sample_s(data: Data) -> float:
-    """The recordings' sampling interval, s."""
-    return float(np.median(np.concatenate([np.diff(one["time_s"]) for one in data.measurements])))
 
 
 def parts_of(data: Data, found: Fit) -> list[NDArray[np.bool_]]:

@@ -11,8 +11,7 @@ from emaviz.page.page import Page
 from emaviz.session.practice import Practice
 from emaviz.text.html import add_html, html, joined
 from emaviz.text.notes import BOX, boxed
-
-_GOOD, _BAD = "#2b8a3e", "#e03131"
+from emaviz.text.told import large
 
 
 class PracticeButtons:
@@ -65,6 +64,5 @@ class Seal:
         lines = joined(html("<div>{}</div>", line) for line in told.lines)
         verdict = html("")
         if told.agrees is not None:
-            colour, text = (_GOOD, "The answer agrees.") if told.agrees else (_BAD, "The answer differs.")
-            verdict = html('<div style="font-size:16px;font-weight:600;color:{}">{}</div>', colour, text)
+            verdict = large("The answer agrees.", "good") if told.agrees else large("The answer differs.", "bad")
         self._told.content = html("<div {}>{}{}</div>", BOX, verdict, lines)

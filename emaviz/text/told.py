@@ -33,4 +33,5 @@ def large(text: str, severity: Severity) -> Html:
 
 def warned(warnings: Iterable[str]) -> Html:
     """A line for each warning."""
-    return joined(html('<div style="color:{}">▲ {}</div>', COLOURS["warning"], text) for text in warnings)
+    style = f"color:{COLOURS['warning']};overflow-wrap:anywhere"
+    return joined(html('<div style="{}">▲ {}</div>', style, text) for text in warnings)

@@ -274,15 +274,15 @@ def test_a_comparison_names_the_motors_angle(comparing, heard, recording):
 def test_a_comparison_is_kept_as_report_and_recording(comparing, heard, recording):
     kept = []
     comparing.events.kept.connect(kept.append)
-    comparing.save_report()
+    comparing.save(".html")
     assert "nothing is compared yet" in heard.wait(heard.told)
     write_measurement(recording, comparing.folder.uploads / "run.csv")
     comparing.add("uploads/run.csv")
     heard.wait(heard.opened)
     assert comparing.compare()
     comparison = heard.wait(heard.compared)
-    comparing.save_report()
-    comparing.record()
+    comparing.save(".html")
+    comparing.save(".rrd")
     heard.wait(kept, 2)
     report, record = sorted(kept, key=lambda path: path.suffix)
     assert report.parent == record.parent == comparing.folder.recordings

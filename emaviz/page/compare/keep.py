@@ -2,47 +2,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
-import viser
-
-from emaviz.page.identify.controls import recording_link
+from emaviz.page.kept import RECORD, REPORT, KeepButtons
 from emaviz.page.page import Page
 from emaviz.recording.viewer import ViewerHost
 from emaviz.session.compare.comparing import Comparing
-from emaviz.text.html import add_html, html
 
 
-class KeepControls:
+class KeepControls(KeepButtons):
     """Two buttons, and what they have written."""
 
     def __init__(self, page: Page, comparing: Comparing, viewer: ViewerHost | None) -> None:
-        self._comparing, self._viewer = comparing, viewer
-        self._asked: viser.ClientHandle | None = None  # who is sent the report
-        gui = page.server.gui
-        report = gui.add_button("Save report", icon=viser.Icon.FILE_TEXT, hint="One HTML file that opens offline")
-        record = gui.add_button("Record", icon=viser.Icon.DEVICE_FLOPPY, hint="An .rrd file for the Rerun viewer")
-        self._links = add_html(gui)
-
-        def save(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
-            self._asked = event.client
-            comparing.save_report()
-
-        report.on_click(save)
-        record.on_click(lambda _: comparing.record())
-        comparing.events.kept.connect(lambda path: page.screen.post("kept", lambda: self._kept(path)))
-
-    def clear(self) -> None:
-        """Another comparison is shown: what was kept of the one before is told no more."""
-        self._links.content = ""
-
-    def _kept(self, path: Path) -> None:
-        if path.suffix == ".rrd":
-            self._links.content = recording_link(self._viewer, path)
-            return
-        name = self._comparing.folder.name_of(path)
-        self._links.content = html(
-            '<div style="padding:2px 10px;font-size:13px">Also kept in the data folder: {}</div>', name
+        super().__init__(
+            page, "comparison", comparing.folder, viewer, comparing.events.kept, comparing.save, REPORT, RECORD
         )
-        if self._asked is not None:
-            self._asked.send_file_download(path.name, path.read_bytes(), save_immediately=True)

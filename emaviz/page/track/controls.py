@@ -9,6 +9,7 @@ import viser
 from ema_model.faults import BY_NAME
 from ema_model.quantities.titles import in_sentence
 from ema_model.tracking.track import TRACKED
+from emaviz.page.folder_choice import FolderChoice
 from emaviz.page.job_line import JobLine
 from emaviz.page.page import Page
 from emaviz.page.practice import PracticeButtons
@@ -17,8 +18,8 @@ from emaviz.page.track.result import TrackResult
 from emaviz.session.track.following import Following
 from emaviz.text.html import add_html, html, joined
 from emaviz.text.notes import boxed, note
+from emaviz.text.told import warned
 
-_NONE = "–"
 _HALFWAY = 0.5  # from healthy to the end of a k's range, where a threshold begins
 _ABOUT = (
     "A folder of recordings of one unit, a flight each, whose names tell their order (flight_0001, 2026-05-03 …), "
@@ -31,12 +32,10 @@ class TrackPanel:
 
     def __init__(self, page: Page, following: Following, result: TrackResult) -> None:
         self._page, self._following, self._result = page, following, result
-        self._names: dict[str, str] = {}
         gui, post = page.server.gui, page.screen.post
         add_html(gui, note(_ABOUT))
-        self._folder: Any = gui.add_dropdown(
-            "Flights", (_NONE,), hint="Folders of the data folder that hold recordings"
-        )
+        hint = "Folders of the data folder that hold recordings"
+        self._folder = FolderChoice(page, "Flights", hint, self._listed, lambda: following.chosen, self._take_folder)
         self._practice = PracticeButtons(page, following.practice, self.choose)
         with gui.add_folder("The life ends where"):
             self._faults = {BY_NAME[name].label: name for name in TRACKED}
@@ -50,7 +49,6 @@ class TrackPanel:
             "Take up new flights", following.watching, hint="Files that arrive in the folder add a point each"
         )
         self._left_out = add_html(gui)
-        self._folder.on_update(lambda event: event.client and self._ask_folder())
         self._fault.on_update(lambda event: event.client and post("fault", self._show_fault))
         for control in (self._ends, self._threshold):
             control.on_update(lambda event: event.client and self._ask_threshold())
@@ -65,44 +63,28 @@ class TrackPanel:
 
     def refresh(self) -> None:
         """Reads the data folder's list again; the chosen one stays as long as it exists."""
-        found = self._following.folder.folders()
-        self._names = {f"{name} ({count})" if name != "." else f"the data folder ({count})": name
-                       for name, count in found.items()}  # fmt: skip
-        options = tuple(self._names) or (_NONE,)
-        chosen = next((title for title, name in self._names.items() if name == self._following.chosen), None)
-        if tuple(self._folder.options) != options:
-            self._folder.options = options
-        if chosen is not None:
-            self._folder.value = chosen
-        elif self._names:
-            self._take_folder(options[0])
-        self._start.disabled = self._following.job.running or not self._names
+        self._folder.refresh()
+        self._start.disabled = self._following.job.running or self._folder.empty
 
     # --- what is asked ----------------------------------------------------------------------------------------------
 
     def choose(self, name: str) -> None:
         """A folder by its name; on the screen's thread."""
-        self.refresh()
-        self._take_folder(next(title for title, one in self._names.items() if one == name))
+        self._folder.choose(name)
 
-    def _ask_folder(self) -> None:
-        """As it is chosen now: the list may be about to be read again."""
-        title = str(self._folder.value)
-        self._page.screen.post("flights", lambda: self._take_folder(title))
+    def _listed(self) -> dict[str, str]:
+        found = self._following.folder.folders().items()
+        return {f"{name} ({count})" if name != "." else f"the data folder ({count})": name for name, count in found}
 
-    def _take_folder(self, title: str) -> None:
-        name = self._names.get(title)
-        if name is not None and self._folder.value != title:
-            self._folder.value = title
-        if name is not None and name != self._following.chosen:
-            if self._page.checked(lambda: self._following.choose(name)):
-                self._result.show(None)
-                self._practice.show(name)
-                self._show_thresholds()
-                self._line.say("")
-                self._show_left_out()
-            else:
-                self.refresh()
+    def _take_folder(self, name: str) -> None:
+        if self._page.checked(lambda: self._following.choose(name)):
+            self._result.show(None)
+            self._practice.show(name)
+            self._show_thresholds()
+            self._line.say("")
+            self._show_left_out()
+        else:
+            self.refresh()
 
     def _show_fault(self) -> None:
         name = self._faults[str(self._fault.value)]
@@ -150,13 +132,12 @@ class TrackPanel:
     def _busy(self, busy: bool) -> None:
         with self._page.server.atomic():
             self._start.disabled = busy
-            for control in (self._folder, self._fault, self._ends):
+            for control in (self._folder.control, self._fault, self._ends):
                 control.disabled = busy
             self._threshold.disabled = busy or not self._ends.value
         self._show_left_out()
         self.refresh()
 
     def _show_left_out(self) -> None:
-        lines = [html('<div style="color:#e8590c;overflow-wrap:anywhere">▲ {}</div>', line)
-                 for line in self._following.left_out.values()]  # fmt: skip
-        self._left_out.content = boxed(joined(lines)) if lines else ""
+        lines = self._following.left_out.values()
+        self._left_out.content = boxed(warned(lines)) if lines else ""

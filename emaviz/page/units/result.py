@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import plotly.graph_objects as go
-import viser
 
 from ema_model.units.result import UnitsCompared
 from ema_model.units.words import document_of, lacking, notes, rests_on, sentences
 from emaviz.figures import transfer_matrix, unit_parameters
 from emaviz.page.page import Page
 from emaviz.page.practice import Seal
-from emaviz.session.units.comparing_units import REPORT, TYPE, ComparingUnits
+from emaviz.page.units.keep import UnitsKeep
+from emaviz.session.units.comparing_units import ComparingUnits
 from emaviz.text.html import Html, add_html, html, joined
 from emaviz.text.notes import BOX, DIM, boxed
-from emaviz.text.told import whole
+from emaviz.text.told import warned, whole
 
 _CONFIG = {"displayModeBar": False}
 _NOTHING = "No units are compared yet: choose a folder of units on the left."
@@ -29,7 +28,6 @@ class UnitsResult:
 
     def __init__(self, page: Page, comparing: ComparingUnits) -> None:
         self._page, self._comparing = page, comparing
-        self._asked: viser.ClientHandle | None = None  # who is sent what is saved
         gui = page.server.gui
         self._told = add_html(gui, boxed(_NOTHING))
         self._figures = gui.add_folder("Parameters of each unit", visible=False)
@@ -44,23 +42,14 @@ class UnitsResult:
             self._document = add_html(gui)
         self._save = gui.add_folder("Keep it", visible=False)
         with self._save:
-            report = gui.add_button("Save report", icon=viser.Icon.FILE_TEXT, hint="One HTML file that opens offline")
-            type_file = gui.add_button(
-                "Save the type as an actuator",
-                icon=viser.Icon.DEVICE_FLOPPY,
-                hint="Means as values, and how far a further unit may be from them as tolerances",
-            )
-            self._links = add_html(gui)
-        report.on_click(lambda event: self._ask(event.client, REPORT))
-        type_file.on_click(lambda event: self._ask(event.client, TYPE))
-        comparing.events.kept.connect(lambda path: page.screen.post("units kept", lambda: self._kept(path)))
+            self._keep = UnitsKeep(page, comparing)
 
     def show(self, found: UnitsCompared | None) -> None:
         """An answer; None for none."""
         with self._page.server.atomic():
             for folder in (self._figures, self._matrix, self._words, self._save):
                 folder.visible = found is not None
-            self._links.content = ""
+            self._keep.clear()
             self._seal.show()
             if found is None:
                 self._told.content = boxed(_NOTHING)
@@ -73,18 +62,6 @@ class UnitsResult:
             self._transfer.aspect = (_HEAD_PX + _ROW_PX * rows) / _WIDTH_PX
             self._document.content = whole(document_of(found))
 
-    def _ask(self, client: viser.ClientHandle | None, suffix: str) -> None:
-        self._asked = client
-        self._page.ask("units keep", lambda: self._comparing.save(suffix))
-
-    def _kept(self, path: Path) -> None:
-        name = self._comparing.folder.name_of(path)
-        self._links.content = html(
-            '<div style="padding:2px 10px;font-size:13px">Also kept in the data folder: {}</div>', name
-        )
-        if self._asked is not None:
-            self._asked.send_file_download(path.name, path.read_bytes(), save_immediately=True)
-
 
 def said(found: UnitsCompared) -> Html:
     """The sentences, what the answer rests on, warnings, and which recordings lack."""
@@ -96,7 +73,7 @@ def said(found: UnitsCompared) -> Html:
         joined(html("<div>{}</div>", line) for line in sentences(found)),
         DIM,
         rests_on(found),
-        joined(html('<div style="color:#e8590c">▲ {}</div>', line) for line in notes(found)),
+        warned(notes(found)),
         _listed(lacking(found)),
     )
 

@@ -268,13 +268,9 @@ class Comparing:
 
     # --- what stays -------------------------------------------------------------------------------------------------
 
-    def save_report(self) -> None:
-        """Writes the last comparison as an HTML report into the data folder, soon."""
-        self._files.post("report", lambda: self._keep(".html"))
-
-    def record(self) -> None:
-        """Writes the last comparison as a recording for Rerun into the data folder, soon."""
-        self._files.post("record", lambda: self._keep(".rrd"))
+    def save(self, suffix: str) -> None:
+        """Writes the last comparison as a report (.html) or for Rerun (.rrd) into the data folder, soon."""
+        self._files.post(f"comparison {suffix}", lambda: self._keep(suffix))
 
     def _keep(self, suffix: str) -> None:
         comparison = self.comparison

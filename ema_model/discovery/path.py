@@ -181,7 +181,7 @@ class Story:
         rung = self._rung(_change(trial, parameter), trial.fit)
         errors = before.rmse, rung.rmse, before.holdout_rmse, rung.holdout_rmse
         new = [
-            Added(catalogue_name(key), {}, *errors, tuple(ties), key, {}, moved, stands_for=parameter)
+            Added(catalogue_name(key), {}, *errors, tuple(ties), key, {}, moved, (), parameter, key in self.of_the_file)
             for key in trial.effects
         ]
         self._append(trial.fit, rung, (*self.added, *new))

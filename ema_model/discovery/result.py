@@ -91,6 +91,7 @@ class Added:
     stood_in: tuple[StoodIn, ...] = ()  # parameters that had been standing in for it
     supported_by: tuple[str, ...] = ()  # of "closed_loop" and "inverse_dynamics"
     stands_for: str = ""  # the path of the base parameter whose value outside its tolerance it is
+    of_the_file: bool = False  # whether the file has it, at other values
 
 
 @dataclass(frozen=True)

@@ -62,7 +62,13 @@ def _named(found: Discovery) -> str:
     """'cogging torque and constant load or current sensor bias, which cannot be told apart'; "" where none is."""
     # Once, where two orders of one effect were added.
     groups = {one.name: [one.name, *one.same_as] for one in reversed(found.effects)}
-    names = [" or ".join(in_sentence(effect_title(name)) for name in groups[one]) for one in reversed(groups)]
+    theirs = {one.name for one in found.effects if one.of_the_file}
+
+    def called(name: str) -> str:
+        title = in_sentence(effect_title(name))
+        return f"a {title} other than the file's" if name in theirs else title
+
+    names = [" or ".join(called(name) for name in groups[one]) for one in reversed(groups)]
     if any(len(group) > 1 for group in groups.values()):
         return f"{', and '.join(names)}, which cannot be told apart"
     return all_of(names) if names else ""

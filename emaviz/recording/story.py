@@ -118,7 +118,7 @@ class IdentificationStory:
         for answer in (best, *others):
             if self._fits and answer.algorithm in self._last:
                 last = self._last[answer.algorithm] + 1  # the answer stands one on: it is a fit from there
-                model = self._fitted(answer.k)
+                model = monitor if answer is best else self._fitted(answer.k)
                 for name in self._fits:
                     self._writer.fit_iteration(answer.algorithm, last, self._named(name), model.time_s, model[name])
                 self._writer.iteration(answer.algorithm, last, answer.rmse, answer.k)

@@ -11,6 +11,7 @@ from ema_model.discovery.path import Step, Story, rung_of
 from ema_model.discovery.repeatability import by_inverse_dynamics, is_lost, with_divergence
 from ema_model.discovery.result import Change
 from ema_model.discovery.sentences import NOT_REPEATABLE
+from ema_model.models.delay_of_drive import with_delay_of_drive
 from ema_model.models.stretches import fit_stretches
 from ema_model.recordings import Measurement
 from ema_model.recordings.prepared import prepared
@@ -34,6 +35,7 @@ def begun(
     """
     check_same_actuator([*measurements, *holdout])
     compile_library(actuator)
+    actuator = with_delay_of_drive(actuator, measurements)
     story = calibrated_story(measurements, actuator, holdout, signals, tell)
     inverse = None if story.repeatable else by_inverse_dynamics(story.data, actuator)
     if inverse is None:

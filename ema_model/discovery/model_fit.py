@@ -113,12 +113,14 @@ def with_effect(actuator: Actuator, name: str, settings: Mapping[str, float]) ->
     effect = find(name, actuator.axes)
     tolerances = dict(actuator.tolerances)
     full = effect.settings(dict(settings))
+    first = effect.parameters[0]
+    strength = abs(full[first.name] / first.default) or 1.0  # a small machine's offsets are small as well
     for parameter in effect.parameters:
         if not parameter.integer:
             value = full[parameter.name]
             share = _ORDER_SHARE if parameter.name == "order" else _SHARE
             sigma = _ANGLE_SIGMA if parameter.name in ANGLES else share * abs(value)
-            sigma = sigma or _SHARE * abs(parameter.default) or 0.01 * (parameter.high - parameter.low)
+            sigma = sigma or _SHARE * abs(parameter.default) or 0.01 * (parameter.high - parameter.low) * strength
             tolerances[f"effects.{name}.{parameter.name}"] = Tolerance(sigma, True)
     return replace(actuator, effects={**actuator.effects, name: full}, tolerances=tolerances)
 

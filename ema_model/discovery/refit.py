@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ema_model.discovery.criteria import LEAST_BIC, MOMENT, MOMENTS
+from ema_model.actuator import Actuator
+from ema_model.discovery.criteria import HALF, LEAST_BIC, MOMENT, MOMENTS
 from ema_model.discovery.evidence import colour_of, effective_values, evidence
 from ema_model.discovery.model_fit import ANGLES, Data, Fit, fit, holdout_error, with_effect
 from ema_model.discovery.result import Candidate
 from ema_model.effects import Effect, find
+from ema_model.estimation import default_free
 from ema_model.quantities.axes import Axes
 
 Progress = Callable[[str], None]
@@ -21,7 +23,7 @@ _LEAST_FALL = 0.004  # of the error: what is less is immaterial
 _FALL = 0.01  # below which a fall is slight, and the data must be twice as sure
 _LEAST_T = 2.4  # of the mean gain over blocks of time: 1 % of chance
 _HELD = 0.01  # of the held-out error, that must go above the floor
-_SHOWS = 1.0 / 3.0  # of the fall of the fitted error at the floor, that must be seen there as well
+_SHOWS = 0.125  # of the fall of the fitted error at the floor, that must be seen there as well
 _AGREES = 0.8  # of the held-out error: so great a fall there, and of the fitted one, needs no other test
 _FLOOR = 1.1  # of the floor, up to which an error counts as at it
 _CORRELATED = 50  # values of a signal that may share their error
@@ -30,6 +32,7 @@ _RECENTRED = 4  # times that a refit begins anew from where its first guess held
 _HELD_BACK = 2.0  # σ of that guess, from which on it did
 _FOUND = (*ANGLES, "order")  # what no guess holds back: any angle is as likely, a pitch is as exact as the travel
 _UNMOVED = 1.0  # σ
+_STRAINED = 2.0  # σ, from which on a parameter may be what holds an effect's place
 _FAINT = 0.1  # of the suggested strength, from which a fit that went astray begins anew
 
 
@@ -54,12 +57,62 @@ def tried(
     if best.chi2 > current.chi2:  # it began too strong to find back
         faint = {name: _weakened(find(name, current.actuator.axes), settings) for name, settings in effects.items()}
         best = min(best, _refitted(data, current, faint, tell), key=lambda one: one.chi2)
+    best = _recentred(data, current, best, effects, tell)
+    if best.error() > HALF * current.error() and _is_strained(current):
+        best = min(best, _from_the_file(data, current, _sized(data, current, effects, tell), tell), key=_chi2)
+    return Trial(candidate, effects, best, current.chi2 - best.chi2)
+
+
+def again(data: Data, current: Fit, trial: Trial, tell: Progress) -> Trial:
+    """A trial refitted from the file's values, too, beside the effects as it has them; the better of both.
+
+    Its own way began where the smaller model ended, which may be held there by the start of a recording.
+    """
+    found = trial.fit.calibration.actuator.effects
+    best = min(trial.fit, _from_the_file(data, current, {name: found[name] for name in trial.effects}, tell), key=_chi2)
+    return replace(trial, fit=best, drop=current.chi2 - best.chi2)
+
+
+def _recentred(data: Data, current: Fit, best: Fit, effects: Mapping[str, Mapping[str, float]], tell: Progress) -> Fit:
+    """A refit that began anew from where its first guess held it back."""
     for _ in range(_RECENTRED):
         if best.chi2 > current.chi2 - LEAST_BIC or not _held_back(best, effects):
             break
         found = best.calibration.actuator.effects
-        best = _refitted(data, current, {name: found[name] for name in effects}, tell)
-    return Trial(candidate, effects, best, current.chi2 - best.chi2)
+        again = _refitted(data, current, {name: found[name] for name in effects}, tell)
+        if again.chi2 > best.chi2:
+            break
+        best = again
+    return best
+
+
+def _is_strained(current: Fit) -> bool:
+    """Whether a parameter stands so far from the file's value that it may stand in for what is missing."""
+    return any(abs(one.z) > _STRAINED for one in current.calibration.parameters.values())
+
+
+def _sized(
+    data: Data, current: Fit, effects: Mapping[str, Mapping[str, float]], tell: Progress
+) -> Mapping[str, Mapping[str, float]]:
+    """The effects as large as the recordings ask for where all else is held at the file's values.
+
+    Beside parameters that have long taken up what an effect does, the way to it leads up first.
+    """
+    held = tuple(default_free(current.actuator))
+    for _ in range(_RECENTRED):
+        found = fit(data, _with_effects(current.actuator, effects), {}, tell, current.faults, held)
+        effects = {name: found.calibration.actuator.effects[name] for name in effects}
+        if not _held_back(found, effects):
+            break
+    return effects
+
+
+def _from_the_file(data: Data, current: Fit, effects: Mapping[str, Mapping[str, float]], tell: Progress) -> Fit:
+    return fit(data, _with_effects(current.actuator, effects), {}, tell, current.faults)
+
+
+def _chi2(found: Fit) -> float:
+    return found.chi2
 
 
 def stands_for(before: Fit, name: str) -> str:
@@ -120,10 +173,13 @@ def _holds(before: float, after: float, fall: float) -> bool:
 
 
 def _refitted(data: Data, current: Fit, effects: Mapping[str, Mapping[str, float]], tell: Progress) -> Fit:
-    actuator = current.actuator
+    return fit(data, _with_effects(current.actuator, effects), current.starts, tell, current.faults)
+
+
+def _with_effects(actuator: Actuator, effects: Mapping[str, Mapping[str, float]]) -> Actuator:
     for name, settings in effects.items():
         actuator = with_effect(actuator, name, settings)
-    return fit(data, actuator, current.starts, tell, current.faults)
+    return actuator
 
 
 def _held_back(found: Fit, effects: Mapping[str, Mapping[str, float]]) -> bool:

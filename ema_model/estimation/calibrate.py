@@ -179,18 +179,15 @@ class _Search:
             starts = [np.array([start.get(u.name, 0.0) for u in self.problem.unknowns])]
         else:
             starts = [np.zeros(count), *_promising(self.problem)]
-        found = self._from(starts, 1.0, "linear")
+        found = self._from(starts)
         if found.chi2 > _MISFIT:
-            scale = np.sqrt(found.chi2) / 3.0
-            found = self._from([found.x, *starts], scale, "soft_l1")
+            found = self._from([found.x, *starts], soft=float(np.sqrt(found.chi2)) / 3.0)
         return found
 
-    def _from(self, starts: Sequence[Array], scale: float, loss: str) -> _Found:
-        least, greatest = self.problem.low, self.problem.high
+    def _from(self, starts: Sequence[Array], soft: float | None = None) -> _Found:
         fits, agree = [], len(starts) == 1
         for start in starts:
-            inside = np.clip(start, 0.98 * least, 0.98 * greatest)
-            fits.append(descended(self.problem, inside, scale, loss, self._tell))
+            fits.append(descended(self.problem, start, soft, self._tell))
             fits.sort(key=lambda fit: fit.cost)
             # "At most a hundredth apart": two minima of the same depth are one answer, and none is deeper than nothing.
             if fits[0].cost < 2.0 or (len(fits) > 1 and fits[1].cost < 1.01 * fits[0].cost + 2.0):

@@ -1,7 +1,8 @@
 """Each unit's own calibration, and all units' linearisations at what they together say of each.
 
 The first common point is the middle of the units' own; each pass goes on from the last one's answer (Gauss and
-Newton's steps for all units at once), and adds to what is known of the chopping's ripple.
+Newton's steps for all units at once, each as far as the unit's recordings agree), and adds to what is known of the
+chopping's ripple.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from ema_model.identification.model_bias import TWINS
 from ema_model.units.block import WIDER, Linearised, Unit, colour_of, linearised, pooled
 from ema_model.units.pool import Pool
 from ema_model.units.select import price_of, select
+from ema_model.units.step import step
 
 Array = NDArray[np.float64]
 
@@ -99,8 +101,9 @@ def together(fits: Sequence[Fitted], seed: int = 0, tell: Callable[[str], None] 
             )
         freedom = sum((TWINS - 1) * one.rounds for one in parts)
         pool = select(pooled(parts), price_of(count, len(middle), freedom))
-        # The first point may be far: what seems to differ there may be how curved the model is.
-        points = [pool.unit(i) if number else pool.shared for i in range(count)]
+        points = [
+            step(one.unit, points[i], one.starts, parts[i], (pool.unit(i), pool.shared)) for i, one in enumerate(fits)
+        ]
         about = pool.shared_root
         found = Together(parts, pool, freedom)
     assert found is not None

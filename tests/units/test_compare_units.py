@@ -126,7 +126,7 @@ def test_a_unit_alone_is_calibrated_as_it_would_be_without_others():
 @pytest.mark.long
 @pytest.mark.parametrize("seed", [60003, 60004])
 def test_a_unit_far_from_the_others_does_not_lead_the_search_astray(seed):
-    """Torque constant and bus voltage differ by a tolerance: linearised as the others, the unit seems to be anywhere."""
+    """Torque constant and bus voltage differ by a tolerance: the unit must not be linearised as the others are."""
     fleet = draw(ACTUATOR, seed, units=5, size=5.0)
     every = [recorded(fleet.unit(i), seed, i) for i in range(5)]
     fitted = {name: [one[run] for run in fleet.runs] for name, one in zip(fleet.names, every)}

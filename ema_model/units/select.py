@@ -19,6 +19,7 @@ from ema_model.units.pool import Pair, Pool, scatter
 
 _LARGEST_SET = 4  # parameters of a unit, that are chosen together
 _MOST_EXCHANGES = 20
+_FIRSTS = 8  # pairs that a search begins with
 _LEAST = 1e-6  # of −2 log likelihood, that is a better account
 
 
@@ -45,7 +46,8 @@ def select(blocks: Sequence[Block], price: Price, start: Pool | None = None) -> 
     pool = start or Pool(blocks, (), np.zeros(len(blocks[0].pull)))
     if start is not None:
         pool = _paid(Pool(blocks, start.pairs, start.tau), price)
-    pool = _grown(pool, price)
+    every = [_with_pairs(first, price) for first in _firsts(pool, price)]
+    pool = _grown(min(every, key=lambda one: total(one, price)), price)
     for _ in range(_MOST_EXCHANGES):
         changed = min(_exchanged(pool, price), key=lambda one: total(one, price), default=pool)
         if total(changed, price) >= total(pool, price) - _LEAST:
@@ -54,22 +56,40 @@ def select(blocks: Sequence[Block], price: Price, start: Pool | None = None) -> 
     return pool
 
 
+def _firsts(pool: Pool, price: Price) -> list[Pool]:
+    """From which a search goes on: as it is, and with one pair that pays, the best of each parameter.
+
+    Of few units, any may be the one that differs: the pair that gains most may be none that does.
+    """
+    best = [(int(unit), place) for place, unit in enumerate(np.argmax(pool.gains, axis=0))]
+    paying = sorted((one for one in best if pool.gains[one] > price.pair), key=lambda one: -pool.gains[one])
+    return [pool, *(pool.with_pairs([*pool.pairs, one]) for one in paying[:_FIRSTS])]
+
+
 def _grown(pool: Pool, price: Price) -> Pool:
-    """With all that pays besides, the best first."""
-    for _ in range(4 * len(pool.blocks) * pool.parameters):
+    """With all that pays besides: pairs, and a scatter in which no unit stands out."""
+    while True:
+        pool = _with_pairs(pool, price)
+        every = [_scattered(pool, p, pool.pairs, price) for p in range(pool.parameters)]
+        changed = min(every, key=lambda one: total(one, price))
+        if total(changed, price) >= total(pool, price) - _LEAST:
+            return pool
+        pool = changed
+
+
+def _with_pairs(pool: Pool, price: Price) -> Pool:
+    """With all pairs that pay besides, the best first."""
+    while True:
         at = np.unravel_index(int(np.argmax(pool.gains)), pool.gains.shape)
         pair = int(at[0]), int(at[1])
-        if pool.gains[pair] > price.pair:
-            changed = _paid(_best_of_unit(pool.with_pairs([*pool.pairs, pair]), pair[0]), price)
-            if sum(p == pair[1] for _, p in changed.pairs) > MINORITY * len(pool.blocks):
-                changed = _scattered(changed, pair[1], (), price)
-        else:  # a scatter in which no unit stands out
-            every = [_scattered(pool, p, pool.pairs, price) for p in range(pool.parameters)]
-            changed = min(every, key=lambda one: total(one, price))
+        if pool.gains[pair] <= price.pair:
+            return pool
+        changed = _paid(_best_of_unit(pool.with_pairs([*pool.pairs, pair]), pair[0]), price)
+        if sum(p == pair[1] for _, p in changed.pairs) > MINORITY * len(pool.blocks):
+            changed = _scattered(changed, pair[1], (), price)
         if total(changed, price) >= total(pool, price) - _LEAST:
-            break
+            return pool
         pool = changed
-    return pool
 
 
 def _exchanged(pool: Pool, price: Price) -> Iterator[Pool]:

@@ -34,7 +34,7 @@ FOUND = UnitsCompared(
 )
 
 
-def kept(found=FOUND):
+def kept(found: UnitsCompared | None = FOUND):
     return json.loads(json.dumps(saved("fleet", "*unseen*", ACTUATOR.name, found)))
 
 

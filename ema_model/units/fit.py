@@ -18,7 +18,7 @@ from ema_model.estimation import Calibration, calibrate
 from ema_model.identification.model_bias import TWINS
 from ema_model.units.block import WIDER, Linearised, Unit, colour_of, linearised, pooled
 from ema_model.units.pool import Pool
-from ema_model.units.select import price_of, select
+from ema_model.units.select import Price, price_of, select
 from ema_model.units.step import step
 
 Array = NDArray[np.float64]
@@ -28,6 +28,7 @@ _SETTLING = 2  # of them, in which the point still moves, and the model's bias w
 _FIRST = 0.2  # tolerances, about the first point
 _WORSE = 1.5  # times the χ² of the best unit so far, from which on a unit is fitted from further starts
 _FREEDOM = 60  # independent values, over all units, that the ripple's spread is to be known by
+_SURE = 3.0  # times the price, which a difference must be worth before it moves the next pass's point
 _NEXT = 1000  # from one pass's seeds to the next one's, and
 _NEXT_UNIT = 50  # from one unit's
 
@@ -100,11 +101,13 @@ def together(fits: Sequence[Fitted], seed: int = 0, tell: Callable[[str], None] 
                 linearised(one.unit, points[i], place, 1 if settling else rounds, one.starts, last, about, one.lasting)
             )
         freedom = sum((TWINS - 1) * one.rounds for one in parts)
-        pool = select(pooled(parts), price_of(count, len(middle), freedom))
+        blocks, price = pooled(parts), price_of(count, len(middle), freedom)
+        found = Together(parts, select(blocks, price), freedom)
+        # What just pays may be how curved the model is: it leads the point astray along what is hardly told.
+        sure = select(blocks, Price(_SURE * price.pair, _SURE * price.scatter))
         points = [
-            step(one.unit, points[i], one.starts, parts[i], (pool.unit(i), pool.shared)) for i, one in enumerate(fits)
+            step(one.unit, points[i], one.starts, parts[i], (sure.unit(i), sure.shared)) for i, one in enumerate(fits)
         ]
-        about = pool.shared_root
-        found = Together(parts, pool, freedom)
+        about = sure.shared_root
     assert found is not None
     return found

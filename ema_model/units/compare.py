@@ -49,7 +49,7 @@ def compare_units(
     """
     tell = on_progress or (lambda text: None)
     names = tuple(units)
-    _check(units)
+    check_units(units)
     paths = default_free(actuator) if free is None else free
     paths = tuple(path_inside(path, actuator.tolerances, actuator.axes) for path in paths)
     if not paths:
@@ -84,7 +84,8 @@ def compare_units(
     return result
 
 
-def _check(units: Mapping[str, Sequence[Measurement]]) -> None:
+def check_units(units: Mapping[str, Sequence[Measurement]]) -> None:
+    """InputError for one unit only, one without a recording, and recordings of several actuators."""
     if len(units) < 2:
         only = quoted(next(iter(units), ""), 60)
         raise InputError(f"one unit only ({only}): two or more are needed to compare; name others, or leave --by out")

@@ -19,7 +19,7 @@ from ema_model.identification.model_bias import TWINS
 from ema_model.units.block import WIDER, Linearised, Unit, colour_of, linearised, pooled
 from ema_model.units.pool import Pool
 from ema_model.units.select import Price, price_of, select
-from ema_model.units.step import step
+from ema_model.units.step import At, step
 
 Array = NDArray[np.float64]
 
@@ -85,7 +85,7 @@ def together(fits: Sequence[Fitted], seed: int = 0, tell: Callable[[str], None] 
     """Linearises and selects, PASSES times."""
     count = len(fits)
     middle = np.median([one.x for one in fits], axis=0)
-    points, about = [middle] * count, _FIRST * np.eye(len(middle))
+    common, points, about = middle, [middle] * count, _FIRST * np.eye(len(middle))
     parts: list[Linearised] = []
     rounds = max(1, -(-_FREEDOM // ((PASSES - _SETTLING) * (TWINS - 1) * count)))
     found: Together | None = None
@@ -105,9 +105,23 @@ def together(fits: Sequence[Fitted], seed: int = 0, tell: Callable[[str], None] 
         found = Together(parts, select(blocks, price), freedom)
         # What just pays may be how curved the model is: it leads the point astray along what is hardly told.
         sure = select(blocks, Price(_SURE * price.pair, _SURE * price.scatter))
-        points = [
-            step(one.unit, points[i], one.starts, parts[i], (sure.unit(i), sure.shared)) for i, one in enumerate(fits)
-        ]
+        common, points = _next_points(fits, parts, sure, common, points)
         about = sure.shared_root
     assert found is not None
     return found
+
+
+def _next_points(
+    fits: Sequence[Fitted], parts: Sequence[Linearised], pool: Pool, common: Array, points: Sequence[Array]
+) -> tuple[Array, list[Array]]:
+    """Where to linearise next: the units that do not differ at one point, as how curved the model is differs nowhere.
+
+    common: that point before; points: of each unit.
+    """
+    units = [At(one.unit, one.starts, part) for one, part in zip(fits, parts)]
+    apart = {*range(len(units))} if pool.tau.any() else {unit for unit, _ in pool.pairs}
+    alike = [one for i, one in enumerate(units) if i not in apart]
+    if alike:
+        common = step(alike, common, (pool.shared,))
+    own = [step([one], points[i], (pool.unit(i), pool.shared)) if i in apart else common for i, one in enumerate(units)]
+    return common, own

@@ -26,7 +26,8 @@ def sentences(result: UnitsDiscovered) -> list[str]:
         told.append(
             f"of {and_so_on(result.undecided)} nothing can be said: the fit has not converged, or no run repeats"
         )
-    return [*told, *(f"beside it, {line}" if result.lacks else line for line in of_differences(result.compared))]
+    first, *rest = of_differences(result.compared)
+    return [*told, f"beside it, {first}" if result.lacks else first, *rest]
 
 
 def headline(result: UnitsDiscovered) -> str:

@@ -19,7 +19,7 @@ from ema_model.recordings.prepared import prepared
 from ema_model.recordings.read import check_same_actuator
 from ema_model.units.block import Block, pooled, starts_at, unit_of
 from ema_model.units.block import linearised as linearised_at
-from ema_model.units.criteria import MISFIT, REFUSED, SLOPE, TOLD, UNTOLD
+from ema_model.units.criteria import MISFIT, REFUSED, REFUSED_SHARE, SLOPE, TOLD, UNTOLD
 from ema_model.units.fit import Fitted, Together, fit, together
 from ema_model.units.pool import Pair, Pool
 from ema_model.units.result import Alone, Difference, Need, OfType, UnitsCompared
@@ -121,7 +121,7 @@ def _confirmed(
     dropped: list[Difference] = []
     while pool.pairs:
         told = {pair: _held_out(pool, pair, held) for pair in pool.pairs}
-        spoken = {pair: value for pair, value in told.items() if value is not None}
+        spoken = {pair: value + REFUSED_SHARE * pool.loss(pair) for pair, value in told.items() if value is not None}
         worst = min(spoken, key=lambda pair: spoken[pair], default=None)
         if worst is None or spoken[worst] > -REFUSED:
             break

@@ -52,6 +52,7 @@ class Linearised:
     rounds: int  # of twins, each with a mean of its own
     by_recording: Array  # (recordings, parameters): the curvature's diagonal, of each recording alone
     twins: Twins | None
+    starts_slope: Array  # (values, starts): what the starts do to the residual
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,6 +147,7 @@ def linearised(
         rounds=len(ripple) // TWINS,
         by_recording=by_recording,
         twins=found,
+        starts_slope=slope[:, count:],
     )
 
 

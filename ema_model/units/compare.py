@@ -19,7 +19,7 @@ from ema_model.recordings.prepared import prepared
 from ema_model.recordings.read import check_same_actuator
 from ema_model.units.block import Block, pooled, starts_at, unit_of
 from ema_model.units.block import linearised as linearised_at
-from ema_model.units.criteria import MISFIT, REFUSED, SLOPE, TOLD, UNTOLD
+from ema_model.units.criteria import MISFIT, REFUSED, REFUSED_SHARE, SLOPE, TOLD, UNTOLD
 from ema_model.units.fit import Fitted, Together, fit, together
 from ema_model.units.pool import Pair, Pool
 from ema_model.units.result import Alone, Difference, Need, OfType, UnitsCompared
@@ -49,7 +49,7 @@ def compare_units(
     """
     tell = on_progress or (lambda text: None)
     names = tuple(units)
-    _check(units)
+    check_units(units)
     paths = default_free(actuator) if free is None else free
     paths = tuple(path_inside(path, actuator.tolerances, actuator.axes) for path in paths)
     if not paths:
@@ -84,7 +84,8 @@ def compare_units(
     return result
 
 
-def _check(units: Mapping[str, Sequence[Measurement]]) -> None:
+def check_units(units: Mapping[str, Sequence[Measurement]]) -> None:
+    """InputError for one unit only, one without a recording, and recordings of several actuators."""
     if len(units) < 2:
         only = quoted(next(iter(units), ""), 60)
         raise InputError(f"one unit only ({only}): two or more are needed to compare; name others, or leave --by out")
@@ -120,7 +121,7 @@ def _confirmed(
     dropped: list[Difference] = []
     while pool.pairs:
         told = {pair: _held_out(pool, pair, held) for pair in pool.pairs}
-        spoken = {pair: value for pair, value in told.items() if value is not None}
+        spoken = {pair: value + REFUSED_SHARE * pool.loss(pair) for pair, value in told.items() if value is not None}
         worst = min(spoken, key=lambda pair: spoken[pair], default=None)
         if worst is None or spoken[worst] > -REFUSED:
             break

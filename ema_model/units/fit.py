@@ -1,7 +1,8 @@
 """Each unit's own calibration, and all units' linearisations at what they together say of each.
 
 The first common point is the middle of the units' own; each pass goes on from the last one's answer (Gauss and
-Newton's steps for all units at once), and adds to what is known of the chopping's ripple.
+Newton's steps for all units at once, each as far as the unit's recordings agree), and adds to what is known of the
+chopping's ripple.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ from ema_model.estimation import Calibration, calibrate
 from ema_model.identification.model_bias import TWINS
 from ema_model.units.block import WIDER, Linearised, Unit, colour_of, linearised, pooled
 from ema_model.units.pool import Pool
-from ema_model.units.select import price_of, select
+from ema_model.units.select import Price, price_of, select
+from ema_model.units.step import At, step
 
 Array = NDArray[np.float64]
 
@@ -26,6 +28,7 @@ _SETTLING = 2  # of them, in which the point still moves, and the model's bias w
 _FIRST = 0.2  # tolerances, about the first point
 _WORSE = 1.5  # times the χ² of the best unit so far, from which on a unit is fitted from further starts
 _FREEDOM = 60  # independent values, over all units, that the ripple's spread is to be known by
+_SURE = 3.0  # times the price, which a difference must be worth before it moves the next pass's point
 _NEXT = 1000  # from one pass's seeds to the next one's, and
 _NEXT_UNIT = 50  # from one unit's
 
@@ -82,7 +85,7 @@ def together(fits: Sequence[Fitted], seed: int = 0, tell: Callable[[str], None] 
     """Linearises and selects, PASSES times."""
     count = len(fits)
     middle = np.median([one.x for one in fits], axis=0)
-    points, about = [middle] * count, _FIRST * np.eye(len(middle))
+    common, points, about = middle, [middle] * count, _FIRST * np.eye(len(middle))
     parts: list[Linearised] = []
     rounds = max(1, -(-_FREEDOM // ((PASSES - _SETTLING) * (TWINS - 1) * count)))
     found: Together | None = None
@@ -98,10 +101,27 @@ def together(fits: Sequence[Fitted], seed: int = 0, tell: Callable[[str], None] 
                 linearised(one.unit, points[i], place, 1 if settling else rounds, one.starts, last, about, one.lasting)
             )
         freedom = sum((TWINS - 1) * one.rounds for one in parts)
-        pool = select(pooled(parts), price_of(count, len(middle), freedom))
-        # The first point may be far: what seems to differ there may be how curved the model is.
-        points = [pool.unit(i) if number else pool.shared for i in range(count)]
-        about = pool.shared_root
-        found = Together(parts, pool, freedom)
+        blocks, price = pooled(parts), price_of(count, len(middle), freedom)
+        found = Together(parts, select(blocks, price), freedom)
+        # What just pays may be how curved the model is: it leads the point astray along what is hardly told.
+        sure = select(blocks, Price(_SURE * price.pair, _SURE * price.scatter))
+        common, points = _next_points(fits, parts, sure, common, points)
+        about = sure.shared_root
     assert found is not None
     return found
+
+
+def _next_points(
+    fits: Sequence[Fitted], parts: Sequence[Linearised], pool: Pool, common: Array, points: Sequence[Array]
+) -> tuple[Array, list[Array]]:
+    """Where to linearise next: the units that do not differ at one point, as how curved the model is differs nowhere.
+
+    common: that point before; points: of each unit.
+    """
+    units = [At(one.unit, one.starts, part) for one, part in zip(fits, parts)]
+    apart = {*range(len(units))} if pool.tau.any() else {unit for unit, _ in pool.pairs}
+    alike = [one for i, one in enumerate(units) if i not in apart]
+    if alike:
+        common = step(alike, common, (pool.shared,))
+    own = [step([one], points[i], (pool.unit(i), pool.shared)) if i in apart else common for i, one in enumerate(units)]
+    return common, own

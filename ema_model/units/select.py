@@ -6,7 +6,7 @@ of all pairs' fall (Bonferroni), a scatter over all units likewise.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -18,6 +18,9 @@ from ema_model.units.criteria import ALIKE, FALSE, MINORITY, SCATTER_UNITS
 from ema_model.units.pool import Pair, Pool, scatter
 
 _LARGEST_SET = 4  # parameters of a unit, that are chosen together
+_MOST_EXCHANGES = 20
+_FIRSTS = 8  # pairs that a search begins with
+_LEAST = 1e-6  # of −2 log likelihood, that is a better account
 
 
 @dataclass(frozen=True)
@@ -43,20 +46,74 @@ def select(blocks: Sequence[Block], price: Price, start: Pool | None = None) -> 
     pool = start or Pool(blocks, (), np.zeros(len(blocks[0].pull)))
     if start is not None:
         pool = _paid(Pool(blocks, start.pairs, start.tau), price)
-    for _ in range(4 * len(blocks) * pool.parameters):
+    every = [_with_pairs(first, price) for first in _firsts(pool, price)]
+    pool = _grown(min(every, key=lambda one: total(one, price)), price)
+    for _ in range(_MOST_EXCHANGES):
+        changed = min(_exchanged(pool, price), key=lambda one: total(one, price), default=pool)
+        if total(changed, price) >= total(pool, price) - _LEAST:
+            break
+        pool = _grown(changed, price)
+    return pool
+
+
+def _firsts(pool: Pool, price: Price) -> list[Pool]:
+    """From which a search goes on: as it is, and with one pair that pays, the best of each parameter.
+
+    Of few units, any may be the one that differs: the pair that gains most may be none that does.
+    """
+    best = [(int(unit), place) for place, unit in enumerate(np.argmax(pool.gains, axis=0))]
+    paying = sorted((one for one in best if pool.gains[one] > price.pair), key=lambda one: -pool.gains[one])
+    return [pool, *(pool.with_pairs([*pool.pairs, one]) for one in paying[:_FIRSTS])]
+
+
+def _grown(pool: Pool, price: Price) -> Pool:
+    """With all that pays besides: pairs, and a scatter in which no unit stands out."""
+    while True:
+        pool = _with_pairs(pool, price)
+        every = [_scattered(pool, p, pool.pairs, price) for p in range(pool.parameters)]
+        changed = min(every, key=lambda one: total(one, price))
+        if total(changed, price) >= total(pool, price) - _LEAST:
+            return pool
+        pool = changed
+
+
+def _with_pairs(pool: Pool, price: Price) -> Pool:
+    """With all pairs that pay besides, the best first."""
+    while True:
         at = np.unravel_index(int(np.argmax(pool.gains)), pool.gains.shape)
         pair = int(at[0]), int(at[1])
-        if pool.gains[pair] > price.pair:
-            changed = _paid(_best_of_unit(pool.with_pairs([*pool.pairs, pair]), pair[0]), price)
-            if sum(p == pair[1] for _, p in changed.pairs) > MINORITY * len(blocks):
-                changed = _scattered(changed, pair[1], (), price)
-        else:  # a scatter in which no unit stands out
-            every = [_scattered(pool, p, pool.pairs, price) for p in range(pool.parameters)]
-            changed = min(every, key=lambda one: _total(one, price))
-        if _total(changed, price) >= _total(pool, price) - 1e-9:
-            break
+        if pool.gains[pair] <= price.pair:
+            return pool
+        changed = _paid(_best_of_unit(pool.with_pairs([*pool.pairs, pair]), pair[0]), price)
+        if sum(p == pair[1] for _, p in changed.pairs) > MINORITY * len(pool.blocks):
+            changed = _scattered(changed, pair[1], (), price)
+        if total(changed, price) >= total(pool, price) - _LEAST:
+            return pool
         pool = changed
-    return pool
+
+
+def _exchanged(pool: Pool, price: Price) -> Iterator[Pool]:
+    """Neighbours that a search which adds one by one does not reach, each where it may be the better account.
+
+    In place of one or two pairs others, as many or fewer; and in place of the units that differ in a parameter all the
+    others, which then differ the other way.
+    """
+    for place in {p for _, p in pool.pairs}:
+        units = {u for u, p in pool.pairs if p == place}
+        others = [one for one in pool.pairs if one[1] != place]
+        turned = [(u, place) for u in range(len(pool.blocks)) if u not in units]
+        yield _paid(pool.with_pairs([*others, *turned]), price)
+    for count in (1, 2):
+        for left in combinations(pool.pairs, count):
+            if len({u for u, _ in left}) > 1 and len({p for _, p in left}) > 1:
+                continue  # they have nothing in common
+            bare = pool.with_pairs([one for one in pool.pairs if one not in left])
+            for _ in range(count):
+                gains = bare.gains.copy()
+                gains[tuple(zip(*left))] = 0.0
+                unit, place = np.unravel_index(int(np.argmax(gains)), gains.shape)
+                bare = bare.with_pairs([*bare.pairs, (int(unit), int(place))])
+                yield _paid(bare, price)
 
 
 def alike(pool: Pool, pair: Pair) -> tuple[int, ...]:
@@ -67,7 +124,8 @@ def alike(pool: Pool, pair: Pair) -> tuple[int, ...]:
     return (chosen, *(int(p) for p in order if p != chosen and gains[p] > gains[chosen] - ALIKE))
 
 
-def _total(pool: Pool, price: Price) -> float:
+def total(pool: Pool, price: Price) -> float:
+    """What its fit leaves, and what its pairs and scatters cost: the less, the better the account."""
     return pool.cost + len(pool.pairs) * price.pair + np.count_nonzero(pool.tau) * price.scatter
 
 
@@ -109,4 +167,4 @@ def _scattered(pool: Pool, place: int, kept: Sequence[Pair], price: Price) -> Po
     tau = pool.tau.copy()
     tau[place] = scatter(bare, place)
     changed = _paid(bare.with_tau(tau), price)
-    return changed if tau[place] and _total(changed, price) < _total(pool, price) else pool
+    return changed if tau[place] and total(changed, price) < total(pool, price) else pool

@@ -97,7 +97,7 @@ def _differ(result: UnitsCompared, group: Sequence[Difference]) -> str:
         return f"{' and '.join(result.units)} {several} in {names} ({first.unit} has {size})"
     units = [one.unit for one in group]
     verb = several if len(units) > 1 else single
-    return f"{_and(units)} {verb} from the rest in {names} ({size})"
+    return f"{and_so_on(units)} {verb} from the rest in {names} ({size})"
 
 
 def _differences(result: UnitsCompared) -> Table:
@@ -156,7 +156,7 @@ def _needed(result: UnitsCompared) -> Iterator[str]:
         names, title = [one.unit for one in of_it], _title(result, path)
         if of_it[0].recording:
             tell = "tell" if len(names) > 1 else "tells"
-            yield f"{_and(names)} {tell} nothing of {title}: a recording like {of_it[0].recording} would"
+            yield f"{and_so_on(names)} {tell} nothing of {title}: a recording like {of_it[0].recording} would"
         else:
             yield f"no unit tells anything of {title}: it is as the file says, and may differ unseen"
 
@@ -186,7 +186,8 @@ def _plus(value: float) -> str:
     return ("+" if value > 0.0 else "") + number(value)
 
 
-def _and(names: Sequence[str]) -> str:
+def and_so_on(names: Sequence[str]) -> str:
+    """'a, b and c', or the first and how many more."""
     if len(names) > _MOST_NAMED:
         return f"{', '.join(names[:_MOST_NAMED])} and {len(names) - _MOST_NAMED} more units"
     return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))

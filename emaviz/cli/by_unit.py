@@ -1,4 +1,4 @@
-"""`emaviz compare … --by unit`: which recording is of which unit, and what the units differ in."""
+"""`emaviz compare|discover … --by unit`: whose a recording is, what units differ in, and which physics they lack."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from ema_model.actuator import Actuator, save_actuator
+from ema_model.comparison.summary import plain
 from ema_model.errors import InputError, quoted
 from ema_model.files.limits import FILE_BYTES
 from ema_model.files.refusal import listed
@@ -19,6 +20,7 @@ from emaviz.cli import given, output
 
 _BY_FOLDER = ("unit", "folder")
 _NOT_OF_UNITS = {"record": None, "calibrate": True, "signals": None, "fault": []}  # with their defaults
+_WORD = {"calibrate": "--no-calibrate", "signals": "--signal"}
 _Units = dict[str, list[Measurement]]
 
 
@@ -27,7 +29,7 @@ def add_units(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--by",
         metavar="unit|COLUMN",
-        help="compare units with each other: a unit is a folder of recordings, or a number in a column of that name",
+        help="take units beside each other: a unit is a folder of recordings, or a number in a column of that name",
     )
     parser.add_argument(
         "--unit",
@@ -52,8 +54,7 @@ def run(arguments: argparse.Namespace, actuator: Actuator) -> int:
 
     for name, default in _NOT_OF_UNITS.items():
         if getattr(arguments, name) != default:
-            option = {"calibrate": "--no-calibrate", "signals": "--signal"}.get(name, f"--{name}")
-            raise InputError(f"{option}: has no meaning where units are compared; leave it out")
+            raise InputError(f"{_WORD.get(name, f'--{name}')}: has no meaning where units are compared; leave it out")
     actuator = replace(actuator, effects={**actuator.effects, **given.effects_of(arguments, actuator.axes)})
     progress = output.Progress()
     try:
@@ -71,6 +72,38 @@ def run(arguments: argparse.Namespace, actuator: Actuator) -> int:
     if arguments.save_actuator:
         save_actuator(result.type_actuator, arguments.save_actuator)
     output.write_json(arguments, as_dict(result))
+    print(result)
+    return 0
+
+
+def run_discovery(arguments: argparse.Namespace, actuator: Actuator, signals: tuple[str, ...] | None) -> int:
+    """Reads, looks for what the units lack, writes and prints."""
+    from ema_model.units.discovery import as_dict, discover_units
+
+    if arguments.record:
+        raise InputError("--record: has no meaning where units are compared; leave it out")
+    progress = output.Progress()
+    try:
+        fitted, held = read_units(arguments, actuator, progress)
+        result = discover_units(
+            fitted,
+            actuator,
+            holdout=held,
+            signals=signals,
+            most_effects=arguments.max_effects,
+            seed=arguments.seed,
+            on_progress=progress.show,
+        )
+        if arguments.report:
+            progress.show("writing the report")
+            from emaviz.report import write_units_discovery_report  # plotly takes a second to import
+
+            write_units_discovery_report(result, arguments.report)
+    finally:
+        progress.done()
+    if arguments.save_actuator:
+        save_actuator(result.compared.type_actuator, arguments.save_actuator)
+    output.write_json(arguments, plain(as_dict(result)))
     print(result)
     return 0
 

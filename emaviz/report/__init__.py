@@ -5,11 +5,13 @@ from emaviz.report.discovery import write_discovery_report
 from emaviz.report.identification import write_identification_report
 from emaviz.report.tracking import write_tracking_report
 from emaviz.report.units import write_units_report
+from emaviz.report.units_discovery import write_units_discovery_report
 
 __all__ = [
     "write_discovery_report",
     "write_identification_report",
     "write_report",
     "write_tracking_report",
+    "write_units_discovery_report",
     "write_units_report",
 ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 
 import numpy as np
@@ -171,3 +172,78 @@ def test_what_stays(following):
         wait_until(lambda suffix=suffix: kept and kept[-1].suffix == suffix)
     assert "k over the flights" in kept[0].read_text(encoding="utf-8")
     assert read(kept[1]).properties["track"]["flights"] == [f"flight_{i:02d}" for i in range(COUNT)]
+
+
+def another(following):
+    """A page that starts anew on the same data folder."""
+    new = Following(following.session, following.folder, following._files)
+    new.watching = False
+    return new
+
+
+def restored(new, saved):
+    shown = []
+    new.events.followed.connect(shown.append)
+    new.restore(json.loads(json.dumps(saved)))
+    wait_until(lambda: shown and not new.job.running)
+    return shown[-1]
+
+
+def test_a_session_keeps_the_flights_so_that_none_is_identified_again(following, asked):
+    following.watching = False
+    following.choose("unit")
+    following.set_threshold("k1", 0.6)
+    followed(following)
+    saved, before = following.saved(), following.last
+    del asked[:]
+    new = another(following)
+    last = restored(new, saved).last
+    assert not asked and new.chosen == "unit" and new.thresholds == {"k1": 0.6}
+    assert str(last) == str(before) and last.faults["k1"].remaining.p50 == before.faults["k1"].remaining.p50
+    assert new.file_of(last.flights[3]) == "unit/flight_03.parquet"
+    assert new.saved() == saved
+    new.watching = True
+    new._watch()
+    shutil.copy(
+        following.folder.folder / "unit" / "flight_00.parquet", following.folder.folder / "unit" / "flight_20.parquet"
+    )
+    wait_until(lambda: asked)
+    assert asked == ["flight_20"], "what the session holds has arrived before"
+    new.close()
+    (following.folder.folder / "unit" / "flight_20.parquet").unlink()
+    del asked[:]
+
+    recording(following.folder.folder / "unit" / "flight_05.parquet")  # another one by now
+    (following.folder.folder / "unit" / "flight_06.parquet").unlink()
+    new = another(following)
+    flight = restored(new, saved).last.flights[5]
+    with pytest.raises(InputError, match="flight_05: its recording is not in the data folder, or is another"):
+        new.file_of(flight)
+    followed(new)
+    assert asked == ["flight_05"] and len(new.last.flights) == COUNT - 1
+
+    shutil.rmtree(following.folder.folder / "unit")
+    new = another(following)
+    assert len(restored(new, saved).last.flights) == COUNT and new.is_elsewhere
+    with pytest.raises(InputError, match="no such folder in the data folder"):
+        new.begin()
+
+
+@pytest.mark.parametrize(
+    ("damage", "line"),
+    [
+        ({"thresholds": {"k9": 0.5}}, "no such fault"),
+        ({"actuator": "another"}, "are of another actuator"),
+        ({"flights": [{"name": "a", "numbers": "AAAA"}]}, "numbers make no sense"),
+        ({"flights": [{"name": "a", "numbers": "no base 64"}]}, "numbers make no sense"),
+        ({"flights": 7}, "is damaged"),
+    ],
+)
+def test_a_damaged_session_is_refused_in_one_line_and_changes_nothing(following, damage, line):
+    following.watching = False
+    following.choose("unit")
+    followed(following)
+    saved = following.saved()
+    with pytest.raises(InputError, match=line) as told:
+        following.restore(saved | damage)
+    assert "\n" not in str(told.value) and following.saved() == saved

@@ -86,6 +86,19 @@ def test_a_life_is_followed(page, app, monkeypatch):
     wait_until(lambda: [*app.comparing.opened] == ["unit/flight_07.parquet"])
     app.comparing.job.stop()
 
+    page.get_by_role("tab", name="Runs").click()
+    fill(page, "Session name", "life")
+    page.get_by_role("button", name="Save session").click()
+    wait_until(lambda: app.comparing.folder.session_files() == ["sessions/life.emaviz"])
+    before, tab.following.thresholds = tab.following.history, {}
+    monkeypatch.setattr(f"{FOLLOWING}.identified", None)  # what is loaded is not identified again
+    page.get_by_role("button", name="Load session").click()
+    wait_until(lambda: tab.following.history not in (None, before), 60.0)
+    assert str(tab.following.last) == str(before.last) and tab.following.thresholds == {"k1": 0.5}
+    page.get_by_role("tab", name="Track", exact=True).click()
+    page.get_by_text("k1 friction drifts by 0.02").first.wait_for()
+    page.get_by_text(f"after flight_40: {COUNT + 1} flights").wait_for()
+
 
 def test_what_is_missing_is_said_in_one_line(page, app):
     lonely = app.comparing.folder.folder / "lonely"

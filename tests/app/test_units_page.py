@@ -49,6 +49,20 @@ def test_units_are_compared(page, app):
     page.get_by_role("button", name="Save report").locator("visible=true").click()
     page.get_by_text("Also kept in the data folder: recordings/").locator("visible=true").wait_for()
 
+    page.get_by_role("tab", name="Runs").click()
+    fill(page, "Session name", "bench")
+    page.get_by_role("button", name="Save session").click()
+    wait_until(lambda: folder.session_files() == ["sessions/bench.emaviz"])
+    (folder.folder / "bench").rename(folder.folder.parent / "bench")  # as on another computer
+    tab.comparing.chosen, tab.comparing.found = "", None
+    page.get_by_role("button", name="Load session").click()
+    page.get_by_text("Session loaded").wait_for()
+    page.get_by_role("tab", name="Units", exact=True).first.click()
+    page.get_by_text("from the rest in motor dynamic friction").first.wait_for()
+    assert not tab.comparing.job.running and str(tab.comparing.found) == str(found)
+    page.get_by_role("button", name="Compare units").click()
+    page.get_by_text("no such folder in the data folder").wait_for()
+
 
 @pytest.mark.long
 def test_units_of_several_types_and_one_unit_are_refused(page, app):

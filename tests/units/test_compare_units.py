@@ -123,6 +123,19 @@ def test_a_unit_alone_is_calibrated_as_it_would_be_without_others():
     assert alone.parameters[path].initial == wider(ACTUATOR).value(path) == ACTUATOR.value(path)
 
 
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [60003, 60004])
+def test_a_unit_far_from_the_others_does_not_lead_the_search_astray(seed):
+    """Torque constant and bus voltage differ by a tolerance: the unit must not be linearised as the others are."""
+    fleet = draw(ACTUATOR, seed, units=5, size=5.0)
+    every = [recorded(fleet.unit(i), seed, i) for i in range(5)]
+    fitted = {name: [one[run] for run in fleet.runs] for name, one in zip(fleet.names, every)}
+    found = compare_units(fitted, ACTUATOR, seed=seed)
+    true = {(fleet.names[unit], one.parameter) for one in fleet.differences for unit in one.units}
+    assert {(one.unit, one.parameter) for one in found.differences} == true
+    assert ("motor.torque_constant_Nm_A" in {path for _, path in true}) and len(true) >= 2
+
+
 def test_the_work_grows_with_the_units_and_no_faster(monkeypatch):
     """Linearisations are what costs: as many for each of six units as for each of three, and a fit each."""
     counted = {}

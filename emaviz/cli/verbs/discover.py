@@ -8,7 +8,7 @@ from ema_model.actuator import save_actuator
 from ema_model.comparison.summary import plain
 from ema_model.discovery import Discovery, as_dict, discover, verified
 from ema_model.discovery.words import verification
-from emaviz.cli import files, given, options, output
+from emaviz.cli import by_unit, files, given, options, output
 from emaviz.cli.numbers import whole
 
 HELP = "find the physical effects that the model lacks, and add them"
@@ -18,7 +18,8 @@ _CURRENT_ONLY = ("current_A",)
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of INTERFACES."""
-    files.add_recordings(parser, "fitted")
+    files.add_recordings(parser, "fitted", declared=files.UNITS)
+    by_unit.add_units(parser)
     options.add_fit(parser, "the discovery")
     parser.add_argument("--signals", choices=("current", "all"), default="all", help="what is fitted")
     parser.add_argument("--max-effects", type=whole(0, 100), default=3, metavar="N", help="at most so many are added")
@@ -29,6 +30,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Reads, discovers, writes and prints."""
     actuator = given.actuator_of(arguments)
+    signals = _CURRENT_ONLY if arguments.signals == "current" else None
+    if by_unit.is_asked(arguments):
+        return by_unit.run_discovery(arguments, actuator, signals)
     progress = output.Progress()
     try:
         fitted, held = given.read_set(arguments, actuator, progress)
@@ -36,7 +40,7 @@ def run(arguments: argparse.Namespace) -> int:
             fitted,
             actuator,
             holdout=held,
-            signals=_CURRENT_ONLY if arguments.signals == "current" else None,
+            signals=signals,
             most_effects=arguments.max_effects,
             on_progress=progress.show,
         )

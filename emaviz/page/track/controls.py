@@ -72,9 +72,22 @@ class TrackPanel:
         """A folder by its name; on the screen's thread."""
         self._folder.choose(name)
 
+    def show(self) -> None:
+        """What is chosen, as a session's file says; its flights are shown once they are followed."""
+        following = self._following
+        self._result.show(None)
+        self.refresh()
+        self._practice.show(following.chosen)
+        self._show_thresholds()
+        self._show_left_out()
+
     def _listed(self) -> dict[str, str]:
-        found = self._following.folder.folders().items()
-        return {f"{name} ({count})" if name != "." else f"the data folder ({count})": name for name, count in found}
+        following = self._following
+        found = following.folder.folders().items()
+        listed = {f"{name} ({count})" if name != "." else f"the data folder ({count})": name for name, count in found}
+        if following.is_elsewhere and following.chosen not in listed.values():
+            listed[f"{following.chosen} (not in the data folder)"] = following.chosen  # of a session
+        return listed
 
     def _take_folder(self, name: str) -> None:
         if self._page.checked(lambda: self._following.choose(name)):

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import viser
 
 from emaviz.page.practice import Seal
@@ -11,6 +14,7 @@ from emaviz.page.track.controls import TrackPanel
 from emaviz.page.track.keep import TrackKeep
 from emaviz.page.track.leads import FlightLead
 from emaviz.page.track.result import TrackResult
+from emaviz.session.saved import Part
 from emaviz.session.track.following import Following
 
 
@@ -34,6 +38,14 @@ class TrackTab(Tab):
     def build(self) -> None:
         """Which flights, and where the life ends."""
         self.panel = TrackPanel(self.page, self.following, self.result)
+
+    def kept(self) -> dict[str, Part]:
+        """The flights, as they were identified."""
+        return {"track": Part(self.following.saved, self._restore)}
+
+    def _restore(self, saved: Any, _: Mapping[str, str]) -> None:
+        self.following.restore(saved)
+        self.panel.show()
 
     def close(self) -> None:
         """Ends the watch of the folder."""

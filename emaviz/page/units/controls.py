@@ -59,11 +59,24 @@ class UnitsPanel:
         """A folder by its name; on the screen's thread."""
         self._folder.choose(name)
 
+    def show(self) -> None:
+        """What is chosen and its answer, as a session's file says."""
+        comparing = self._comparing
+        self._rule.value = comparing.rule
+        self.refresh()
+        self._actuator.value = comparing.actuator_name
+        self._practice.show(comparing.chosen)
+        self._result.show(comparing.found)
+
     def _listed(self) -> dict[str, str]:
-        return {
+        comparing = self._comparing
+        listed = {
             f"{'the data folder' if name == '.' else name} ({count} unit{'s' if count > 1 else ''})": name
-            for name, count in self._comparing.fleets().items()
+            for name, count in comparing.fleets().items()
         }
+        if comparing.found is not None and comparing.chosen not in listed.values():
+            listed[f"{comparing.chosen} (not in the data folder)"] = comparing.chosen  # of a session
+        return listed
 
     def _take_folder(self, name: str) -> None:
         self._page.checked(lambda: self._comparing.choose(name))

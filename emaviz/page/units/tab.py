@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import viser
 
 from emaviz.page.tab import Shared, Tab
 from emaviz.page.units import WORKSPACE
 from emaviz.page.units.controls import UnitsPanel
 from emaviz.page.units.result import UnitsResult
+from emaviz.session.saved import Part
 from emaviz.session.units.comparing_units import ComparingUnits
 
 
@@ -25,6 +29,14 @@ class UnitsTab(Tab):
     def build(self) -> None:
         """Which units, what is held out, and the run."""
         self.panel = UnitsPanel(self.page, self.comparing, self.result)
+
+    def kept(self) -> dict[str, Part]:
+        """What is chosen, and the answer."""
+        return {"units": Part(self.comparing.saved, self._restore, self.comparing.files)}
+
+    def _restore(self, saved: Any, names: Mapping[str, str]) -> None:
+        self.comparing.restore(saved, names)
+        self.panel.show()
 
     def close(self) -> None:
         """Ends the run."""

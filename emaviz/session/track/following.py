@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ema_model.errors import InputError
+from ema_model.actuator.write import as_toml
+from ema_model.errors import InputError, quoted
 from ema_model.files.arriving import LOOK_S, Watched
 from ema_model.identification.run import Progress
 from ema_model.recordings import read
@@ -27,6 +28,7 @@ from emaviz.session.opened import side_file_of
 from emaviz.session.practice import Practice
 from emaviz.session.session import Session
 from emaviz.session.signal import Signal
+from emaviz.session.track import kept
 from emaviz.session.track.keep import keep
 from emaviz.session.worker import Worker
 
@@ -58,8 +60,9 @@ class Following:
         self.left_out: dict[str, str] = {}  # why a file is, by its name
         self.history: History | None = None  # as it was followed last
         self._growing: History | None = None
-        self._path = folder.folder
+        self._path: Path | None = folder.folder  # None: a session's, which is not there
         self._flights: dict[Path, Flight] = {}
+        self._brought_flights: list[Flight] = []  # by a session, until they are followed
         self._watched = Watched()
         self._closed = threading.Event()
         self._looks: threading.Thread | None = None
@@ -78,7 +81,7 @@ class Following:
             raise InputError("flights are being identified; stop that first")
         if name != self.chosen or self._path != path:
             self.chosen, self.history, self._growing, self.left_out = str(name), None, None, {}
-            self._path, self._flights, self._watched = path, {}, Watched()
+            self._path, self._flights, self._brought_flights, self._watched = path, {}, [], Watched()
             challenge = self.practice.held(self.chosen)
             own = dict(self.thresholds.items() - self._brought.items())
             self._brought = {} if challenge is None else challenge.thresholds
@@ -93,13 +96,21 @@ class Following:
         self.thresholds = others
 
     @property
+    def is_elsewhere(self) -> bool:
+        """Whether the folder is one of a session, and not here."""
+        return self._path is None
+
+    @property
     def last(self) -> Tracked | None:
         """What is known after the last flight."""
         return None if self.history is None else self.history.last
 
     def file_of(self, flight: Flight) -> str:
-        """The name in the data folder of a flight's recording."""
-        return next(self.folder.name_of(path) for path, one in self._flights.items() if one is flight)
+        """The name in the data folder of a flight's recording; InputError where it is not there any more."""
+        path = next((path for path, one in self._flights.items() if one is flight), None)
+        if path is None:
+            raise InputError(f"{quoted(flight.name)}: its recording is not in the data folder, or is another by now")
+        return self.folder.name_of(path)
 
     # --- the run ----------------------------------------------------------------------------------------------------
 
@@ -111,7 +122,8 @@ class Following:
         """
         if not self.chosen:
             raise InputError("no folder of flights is chosen; put one into the data folder, and choose it")
-        paths = self._paths()
+        self._path = self._path or self.folder.inner(self.chosen)  # it may have come since
+        paths = self._paths(self._path)
         self.left_out = {}  # it may have been mended
         self._watched.arrived(paths)
         started = self._start(paths, "Identifying flights")
@@ -120,10 +132,10 @@ class Following:
             self._watch()
         return started
 
-    def _paths(self) -> list[Path]:
+    def _paths(self, folder: Path) -> list[Path]:
         """In order of time; the data folder itself has folders of the app beside its flights."""
         try:
-            paths = in_order(recordings_in(self._path)) if self.chosen == "." else flights_in(self._path)
+            paths = in_order(recordings_in(folder)) if self.chosen == "." else flights_in(folder)
             check_order(paths)
         except InputError as error:
             raise InputError(str(error).replace(f"{self.folder.folder}/", "")) from None
@@ -175,7 +187,9 @@ class Following:
 
     def _follow(self, run: Run, share: float) -> None:
         """Looks after each flight, of all that are identified; share: of the bar."""
-        flights = [self._flights[path] for path in in_order(self._flights)]
+        self._grow([self._flights[path] for path in in_order(self._flights)], run, share)
+
+    def _grow(self, flights: list[Flight], run: Run, share: float) -> None:
         if self._growing is None or self._growing.thresholds != self.thresholds:
             self._growing = History(self.thresholds)
         for done in self._growing.follow(flights):
@@ -191,9 +205,10 @@ class Following:
 
     def _look_on(self) -> None:
         while not self._closed.wait(LOOK_S):
-            if self.watching and self.chosen and not self.session.worker.busy:
+            path = self._path
+            if self.watching and self.chosen and path is not None and not self.session.worker.busy:
                 try:
-                    self.take_up(self._watched.arrived(recordings_in(self._path)))
+                    self.take_up(self._watched.arrived(recordings_in(path)))
                 except (InputError, OSError) as error:
                     self.session.events.told("The folder cannot be watched", str(error))
                     self.watching = False
@@ -215,6 +230,51 @@ class Following:
                 self.events.left_out()
         if len(good) > len(self._flights) and not self._start(in_order(good), "Taking up flights"):
             self._watched.forget(new)  # something else has just begun: at the next look
+
+    # --- what a session's file holds --------------------------------------------------------------------------------
+
+    def saved(self) -> dict[str, Any]:
+        """The flights that are followed, as they were identified, and what is asked of them."""
+        flights = self._brought_flights if self.history is None else self.history.flights
+        return kept.saved(self.chosen, self.thresholds, as_toml(self.session.actuator), flights, dict(self._flights))
+
+    def restore(self, saved: Any) -> None:
+        """Takes what `saved` gave: its flights are followed soon, and none is identified, whether it is there or not.
+
+        InputError, and nothing changes, for what makes no sense or is of another actuator, and while flights are
+        identified.
+        """
+        told = kept.read(saved)
+        flights = [one.flight for one in told.flights]
+        if flights and told.actuator != as_toml(self.session.actuator):
+            raise InputError("the session's flights are of another actuator; start the app with that one")
+        if len({one.common.shape for one in flights if not one.excluded}) > 1:
+            raise InputError("the session's flights are of several actuators; save it anew")
+        if self.job.running:
+            raise InputError("flights are being identified; stop that first")
+        try:
+            self._path = self.folder.inner(told.folder) if told.folder else self.folder.folder
+        except InputError:
+            self._path = None
+        self.chosen, self.thresholds, self._brought = told.folder, told.thresholds, {}
+        self.history, self._growing, self.left_out, self._watched = None, None, {}, Watched()
+        files = [] if self._path is None else [self._path / Path(one.file).name for one in told.flights]
+        self._flights = {
+            path: flight for path, one, flight in zip(files, told.flights, flights) if one.file and one.is_of(path)
+        }
+        self._watched.arrived(self._flights)
+        self._watched.take(self._flights)
+        self._brought_flights = flights
+        if not flights:
+            return
+
+        def work(run: Run) -> None:
+            if self._brought_flights is flights:  # nothing else was chosen while it waited
+                self._grow(flights, run, 1.0)
+            if self.history is not None and self.last is not None:
+                self.events.followed(self.history)
+
+        self.job.begin_when_free("Following k", work, lambda: True)
 
     # --- what stays -------------------------------------------------------------------------------------------------
 

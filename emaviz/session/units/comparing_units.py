@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from pathlib import Path, PurePosixPath
@@ -21,6 +21,7 @@ from emaviz.session.opened import side_file_of
 from emaviz.session.practice import Practice
 from emaviz.session.session import Session
 from emaviz.session.signal import Signal
+from emaviz.session.units import kept
 from emaviz.session.worker import Worker
 
 UNSEEN = "*unseen*"  # what recordings to hold out are often called
@@ -127,6 +128,31 @@ class ComparingUnits:
         if found is None:
             raise InputError("no units are compared yet; press Compare units first")
         self._files.post(f"units {suffix}", lambda: self._keep(found, suffix))
+
+    def saved(self) -> dict[str, Any]:
+        """What a session's file holds of it."""
+        return kept.saved(self.chosen, self.rule, self.actuator_name, self.found)
+
+    def restore(self, saved: Any, names: Mapping[str, str]) -> None:
+        """Takes what `saved` gave, the answer too; its recordings need not be there.  InputError, and nothing changes.
+
+        names: the files' names of now by those of then.
+        """
+        if self.job.running:
+            raise InputError("units are being compared; stop that first")
+        told, found = kept.read(saved)
+        actuator = told.actuator
+        if actuator.startswith(actuator_files.UPLOADED):
+            name = actuator.removeprefix(actuator_files.UPLOADED)
+            actuator = actuator_files.UPLOADED + names.get(name, name)
+        if actuator in self.actuators():
+            self.choose_actuator(actuator)
+        self.chosen, self.rule, self.found = told.folder, told.rule, found
+
+    def files(self) -> list[str]:
+        """Names in the data folder of what a session needs for it."""
+        uploaded = self.actuator_name.startswith(actuator_files.UPLOADED)
+        return [self.actuator_name.removeprefix(actuator_files.UPLOADED)] if uploaded else []
 
     def _keep(self, found: UnitsCompared, suffix: str) -> None:
         if suffix == REPORT:

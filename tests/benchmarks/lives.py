@@ -1,0 +1,123 @@
+"""The life that remains as the tracking tells it, beside an exponential fit, a particle filter, and an oracle.
+
+    python tests/benchmarks/lives.py [--seeds 30] [--first 60000]
+
+Lives are drawn as in the plan `lives`; all are asked after the same flights: those at λ between the one in which the
+tracking declares a trend and the end.  The peers are given the same k since the last jump that the tracking found; the
+oracle k without what the unit's base parameters add, since the last repair, and the law with its exponent, its onset
+and how unevenly flights wear.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections import defaultdict
+
+import numpy as np
+from life_peers import Law, exponential_fit, oracle, particle_filter
+
+from ema_model import faults
+from ema_model.campaign.kinds.track import ALPHA, LAMBDA, LAMBDAS, Told, places
+from ema_model.estimation.unknowns import ECCENTRICITY, to_vector
+from ema_model.lives import LAWS, Life, drawn, worn_life
+from ema_model.lives.recorded import base_of
+from ema_model.tracking.flight import Flight
+from ema_model.tracking.track import Tracker
+
+WAYS = ("emaviz", "exponential fit", "particle filter", "oracle")
+VARIATIONS = (0.5, 1.0)
+
+
+def answers(life: Life) -> dict[str, list[Told]]:
+    """What each way tells at λ = 0 and at each of LAMBDAS; nothing where no trend is declared before the end."""
+    last, flights = life.flights - 1, drawn(life)
+    tracker = Tracker({life.fault: life.threshold}, life.seed)
+    looks: list[int] = []
+    told: dict[str, list[Told]] = {name: [] for name in WAYS}
+    for i, flight in enumerate(flights):
+        tracker.add(flight)
+        if not looks and tracker.has_trend(life.fault) and (life.repaired or 0) <= i < last:
+            looks = places(i, last, (0.0, *LAMBDAS))
+        if i in looks:
+            for name, quantiles in after(life, flights[: i + 1], tracker).items():
+                told[name] += [Told(i, float(last - i), *quantiles)] * looks.count(i)
+    return told
+
+
+def after(life: Life, flights: list[Flight], tracker: Tracker) -> dict[str, tuple[float, float, float]]:
+    """By way, 5, 50 and 95 % of the flights that remain."""
+    one = tracker.look().faults[life.fault]
+    healthy = faults.BY_NAME[life.fault].healthy
+    sign = 1.0 if life.threshold > healthy else -1.0
+    numbered = [(i + 1.0, flight) for i, flight in enumerate(flights) if not flight.excluded]
+    begin = next((i for i, (_, f) in enumerate(numbered) if one.jumps and f.name == one.jumps[-1].flight), 0)
+    at = np.array([number for number, _ in numbered])
+    given = at[begin:], sign * (one.k[begin:] - healthy), one.sigma[begin:]
+    now, threshold = float(len(flights)), sign * (life.threshold - healthy)
+    left = one.remaining
+    return {
+        "emaviz": (np.nan,) * 3 if left is None else (left.p05, left.p50, left.p95),
+        "exponential fit": exponential_fit(*given, now, threshold),
+        "particle filter": particle_filter(*given, now, threshold, life.seed),
+        "oracle": _oracle(life, numbered, now, threshold, sign * healthy, sign),
+    }
+
+
+def _oracle(life: Life, numbered: list, now: float, threshold: float, healthy: float, sign: float):
+    place = faults.NAMES.index(life.fault)
+    way = np.zeros(len(faults.NAMES))
+    way[place] = sign
+    if life.fault == "k6":
+        places_of = list(ECCENTRICITY)
+        vector = to_vector(life.k[-1])[places_of]
+        way[:] = 0.0
+        way[places_of] = vector / np.hypot(*vector)
+    first = life.repaired or 0
+    since = [(number, flight) for number, flight in numbered if number > first]
+    base = base_of(life, since[0][1].common.shape[1])
+    at = np.array([number for number, _ in since])
+    k = np.array([way @ (flight.k - flight.common @ base) - healthy for _, flight in since])
+    sigma = np.array([np.sqrt(way @ flight.own @ way) for _, flight in since])
+    begun = 0.0 if life.fault == "k8" else 0.05
+    law = Law(life.power, max(0, life.onset - first), life.variation, begun)
+    return oracle(at, k, sigma, now, threshold, law, first + 1)
+
+
+def main() -> None:
+    """Prints a table of each law."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--seeds", type=int, default=30, help="of each law and each of two variations of wear")
+    parser.add_argument("--first", type=int, default=60000)
+    asked = parser.parse_args()
+    print("| law | way | 90 % holds, % | undefined | α-λ | cumulative relative accuracy, mean / median |")
+    print("|---|---|---|---|---|---|")
+    for law in LAWS:
+        lives = [
+            answers(worn_life(law, seed, variation))
+            for variation in VARIATIONS
+            for seed in range(asked.first, asked.first + asked.seeds)
+        ]
+        seen = [one for one in lives if one["emaviz"]]
+        measured = defaultdict(list)
+        for life in seen:
+            for name in WAYS:
+                told = life[name]
+                defined = [one for one in told if one.defined]
+                middle = told[1 + LAMBDAS.index(LAMBDA)]
+                measured[name, "held"] += [one.p05 <= one.true <= one.p95 for one in defined]
+                measured[name, "undefined"] += [not one.defined for one in told]
+                measured[name, "alpha"].append(middle.defined and middle.relative_accuracy >= 1.0 - ALPHA)
+                accuracies = [one.relative_accuracy for one in told[1:] if one.defined]
+                measured[name, "cra"] += [np.mean(accuracies)] if accuracies else []
+        for name in WAYS:
+            held, undefined, alpha, cra = (measured[name, one] for one in ("held", "undefined", "alpha", "cra"))
+            print(
+                f"| {law}, {len(seen)} of {len(lives)} lives | {name} | {100.0 * np.mean(held):.1f} | "
+                f"{sum(undefined)} of {len(undefined)} | {np.mean(alpha):.2f} | "
+                f"{np.mean(cra):.2f} / {np.median(cra):.2f} |",
+                flush=True,
+            )
+
+
+if __name__ == "__main__":
+    main()

@@ -14,6 +14,7 @@ from typing import Any
 
 import viser
 
+from emaviz.page import inset
 from emaviz.page.docked import WINDOWS_PX, Docked
 from emaviz.page.style import unseen
 from emaviz.server.viser_private import Inside, id_of
@@ -50,6 +51,7 @@ _SCRIPT = """
     wanted = null;
     if (now.name === told) return;
     told = now.name;
+    window.emavizInset?.enter(now.inset);
     const address = new URL(location.href);
     address.searchParams.set('view', told);
     history.replaceState(history.state, '', address);
@@ -88,6 +90,7 @@ class Workspace:
     icon: viser.IconName
     place: int
     share: float = 0.58  # of what the left panel leaves of a window, that its results have beside the actuator
+    inset: bool = True  # whether the actuator is small there until it is clicked, and results have the width
 
 
 class Workspaces:
@@ -120,9 +123,11 @@ class Workspaces:
             button.on_click(lambda event, px=px: event.client and self._docked.fit(event.client.client_id, px))
         add_html(gui, unseen([id_of(button) for button in (*buttons.values(), *widths.values())]))
         views = [
-            {"name": name, "title": one.title, "button": id_of(buttons[name])} for name, one in self._members.items()
+            {"name": name, "title": one.title, "inset": one.inset, "button": id_of(buttons[name])}
+            for name, one in self._members.items()
         ]
         fits = [{"px": px, "button": id_of(button)} for px, button in widths.items()]
+        self._inside.run(inset.script())
         script = _SCRIPT.replace("VIEWS", json.dumps(views)).replace("WIDTHS", json.dumps(fits))
         self._inside.run(script.replace("FIRST", json.dumps(self.first)))
 

@@ -72,7 +72,7 @@ def style() -> Html:
     columns = f"{right} div:has(> div > .emaviz-columns)"
     return unescaped(
         "<style>"
-        ":root{--emaviz-inset:clamp(190px,31vh,330px)}"
+        ":root{--emaviz-inset:clamp(150px,calc(46vh - 138px),330px)}"
         f"{inset} [data-dock-root] > div:has(> canvas){{inset:auto auto 8px 8px!important;"
         "width:calc(var(--emaviz-left) - 16px)!important;height:var(--emaviz-inset)!important;z-index:6;"
         "border:1px solid rgba(134,142,150,.55);border-radius:6px;overflow:hidden;cursor:pointer}"

@@ -69,6 +69,7 @@ class IdentifyResult:
                 hint="The run that would tell them apart; then identify again",
             )
             self._fit = LiveFit(gui)
+            page.workspaces.heights.add(self._fit.handles, spare_px=30)
         with panel.add_tab("Landscape", viser.Icon.MAP_2):
             self._landscape = LandscapeView(page, slow)
         with panel.add_tab("History", viser.Icon.TABLE):

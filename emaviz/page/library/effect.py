@@ -18,6 +18,8 @@ from emaviz.text.html import add_html, html
 from emaviz.text.mathml import mathml
 from emaviz.text.notes import BOX, note
 
+_FIRST = "cogging_torque"  # shown until another one is chosen
+
 
 class EffectPage:
     """An effect on the right: what it is, a slider for each parameter, the run with and without it."""
@@ -34,7 +36,13 @@ class EffectPage:
         self._place = gui.add_folder("What each parameter does", visible=False)
         self._status = add_html(gui)
         self._charts = EffectCharts(gui, page.session.actuator.axes)
+        page.workspaces.entered.connect(self._enter)
         self._run.on_update(lambda event: event.client and self._ask())
+
+    def _enter(self, workspace: str) -> None:
+        """A first visit finds an effect opened."""
+        if workspace == WORKSPACE.name and not self._name:
+            self.open(_FIRST)
 
     def open(self, name: str) -> None:
         """Shows an effect, and runs it; on the screen's thread."""

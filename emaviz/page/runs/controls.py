@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
+from datetime import datetime
 from typing import Any
 
 import viser
@@ -37,6 +38,7 @@ class RunsPanel:
         self._page, self._viewer, self._recorded = page, viewer, recorded
         self._files, self._result = files, result
         self._by_hand = False  # chosen; else the newest is shown
+        self._seen: tuple[str, datetime] | None = None  # which is shown at a glance
         gui = page.server.gui
         self._choice: Any = gui.add_dropdown("Run", (NONE,))
         self._card = add_html(gui, _empty("None yet: identify something, or record a comparison or a discovery."))
@@ -125,10 +127,24 @@ class RunsPanel:
         self._compare.disabled = self._rename.disabled = self._delete.disabled = not exists
         if not exists:
             self._card.content, self._link.content = _empty("None yet."), ""
+            self._result.show(Html(), None)
             return
-        self._card.content = _card(self._recorded.entry(name))
+        entry = self._recorded.entry(name)
+        self._card.content = _card(entry)
+        self._glance(entry)
         self._link.content = recording_link(self._viewer, self._recorded.path(name))
         self._name.value = name.removesuffix(".rrd")
+
+    def _glance(self, entry: Entry) -> None:
+        """The chosen run on the right, once somebody looks."""
+        if (entry.name, entry.at) == self._seen or not self._page.workspaces.anyone(WORKSPACE.name):
+            return
+        self._seen = entry.name, entry.at
+        told = html('<div style="padding:8px 2px 2px;font-size:14px"><b>{}</b></div>{}', entry.name, _card(entry))
+        try:
+            self._result.show(told, self._recorded.read(entry.name))
+        except InputError:  # it is not whole
+            self._result.show(told, None)
 
     def _open_chosen(self) -> None:
         if self._viewer is not None:

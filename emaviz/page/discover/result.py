@@ -86,8 +86,8 @@ class DiscoveryPanel:
         self._signal.on_update(lambda event: event.client and page.screen.post("residual", self._draw_residual))
         self._reveal.on_click(lambda _: page.screen.post("reveal", self._revealed))
 
-    def connect(self, ask: Callable[[Callable[[], bool]], None], close: Callable[[], None]) -> None:
-        """ask(begin) starts a step; close() closes the opened card."""
+    def connect(self, ask: Callable[[Callable[[], bool], Any], None], close: Callable[[], None]) -> None:
+        """ask(begin, button) starts a step; close() closes the opened card."""
         self._effect.connect(ask, close)
         self._next.connect(ask)
 
@@ -160,7 +160,7 @@ class DiscoveryPanel:
             self._explained.figure = explained_steps.figure(look.explained_before, look.assessment.left.explained)
 
     def _revealed(self) -> None:
-        self._page.checked(self._show_truth)
+        self._page.checked(self._show_truth, self._reveal)
 
     def _show_truth(self) -> None:
         if self._look is not None:

@@ -84,7 +84,7 @@ class LandscapeView:
             return
         x, y = (_NAMES.index(str(entry.value)) for entry in (self._x, self._y))
         through, close = self._place_held(race), self._extent.value == _CLOSE
-        self._page.begins(lambda: self._landscapes.draw(race, x, y, through, close))
+        self._page.begins(lambda: self._landscapes.draw(race, x, y, through, close), self._draw)
 
     def _place_held(self, race: Race) -> np.ndarray:
         """(8,): where the chosen search ended, or the answer."""

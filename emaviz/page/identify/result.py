@@ -143,7 +143,7 @@ class IdentifyResult:
 
     def _try_separating(self, client: viser.ClientHandle | None) -> None:
         run = self._separating
-        if run is not None and self._page.checked(lambda: self._to_explore(run)):
+        if run is not None and self._page.checked(lambda: self._to_explore(run), self._try):
             self._page.notify("Explore has the command", "On Identify, press Identify again.", "green")
             self._page.workspaces.go("explore", client)
 

@@ -9,6 +9,7 @@ from ema_model.faults import HEALTHY
 from ema_model.simulation.with_effect import RUNS, WithEffect
 from emaviz.figures.effect_signature import EffectCharts
 from emaviz.page.discover.effect import about
+from emaviz.page.inset import COLUMNS
 from emaviz.page.library import WORKSPACE
 from emaviz.page.page import Page
 from emaviz.page.playback import PlaybackStrip
@@ -30,6 +31,7 @@ class EffectPage:
         self.best_runs: dict[str, str] = {}  # by effect, where it shows most
         self._sliders: dict[str, Any] = {}
         gui = page.server.gui
+        add_html(gui, COLUMNS)
         self._title = add_html(gui, note("Choose an effect on the left."))
         self._text = add_html(gui)
         self._run = gui.add_dropdown("Run", tuple(RUNS), visible=False)
@@ -99,4 +101,4 @@ class EffectPage:
     def _ask(self) -> None:
         if self._name:
             settings = {name: float(slider.value) for name, slider in self._sliders.items()}
-            self._page.checked(lambda: self._library.feel(self._name, settings, str(self._run.value)))
+            self._page.checked(lambda: self._library.feel(self._name, settings, str(self._run.value)), self._run)

@@ -55,9 +55,9 @@ class RunsPanel:
             self._list = add_html(gui)
             again = gui.add_button("Read the folder again", icon=viser.Icon.REFRESH, color="gray")
         self._choice.on_update(lambda event: event.client and self._post(self._take_choice))
-        self._open.on_click(lambda _: self._post(self._open_chosen))
-        self._compare.on_click(lambda _: self._post(self._compare_two))
-        self._rename.on_click(lambda _: self._post(self._rename_chosen))
+        self._open.on_click(lambda _: self._post(self._open_chosen, self._open))
+        self._compare.on_click(lambda _: self._post(self._compare_two, self._compare))
+        self._rename.on_click(lambda _: self._post(self._rename_chosen, self._rename))
         self._delete.on_click(lambda event: event.client and self._ask(event.client))
         again.on_click(lambda _: self._post(self.refresh))
         page.session.identifying.identified.connect(lambda _: self.refresh_soon())
@@ -178,7 +178,7 @@ class RunsPanel:
         @yes.on_click
         def _(_: Any) -> None:
             modal.close()
-            self._post(lambda: self._delete_named(name))
+            self._post(lambda: self._delete_named(name), self._delete)
 
         no.on_click(lambda _: modal.close())
 
@@ -186,11 +186,11 @@ class RunsPanel:
         self._recorded.delete(name)
         self.refresh()
 
-    def _post(self, job: Callable[[], None]) -> None:
-        """On the files' thread; what is refused is told."""
+    def _post(self, job: Callable[[], None], control: Any = None) -> None:
+        """On the files' thread; what is refused stands beside the control."""
 
         def checked() -> None:
-            self._page.checked(job)
+            self._page.checked(job, control or self._choice)
 
         self._files.post(job.__qualname__, checked)
 

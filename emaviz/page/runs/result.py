@@ -14,7 +14,9 @@ from emaviz.recording.read import Recording
 from emaviz.text.html import Html, add_html, html
 
 _CONFIG = {"displayModeBar": False}
-_NOTHING = "Nothing is recorded yet. Identify something, or press Record below a comparison or a discovery: it is listed here."
+_NOTHING = (
+    "Nothing is recorded yet. Identify something, or press Record below a comparison or a discovery: it is listed here."
+)
 
 
 class RunsResult:
@@ -53,7 +55,7 @@ class RunsResult:
         self._close.visible, self._glance.visible = True, False
 
     def show(self, told: Html, recording: Recording | None) -> None:
-        """The chosen run at a glance, where the viewer is not open: what is said of it, and its current; None for none."""
+        """The chosen run, where the viewer is not open: what is said of it, and its current; None for none."""
         figure = one_recording.figure(recording) if recording is not None else None
         self._told, self._drawn = told or _hint(_NOTHING), figure is not None
         if figure is not None:

@@ -19,7 +19,6 @@ from emaviz.figures.identified_table import Row, table
 from emaviz.page.identify import WORKSPACE
 from emaviz.page.identify.landscape import LandscapeView
 from emaviz.page.identify.swarm import SwarmView
-from emaviz.page.inset import COLUMNS
 from emaviz.page.page import Page
 from emaviz.page.playback import PlaybackStrip
 from emaviz.scene.motion import PLAYED, motion
@@ -54,7 +53,6 @@ class IdentifyResult:
         self.rows: list[Row] = []
         gui = page.server.gui
         with panel.add_tab(_SEARCH, viser.Icon.CHART_DOTS):
-            add_html(gui, COLUMNS)
             self._convergence = LiveConvergence(gui)
             self._swarm = SwarmView(page)
         with panel.add_tab(_ANSWER, viser.Icon.TARGET_ARROW):

@@ -32,7 +32,7 @@ _SCRIPT = """
   window.emavizViews?.end();
   const asked = new URLSearchParams(location.search).get('view');
   let wanted = views.some(v => v.name === asked) ? asked : FIRST, told = null, pressed = 0;
-  const fitted = {};
+  const fitted = {}, passing = {};
   const tabs = () => [...document.querySelectorAll('[role=tab]')].filter(t => t.textContent.trim() in titles);
   const view = (tab) => titles[tab.textContent.trim()];
   const press = (tab) => {
@@ -63,15 +63,16 @@ _SCRIPT = """
   const fit = () => {
     for (const [side, steps] of Object.entries(sizes)) {
       const step = steps.filter(s => s.px <= window[side]).pop() ?? steps[0];
-      const button = document.getElementById(step.button);
-      if (!button || step.px === fitted[side]) continue;
+      const button = document.getElementById(step.button), rests = step.px === passing[side];
+      passing[side] = step.px;  // while an edge is dragged, sizes would overtake each other on their way
+      if (!button || !rests || step.px === fitted[side]) continue;
       fitted[side] = step.px;
       button.click();
     }
   };
   const seen = new MutationObserver(look);
   seen.observe(document.body, { subtree: true, attributes: true, attributeFilter: ['aria-selected'] });
-  const timer = setInterval(() => { if (told === null || wanted !== null) look(); fit(); }, 100);
+  const timer = setInterval(() => { if (told === null || wanted !== null) look(); }, 100), sizing = setInterval(fit, 250);
   window.emavizViews = {
     go: (name) => { wanted = name; look(); },
     front: (before, after) => {
@@ -80,7 +81,7 @@ _SCRIPT = """
         if ((!before || from.textContent.trim() === before) && to && to.offsetParent) press(to);
       }
     },
-    end: () => { seen.disconnect(); clearInterval(timer); },
+    end: () => { seen.disconnect(); clearInterval(timer); clearInterval(sizing); },
   };
 })();
 """

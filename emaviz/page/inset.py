@@ -10,6 +10,7 @@ from emaviz.text.html import Html, unescaped
 
 COLUMNS = Html('<div class="emaviz-columns"></div>')  # stands in a tab whose parts take two columns where there is room
 NEXT_COLUMN = Html('<div class="emaviz-next-column"></div>')  # stands in the folder that begins the second one
+ALL_COLUMNS = Html('<div class="emaviz-all-columns"></div>')  # stands in a folder that is as wide as both
 _LEAST_WIDTH_PX, _TWO_COLUMNS_PX = 900, 1240  # of a window
 _CLICK_PX = 4  # a pointer that moves further turns the actuator
 
@@ -88,6 +89,7 @@ def style() -> Html:
         "background:var(--mantine-color-body);color:var(--mantine-color-text)}"
         f"@media (min-width:{_TWO_COLUMNS_PX}px){{{columns}{{columns:2;column-gap:6px;padding-top:12px}}"
         f"{columns} > div{{break-inside:avoid}}"
-        f"{columns} > div:has(.emaviz-next-column){{break-before:column}}}}"
+        f"{columns} > div:has(.emaviz-next-column){{break-before:column}}"
+        f"{columns} > div:has(.emaviz-all-columns){{column-span:all}}}}"
         "</style>"
     )

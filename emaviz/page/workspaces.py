@@ -72,7 +72,8 @@ _SCRIPT = """
   };
   const seen = new MutationObserver(look);
   seen.observe(document.body, { subtree: true, attributes: true, attributeFilter: ['aria-selected'] });
-  const timer = setInterval(() => { if (told === null || wanted !== null) look(); }, 100), sizing = setInterval(fit, 250);
+  const timer = setInterval(() => { if (told === null || wanted !== null) look(); }, 100);
+  const sizing = setInterval(fit, 250);
   window.emavizViews = {
     go: (name) => { wanted = name; look(); },
     front: (before, after) => {

@@ -17,7 +17,7 @@ from emaviz.page.compare import WORKSPACE
 from emaviz.page.compare.moment import motion_of
 from emaviz.page.compare.plots import ComparePlots, View
 from emaviz.page.compare.raw_lines import RawLines
-from emaviz.page.inset import COLUMNS, NEXT_COLUMN
+from emaviz.page.inset import ALL_COLUMNS, COLUMNS, NEXT_COLUMN
 from emaviz.page.kept import Cleared
 from emaviz.page.page import Page
 from emaviz.page.playback import PlaybackStrip
@@ -63,6 +63,7 @@ class ResultPanel:
         self._headline = add_html(gui, html("<div {}>Nothing is compared yet: upload a measurement.</div>", _BOX))
         self._place = gui.add_folder("Preview of the columns", visible=False)
         with self._place:
+            add_html(gui, ALL_COLUMNS)
             self._lines = lines()
         self._answer = gui.add_folder("Where the model fails", visible=False)
         with self._answer:

@@ -8,6 +8,7 @@ import plotly.graph_objects as go
 import viser
 
 from emaviz.figures import one_recording, two_recordings
+from emaviz.page.inset import COLUMNS
 from emaviz.page.page import Page
 from emaviz.recording.entry import Entry
 from emaviz.recording.read import Recording
@@ -34,6 +35,7 @@ class RunsResult:
             self._glance: Any = gui.add_plotly(go.Figure(), config=_CONFIG, aspect=0.5, visible=False)
             self._close = gui.add_button("Close the viewer", icon=viser.Icon.X, color="gray", visible=False)
         with panel.add_tab("Two runs", viser.Icon.ARROWS_DIFF):
+            add_html(gui, COLUMNS)
             self._names = add_html(gui, _hint("Choose two on the left."))
             self._signal: Any = gui.add_dropdown("Signal", ("current_A",), visible=False)
             self._place = gui.add_folder("Signals and search", visible=False)

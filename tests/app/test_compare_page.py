@@ -225,7 +225,7 @@ def test_a_header_found_wrongly_is_clicked(compare, app, recording, tmp_path):
     assert list(app.comparing.opened[name].columns) == ["K1", "K2", "K3", "K4"]
 
     choose(page, "Header in line", "1")
-    page.get_by_text("line 1: no table begins there").wait_for()
+    page.locator(".emaviz-beside").filter(has_text="line 1: no table begins there").wait_for()
     wait_until(lambda: field(page, "Header in line").input_value() == "found by itself")
     page.get_by_role("button", name="4  t [ms];Soll <b> [°]").click()
     page.get_by_text("As said: header in line 4, Windows-1252.").wait_for()

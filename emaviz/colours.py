@@ -8,8 +8,8 @@ FAULT = "#ff5a00"  # on the actuator: what is broken, and nothing else
 FITTED, HELD_OUT = "#1098ad", "#9c36b5"  # what was fitted, and what was not
 TRUTH = "#2b8a3e"
 GHOST = "#9c6ade"  # a frozen run
-PHASES = ("#ec403a", "#28be5a", "#3878ff")  # A, B, C, in the charts and in the windings
-ALGORITHMS = {"robust": "#d6336c", "ssa": "#9c36b5", "hba": "#f08c00", "do": "#1098ad"}
+PHASES = ("#c9a200", "#0fa58a", "#c2459e")  # A, B, C, in the charts and in the windings: none is a model's or a fault's
+ALGORITHMS = {"robust": MONITOR, "ssa": "#9c36b5", "hba": "#846358", "do": "#1098ad"}
 
 
 def rgb(colour: str) -> tuple[int, int, int]:

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 
 from ema_model.actuator.naming import on_axes
 from ema_model.discovery.labels import effect_title, rung_title, settings
-from ema_model.discovery.result import Added, Discovery
+from ema_model.discovery.result import Added, Candidate, Discovery
 from ema_model.effects import find
 from ema_model.effects.effect import FAMILIES
 from ema_model.quantities.numbers import number
 from ema_model.quantities.shown import of_signal
 from ema_model.text import Facts, Table
+
+_DIVERGED = 1e3  # times what was predicted, by which a refit is worse than the model without the effect
 
 
 def added(found: Discovery) -> Iterator[Facts]:
@@ -71,12 +74,21 @@ def candidates(found: Discovery) -> Table | None:
         [
             effect_title(one.name),
             "–" if one.untestable_reason else f"{one.predicted_drop:.0f}",
-            "" if one.refitted_drop is None else f"{one.refitted_drop:.0f}".replace("-", "−"),
+            _refitted(one),
         ]
         for one in found.ranked
     ]
     remarks = [one.untestable_reason or "" for one in found.ranked]
     return Table(("predicted", "refitted"), rows, "candidates", remarks, "(fall of χ²)")
+
+
+def _refitted(one: Candidate) -> str:
+    """A refit that ends at far more than it could ever take away has diverged; its number says nothing."""
+    if one.refitted_drop is None:
+        return ""
+    if not -_DIVERGED * max(one.predicted_drop, 1.0) < one.refitted_drop < math.inf:
+        return "refit diverged"
+    return f"{one.refitted_drop:.0f}".replace("-", "−")
 
 
 def _three(rmse: float | None) -> str:

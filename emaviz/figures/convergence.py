@@ -31,7 +31,7 @@ class LiveConvergence:
             scales=_scales(150),
             axes=axes,
             legend={"show": False},
-            padding=PADDING,
+            padding=(PADDING[0], 14, *PADDING[2:]),  # half of the last number
             height=height,
         )
 

@@ -47,6 +47,7 @@ class LiveFan:
                 visible=False,
             )
             self._charts.append((chart, handle))
+        self.handles = [handle for _, handle in self._charts]
 
     def show(self, labels: Sequence[str], runs: Sequence[Measurement]) -> None:
         """labels: what each run is; both from the mildest to the worst, five."""

@@ -51,10 +51,10 @@ def fault_bars(
         rows.append(
             html(
                 '<tr title="{}">'
-                '<td style="white-space:nowrap;padding:1px 6px 1px 0"><b>{}</b> {}</td>'
+                '<td style="width:1%;white-space:nowrap;padding:1px 12px 1px 0"><b>{}</b> {}</td>'
                 '<td style="width:30%"><div style="position:relative;height:18px;background:#8686861c;'
                 'border-radius:3px">{}</div></td>'
-                '<td style="text-align:right;padding:0 6px;font-variant-numeric:tabular-nums">{}</td>'
+                '<td style="width:1%;text-align:right;padding:0 6px 0 12px;font-variant-numeric:tabular-nums">{}</td>'
                 '<td style="font-size:11.5px;{}">{}</td>'
                 "</tr>",
                 _values(i, k[i], None if ends is None else ends[i], limits[i]),

@@ -10,7 +10,7 @@ import viser
 from numpy.typing import NDArray
 
 from ema_model.identification.run import ALGORITHMS as TITLES
-from emaviz.colours import REFERENCE
+from emaviz.colours import DIFFERENCE, REFERENCE
 from emaviz.figures.convergence import colour
 from emaviz.figures.decimate import envelope
 from emaviz.figures.signals import CURSOR, PADDING, PLANT_LINE, POINTS, legend, time_axis, value_axis
@@ -55,6 +55,7 @@ class LiveFit:
             height=height,
             **common,
         )
+        self.handles = [self._currents, self._left]
 
     def show(self, time_s: Array, measured_A: Array, fitted_A: Mapping[str, Array]) -> None:
         """All arrays (blocks,); fitted by algorithm."""
@@ -71,7 +72,8 @@ class LiveFit:
                 MEASURED,
                 *(_line(name, drawn) for name, drawn in names),
             )
-            self._left.series = ({"label": "t [s]"}, *(_line(name, drawn) for name, drawn in names))
+            left = names if len(names) > 1 else [(names[0][0], DIFFERENCE)]
+            self._left.series = ({"label": "t [s]"}, *(_line(name, drawn) for name, drawn in left))
             self._legend.content = legend(
                 (REFERENCE, "measured"), *((drawn, TITLES.get(name, name)) for name, drawn in names)
             )

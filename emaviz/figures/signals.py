@@ -98,6 +98,11 @@ class LiveSignals:
             )
             self._charts.append((chart, handle))
 
+    @property
+    def handles(self) -> list[Any]:
+        """The charts, from above."""
+        return [handle for _, handle in self._charts]
+
     def show(
         self, reference: Measurement, monitor: Measurement, ghost: Measurement | None, window_s: tuple[float, float]
     ) -> None:
@@ -160,6 +165,7 @@ class LivePhases:
             height=height + 16,
             **common,  # type: ignore[arg-type]
         )
+        self.handles = [self._phases, self._equivalent]
 
     def show(
         self, reference: Measurement, monitor: Measurement, ghost: Measurement | None, window_s: tuple[float, float]
@@ -199,7 +205,7 @@ def time_axis(labelled: bool) -> Any:
 
 def value_axis(unit: str) -> Any:
     """The axis at the left of a chart."""
-    return {**AXIS, "scale": "y", "label": f"[{unit}]", "size": 48, "space": 24}
+    return {**AXIS, "scale": "y", "label": f"[{unit}]", "size": 48, "space": 16}
 
 
 def _difference_axis(unit: str) -> Any:
@@ -207,7 +213,7 @@ def _difference_axis(unit: str) -> Any:
         **value_axis(unit),
         "scale": "difference",
         "side": 1,
-        "label": f"difference [{unit}]",
+        "label": f"Δ [{unit}]",
         "stroke": DIFFERENCE,
         "grid": {"show": False},
     }

@@ -18,7 +18,7 @@ _WIDTH, _PLANE_HEIGHT, _LINES_HEIGHT = 460, 330, 330
 _LEFT, _RIGHT, _TOP, _BOTTOM = 44, 14, 10, 36
 _MOST_DRAWN = 150  # candidates of one swarm
 # of a window: with what stands above it, the picture is seen whole; its letters grow no larger than others
-_FITS = "max-height:min(calc(100vh - 560px),430px);min-height:200px"
+_FITS = "max-height:min(calc(100vh - 560px),640px);min-height:200px"
 _INK = 'fill="currentColor"'
 
 

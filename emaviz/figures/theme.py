@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import math
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
@@ -26,6 +27,7 @@ SHADE = "rgba(224,49,49,0.16)"
 MARK = "#c2255c"
 POINTS = 4000  # of a trace, at most
 FLOOR_NAME = f"floor ±{BAND_SIGMAS:g}σ"
+_INDEX = re.compile(r"\b(Δ?[A-Za-zθω])_([A-Za-z]+)\b")
 _MOST_SHADES = 150
 _FONT = "system-ui, 'Segoe UI', Helvetica, Arial, sans-serif"
 
@@ -90,8 +92,8 @@ def new(title: str, x: str, y: str, *, dark: bool = False) -> go.Figure:
     figure.update_layout(
         template=(DARK if dark else LIGHT).template(),
         title={"text": f"<b>{plain(title)}</b>", "y": 1.0, "yanchor": "top", "pad": {"t": 6, "l": 8}},
-        xaxis={"title": {"text": plain(x)}},
-        yaxis={"title": {"text": plain(y)}},
+        xaxis={"title": {"text": lowered(plain(x))}},
+        yaxis={"title": {"text": lowered(plain(y))}},
         margin={"l": 48, "r": 14, "t": 30, "b": 0},  # below, as axis and legend need: a narrow panel has no more
         # Below the axes: above, its second row would run into the title on a narrow panel.
         legend={
@@ -111,6 +113,11 @@ def new(title: str, x: str, y: str, *, dark: bool = False) -> go.Figure:
 def plain(text: str) -> str:
     """Text that Plotly shows as it is; it takes tags for its own otherwise."""
     return html.escape(text, quote=False)
+
+
+def lowered(text: str) -> str:
+    """A symbol's index set low: 'I_eq [A]' of `plain` text, as Plotly writes it."""
+    return _INDEX.sub(r"\1<sub>\2</sub>", text)
 
 
 def missing(title: str, why: str, *, dark: bool = False) -> go.Figure:
@@ -158,4 +165,4 @@ def shade(figure: go.Figure, ranges: Iterable[tuple[float, float]], window: tupl
 def moment(figure: go.Figure, x: float | None) -> None:
     """A thin upright line: where the play-head stands."""
     if x is not None:
-        figure.add_shape(type="line", x0=x, x1=x, yref="y domain", y0=0, y1=1, line={"width": 1.5, "color": MARK})
+        figure.add_shape(type="line", x0=x, x1=x, yref="y domain", y0=0, y1=1, line={"width": 1.5, "color": EDGE})

@@ -9,6 +9,7 @@ from emaviz.session.job import Job
 from emaviz.text.html import add_html
 from emaviz.text.notes import boxed
 from emaviz.text.time_left import going_on
+from emaviz.text.told import warned
 
 
 class JobLine:
@@ -71,4 +72,4 @@ class JobLine:
     def _ended(self, text: str) -> None:
         with self._page.server.atomic():
             self._stop.visible = self._pause.visible = self._bar.visible = False
-            self.say(text)
+            self.say(warned([self._job.error]) if self._job.error and not text else text)

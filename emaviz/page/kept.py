@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import viser
 
@@ -48,16 +48,16 @@ class KeepButtons:
         folder: DataFolder,
         viewer: ViewerHost | None,
         kept: Signal[[Path]],
-        save: Callable[[str], object],
+        save: Callable[[str, Any], object],
         *buttons: Keeps,
     ) -> None:
-        """what: is kept, a word that no other tab has; save(suffix): asks for the file; kept: it is written."""
+        """what: is kept, a word that no other tab has; save(suffix, button): asks for the file; kept: it is written."""
         self._folder, self._viewer, self._save = folder, viewer, save
         self._asked: viser.ClientHandle | None = None  # who is sent the file
         gui = page.server.gui
         for one in buttons:
             button = gui.add_button(one.label, icon=one.icon, hint=one.hint)
-            button.on_click(lambda event, suffix=one.suffix: self._ask(event.client, suffix))
+            button.on_click(lambda event, suffix=one.suffix, button=button: self._ask(event.client, suffix, button))
         self._links = add_html(gui)
         kept.connect(lambda path: page.screen.post(f"{what} kept {path.suffix}", lambda: self._kept(path)))
 
@@ -76,9 +76,9 @@ class KeepButtons:
         """What is to be said of a file that has just been written."""
         return ""
 
-    def _ask(self, client: viser.ClientHandle | None, suffix: str) -> None:
+    def _ask(self, client: viser.ClientHandle | None, suffix: str, button: Any) -> None:
         self._asked = client
-        self._save(suffix)
+        self._save(suffix, button)
 
     def _kept(self, path: Path) -> None:
         if path.suffix == RECORD.suffix:

@@ -35,7 +35,7 @@ class Leads:
 
         def follow(event: viser.GuiEvent[Any]) -> None:
             def taken() -> None:
-                if self._page.checked(lead.take):
+                if self._page.checked(lead.take, button):
                     self._page.workspaces.go(lead.to, event.client)
 
             self._page.screen.post(f"lead {lead.label}", taken)

@@ -42,22 +42,23 @@ class Page:
             if control is None:
                 self.notify("Input refused", str(error))
             else:
-                self._beside(control, str(error))
+                self.say_beside(control, str(error))
             return False
-        if control is not None and id_of(control) in self._refused:
-            self._beside(control, "")
+        if control is not None:
+            self.say_beside(control, "")
         return True
 
-    def ask(self, kind: str, asked: Callable[[], Any]) -> None:
-        """Does what was asked soon, on the screen's thread; what is refused becomes a message."""
+    def ask(self, kind: str, asked: Callable[[], Any], control: Any = None) -> None:
+        """Does what was asked soon, on the screen's thread; what is refused stands beside the control that asked."""
 
         def checked() -> None:
-            self.checked(asked)
+            self.checked(asked, control)
 
         self.screen.post(kind, checked)
 
-    def _beside(self, control: Any, text: str) -> None:
-        if control is not None:
+    def say_beside(self, control: Any, text: str) -> None:
+        """Stands below a control until it is used again; no text takes it away."""
+        if text or id_of(control) in self._refused:
             (self._refused.add if text else self._refused.discard)(id_of(control))
             say_beside(Inside(self.server), control, text)
 

@@ -30,7 +30,9 @@ class PracticeButtons:
                     hint="Its recordings are made in the data folder, in some seconds",
                 )
                 button.on_click(
-                    lambda _, one=one: page.ask("challenge", lambda: page.begins(lambda: practice.open(one)))
+                    lambda _, one=one, button=button: page.ask(
+                        "challenge", lambda: page.begins(lambda: practice.open(one), button)
+                    )
                 )
         practice.made.connect(lambda name: page.screen.post("challenge made", lambda: chosen(name)))
 
@@ -52,7 +54,7 @@ class Seal:
         with self._place:
             button = gui.add_button("Open the seal", icon=viser.Icon.LOCK_OPEN, color="gray")
             self._told = add_html(gui)
-        button.on_click(lambda _: page.ask("seal", self._open))
+        button.on_click(lambda _: page.ask("seal", self._open, button))
 
     def show(self) -> None:
         """Something else is shown: the seal is closed again."""

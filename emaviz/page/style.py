@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from emaviz.figures.theme import DARK, MARK
+from emaviz.figures.theme import DARK
+from emaviz.page import inset
 from emaviz.text.html import Html, html, unescaped
 
 STRIP = Html('<div class="emaviz-strip"></div>')  # stands in the panel that becomes the strip
@@ -44,7 +45,7 @@ def page() -> Html:
         f"div:has(> div > .emaviz-long) {_LABEL}{{width:10.4em!important}}"
         "</style>"
     )
-    return rules + _strip()
+    return rules + _strip() + inset.style()
 
 
 def _strip() -> Html:
@@ -100,7 +101,7 @@ def play_head(share: float | None) -> Html:
         return Html()
     return unescaped(
         "<style>div:has(> div > .emaviz-time) .u-over::after{content:'';position:absolute;top:0;bottom:0;"
-        f"left:{100.0 * share:.2f}%;width:1.5px;background:{MARK};pointer-events:none}}</style>"
+        f"left:{100.0 * share:.2f}%;width:1.5px;background:currentColor;opacity:.65;pointer-events:none}}</style>"
     )
 
 

@@ -1,6 +1,6 @@
 """The workspaces: a window's tab, its panel on the right, its address and the actuator's run change together.
 
-Each window has its own: the server is told which tab is in front there, and how wide the window is, by buttons that
+Each window has its own: the server is told which tab is in front there, and how large the window is, by buttons that
 nobody sees, and shows that window alone the panel that belongs to it.  The 3D scene is the server's, so the actuator
 plays for the window that was used last.
 """
@@ -9,26 +9,30 @@ from __future__ import annotations
 
 import json
 import threading
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import viser
 
-from emaviz.page.docked import WINDOWS_PX, Docked
+from emaviz.page import chart_heights, docked, inset
+from emaviz.page.chart_heights import ChartHeights
+from emaviz.page.docked import Docked
 from emaviz.page.style import unseen
 from emaviz.server.viser_private import Inside, id_of
 from emaviz.session.signal import Signal
 from emaviz.session.worker import Worker
 from emaviz.text.html import add_html
 
-# On the page: the tab in front goes into the address and to the server, as does the window's width; `go` and a reload's
+# On the page: the tab in front goes into the address and to the server, as does the window's size; `go` and a reload's
 # address choose a tab.
 _SCRIPT = """
 (() => {
-  const views = VIEWS, widths = WIDTHS, titles = Object.fromEntries(views.map(v => [v.title, v]));
+  const views = VIEWS, sizes = SIZES, titles = Object.fromEntries(views.map(v => [v.title, v]));
   window.emavizViews?.end();
   const asked = new URLSearchParams(location.search).get('view');
-  let wanted = views.some(v => v.name === asked) ? asked : FIRST, told = null, pressed = 0, fitted = null;
+  let wanted = views.some(v => v.name === asked) ? asked : FIRST, told = null, pressed = 0;
+  const fitted = {}, passing = {};
   const tabs = () => [...document.querySelectorAll('[role=tab]')].filter(t => t.textContent.trim() in titles);
   const view = (tab) => titles[tab.textContent.trim()];
   const press = (tab) => {
@@ -50,21 +54,26 @@ _SCRIPT = """
     wanted = null;
     if (now.name === told) return;
     told = now.name;
+    window.emavizInset?.enter(now.inset);
     const address = new URL(location.href);
     address.searchParams.set('view', told);
     history.replaceState(history.state, '', address);
     button.click();
   };
   const fit = () => {
-    const width = widths.filter(w => w.px <= innerWidth).pop() ?? widths[0];
-    const button = document.getElementById(width.button);
-    if (!button || width.px === fitted) return;
-    fitted = width.px;
-    button.click();
+    for (const [side, steps] of Object.entries(sizes)) {
+      const step = steps.filter(s => s.px <= window[side]).pop() ?? steps[0];
+      const button = document.getElementById(step.button), rests = step.px === passing[side];
+      passing[side] = step.px;  // while an edge is dragged, sizes would overtake each other on their way
+      if (!button || !rests || step.px === fitted[side]) continue;
+      fitted[side] = step.px;
+      button.click();
+    }
   };
   const seen = new MutationObserver(look);
   seen.observe(document.body, { subtree: true, attributes: true, attributeFilter: ['aria-selected'] });
-  const timer = setInterval(() => { if (told === null || wanted !== null) look(); fit(); }, 100);
+  const timer = setInterval(() => { if (told === null || wanted !== null) look(); }, 100);
+  const sizing = setInterval(fit, 250);
   window.emavizViews = {
     go: (name) => { wanted = name; look(); },
     front: (before, after) => {
@@ -73,7 +82,7 @@ _SCRIPT = """
         if ((!before || from.textContent.trim() === before) && to && to.offsetParent) press(to);
       }
     },
-    end: () => { seen.disconnect(); clearInterval(timer); },
+    end: () => { seen.disconnect(); clearInterval(timer); clearInterval(sizing); },
   };
 })();
 """
@@ -88,13 +97,15 @@ class Workspace:
     icon: viser.IconName
     place: int
     share: float = 0.58  # of what the left panel leaves of a window, that its results have beside the actuator
+    inset: bool = True  # whether the actuator is small there until it is clicked, and results have the width
 
 
 class Workspaces:
     """Which windows are where.  entered: called with the name, on the screen's thread, when a window comes there."""
 
-    def __init__(self, server: viser.ViserServer, screen: Worker, docked: Docked, first: str) -> None:
-        self._server, self._inside, self._screen, self._docked = server, Inside(server), screen, docked
+    def __init__(self, server: viser.ViserServer, screen: Worker, panels: Docked, first: str) -> None:
+        self._server, self._inside, self._screen, self._docked = server, Inside(server), screen, panels
+        self.heights = ChartHeights(self._inside)
         self.first = first  # where a window without a place in its address begins
         self.entered: Signal[[str]] = Signal()
         self._members: dict[str, Workspace] = {}
@@ -114,16 +125,26 @@ class Workspaces:
         for name in self._members:
             buttons[name] = button = gui.add_button(f"view:{name}")
             button.on_click(lambda event, name=name: event.client and self._came(event.client, name))
-        widths: dict[int, Any] = {}
-        for px in WINDOWS_PX:
-            widths[px] = button = gui.add_button(f"window:{px}")
-            button.on_click(lambda event, px=px: event.client and self._docked.fit(event.client.client_id, px))
-        add_html(gui, unseen([id_of(button) for button in (*buttons.values(), *widths.values())]))
-        views = [
-            {"name": name, "title": one.title, "button": id_of(buttons[name])} for name, one in self._members.items()
+        sizes: dict[str, list[dict[str, Any]]] = {}
+        fits: list[tuple[str, Sequence[int], Callable[[int, int], None]]] = [
+            ("innerWidth", docked.WINDOWS_PX, self._docked.fit),
+            ("innerHeight", chart_heights.WINDOWS_PX, self.heights.fit),
         ]
-        fits = [{"px": px, "button": id_of(button)} for px, button in widths.items()]
-        script = _SCRIPT.replace("VIEWS", json.dumps(views)).replace("WIDTHS", json.dumps(fits))
+        for side, steps, fit in fits:
+            sizes[side] = []
+            for px in steps:
+                button = gui.add_button(f"{side}:{px}")
+                button.on_click(lambda event, px=px, fit=fit: event.client and fit(event.client.client_id, px))
+                sizes[side].append({"px": px, "button": id_of(button)})
+        every = [id_of(button) for button in buttons.values()]
+        every += [step["button"] for steps in sizes.values() for step in steps]
+        add_html(gui, unseen(every))
+        views = [
+            {"name": name, "title": one.title, "inset": one.inset, "button": id_of(buttons[name])}
+            for name, one in self._members.items()
+        ]
+        self._inside.run(inset.script())
+        script = _SCRIPT.replace("VIEWS", json.dumps(views)).replace("SIZES", json.dumps(sizes))
         self._inside.run(script.replace("FIRST", json.dumps(self.first)))
 
     def go(self, name: str, client: viser.ClientHandle | None) -> None:

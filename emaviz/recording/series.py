@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import rerun as rr
 
+from ema_model.identification.run import ALGORITHMS as TITLES
 from emaviz.recording import style
 from emaviz.recording.style import Colour
 
@@ -35,7 +36,9 @@ def iteration_style(path: str) -> Style:
         return line(f"{algorithm} best {name} [-]", colour, 2.5)
     if kind == "truth":
         return line(f"true {name} [-]", style.TRUTH_COLOUR, 2.0)
-    return line("log10 of best RMSE [A]" if kind == "log10_rmse" else "best RMSE [A]", colour, 2.0)
+    # Series of one name share an entry of the legend.
+    title = TITLES.get(algorithm, algorithm)
+    return line(f"{title}, log10 of best RMSE [A]" if kind == "log10_rmse" else f"{title}, best RMSE [A]", colour, 2.0)
 
 
 def line(name: str, colour: Colour, width: float) -> Style:

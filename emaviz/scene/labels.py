@@ -29,6 +29,7 @@ _SCREW = ((0.42, 1.2), (-0.06, 0.06), (-0.24, -0.06))
 _SOLID = (BOXES[0], *BOXES[3:], _SCREW)  # what labels had better leave to be seen
 _LEADER_PX = 9.0  # from where on a line leads to the place
 _FIRST_PICTURE = (604, 832)  # px, until a browser tells
+_LEAST_NAMED_PX = 400  # high: a smaller picture has room for what is told, but not for the parts' names
 _TOP_PX = 20.0  # where windows have their handles
 
 
@@ -171,7 +172,8 @@ class Labels:
 
     def _arrange(self) -> None:
         with self._arranging:
-            labels = [*self._callouts, *self._told, *self._names] if self._shown else []
+            names = self._names if self._picture[1] >= _LEAST_NAMED_PX else []
+            labels = [*self._callouts, *self._told, *names] if self._shown else []
             placed = self._lay_out(labels)
             for name in self._handles.keys() - {one.label.name for one in placed}:
                 self._put(name, "", (0.0, 0.0, 0.0), False, visible=False)

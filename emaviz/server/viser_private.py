@@ -91,6 +91,10 @@ class Inside:
         placed = gui._next_layout_counter(), gui._layout_run_id
         self._push(client, _messages.GuiSetPanelWidthMessage(panel._placement_uuid, width_px, *placed))
 
+    def set_height(self, client: int, chart: Any, height_px: int) -> None:
+        """How high a chart is in one page."""
+        self._push(client, _messages.GuiUpdateMessage(chart._impl.uuid, {"height": height_px}))
+
     def pages(self) -> tuple[int, ...]:
         """The pages that are open, by their numbers."""
         return tuple(self._server.get_clients())

@@ -117,6 +117,7 @@ class Job:
         """on_stop(): how things stand then; on_divergence: what to do about numbers that are no more finite."""
         self.running = False
         self.finished = False  # the last one, and was not stopped
+        self.error = ""  # why the last one failed
         self.began: Signal[[str]] = Signal()  # with its title
         self.progressed: Signal[[str, float, float | None]] = Signal()  # text, seconds since it began, share
         self.rests: Signal[[bool]] = Signal()  # it was paused, or goes on
@@ -142,7 +143,7 @@ class Job:
         started = self._worker.start(self._steps(run, work, done))
         if started:
             self._waits.set()
-            self._run, self.running, self.finished = run, True, False
+            self._run, self.running, self.finished, self.error = run, True, False, ""
             self.began(title)
         return started
 
@@ -190,10 +191,11 @@ class Job:
             self._end(self._on_stop())
             return
         except FloatingPointError as error:
-            self._end("")
-            raise InputError("; ".join(filter(None, (str(error), self._on_divergence)))) from None
-        except BaseException:
-            self._end("")
+            told = InputError("; ".join(filter(None, (str(error), self._on_divergence))))
+            self._fail(told)
+            raise told from None
+        except BaseException as error:
+            self._fail(error)
             raise
         finally:
             run.over.set()
@@ -201,6 +203,11 @@ class Job:
             self._pace.end(run.elapsed_s)
         self.finished = True
         self._end(f"{run.title}: done in {run.elapsed_s:.1f} s.", done)
+
+    def _fail(self, error: BaseException) -> None:
+        """What stands where the job is asked for; it is told as well."""
+        self.error = str(error) if isinstance(error, InputError) else "Something failed; the app goes on."
+        self._end("")
 
     def _end(self, text: str, done: Callable[[], str | None] | None = None) -> None:
         def ended() -> None:

@@ -225,7 +225,7 @@ def test_a_header_found_wrongly_is_clicked(compare, app, recording, tmp_path):
     assert list(app.comparing.opened[name].columns) == ["K1", "K2", "K3", "K4"]
 
     choose(page, "Header in line", "1")
-    page.get_by_text("line 1: no table begins there").wait_for()
+    page.locator(".emaviz-beside").filter(has_text="line 1: no table begins there").wait_for()
     wait_until(lambda: field(page, "Header in line").input_value() == "found by itself")
     page.get_by_role("button", name="4  t [ms];Soll <b> [°]").click()
     page.get_by_text("As said: header in line 4, Windows-1252.").wait_for()
@@ -246,7 +246,7 @@ def test_a_bad_file_is_one_line_and_the_app_goes_on(compare, app, tmp_path):
     bad = tmp_path / "bad.csv"
     bad.write_text("time_s,current_A\n0,1\n1e-3,x\n" + "2e-3,1\n" * 200)
     upload(page, bad)
-    line = page.get_by_text("a number is expected")
+    line = page.locator(".emaviz-beside").filter(has_text="a number is expected")  # stays, beside its toast
     line.wait_for()
     assert line.count() == 1 and "line 3" in line.inner_text()
     assert str(app.comparing.folder.folder) not in line.inner_text()

@@ -133,3 +133,22 @@ def test_the_second_run_knows_how_far_it_is_by_the_first():
     assert pace.at("something new", 3.0) is None
     pace.begin("b")
     assert pace.at("reading", 1.0) is None
+
+
+def test_why_one_failed_is_kept_until_the_next_begins(worker, errors):
+    job = Job(worker, on_divergence="try less")
+    heard = Heard(job)
+
+    def refused(tell):
+        raise InputError("there is no column of current")
+
+    def diverges(tell):
+        raise FloatingPointError("the speed is no more finite")
+
+    for at, (work, why) in enumerate(((refused, "no column of current"), (diverges, "finite; try less")), 1):
+        assert job.begin("Comparing", work)
+        wait_until(lambda at=at: len(heard.ended) == at)
+        assert heard.ended[-1] == "" and why in job.error and len(errors) == at, "it is told as well"
+    assert job.begin("Comparing", lambda tell: None)
+    wait_until(lambda: len(heard.ended) == 3)
+    assert job.error == ""

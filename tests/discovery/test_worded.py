@@ -7,7 +7,8 @@ from dataclasses import replace
 
 from support.discovered import with_cogging
 
-from ema_model.discovery.labels import rung_label
+from ema_model.discovery import tables
+from ema_model.discovery.labels import effect_title, rung_label
 from ema_model.discovery.result import Change, StoodIn
 from ema_model.discovery.sentences import NOT_REPEATABLE, masked, untold
 from ema_model.discovery.summary import as_dict
@@ -51,3 +52,13 @@ def test_orders_along_a_linear_motor_are_pitches():
     change = Change("effect", ("cogging_torque",), (2513.274, 7539.82))
     assert rung_label(change, Axes("linear", "linear")) == "+ cogging_torque of pitches 2.50 mm, 0.833 mm"
     assert rung_label(Change("effect", ("cogging_torque",), (24.0, 4.0)), ROTARY) == "+ cogging_torque of orders 24, 4"
+
+
+def test_a_refit_that_diverged_is_called_so_and_a_poor_one_has_its_number():
+    found = with_cogging()
+    one, other, *rest = found.candidates
+    told = replace(found, candidates=[replace(one, refitted_drop=-1.4e16), replace(other, refitted_drop=-3.0), *rest])
+    table = tables.candidates(told)
+    assert table is not None
+    refitted = {row[0]: row[2] for row in table.rows}
+    assert refitted[effect_title(one.name)] == "refit diverged" and refitted[effect_title(other.name)] == "−3"

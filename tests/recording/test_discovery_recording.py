@@ -78,6 +78,7 @@ def test_words_tell_the_verdict_the_effect_and_the_candidates(found, written):
     value = found.calibration.parameters["effects.cogging_torque.amplitude_Nm"].value
     for told in ("The model lacks cogging torque.", f"{1e3 * value:.1f} ± ", "mN·m", "| 12 |", "+ Cogging torque"):
         assert told in verdict[0], told
+    assert "effects_found" not in verdict[0], "that name is for programs"
     [ranking] = _columns(written, "/discovery/candidates", "TextDocument:text")
     assert (
         "|\n| Cogging torque |" in ranking[0] and "| Dead time | – |  | these recordings cannot show it" in ranking[0]

@@ -90,16 +90,16 @@ class CampaignControls:
         chosen = str(self._row.value)
         if chosen not in self._rows:
             raise InputError("there is no such row; choose another")
-        self._page.begins(lambda: self._campaigns.open_row(str(self._choice.value), self._rows[chosen]))
+        self._page.begins(lambda: self._campaigns.open_row(str(self._choice.value), self._rows[chosen]), self._open)
 
     def _say(self, text: str) -> None:
         self._status.content = said(text)
 
     def _post(self, job: Callable[[], None]) -> None:
-        """On the files' thread; what is refused is told."""
+        """On the files' thread; what is refused stands below the list."""
 
         def checked() -> None:
-            self._page.checked(job)
+            self._page.checked(job, self._choice)
 
         self._files.post(f"campaign {job.__qualname__}", checked)
 

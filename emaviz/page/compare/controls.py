@@ -17,6 +17,7 @@ from emaviz.page.page import Page
 from emaviz.server.uploads import Uploads
 from emaviz.session.actuators import UPLOADED
 from emaviz.session.compare.comparing import Comparing
+from emaviz.session.compare.events import LAY_OUT, MAP, OPEN
 from emaviz.session.data_folder import ACTUATOR_SUFFIX
 from emaviz.session.opened import Opened
 from emaviz.text.html import Html, add_html
@@ -35,7 +36,7 @@ class ComparePanel:
         gui.add_markdown("Upload a measurement of a test bench, or **drop it anywhere** on the page.")
         uploads.add_button("Upload a measurement", ",".join(FORMATS), icon=viser.Icon.UPLOAD)
         self._choice = gui.add_dropdown("Data folder", [_NONE])
-        add = gui.add_button("Add this file", icon=viser.Icon.PLUS, color="gray")
+        self._add_it = gui.add_button("Add this file", icon=viser.Icon.PLUS, color="gray")
         with gui.add_folder("Measurements"):
             self._list = add_html(gui, recordings_list([]))
             self._which = gui.add_dropdown("Shown", [_NONE], visible=False)
@@ -48,7 +49,7 @@ class ComparePanel:
         with self._health_folder:
             self._health = add_html(gui)
         self.asked = AskedControls(page, comparing, uploads)
-        add.on_click(lambda _: self._add())
+        self._add_it.on_click(lambda _: self._add())
         self._which.on_update(lambda event: event.client and self._post_show(str(self._which.value)))
         self._columns.on_click(lambda _: page.screen.post("columns", self._open_columns))
         self._remove.on_click(lambda _: self._remove_shown())
@@ -56,6 +57,7 @@ class ComparePanel:
         events = comparing.events
         events.opened.connect(lambda opened: page.screen.post(f"opened {opened.name}", lambda: self._opened(opened)))
         events.refused.connect(lambda: page.screen.post("columns", self._open_columns))
+        events.failed.connect(lambda what, why: page.screen.post(f"failed to {what}", lambda: self._failed(what, why)))
         events.removed.connect(lambda: page.screen.post("removed", self._removed))
         events.compared.connect(lambda found: page.screen.post("compared", lambda: result.show(found)))
         comparing.job.began.connect(lambda _: page.screen.post("compare began", self._began))
@@ -97,6 +99,12 @@ class ComparePanel:
         if self._comparing.comparison is None:
             self._result.preview(opened)
         self._begin(told=False)
+
+    def _failed(self, what: str, why: str) -> None:
+        """Beside what was asked for; no reason takes it away."""
+        control = {OPEN: self._add_it, MAP: self._mapping.use, LAY_OUT: self._mapping.header}.get(what)
+        if control is not None:
+            self._page.say_beside(control, why)
 
     def _removed(self) -> None:
         self._show(next(reversed(self._comparing.opened), None))
@@ -140,7 +148,7 @@ class ComparePanel:
             started = self._comparing.compare()
         except InputError as error:
             if told:
-                self._page.notify("The comparison cannot start", str(error))
+                self._page.say_beside(self._start, str(error))
             else:
                 self._line.say(str(error))
             return

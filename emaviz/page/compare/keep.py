@@ -13,5 +13,12 @@ class KeepControls(KeepButtons):
 
     def __init__(self, page: Page, comparing: Comparing, viewer: ViewerHost | None) -> None:
         super().__init__(
-            page, "comparison", comparing.folder, viewer, comparing.events.kept, comparing.save, REPORT, RECORD
+            page,
+            "comparison",
+            comparing.folder,
+            viewer,
+            comparing.events.kept,
+            lambda suffix, _: comparing.save(suffix),
+            REPORT,
+            RECORD,
         )

@@ -25,15 +25,15 @@ class LayoutControls:
         self._name = ""
         gui = page.server.gui
         self._told = add_html(gui, visible=False)
-        self._header = gui.add_dropdown("Header in line", [_FOUND], visible=False)
+        self.header = gui.add_dropdown("Header in line", [_FOUND], visible=False)
         self._encoding = gui.add_dropdown("Encoding", [_FOUND], visible=False)
-        for control in (self._header, self._encoding):
+        for control in (self.header, self._encoding):
             control.on_update(lambda event: event.client and page.screen.post("layout", self._say))
 
     def show(self, opened: Opened) -> None:
         """As a file was read; nothing for one that is no text.  On the screen's thread."""
         self._name, head, said = opened.name, opened.head, opened.hints
-        for control in (self._told, self._header, self._encoding):
+        for control in (self._told, self.header, self._encoding):
             control.visible = head is not None
         if head is None:
             return
@@ -41,11 +41,11 @@ class LayoutControls:
         told = html("{}: {}.", what, head.told) if head.told else "No line with the columns' names is found."
         why = html('<span style="color:#e8590c;overflow-wrap:anywhere">▲ {}</span>', opened.problem)
         self._told.content = html("<div {}>{}</div>", _BOX, why if opened.problem else told)
-        _offer(self._header, range(1, min(len(head.lines), _MOST_LINES) + 1), said.header_line)
+        _offer(self.header, range(1, min(len(head.lines), _MOST_LINES) + 1), said.header_line)
         _offer(self._encoding, ENCODINGS.values(), said.encoding and ENCODINGS.get(said.encoding, said.encoding))
 
     def _say(self) -> None:
-        line, encoding = str(self._header.value), str(self._encoding.value)
+        line, encoding = str(self.header.value), str(self._encoding.value)
         names = {title: name for name, title in ENCODINGS.items()}
         said = Hints(
             None if line == _FOUND else int(line), None if encoding == _FOUND else names.get(encoding, encoding)

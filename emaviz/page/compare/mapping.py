@@ -42,13 +42,18 @@ class MappingStep:
             self._late = gui.add_number(
                 "Late by [ms]", 0.0, step=0.001, hint="Moved back by as much: a delay of its clock, or of its sensor"
             )
-            self._use = gui.add_button("Use these columns", icon=viser.Icon.CHECK)
+            self.use = gui.add_button("Use these columns", icon=viser.Icon.CHECK)
         self._column.on_update(lambda event: self._later(event, "column", self._show_column))
         self._signal.on_update(lambda event: self._later(event, "signal", lambda: self._edit(new_signal=True)))
         self._unit.on_update(lambda event: self._later(event, "unit", self._edit))
         self._turned.on_update(lambda event: self._later(event, "sign", self._edit))
         self._late.on_update(lambda event: self._later(event, "delay", self._edit))
-        self._use.on_click(lambda _: self._apply())
+        self.use.on_click(lambda _: self._apply())
+
+    @property
+    def header(self) -> Any:
+        """The control that says where a text's columns are named."""
+        return self._layout.header
 
     @property
     def mapping(self) -> ColumnMapping:
@@ -60,7 +65,7 @@ class MappingStep:
         self._opened = opened
         self._layout.show(opened)
         names = list(opened.columns)[:_MOST_COLUMNS]
-        for control in (self._table, self._column, self._signal, self._use):
+        for control in (self._table, self._column, self._signal, self.use):
             control.visible = bool(names)
         if names:
             first = next((name for name, _ in opened.mapping.unmapped if name in names), names[0])
@@ -77,10 +82,7 @@ class MappingStep:
     def _later(self, event: viser.GuiEvent[Any], control: str, job: Callable[[], None]) -> None:
         """A person has moved a control: what follows is done on the screen's thread, one at a time."""
         if event.client is not None:  # else it was set from here
-            self._page.screen.post(f"mapping's {control}", lambda: self._checked(job))
-
-    def _checked(self, job: Callable[[], None]) -> None:
-        self._page.checked(job)
+            self._page.ask(f"mapping's {control}", job, event.target)
 
     def _entry(self) -> MappedColumn | None:
         return next((e for e in self.mapping.entries if e.column == self._column.value), None)

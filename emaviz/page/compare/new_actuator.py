@@ -37,11 +37,13 @@ class NewActuator:
             self._drive = gui.add_dropdown("Drive", tuple(KINDS["inverter"]))
             self._kinds = add_html(gui)
             self._place = gui.add_folder("Parameters")
-            make = gui.add_button("Make this actuator", icon=viser.Icon.PLUS, hint="Its file goes to the data folder")
+            self._button = gui.add_button(
+                "Make this actuator", icon=viser.Icon.PLUS, hint="Its file goes to the data folder"
+            )
             self._told = add_html(gui)
         for control in (self._motor, self._user, self._controller, self._drive):
             control.on_update(lambda event: event.client and page.screen.post("new actuator", self._ask))
-        make.on_click(lambda _: page.screen.post("make actuator", self._make))
+        self._button.on_click(lambda _: page.screen.post("make actuator", self._make))
         self._ask()
 
     def _description(self) -> Description:
@@ -76,7 +78,7 @@ class NewActuator:
                     self._about.append(add_html(gui, _about(one)))
 
     def _make(self) -> None:
-        self._page.checked(self._save)
+        self._page.checked(self._save, self._button)
 
     def _save(self) -> None:
         name, doubts = self._description().save(self._folder)

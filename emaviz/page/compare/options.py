@@ -43,7 +43,7 @@ class AskedControls:
 
     def choose(self, name: str) -> None:
         """Takes an actuator, just uploaded; on the screen's thread."""
-        if self._page.checked(lambda: self._comparing.choose_actuator(name)):
+        if self._page.checked(lambda: self._comparing.choose_actuator(name), self._actuator):
             self.show_actuator()
 
     def show_actuator(self) -> None:
@@ -110,8 +110,8 @@ class AskedControls:
                 one, value = on_axes(path, actuator.axes), actuator.value(path)
                 hint = f"{one.path}: {value:.4g} ± {tolerance.sigma:.2g} {one.unit}".rstrip() + " (1 σ)"
                 box = gui.add_checkbox(one.title, path in self._comparing.free, hint=hint)
-                box.on_update(lambda _, path=path, box=box: self._set_free(path, bool(box.value)))
+                box.on_update(lambda _, path=path, box=box: self._set_free(path, box))
                 self._free.append(box)
 
-    def _set_free(self, path: str, free: bool) -> None:
-        self._page.checked(lambda: self._comparing.set_free(path, free))
+    def _set_free(self, path: str, box: Any) -> None:
+        self._page.checked(lambda: self._comparing.set_free(path, bool(box.value)), box)

@@ -23,7 +23,7 @@ from emaviz.figures import (
     residual_time,
 )
 from emaviz.page.page import Page
-from emaviz.text.html import add_html
+from emaviz.text.html import add_html, html
 from emaviz.text.told import shown
 
 _CONFIG = {"displayModeBar": False}
@@ -97,7 +97,8 @@ class ComparePlots:
         first = comparison.explained_by[0].variable if comparison.explained_by else ""
         self._choose(comparison.primary, first)
         fit = comparison.calibration
-        self._numbers.content = shown(calibration_table(fit, comparison.actuator.axes) if fit is not None else None)
+        table = shown(calibration_table(fit, comparison.actuator.axes) if fit is not None else None)
+        self._numbers.content = html('<div style="overflow-x:auto;font-size:12px;padding:0 8px">{}</div>', table)
         self._draw(list(self._all()))
 
     def show(self, view: View) -> None:

@@ -17,6 +17,7 @@ from emaviz.page.compare import WORKSPACE
 from emaviz.page.compare.moment import motion_of
 from emaviz.page.compare.plots import ComparePlots, View
 from emaviz.page.compare.raw_lines import RawLines
+from emaviz.page.inset import ALL_COLUMNS, COLUMNS, NEXT_COLUMN
 from emaviz.page.kept import Cleared
 from emaviz.page.page import Page
 from emaviz.page.playback import PlaybackStrip
@@ -58,9 +59,11 @@ class ResultPanel:
         self._preview: Any = None
         self._buttons: list[Any] = []
         gui = page.server.gui
+        add_html(gui, COLUMNS)
         self._headline = add_html(gui, html("<div {}>Nothing is compared yet: upload a measurement.</div>", _BOX))
         self._place = gui.add_folder("Preview of the columns", visible=False)
         with self._place:
+            add_html(gui, ALL_COLUMNS)
             self._lines = lines()
         self._answer = gui.add_folder("Where the model fails", visible=False)
         with self._answer:
@@ -71,6 +74,7 @@ class ResultPanel:
             leads()
         self._plots_folder = gui.add_folder("Plots", visible=False)
         with self._plots_folder:
+            add_html(gui, NEXT_COLUMN)
             self._recording = gui.add_dropdown("Measurement", ["–"], visible=False)
             self._plots = ComparePlots(page)
         self._save = gui.add_folder("Keep it", visible=False)

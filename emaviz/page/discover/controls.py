@@ -69,7 +69,7 @@ class DiscoverPanel:
         discovering, post = self._discovering, self._page.screen.post
         self._start.on_click(lambda _: self._begin())
         self._undo.on_click(lambda _: self._page.screen.post("undo", self._step_back))
-        self._all.on_click(lambda _: self.ask(discovering.find_all))
+        self._all.on_click(lambda _: self.ask(discovering.find_all, self._all))
         for i, button in enumerate(self._removes):
             button.on_click(lambda _, i=i: self._remove(i))
         self._result.connect(self.ask, lambda: self._open(None))
@@ -90,21 +90,20 @@ class DiscoverPanel:
         self._start.disabled = self._discovering.running or not self._discovering.source.ready
         self._guide.show(self._look, self._opened)
 
-    def ask(self, begin: Callable[[], bool]) -> None:
-        """Begins a step, or says why not."""
-
-        self._page.begins(begin)
+    def ask(self, begin: Callable[[], bool], button: Any) -> None:
+        """Begins a step, or says why not, beside the button that asks for it."""
+        self._page.begins(begin, button)
 
     def _begin(self) -> None:
         self._page.begins(self._discovering.start, self._start)
 
     def _step_back(self) -> None:
-        self._page.checked(self._discovering.undo)
+        self._page.checked(self._discovering.undo, self._undo)
 
     def _remove(self, index: int) -> None:
         look = self._look
         if look is not None and index < len(look.added):
-            self.ask(lambda: self._discovering.remove(look.added[index].key))
+            self.ask(lambda: self._discovering.remove(look.added[index].key), self._removes[index])
 
     # --- the run ----------------------------------------------------------------------------------------------------
 

@@ -43,14 +43,14 @@ class EffectView:
             self._text = add_html(gui)
             self._close = gui.add_button("Close", icon=viser.Icon.X, color="gray")
 
-    def connect(self, ask: Callable[[Callable[[], bool]], None], close: Callable[[], None]) -> None:
-        """ask(begin) starts a step; close() closes the card."""
+    def connect(self, ask: Callable[[Callable[[], bool], Any], None], close: Callable[[], None]) -> None:
+        """ask(begin, button) starts a step; close() closes the card."""
         self._close.on_click(lambda _: close())
 
         def add(_: Any) -> None:
             name = self._name
             if name is not None:
-                ask(lambda: self._discovering.add(name))
+                ask(lambda: self._discovering.add(name), self._add)
 
         self._add.on_click(add)
 

@@ -46,7 +46,7 @@ class EntriesControl:
         discovering = self._discovering
         entry = next((one for one in discovering.entries.all if one.words == chosen), None)
         if entry is None:
-            self._page.checked(lambda: discovering.choose(discovering.source.chosen))
+            self._page.checked(lambda: discovering.choose(discovering.source.chosen), self._choice)
         else:
-            self._page.checked(lambda: discovering.show(entry))
+            self._page.checked(lambda: discovering.show(entry), self._choice)
         self.show()

@@ -24,7 +24,15 @@ class DiscoveryKeep(KeepButtons):
 
     def __init__(self, page: Page, discovering: Discovering, viewer: ViewerHost | None) -> None:
         events = discovering.events
-        super().__init__(page, "discovery", discovering.folder, viewer, events.kept, discovering.keep, *_BUTTONS)
+        super().__init__(
+            page,
+            "discovery",
+            discovering.folder,
+            viewer,
+            events.kept,
+            lambda suffix, _: discovering.keep(suffix),
+            *_BUTTONS,
+        )
         events.verified.connect(lambda path, text: page.screen.post("verified", lambda: self.name(path, text)))
 
     def said_at_once(self, path: Path) -> str:

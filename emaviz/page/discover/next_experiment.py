@@ -39,14 +39,16 @@ class NextTest:
                 "Command as CSV", icon=viser.Icon.FILE_SPREADSHEET, color="gray", visible=False, hint="For a test rig"
             )
         self._load.on_click(
-            lambda event: page.screen.post("load test", lambda: self._with(lambda one: load(one, event.client)))
+            lambda event: page.screen.post(
+                "load test", lambda: self._with(lambda one: load(one, event.client), self._load)
+            )
         )
         self._csv.on_click(self._send)
         discovering.events.unsuggested.connect(lambda: page.screen.post("unsuggested", self._nothing))
 
-    def connect(self, ask: Callable[[Callable[[], bool]], None]) -> None:
-        """ask(begin) starts a step."""
-        self._find.on_click(lambda _: ask(self._discovering.suggest))
+    def connect(self, ask: Callable[[Callable[[], bool], Any], None]) -> None:
+        """ask(begin, button) starts a step."""
+        self._find.on_click(lambda _: ask(self._discovering.suggest, self._find))
 
     def busy(self, busy: bool) -> None:
         """Whether a step runs."""
@@ -67,15 +69,17 @@ class NextTest:
     def _nothing(self) -> None:
         self._text.content = note("No test that the actuator can follow would tell the two apart.")
 
-    def _with(self, act: Callable[[Experiment], Any]) -> None:
+    def _with(self, act: Callable[[Experiment], Any], button: Any) -> None:
         one = self._discovering.experiment
         if one is not None:
-            self._page.checked(lambda: act(one))
+            self._page.checked(lambda: act(one), button)
 
     def _send(self, event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
         client = event.client
         if client is not None:
-            self._with(lambda one: client.send_file_download("next-test.csv", as_csv(one), save_immediately=True))
+            self._with(
+                lambda one: client.send_file_download("next-test.csv", as_csv(one), save_immediately=True), self._csv
+            )
 
 
 def as_csv(one: Experiment) -> bytes:

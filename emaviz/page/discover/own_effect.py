@@ -58,10 +58,10 @@ class OwnEffect:
         events.previewed.connect(lambda found: page.screen.post("own preview", lambda: self._draw(found)))
         events.unpreviewed.connect(lambda why: page.screen.post("own preview", lambda: self._hide(why)))
 
-    def connect(self, ask: Callable[[Callable[[], bool]], None]) -> None:
-        """ask(begin) starts a step."""
-        self._add.on_click(lambda _: ask(self._begin))
-        self._curve.on_click(lambda _: ask(self._discovering.add_curve))
+    def connect(self, ask: Callable[[Callable[[], bool], Any], None]) -> None:
+        """ask(begin, button) starts a step."""
+        self._add.on_click(lambda _: ask(self._begin, self._add))
+        self._curve.on_click(lambda _: ask(self._discovering.add_curve, self._curve))
 
     def busy(self, busy: bool) -> None:
         """Whether a step runs."""

@@ -19,6 +19,7 @@ from emaviz.figures.model_equation import equation
 from emaviz.page.discover.actuator import ActuatorSwitch
 from emaviz.page.discover.effect import CONFIG, EffectView
 from emaviz.page.discover.next_experiment import NextTest
+from emaviz.page.inset import COLUMNS, NEXT_COLUMN
 from emaviz.page.kept import Cleared
 from emaviz.page.page import Page
 from emaviz.page.playback import PlaybackStrip
@@ -54,6 +55,7 @@ class DiscoveryPanel:
         self._look: Look | None = None
         self._titles: dict[str, str] = {}
         gui = page.server.gui
+        add_html(gui, COLUMNS)
         self._headline = add_html(gui, boxed(_RESTING))
         self._ladder: Any = gui.add_plotly(go.Figure(), config=CONFIG, aspect=0.5, visible=False)
         self._effect = EffectView(page, discovering)
@@ -66,6 +68,7 @@ class DiscoveryPanel:
             self._equation = add_html(gui)
         self._before_folder = gui.add_folder("Before and after", visible=False)
         with self._before_folder:
+            add_html(gui, NEXT_COLUMN)
             self._recording = gui.add_dropdown("Measurement", ["–"])
             self._signal = gui.add_dropdown("Signal", ["–"])
             self._actuator = ActuatorSwitch(page, discovering, self._track, strip)
@@ -83,8 +86,8 @@ class DiscoveryPanel:
         self._signal.on_update(lambda event: event.client and page.screen.post("residual", self._draw_residual))
         self._reveal.on_click(lambda _: page.screen.post("reveal", self._revealed))
 
-    def connect(self, ask: Callable[[Callable[[], bool]], None], close: Callable[[], None]) -> None:
-        """ask(begin) starts a step; close() closes the opened card."""
+    def connect(self, ask: Callable[[Callable[[], bool], Any], None], close: Callable[[], None]) -> None:
+        """ask(begin, button) starts a step; close() closes the opened card."""
         self._effect.connect(ask, close)
         self._next.connect(ask)
 
@@ -157,7 +160,7 @@ class DiscoveryPanel:
             self._explained.figure = explained_steps.figure(look.explained_before, look.assessment.left.explained)
 
     def _revealed(self) -> None:
-        self._page.checked(self._show_truth)
+        self._page.checked(self._show_truth, self._reveal)
 
     def _show_truth(self) -> None:
         if self._look is not None:

@@ -69,7 +69,7 @@ class ParameterSliders:
 
     def _post_range(self, name: str) -> None:
         def take() -> None:
-            self._page.checked(lambda: self._take_range(name))
+            self._page.checked(lambda: self._take_range(name), self._ranges[name])
 
         self._page.screen.post(f"range of {name}", take)
 

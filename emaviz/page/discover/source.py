@@ -82,7 +82,7 @@ class SourceControls:
 
     def _take(self) -> None:
         name = self._names.get(str(self._source.value), "")
-        if self._page.checked(lambda: self._discovering.choose(name)):
+        if self._page.checked(lambda: self._discovering.choose(name), self._source):
             self._chosen()
             self.show(None)
         else:

@@ -4,4 +4,4 @@ import viser
 
 from emaviz.page.workspaces import Workspace
 
-WORKSPACE = Workspace("explore", "Explore", viser.Icon.ADJUSTMENTS, 1, share=0.4)  # the actuator is what one looks at
+WORKSPACE = Workspace("explore", "Explore", viser.Icon.ADJUSTMENTS, 1, share=0.4, inset=False)

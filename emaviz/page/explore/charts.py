@@ -46,12 +46,14 @@ class ChartsPanel:
             )
             self._melt = gui.add_button("Drop the frozen run", icon=viser.Icon.X, color="gray", visible=False)
             self.signals = LiveSignals(gui, page.session.actuator.axes)
+            page.workspaces.heights.add(self.signals.handles, spare_px=-48)
             self._range = gui.add_multi_slider(
                 "Shown [%]", 0, 100, 1, (0, 100), min_range=1, hint="Of the run; zooms all charts, in full resolution"
             )
         with panel.add_tab("Phases", viser.Icon.WAVE_SINE):
             add_html(gui, TIME_CHARTS)
             self._phases = LivePhases(gui)
+            page.workspaces.heights.add(self._phases.handles)
         self.fan = FanView(page, panel)
         with panel.add_tab("Metrics", viser.Icon.TABLE):
             self._table: Any = add_html(gui)

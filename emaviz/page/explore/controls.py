@@ -105,7 +105,7 @@ class ExplorePanel:
 
     def _take_plant(self) -> None:
         session = self._page.session
-        if not self._page.checked(lambda: session.choose_plant(self._own.value)):
+        if not self._page.checked(lambda: session.choose_plant(self._own.value), self._own):
             self._own.value = session.plant
 
     def _plant_taken(self) -> None:

@@ -31,6 +31,7 @@ class FanView:
             show = gui.add_button("Show five severities", icon=viser.Icon.CHART_AREA_LINE)
             self._note = add_html(gui, said(_ABOUT))
             self._charts = LiveFan(gui, page.session.actuator.axes)
+            page.workspaces.heights.add(self._charts.handles, spare_px=-36)
         show.on_click(lambda _: self._ask())
         self._fault.on_update(lambda event: event.client and self._ask())
         page.session.events.fanned.connect(lambda fan: page.screen.post("fan", lambda: self._draw(fan)))

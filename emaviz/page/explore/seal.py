@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import viser
 
@@ -47,12 +48,14 @@ class SealControls:
             client.gui.add_button("Cancel", color="gray").on_click(lambda _: modal.close())
 
         def begin() -> None:
-            self._begin(client, str(title.value), str(story.value), modal.close)
+            self._begin(client, str(title.value), str(story.value), seal, modal.close)
 
         seal.on_click(lambda _: self._page.screen.post("seal", begin))
 
-    def _begin(self, client: viser.ClientHandle, title: str, story: str, close: Callable[[], None]) -> None:
-        if self._page.begins(lambda: self._sealing.seal(title, story)):
+    def _begin(
+        self, client: viser.ClientHandle, title: str, story: str, button: Any, close: Callable[[], None]
+    ) -> None:
+        if self._page.begins(lambda: self._sealing.seal(title, story), button):
             self._asked = client
             close()
 

@@ -14,6 +14,7 @@ from ema_model.identification.run import ALGORITHMS
 from ema_model.identification.words import way_sentences
 from emaviz.figures import landscape as drawn
 from emaviz.page.identify.swarm import telling
+from emaviz.page.inset import COLUMNS, NEXT_COLUMN
 from emaviz.page.job_line import JobLine
 from emaviz.page.page import Page
 from emaviz.session.identify.landscape import Landscapes, ends
@@ -37,6 +38,7 @@ class LandscapeView:
         self._by_hand = False  # which two k
         self._plot: Any = None
         gui = page.server.gui
+        add_html(gui, COLUMNS)
         self._x: Any = gui.add_dropdown("Map across", _NAMES, initial_value=_NAMES[0])
         self._y: Any = gui.add_dropdown("Map upwards", _NAMES, initial_value=_NAMES[5])
         self._through: Any = gui.add_dropdown("Through", (_BEST,), hint="The other six k are held at this place's")
@@ -45,6 +47,8 @@ class LandscapeView:
         self._line = JobLine(page, self._landscapes.job, stop="Stop drawing")
         self._line.say("Once something is identified, its cost over two k can be drawn here.")
         self._place = gui.add_folder("Map", visible=False)
+        with self._place:
+            add_html(gui, NEXT_COLUMN)
         self._words = add_html(gui)
         for entry in (self._x, self._y):
             entry.on_update(lambda event: event.client and self._chosen())
@@ -84,7 +88,7 @@ class LandscapeView:
             return
         x, y = (_NAMES.index(str(entry.value)) for entry in (self._x, self._y))
         through, close = self._place_held(race), self._extent.value == _CLOSE
-        self._page.begins(lambda: self._landscapes.draw(race, x, y, through, close))
+        self._page.begins(lambda: self._landscapes.draw(race, x, y, through, close), self._draw)
 
     def _place_held(self, race: Race) -> np.ndarray:
         """(8,): where the chosen search ended, or the answer."""

@@ -67,6 +67,7 @@ class IdentifyResult:
                 hint="The run that would tell them apart; then identify again",
             )
             self._fit = LiveFit(gui)
+            page.workspaces.heights.add(self._fit.handles, spare_px=30)
         with panel.add_tab("Landscape", viser.Icon.MAP_2):
             self._landscape = LandscapeView(page, slow)
         with panel.add_tab("History", viser.Icon.TABLE):
@@ -140,7 +141,7 @@ class IdentifyResult:
 
     def _try_separating(self, client: viser.ClientHandle | None) -> None:
         run = self._separating
-        if run is not None and self._page.checked(lambda: self._to_explore(run)):
+        if run is not None and self._page.checked(lambda: self._to_explore(run), self._try):
             self._page.notify("Explore has the command", "On Identify, press Identify again.", "green")
             self._page.workspaces.go("explore", client)
 

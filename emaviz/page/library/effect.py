@@ -9,6 +9,7 @@ from ema_model.faults import HEALTHY
 from ema_model.simulation.with_effect import RUNS, WithEffect
 from emaviz.figures.effect_signature import EffectCharts
 from emaviz.page.discover.effect import about
+from emaviz.page.inset import COLUMNS
 from emaviz.page.library import WORKSPACE
 from emaviz.page.page import Page
 from emaviz.page.playback import PlaybackStrip
@@ -17,6 +18,8 @@ from emaviz.session.library import Library
 from emaviz.text.html import add_html, html
 from emaviz.text.mathml import mathml
 from emaviz.text.notes import BOX, note
+
+_FIRST = "cogging_torque"  # shown until another one is chosen
 
 
 class EffectPage:
@@ -28,13 +31,20 @@ class EffectPage:
         self.best_runs: dict[str, str] = {}  # by effect, where it shows most
         self._sliders: dict[str, Any] = {}
         gui = page.server.gui
+        add_html(gui, COLUMNS)
         self._title = add_html(gui, note("Choose an effect on the left."))
         self._text = add_html(gui)
         self._run = gui.add_dropdown("Run", tuple(RUNS), visible=False)
         self._place = gui.add_folder("What each parameter does", visible=False)
         self._status = add_html(gui)
         self._charts = EffectCharts(gui, page.session.actuator.axes)
+        page.workspaces.entered.connect(self._enter)
         self._run.on_update(lambda event: event.client and self._ask())
+
+    def _enter(self, workspace: str) -> None:
+        """A first visit finds an effect opened."""
+        if workspace == WORKSPACE.name and not self._name:
+            self.open(_FIRST)
 
     def open(self, name: str) -> None:
         """Shows an effect, and runs it; on the screen's thread."""
@@ -91,4 +101,4 @@ class EffectPage:
     def _ask(self) -> None:
         if self._name:
             settings = {name: float(slider.value) for name, slider in self._sliders.items()}
-            self._page.checked(lambda: self._library.feel(self._name, settings, str(self._run.value)))
+            self._page.checked(lambda: self._library.feel(self._name, settings, str(self._run.value)), self._run)

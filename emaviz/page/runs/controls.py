@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
+from datetime import datetime
 from typing import Any
 
 import viser
@@ -37,6 +38,7 @@ class RunsPanel:
         self._page, self._viewer, self._recorded = page, viewer, recorded
         self._files, self._result = files, result
         self._by_hand = False  # chosen; else the newest is shown
+        self._seen: tuple[str, datetime] | None = None  # which is shown at a glance
         gui = page.server.gui
         self._choice: Any = gui.add_dropdown("Run", (NONE,))
         self._card = add_html(gui, _empty("None yet: identify something, or record a comparison or a discovery."))
@@ -53,9 +55,9 @@ class RunsPanel:
             self._list = add_html(gui)
             again = gui.add_button("Read the folder again", icon=viser.Icon.REFRESH, color="gray")
         self._choice.on_update(lambda event: event.client and self._post(self._take_choice))
-        self._open.on_click(lambda _: self._post(self._open_chosen))
-        self._compare.on_click(lambda _: self._post(self._compare_two))
-        self._rename.on_click(lambda _: self._post(self._rename_chosen))
+        self._open.on_click(lambda _: self._post(self._open_chosen, self._open))
+        self._compare.on_click(lambda _: self._post(self._compare_two, self._compare))
+        self._rename.on_click(lambda _: self._post(self._rename_chosen, self._rename))
         self._delete.on_click(lambda event: event.client and self._ask(event.client))
         again.on_click(lambda _: self._post(self.refresh))
         page.session.identifying.identified.connect(lambda _: self.refresh_soon())
@@ -125,10 +127,24 @@ class RunsPanel:
         self._compare.disabled = self._rename.disabled = self._delete.disabled = not exists
         if not exists:
             self._card.content, self._link.content = _empty("None yet."), ""
+            self._result.show(Html(), None)
             return
-        self._card.content = _card(self._recorded.entry(name))
+        entry = self._recorded.entry(name)
+        self._card.content = _card(entry)
+        self._glance(entry)
         self._link.content = recording_link(self._viewer, self._recorded.path(name))
         self._name.value = name.removesuffix(".rrd")
+
+    def _glance(self, entry: Entry) -> None:
+        """The chosen run on the right, once somebody looks."""
+        if (entry.name, entry.at) == self._seen or not self._page.workspaces.anyone(WORKSPACE.name):
+            return
+        self._seen = entry.name, entry.at
+        told = html('<div style="padding:8px 2px 2px;font-size:14px"><b>{}</b></div>{}', entry.name, _card(entry))
+        try:
+            self._result.show(told, self._recorded.read(entry.name))
+        except InputError:  # it is not whole
+            self._result.show(told, None)
 
     def _open_chosen(self) -> None:
         if self._viewer is not None:
@@ -162,7 +178,7 @@ class RunsPanel:
         @yes.on_click
         def _(_: Any) -> None:
             modal.close()
-            self._post(lambda: self._delete_named(name))
+            self._post(lambda: self._delete_named(name), self._delete)
 
         no.on_click(lambda _: modal.close())
 
@@ -170,11 +186,11 @@ class RunsPanel:
         self._recorded.delete(name)
         self.refresh()
 
-    def _post(self, job: Callable[[], None]) -> None:
-        """On the files' thread; what is refused is told."""
+    def _post(self, job: Callable[[], None], control: Any = None) -> None:
+        """On the files' thread; what is refused stands beside the control."""
 
         def checked() -> None:
-            self._page.checked(job)
+            self._page.checked(job, control or self._choice)
 
         self._files.post(job.__qualname__, checked)
 

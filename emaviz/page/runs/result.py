@@ -4,14 +4,20 @@ from __future__ import annotations
 
 from typing import Any
 
+import plotly.graph_objects as go
 import viser
 
-from emaviz.figures import two_recordings
+from emaviz.figures import one_recording, two_recordings
+from emaviz.page.inset import COLUMNS
 from emaviz.page.page import Page
 from emaviz.recording.entry import Entry
+from emaviz.recording.read import Recording
 from emaviz.text.html import Html, add_html, html
 
 _CONFIG = {"displayModeBar": False}
+_NOTHING = (
+    "Nothing is recorded yet. Identify something, or press Record below a comparison or a discovery: it is listed here."
+)
 
 
 class RunsResult:
@@ -21,12 +27,15 @@ class RunsResult:
         self._page = page
         self._pair: tuple[tuple[Entry, Any], tuple[Entry, Any]] | None = None
         self._plot: Any = None
+        self._told, self._drawn = _hint(_NOTHING), False  # of the chosen run
         self._tab = panel.add_tab("Rerun", viser.Icon.PLAYER_PLAY)
         gui = page.server.gui
         with self._tab:
-            self._frame = add_html(gui, _hint("Open a run on the left."))
+            self._frame = add_html(gui, _hint(_NOTHING))
+            self._glance: Any = gui.add_plotly(go.Figure(), config=_CONFIG, aspect=0.5, visible=False)
             self._close = gui.add_button("Close the viewer", icon=viser.Icon.X, color="gray", visible=False)
         with panel.add_tab("Two runs", viser.Icon.ARROWS_DIFF):
+            add_html(gui, COLUMNS)
             self._names = add_html(gui, _hint("Choose two on the left."))
             self._signal: Any = gui.add_dropdown("Signal", ("current_A",), visible=False)
             self._place = gui.add_folder("Signals and search", visible=False)
@@ -45,12 +54,21 @@ class RunsResult:
             url,
             url,
         )
-        self._close.visible = True
+        self._close.visible, self._glance.visible = True, False
+
+    def show(self, told: Html, recording: Recording | None) -> None:
+        """The chosen run, where the viewer is not open: what is said of it, and its current; None for none."""
+        figure = one_recording.figure(recording) if recording is not None else None
+        self._told, self._drawn = told or _hint(_NOTHING), figure is not None
+        if figure is not None:
+            self._glance.figure = figure
+        if not self._close.visible:
+            self._frame.content, self._glance.visible = self._told, self._drawn
 
     def close_viewer(self) -> None:
         """Takes the viewer off the page, which frees its memory."""
-        self._frame.content = _hint("Open a run on the left.")
         self._close.visible = False
+        self._frame.content, self._glance.visible = self._told, self._drawn
 
     def compare(self, first: tuple[Entry, Any], second: tuple[Entry, Any]) -> None:
         """Two recordings, each as an entry and what was read of it."""

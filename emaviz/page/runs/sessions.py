@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from datetime import datetime
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +30,9 @@ class SessionControls:
         gui = page.server.gui
         with gui.add_folder("Session: everything on the page"):
             self._name = gui.add_text("Session name", f"session-{datetime.now():%Y%m%d}")
-            save = gui.add_button("Save session", icon=viser.Icon.DEVICE_FLOPPY, hint="To the data folder, and here")
+            self._save_it = gui.add_button(
+                "Save session", icon=viser.Icon.DEVICE_FLOPPY, hint="To the data folder, and here"
+            )
             self._choice: Any = gui.add_dropdown("Saved", (_NONE,))
             self._load = gui.add_button("Load session", icon=viser.Icon.FOLDER_OPEN, color="gray", disabled=True)
             add_html(
@@ -42,7 +43,7 @@ class SessionControls:
                     SESSION_SUFFIX,
                 ),
             )
-        save.on_click(lambda event: self._post("save session", lambda: self._save(event.client)))
+        self._save_it.on_click(lambda event: self._post("save session", lambda: self._save(event.client)))
         self._load.on_click(lambda _: self._load_named(str(self._choice.value)))
         self.refresh()
 
@@ -61,7 +62,7 @@ class SessionControls:
         def read() -> None:
             self._read(self._comparing.folder.session(name))
 
-        self._page.screen.post("load session", partial(self._checked, read))
+        self._page.ask("load session", read, self._load)
 
     def _save(self, client: viser.ClientHandle | None) -> None:
         folder = self._comparing.folder
@@ -84,13 +85,12 @@ class SessionControls:
         def take() -> None:
             session_file.read(path, self._kept(), self._comparing.folder)
 
-        if self._page.checked(take):
+        if self._page.checked(take, self._load):
             self._page.notify("Session loaded", path.name, "green")
         self.refresh()
 
     def _post(self, kind: str, job: Callable[[], None]) -> None:
-        self._files.post(kind, partial(self._checked, job))
+        def checked() -> None:
+            self._page.checked(job, self._save_it)
 
-    def _checked(self, job: Callable[[], None]) -> None:
-        """What is refused is told."""
-        self._page.checked(job)
+        self._files.post(kind, checked)

@@ -53,7 +53,7 @@ class TrackPanel:
         for control in (self._ends, self._threshold):
             control.on_update(lambda event: event.client and self._ask_threshold())
         self._watch.on_update(lambda event: event.client and self._take_watch())
-        self._start.on_click(lambda _: page.ask("track", lambda: page.begins(following.begin)))
+        self._start.on_click(lambda _: page.ask("track", lambda: page.begins(following.begin, self._start)))
         following.job.began.connect(lambda _: post("track began", lambda: self._busy(True)))
         following.job.ended.connect(lambda _: post("track ended", lambda: self._busy(False)))
         following.events.followed.connect(lambda history: post("followed", lambda: result.show(history)))
@@ -90,7 +90,7 @@ class TrackPanel:
         return listed
 
     def _take_folder(self, name: str) -> None:
-        if self._page.checked(lambda: self._following.choose(name)):
+        if self._page.checked(lambda: self._following.choose(name), self._folder.control):
             self._result.show(None)
             self._practice.show(name)
             self._show_thresholds()
@@ -114,13 +114,13 @@ class TrackPanel:
 
     def _take_threshold(self, value: Any) -> None:
         name, following = self._faults[str(self._fault.value)], self._following
-        taken = self._page.checked(lambda: following.set_threshold(name, value))
+        taken = self._page.checked(lambda: following.set_threshold(name, value), self._threshold)
         self._show_fault()
         if not taken:
             return
         self._tell_thresholds()
         if following.history is not None and not following.job.running:
-            self._page.begins(following.begin)  # what is identified stays, so that this takes a moment
+            self._page.begins(following.begin, self._start)  # what is identified stays, so that this takes a moment
 
     def _show_thresholds(self) -> None:
         """Of the chosen flights, which a challenge may bring."""

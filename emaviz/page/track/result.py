@@ -15,6 +15,7 @@ from ema_model.tracking.result import Tracked
 from ema_model.tracking.track import TRACKED
 from ema_model.tracking.words import headline, hindsight
 from emaviz.figures import k_over_flights, predicted_life, remaining_life
+from emaviz.page.inset import COLUMNS
 from emaviz.page.kept import Cleared
 from emaviz.page.page import Page
 from emaviz.page.practice import Seal
@@ -49,6 +50,7 @@ class TrackResult:
         self._told = add_html(gui, boxed(_NOTHING))
         self._life = gui.add_folder("The unit's life", visible=False)
         with self._life:
+            add_html(gui, COLUMNS)
             self._faults = {BY_NAME[name].label: name for name in TRACKED}
             self._fault: Any = gui.add_dropdown("Shown", tuple(self._faults))
             self._today = gui.add_slider(

@@ -38,7 +38,7 @@ class UnitsPanel:
         self._line = JobLine(page, comparing.job, pauses="it")
         self._rule.on_update(lambda event: event.client and post("units rule", self._take_rule))
         self._actuator.on_update(lambda event: event.client and post("units actuator", self._take_actuator))
-        self._start.on_click(lambda _: page.ask("compare units", lambda: page.begins(comparing.begin)))
+        self._start.on_click(lambda _: page.ask("compare units", lambda: page.begins(comparing.begin, self._start)))
         comparing.job.began.connect(lambda _: post("units began", lambda: self._busy(True)))
         comparing.job.ended.connect(lambda _: post("units ended", lambda: self._busy(False)))
         comparing.events.compared.connect(lambda found: post("units compared", lambda: result.show(found)))
@@ -79,7 +79,7 @@ class UnitsPanel:
         return listed
 
     def _take_folder(self, name: str) -> None:
-        self._page.checked(lambda: self._comparing.choose(name))
+        self._page.checked(lambda: self._comparing.choose(name), self._folder.control)
         self._practice.show(self._comparing.chosen)
         self._result.show(None)
         self._line.say("")
@@ -89,7 +89,7 @@ class UnitsPanel:
 
     def _take_actuator(self) -> None:
         comparing = self._comparing
-        if not self._page.checked(lambda: comparing.choose_actuator(str(self._actuator.value))):
+        if not self._page.checked(lambda: comparing.choose_actuator(str(self._actuator.value)), self._actuator):
             self._actuator.value = comparing.actuator_name
 
     def _busy(self, busy: bool) -> None:

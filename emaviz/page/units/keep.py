@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import viser
 
 from emaviz.page.kept import REPORT, KeepButtons, Keeps
@@ -20,7 +22,7 @@ class UnitsKeep(KeepButtons):
     """Two buttons, and what they have written."""
 
     def __init__(self, page: Page, comparing: ComparingUnits) -> None:
-        def save(suffix: str) -> None:
-            page.ask(f"units {suffix}", lambda: comparing.save(suffix))
+        def save(suffix: str, button: Any) -> None:
+            page.ask(f"units {suffix}", lambda: comparing.save(suffix), button)
 
         super().__init__(page, "units", comparing.folder, None, comparing.events.kept, save, REPORT, _TYPE)

@@ -9,6 +9,7 @@ import plotly.graph_objects as go
 from ema_model.units.result import UnitsCompared
 from ema_model.units.words import document_of, lacking, notes, rests_on, sentences
 from emaviz.figures import transfer_matrix, unit_parameters
+from emaviz.page.inset import COLUMNS, NEXT_COLUMN
 from emaviz.page.page import Page
 from emaviz.page.practice import Seal
 from emaviz.page.units.keep import UnitsKeep
@@ -29,12 +30,14 @@ class UnitsResult:
     def __init__(self, page: Page, comparing: ComparingUnits) -> None:
         self._page, self._comparing = page, comparing
         gui = page.server.gui
+        add_html(gui, COLUMNS)
         self._told = add_html(gui, boxed(_NOTHING))
         self._figures = gui.add_folder("Parameters of each unit", visible=False)
         with self._figures:
             self._parameters: Any = gui.add_plotly(go.Figure(), config=_CONFIG, aspect=1.0)
         self._matrix = gui.add_folder("The model of one unit on another", visible=False)
         with self._matrix:
+            add_html(gui, NEXT_COLUMN)
             self._transfer: Any = gui.add_plotly(go.Figure(), config=_CONFIG, aspect=0.6)
         self._seal = Seal(page, comparing.practice, lambda: comparing.chosen, lambda: comparing.found)
         self._words = gui.add_folder("All of it in numbers", visible=False, expand_by_default=False)

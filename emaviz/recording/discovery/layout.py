@@ -1,4 +1,4 @@
-"""How a discovery's recording opens: Signals, Ladder, Candidates, Residuals, Configuration."""
+"""How a discovery's recording opens: Ladder, Candidates, Signals, Residuals, Configuration."""
 
 from __future__ import annotations
 
@@ -25,19 +25,16 @@ class Step:
 
 
 def build(contents: Contents, steps: Sequence[Step]) -> rrb.Blueprint:
-    """The tabs, of which the ladder with the verdict beside it is open."""
+    """The tabs, of which the first, the verdict with the ladder beside it, is open."""
     fitted = contents.signals.get("residual", [])
-    tabs: list[rrb.Container | rrb.View] = []
+    tabs: list[rrb.Container | rrb.View] = [_ladder(), _candidates()]
     if fitted:
         tabs.append(rrb.Vertical(*(signal_view(contents, name) for name in fitted), name="Signals"))
-    tabs.append(_ladder())
-    tabs.append(_candidates())
     if steps:
         tabs.append(rrb.Vertical(*(_residual(step) for step in steps), name="Residuals"))
     if contents.config:
         tabs.append(rrb.TextDocumentView(origin="/config", name="Configuration"))
-    tabs.append(_steps())
-    return arranged(contents, tabs, active=1 if fitted else 0)
+    return arranged(contents, tabs, active=0)
 
 
 def _ladder() -> rrb.Container:
@@ -49,11 +46,6 @@ def _ladder() -> rrb.Container:
     )
     words = rrb.TextDocumentView(origin=VERDICT, name="What was found")
     return rrb.Horizontal(words, bars, column_shares=[1, 1], name="Ladder")
-
-
-def _steps() -> rrb.View:
-    # It stays empty until that timeline is chosen, and a file has no means to change it with the tab.
-    return plot("Ladder by step (below, choose the timeline: iteration)", [LADDER], linked=False)
 
 
 def _candidates() -> rrb.Container:

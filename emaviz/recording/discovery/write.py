@@ -18,7 +18,7 @@ from ema_model.discovery.tracks import PAUSE_S, Track, one_after_another, primar
 from ema_model.errors import InputError
 from ema_model.estimation.floor import BAND_SIGMAS
 from ema_model.estimation.words import calibration_table, convergence, warnings
-from ema_model.text import Lines, Note
+from ema_model.text import Block, Lines, Note
 from emaviz import colours
 from emaviz.recording import series
 from emaviz.recording.configured import configured
@@ -52,7 +52,7 @@ def write_discovery(found: Discovery, path: str | Path, configuration: Mapping[s
         with DiscoveryWriter(path, found, names[:1]) as writer:
             writer.config(_configuration(found, runs, times, shifts, configuration or {}))
             writer.properties({"discovery": as_dict(found), "shift_s": shifts})
-            writer.document("verdict", written("The verdict", found.document.blocks))
+            writer.document("verdict", written("The verdict", _in_words(found)))
             writer.ladder()
             writer.candidates()
             for name in names:
@@ -61,6 +61,14 @@ def write_discovery(found: Discovery, path: str | Path, configuration: Mapping[s
         raise InputError(str(error)) from None
     if writer.failed is not None:
         raise InputError(writer.failed)
+
+
+def _in_words(found: Discovery) -> list[Block]:
+    """What is shown of it in words, without the verdict's name, which is for programs."""
+    first, *others = found.document.blocks
+    assert isinstance(first, Lines), "it begins with the verdict"
+    named, *more = first.lines
+    return [Lines([named.removeprefix(f"{found.verdict}: "), *more]), *others]
 
 
 def _configuration(

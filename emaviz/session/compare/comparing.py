@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import time
 import traceback
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,13 +18,13 @@ from ema_model.recordings import SIGNALS, ColumnMapping, Measurement, change_sid
 from ema_model.recordings.formats.text_layout import Hints
 from ema_model.recordings.side_file.read import SideFile
 from emaviz.session import actuators as actuator_files
+from emaviz.session.compare.events import LAY_OUT, MAP, OPEN, SAVE, CompareEvents
 from emaviz.session.compare.keep import keep
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.described import number
 from emaviz.session.job import Job, Tell
 from emaviz.session.opened import Opened, guesses, measured, read_opened, side_file_of, side_with
 from emaviz.session.session import Session
-from emaviz.session.signal import Signal
 from emaviz.session.worker import Worker
 
 MOST_RECORDINGS = 20
@@ -31,17 +32,6 @@ MOST_RECORDINGS = 20
 COMPARABLE = ("current_A", "motor_position_rad", "user_position_rad", "motor_speed_rad_s")
 USUAL = {name: 1.0 for name in COMPARABLE[:3]}
 _MOST_WEIGHT = 1e3
-
-
-@dataclass
-class CompareEvents:
-    """What the screen listens to, besides the job; called on the threads that work, so listeners only hand over."""
-
-    opened: Signal[[Opened]] = field(default_factory=Signal)  # also when mapped or laid out anew
-    refused: Signal[[]] = field(default_factory=Signal)  # a layout that does not fit: all is as it was
-    removed: Signal[[]] = field(default_factory=Signal)
-    compared: Signal[[Comparison]] = field(default_factory=Signal)
-    kept: Signal[[Path]] = field(default_factory=Signal)  # a report or a recording is written
 
 
 class Comparing:
@@ -79,7 +69,7 @@ class Comparing:
 
     def add(self, name: str) -> None:
         """Opens a file of the data folder soon; what is wrong with it is told."""
-        self._files.post(f"open {name}", lambda: self._open(name))
+        self._files.post(f"open {name}", lambda: self._try(OPEN, lambda: self._open(name)))
 
     def measurement(self, name: str, actuator: Actuator | None = None) -> Measurement:
         """A file of the data folder for an actuator, the app's without one; as Compare has it, if it is open here."""
@@ -99,11 +89,11 @@ class Comparing:
 
     def use_mapping(self, name: str, mapping: ColumnMapping) -> None:
         """Reads the file with this mapping soon, and remembers it in the side file."""
-        self._files.post(f"map {name}", lambda: self._map(name, mapping))
+        self._files.post(f"map {name}", lambda: self._try(MAP, lambda: self._map(name, mapping)))
 
     def use_layout(self, name: str, hints: Hints) -> None:
         """Reads the text anew, as somebody says that it is laid out, soon, and remembers it in the side file."""
-        self._files.post(f"lay out {name}", lambda: self._lay_out(name, hints))
+        self._files.post(f"lay out {name}", lambda: self._try(LAY_OUT, lambda: self._lay_out(name, hints)))
 
     def _open(self, name: str) -> None:
         path = self.folder.measurement(name)
@@ -270,7 +260,7 @@ class Comparing:
 
     def save(self, suffix: str) -> None:
         """Writes the last comparison as a report (.html) or for Rerun (.rrd) into the data folder, soon."""
-        self._files.post(f"comparison {suffix}", lambda: self._keep(suffix))
+        self._files.post(f"comparison {suffix}", lambda: self._try(SAVE, lambda: self._keep(suffix)))
 
     def _keep(self, suffix: str) -> None:
         comparison = self.comparison
@@ -278,10 +268,22 @@ class Comparing:
             raise InputError("nothing is compared yet; press Compare first")
         self.events.kept(keep(comparison, self.folder, suffix))
 
+    def _try(self, what: str, job: Callable[[], object]) -> None:
+        """Does it on the files' thread; an error is told where it was asked for as well."""
+        try:
+            job()
+        except InputError as error:
+            self.events.failed(what, self._line(error))
+            raise
+        self.events.failed(what, "")
+
+    def _line(self, error: InputError) -> str:
+        """The page knows its files by their names in the data folder."""
+        return str(error).replace(f"{self.folder.folder}/", "")
+
     def _on_error(self, error: BaseException) -> None:
         if isinstance(error, InputError):
-            line = str(error).replace(f"{self.folder.folder}/", "")  # the page knows its files by their names there
-            self.session.events.told("The comparison has failed", line)
+            self.session.events.told("The comparison has failed", self._line(error))
             return
         traceback.print_exception(error)
         self.session.events.told("Something failed; the app goes on", f"{type(error).__name__}: {quoted(error)}")

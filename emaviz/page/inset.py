@@ -1,0 +1,95 @@
+"""The actuator as a framed inset below the controls, so that results have the page's width; a click lets it grow.
+
+Each window lays itself out: a script there follows its workspace, and everything else is a style sheet.  It leans on
+names in viser's own page; where one has changed, the actuator stands between the panels as it does once it has grown.
+"""
+
+from __future__ import annotations
+
+from emaviz.text.html import Html, unescaped
+
+COLUMNS = Html('<div class="emaviz-columns"></div>')  # stands in a tab whose parts take two columns where there is room
+NEXT_COLUMN = Html('<div class="emaviz-next-column"></div>')  # stands in the folder that begins the second one
+ALL_COLUMNS = Html('<div class="emaviz-all-columns"></div>')  # stands in a folder that is as wide as both
+_LEAST_WIDTH_PX, _TWO_COLUMNS_PX = 900, 1240  # of a window
+_CLICK_PX = 4  # a pointer that moves further turns the actuator
+
+_SCRIPT = """
+(() => {
+  window.emavizInset?.end();
+  let asked = false, grown = false, down = null;
+  const root = document.documentElement, body = document.body, button = document.createElement('button');
+  button.className = 'emaviz-grow';
+  body.append(button);
+  const picture = () => document.querySelector('[data-dock-root] > div:has(> canvas)');
+  const dress = () => {
+    const at = picture(), left = document.querySelector('[data-dock-region=left]');
+    const both = ['left', 'right'].every(side => document.querySelector(`[data-dock-region-resize=${side}]`));
+    const can = asked && at && left && both && innerWidth >= LEAST, inset = can && !grown;
+    if (left) root.style.setProperty('--emaviz-left', `${left.getBoundingClientRect().width}px`);
+    body.classList.toggle('emaviz-inset', inset);
+    button.style.display = can ? 'block' : 'none';
+    if (!can) return;
+    const box = at.getBoundingClientRect();
+    button.style.left = `${box.right - 34}px`;
+    button.style.top = `${box.top + (inset ? 6 : 22)}px`;
+    button.textContent = inset ? '⤢' : '⤡';
+    button.title = inset ? 'Larger actuator' : 'Smaller actuator';
+    button.setAttribute('aria-label', button.title);
+  };
+  const grow = (to) => { grown = to; dress(); };
+  const pressed = (event) => {
+    down = body.classList.contains('emaviz-inset') && picture()?.contains(event.target) ? event : null;
+  };
+  const released = (event) => {
+    if (down && Math.hypot(event.clientX - down.clientX, event.clientY - down.clientY) < CLICK) grow(true);
+    down = null;
+  };
+  button.addEventListener('click', () => grow(!grown));
+  document.addEventListener('pointerdown', pressed, true);
+  document.addEventListener('pointerup', released, true);
+  const timer = setInterval(dress, 100);
+  window.emavizInset = {
+    enter: (inset) => { asked = inset; grown = false; dress(); },
+    end: () => {
+      clearInterval(timer);
+      button.remove();
+      document.removeEventListener('pointerdown', pressed, true);
+      document.removeEventListener('pointerup', released, true);
+    },
+  };
+})();
+"""
+
+
+def script() -> str:
+    """To run in every page: `window.emavizInset.enter(inset)` lays it out for a workspace."""
+    return _SCRIPT.replace("LEAST", str(_LEAST_WIDTH_PX)).replace("CLICK", str(_CLICK_PX))
+
+
+def style() -> Html:
+    """The inset at the lower left, the controls above it, the results to the right of both."""
+    inset, right = "body.emaviz-inset", "body.emaviz-inset [data-dock-region=right]"
+    columns = f"{right} div:has(> div > .emaviz-columns)"
+    return unescaped(
+        "<style>"
+        ":root{--emaviz-inset:clamp(150px,calc(46vh - 138px),330px)}"
+        f"{inset} [data-dock-root] > div:has(> canvas){{inset:auto auto 8px 8px!important;"
+        "width:calc(var(--emaviz-left) - 16px)!important;height:var(--emaviz-inset)!important;z-index:6;"
+        "border:1px solid rgba(134,142,150,.55);border-radius:6px;overflow:hidden;cursor:pointer}"
+        f"{inset} [data-dock-region=left]{{bottom:calc(var(--emaviz-inset) + 16px)!important}}"
+        f"{right}{{width:calc(100% - var(--emaviz-left))!important}}"
+        f"{right} > div:not([data-dock-region-handle]):not([data-dock-region-resize]) > div{{width:100%!important}}"
+        f"{right} [data-dock-region-resize]{{display:none!important}}"
+        # what is told, where it covers no result
+        f"{inset} .mantine-Notifications-root{{left:10px!important}}"
+        f"{inset} .mantine-Notifications-root[data-position^=top]{{top:auto!important;bottom:80px!important}}"
+        ".emaviz-grow{position:fixed;z-index:7;width:26px;height:26px;padding:0;border-radius:4px;cursor:pointer;"
+        "font-size:15px;line-height:24px;border:1px solid rgba(134,142,150,.55);"
+        "background:var(--mantine-color-body);color:var(--mantine-color-text)}"
+        f"@media (min-width:{_TWO_COLUMNS_PX}px){{{columns}{{columns:2;column-gap:6px;padding-top:12px}}"
+        f"{columns} > div{{break-inside:avoid}}"
+        f"{columns} > div:has(.emaviz-next-column){{break-before:column}}"
+        f"{columns} > div:has(.emaviz-all-columns){{column-span:all}}}}"
+        "</style>"
+    )

@@ -1,0 +1,101 @@
+"""How a window is laid out: an inset beside results, which fill the window; first visits and errors stay to be seen."""
+
+from __future__ import annotations
+
+import pytest
+from support.on_page import wait_until
+
+from emaviz.recording.writer import RecordingWriter
+
+pytestmark = pytest.mark.browser
+
+PICTURE = "document.querySelector('[data-dock-root] > div:has(> canvas)')"
+RIGHT = "document.querySelector('[data-dock-region=right]')"
+CHARTS = "[...document.querySelectorAll('.uplot-container')].filter(one => one.offsetParent)"
+
+
+@pytest.fixture
+def page(shared_page):
+    yield shared_page
+    shared_page.set_viewport_size({"width": 1400, "height": 900})
+    go(shared_page, "Explore")
+
+
+def go(page, name):
+    page.get_by_role("tab", name=name, exact=True).click()
+    wait_until(lambda: page.url.endswith(f"?view={name.lower()}"), 20.0)
+
+
+def box(page, element):
+    """Left, top, right and bottom, px."""
+    return page.evaluate(
+        f"(({{left, top, right, bottom}}) => [left, top, right, bottom])({element}.getBoundingClientRect())"
+    )
+
+
+def columns(page):
+    """In how many columns the results of Compare stand."""
+    style = "getComputedStyle([...document.querySelectorAll('.emaviz-columns')].find(one => one.offsetParent)"
+    return page.evaluate(f"{style}.parentElement.parentElement).columnCount")
+
+
+def test_results_have_the_width_beside_an_inset_that_grows_at_a_click(page):
+    go(page, "Compare")
+    for width, height in ((1400, 900), (1920, 1080), (1100, 700)):
+        page.set_viewport_size({"width": width, "height": height})
+        wait_until(lambda width=width: abs(box(page, RIGHT)[2] - width) < 2.0, 10.0)
+        wait_until(lambda: box(page, PICTURE)[2] < box(page, RIGHT)[0], 10.0)
+        left, top, right, bottom = box(page, PICTURE)
+        results = box(page, RIGHT)
+        assert results[0] < 400 and results[2] == pytest.approx(width, abs=2), "all that the controls leave"
+        assert left >= 0.0 and bottom <= height - 68.0, "above the playback"
+        assert top >= page.evaluate("document.querySelector('[data-dock-region=left]').getBoundingClientRect().bottom")
+        assert columns(page) == ("2" if width >= 1240 else "auto")
+    page.set_viewport_size({"width": 1400, "height": 900})
+    page.get_by_role("button", name="Larger actuator").click()
+    wait_until(lambda: box(page, PICTURE)[3] - box(page, PICTURE)[1] > 700.0, 10.0)
+    wait_until(lambda: box(page, PICTURE)[2] <= box(page, RIGHT)[0] + 1.0, 10.0)  # between controls and results
+    page.get_by_role("button", name="Smaller actuator").click()
+    wait_until(lambda: box(page, PICTURE)[3] - box(page, PICTURE)[1] < 350.0, 10.0)
+    left, top, right, bottom = box(page, PICTURE)
+    page.mouse.click(0.5 * (left + right), top + 40.0)  # what is told covers its lower part
+    wait_until(lambda: box(page, PICTURE)[3] - box(page, PICTURE)[1] > 700.0, 10.0)
+
+
+def test_explore_keeps_the_actuator_in_the_middle(page):
+    go(page, "Compare")
+    wait_until(lambda: box(page, PICTURE)[2] < 400.0, 10.0)
+    go(page, "Explore")
+    wait_until(lambda: box(page, PICTURE)[2] - box(page, PICTURE)[0] > 500.0, 10.0)
+    assert not page.get_by_role("button", name="Larger actuator").is_visible()
+
+
+def test_charts_are_as_high_as_the_window_lets_them_be(page):
+    ends = {}
+    for height in (900, 1080):
+        page.set_viewport_size({"width": 1400, "height": height})
+        go(page, "Explore")
+        wait_until(
+            lambda height=height: height - 200.0 < page.evaluate(f"{CHARTS}.at(-1).getBoundingClientRect().bottom"),
+            10.0,
+        )
+        ends[height] = page.evaluate(f"{CHARTS}.map(one => one.getBoundingClientRect().height)")
+    assert all(tall > usual + 30.0 for usual, tall in zip(ends[900], ends[1080], strict=True))
+
+
+def test_a_first_visit_finds_an_effect_and_the_newest_run(page, app):
+    go(page, "Library")
+    page.get_by_text("The rotor's magnets pull toward").wait_for(timeout=20_000)
+    with RecordingWriter(app.comparing.folder.recordings / "alone.rrd") as writer:
+        writer.config("# alone")
+    go(page, "Runs")
+    page.locator("[data-dock-region=right]").get_by_text("alone.rrd").wait_for(timeout=20_000)
+
+
+def test_a_file_that_cannot_be_opened_is_told_beside_the_button_and_stays(page, app):
+    go(page, "Compare")
+    app.comparing.add("nowhere.csv")
+    beside = page.locator(".emaviz-beside").filter(has_text="nowhere.csv")
+    beside.wait_for(timeout=20_000)
+    page.wait_for_timeout(1_000)
+    assert beside.is_visible()

@@ -80,11 +80,11 @@ LAW_HOLDS = 0.2
 MUCH_BETTER = 1.0 / 3.0
 
 # Of the closed loop's error, that may be left where an effect of the drive was added, for the loop's account to stand:
-# what takes away nineteen parts of twenty is not given up for a model that has no drive.
+# what takes away nineteen parts of twenty is not given up for a model that has no drive.  Where its first step leaves
+# more, a model without the controller may take over early.
 LOOP_TOLD = 0.05
 
-# Of the closed loop's error, that its first step must leave before a model without the controller may take over early;
-# and of a model's error, below which one with an effect must stay for the effect to be needed.
+# Of a model's error, below which one with an effect must stay for the effect to be needed.
 HALF = 0.5
 
 # Of the closed loop's χ², that what is missing in its drive is expected to tell.  A drive that lacks one thing shows it

@@ -31,7 +31,7 @@ from ema_model.discovery.model_fit import (
     rms_by_signal,
     without_effect,
 )
-from ema_model.discovery.refit import Trial, again, promising, stands_for, tried
+from ema_model.discovery.refit import Trial, again, is_near, promising, stands_for, tried
 from ema_model.discovery.remaining import Left, at_floor, left_by
 from ema_model.discovery.result import Added, Candidate, Change, Contradiction, Rung, StoodIn
 from ema_model.discovery.score import scored, signatures
@@ -143,8 +143,9 @@ class Story:
         for candidate in promising(self.current, ranked, share, most, expected):
             tell(f"trying {candidate.name}")
             trials.append(self.trial(candidate, tell))
-        leading = max([LEAST_BIC, *(_LEADS * trial.drop for trial in trials)])
-        trials = [again(self.data, self.current, t, tell) if t.drop > leading else t for t in trials]
+        if is_near(self.current):
+            leading = max([LEAST_BIC, *(_LEADS * trial.drop for trial in trials)])
+            trials = [again(self.data, self.current, t, tell) if t.drop > leading else t for t in trials]
         return sorted(trials, key=lambda trial: -trial.drop)
 
     def tried_whole(self, ranked: Sequence[Candidate], tell: Progress) -> list[Trial]:

@@ -32,6 +32,7 @@ _RECENTRED = 4  # times that a refit begins anew from where its first guess held
 _HELD_BACK = 2.0  # σ of that guess, from which on it did
 _FOUND = (*ANGLES, "order")  # what no guess holds back: any angle is as likely, a pitch is as exact as the travel
 _UNMOVED = 1.0  # σ
+_NEAR = 5.0  # of the floor
 _STRAINED = 2.0  # σ, from which on a parameter may be what holds an effect's place
 _FAINT = 0.1  # of the suggested strength, from which a fit that went astray begins anew
 
@@ -58,7 +59,7 @@ def tried(
         faint = {name: _weakened(find(name, current.actuator.axes), settings) for name, settings in effects.items()}
         best = min(best, _refitted(data, current, faint, tell), key=lambda one: one.chi2)
     best = _recentred(data, current, best, effects, tell)
-    if best.error() > HALF * current.error() and _is_strained(current):
+    if best.error() > HALF * current.error() and is_near(current) and _is_strained(current):
         best = min(best, _from_the_file(data, current, _sized(data, current, effects, tell), tell), key=_chi2)
     return Trial(candidate, effects, best, current.chi2 - best.chi2)
 
@@ -84,6 +85,11 @@ def _recentred(data: Data, current: Fit, best: Fit, effects: Mapping[str, Mappin
             break
         best = again
     return best
+
+
+def is_near(current: Fit) -> bool:
+    """Whether so little is left that the last of what a descent might still find decides anything."""
+    return current.error() < _NEAR
 
 
 def _is_strained(current: Fit) -> bool:

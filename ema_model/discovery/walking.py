@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from ema_model.comparison.explain import Explanation
 from ema_model.discovery.claim import claimed
 from ema_model.discovery.contradiction import contradictions
-from ema_model.discovery.criteria import FAR, HALF, TOLD_WELL
+from ema_model.discovery.criteria import FAR, HALF, LOOP_TOLD, TOLD_WELL
 from ema_model.discovery.dropped import drop_doubtful, drop_idle
 from ema_model.discovery.model_fit import Fit
 from ema_model.discovery.objections import ratio
@@ -50,7 +50,8 @@ def walk(
         walked = beside.taken_over()
     else:
         own.go()
-        if story.ladder[-1].rmse > HALF * story.ladder[0].rmse and beside.blames_controller() and beside.settles():
+        left = max(FAR, LOOP_TOLD * story.ladder[0].rmse)
+        if story.ladder[-1].rmse > left and beside.blames_controller() and beside.settles():
             walked = beside.taken_over()
         else:
             walked = own.ended()

@@ -1,4 +1,8 @@
-"""One descent of a fit, ended where nothing changes any more that counts; large errors may count less."""
+"""One descent of a fit, in two ways one after the other, each ended where nothing changes any more that counts.
+
+scipy's trust region goes far along a valley that bends; from a start at a bound, or in a valley that is narrow and
+rough, it goes nowhere.  There Marquardt's steps go on.
+"""
 
 from __future__ import annotations
 
@@ -9,14 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.estimation.descent import Descent
+from ema_model.estimation.descent import Problem as Bounded
 from ema_model.estimation.problem import Problem
 
 Array = NDArray[np.float64]
 
-_LONGEST = 40  # steps
-# What a step may change of χ² and mean nothing: stick and slip make it rough.
-_IDLE, _IDLE_SHARE = 0.5, 5e-5
-_MOST_IDLE = 2  # steps, one after the other
+_LONGEST = 40  # evaluations, or steps, of each way
+# What one may change of half χ² and mean nothing: stick and slip make it rough, and a trust region takes half a dozen
+# steps into that roughness before it gives up.
+_IDLE, _IDLE_SHARE = 0.5, 1e-4
+_MOST_IDLE = 2  # one after the other
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,17 +40,82 @@ def descended(
     """Down from a start (unknowns,), inside the problem's bounds.
 
     soft: beyond so many σ, errors count as themselves instead of as their squares.
-    tell is called before each step and may raise to stop.
+    tell is called before each evaluation and may raise to stop.
     """
-    descent = Descent.begin(problem if soft is None else _Soft(problem, soft), start)
+    taken = problem if soft is None else _Soft(problem, soft)
+    return _by_marquardt(taken, _by_trust_region(taken, start, tell), tell)
+
+
+def _by_trust_region(problem: Bounded, start: Array, tell: Callable[[], None]) -> Array:
+    """The lowest point that was seen."""
+    from scipy.optimize import least_squares  # takes a third of a second to import
+
+    way = _Way(problem, tell)
+    try:
+        least_squares(
+            way.residual,
+            np.clip(start, 0.98 * problem.low, 0.98 * problem.high),
+            jac=way.jacobian,  # pyright: ignore[reportArgumentType]
+            bounds=(problem.low, problem.high),
+            max_nfev=_LONGEST,
+            xtol=1e-4,
+            ftol=5e-5,
+            # The long Jacobian's singular values cost more than all else, but lsmr looks for its step in a plane.
+            tr_solver="exact" if len(start) == 1 else "lsmr",
+        )
+    except _Ended:
+        pass
+    return way.x
+
+
+def _by_marquardt(problem: Bounded, start: Array, tell: Callable[[], None]) -> Descended:
+    descent = Descent.begin(problem, start)
     before, idle, steps = np.inf, 0, 0
     while not descent.done and idle < _MOST_IDLE and steps < _LONGEST:
         tell()
         descent.step()
-        now = float(descent.cost[0])
+        now = 0.5 * float(descent.cost[0])
         idle = idle + 1 if before - now < _IDLE + _IDLE_SHARE * now else 0
         before, steps = now, steps + 1
-    return Descended(descent.x[0], 0.5 * before, steps < _LONGEST)
+    return Descended(descent.x[0], before, steps < _LONGEST)
+
+
+class _Ended(Exception):
+    pass
+
+
+class _Way:
+    """What is known on the way: the lowest point, and the Jacobian of the last one, which comes with its residual."""
+
+    def __init__(self, problem: Bounded, tell: Callable[[], None]) -> None:
+        self.x, self._cost = np.zeros(0), np.inf
+        self._problem, self._tell = problem, tell
+        self._at, self._jacobian = np.zeros(0), np.zeros((0, 0))
+        self._idle = 0
+
+    def residual(self, x: Array) -> Array:
+        """(values + unknowns,).  Raises _Ended where the last evaluations changed nothing that counts."""
+        self._tell()
+        residual = self._simulated(x)
+        cost = 0.5 * float(residual @ residual)
+        idle = abs(self._cost - cost) < _IDLE + _IDLE_SHARE * cost
+        if cost < self._cost:
+            self.x, self._cost = self._at, cost
+        self._idle = self._idle + 1 if idle else 0
+        if self._idle == _MOST_IDLE:
+            raise _Ended
+        return residual
+
+    def jacobian(self, x: Array) -> Array:
+        """(values + unknowns, unknowns)."""
+        if not np.array_equal(x, self._at):
+            self._simulated(x)
+        return self._jacobian
+
+    def _simulated(self, x: Array) -> Array:
+        residuals, jacobians = self._problem.jacobians(x[None, :], in_whole_blocks=True)
+        self._at, self._jacobian = x.copy(), jacobians[0]
+        return residuals[0]
 
 
 class _Soft:
@@ -66,5 +137,4 @@ class _Soft:
     def _softened(self, residuals: Array) -> tuple[Array, Array]:
         """And their derivative by the residuals."""
         root = np.sqrt(1.0 + (residuals / self._scale) ** 2)
-        softened = residuals * np.sqrt(2.0 / (1.0 + root))
-        return softened, np.sqrt(0.5 * (1.0 + root)) / root
+        return residuals * np.sqrt(2.0 / (1.0 + root)), np.sqrt(0.5 * (1.0 + root)) / root

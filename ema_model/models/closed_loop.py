@@ -205,7 +205,8 @@ class ClosedLoop:
         late = _each(sensors.delay_s) - self.actuator.sensors.delay_s  # beyond what the window's command has
         if not np.any(late):
             return shown
-        return {name: y - late * np.gradient(y, block_s, axis=1) for name, y in shown.items()}
+        with np.errstate(invalid="ignore", over="ignore"):  # of one that diverges
+            return {name: y - late * np.gradient(y, block_s, axis=1) for name, y in shown.items()}
 
 
 def _each(value: ArrayLike) -> Array:

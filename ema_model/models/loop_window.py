@@ -22,8 +22,8 @@ _SLOPE_SAMPLES = 10  # on either side of a start in mid-run, over which the spee
 CONTEXT = ("load_torque_Nm", "temperature_C")
 BLOCK_S = 0.5e-3  # means over it take the chopping ripple away, which no low-fidelity model follows (MODEL §2)
 # Where something sticks, it does so at a step: with coarser ones the error is too rough to go downhill on (fits of a
-# hobby servo ended up to 300 apart in χ² with steps of 0.5 ms, within 40 with 0.1 ms).
-_COARSEST_STEP_S = 1e-4
+# hobby servo, a sample every 2 ms, ended up to 300 apart in χ² with steps of 0.5 ms, within 40 with 0.1 ms).
+_COARSEST_STEP_S, _COARSEST_SHARE = 1e-4, 0.05  # or of a sample's period, whichever is longer
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -78,7 +78,7 @@ def cut(
         raise InputError(f"{quoted(measurement.name)}: nothing to compare; one of {wanted} is needed")
     period = measurement.sample_period_s
     samples = max(1, round(block_s / period))
-    steps = steps_per_sample(period, min(actuator.step_s, _COARSEST_STEP_S))
+    steps = steps_per_sample(period, min(actuator.step_s, max(_COARSEST_STEP_S, _COARSEST_SHARE * period)))
     step_s = period / steps
     values = {path: value for rule in actuator.rules_for(measurement.name) for path, value in rule.values.items()}
     windows = []

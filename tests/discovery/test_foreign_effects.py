@@ -38,6 +38,13 @@ def test_the_arms_moment_is_found(tmp_path):
     assert found.effects[0].parameters["moment_Nm"].value == pytest.approx(hidden["pendulum"], rel=0.1)
 
 
+def test_a_spring_is_found_though_the_files_tolerances_nearly_take_it_up(tmp_path):
+    """Without it the arm's moment goes to its bound, and the error is at the floor all the same."""
+    found, _ = discovered(tmp_path, "spring")
+    assert [one.name for one in found.effects] == ["hinge_moment"], found
+    assert not found.parameters_outside_tolerance and found.ladder[-1].rmse <= BAND
+
+
 def test_friction_that_falls_at_a_servos_low_speeds_is_looked_for_there(tmp_path):
     """The library's usual speeds are beyond the fastest that this servo turns."""
     found, truth = discovered(tmp_path, "stribeck")

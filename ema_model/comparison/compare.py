@@ -21,6 +21,7 @@ from ema_model.estimation.floor import twin_error
 from ema_model.estimation.problem import SIGNALS
 from ema_model.faults import named
 from ema_model.models import Model, model_for
+from ema_model.models.delay_of_drive import with_delay_of_drive
 from ema_model.models.stretches import evaluation_stretches, fit_stretches
 from ema_model.recordings import Measurement
 from ema_model.recordings.health.card import health_of
@@ -66,6 +67,8 @@ def compare(
     wanted = weights_of(signals, actuator)
     if free is not None:
         free = [path_inside(path, actuator.tolerances, actuator.axes) for path in free]
+    if calibrate and free is None:
+        actuator = with_delay_of_drive(actuator, recordings)
     compile_behind(actuator)  # who compares an improved model does so again
     tell("measuring the model's floor")
     fitted = model_for(recordings, actuator, stretches=fit_stretches(recordings, actuator))

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ema_model.actuator import Actuator
 from ema_model.discovery.criteria import HALF, LEAST_BIC, MOMENT, MOMENTS
 from ema_model.discovery.evidence import colour_of, effective_values, evidence
 from ema_model.discovery.model_fit import ANGLES, Data, Fit, fit, holdout_error, with_effect
@@ -34,6 +33,7 @@ _FOUND = (*ANGLES, "order")  # what no guess holds back: any angle is as likely,
 _UNMOVED = 1.0  # σ
 _NEAR = 5.0  # of the floor
 _STRAINED = 2.0  # σ, from which on a parameter may be what holds an effect's place
+_AS_IN_THE_FILE: Mapping[str, float] = {}  # a start
 _FAINT = 0.1  # of the suggested strength, from which a fit that went astray begins anew
 
 
@@ -54,13 +54,13 @@ def tried(
     data: Data, current: Fit, candidate: Candidate, effects: Mapping[str, Mapping[str, float]], tell: Progress
 ) -> Trial:
     """The effects in the model, refitted together with all that it holds."""
-    best = _refitted(data, current, effects, tell)
+    best = _refitted(data, current, effects, current.starts, tell)
     if best.chi2 > current.chi2:  # it began too strong to find back
         faint = {name: _weakened(find(name, current.actuator.axes), settings) for name, settings in effects.items()}
-        best = min(best, _refitted(data, current, faint, tell), key=lambda one: one.chi2)
+        best = _better(best, _refitted(data, current, faint, current.starts, tell))
     best = _recentred(data, current, best, effects, tell)
     if best.error() > HALF * current.error() and is_near(current) and _is_strained(current):
-        best = min(best, _from_the_file(data, current, _sized(data, current, effects, tell), tell), key=_chi2)
+        best = _better(best, _refitted(data, current, _sized(data, current, effects, tell), _AS_IN_THE_FILE, tell))
     return Trial(candidate, effects, best, current.chi2 - best.chi2)
 
 
@@ -69,8 +69,7 @@ def again(data: Data, current: Fit, trial: Trial, tell: Progress) -> Trial:
 
     Its own way began where the smaller model ended, which may be held there by the start of a recording.
     """
-    found = trial.fit.calibration.actuator.effects
-    best = min(trial.fit, _from_the_file(data, current, {name: found[name] for name in trial.effects}, tell), key=_chi2)
+    best = _better(trial.fit, _refitted(data, current, _settings(trial.fit, trial.effects), _AS_IN_THE_FILE, tell))
     return replace(trial, fit=best, drop=current.chi2 - best.chi2)
 
 
@@ -79,11 +78,10 @@ def _recentred(data: Data, current: Fit, best: Fit, effects: Mapping[str, Mappin
     for _ in range(_RECENTRED):
         if best.chi2 > current.chi2 - LEAST_BIC or not _held_back(best, effects):
             break
-        found = best.calibration.actuator.effects
-        again = _refitted(data, current, {name: found[name] for name in effects}, tell)
-        if again.chi2 > best.chi2:
+        other = _refitted(data, current, _settings(best, effects), current.starts, tell)
+        if other.chi2 > best.chi2:
             break
-        best = again
+        best = other
     return best
 
 
@@ -106,19 +104,20 @@ def _sized(
     """
     held = tuple(default_free(current.actuator))
     for _ in range(_RECENTRED):
-        found = fit(data, _with_effects(current.actuator, effects), {}, tell, current.faults, held)
-        effects = {name: found.calibration.actuator.effects[name] for name in effects}
+        found = _refitted(data, current, effects, _AS_IN_THE_FILE, tell, held)
+        effects = _settings(found, effects)
         if not _held_back(found, effects):
             break
     return effects
 
 
-def _from_the_file(data: Data, current: Fit, effects: Mapping[str, Mapping[str, float]], tell: Progress) -> Fit:
-    return fit(data, _with_effects(current.actuator, effects), {}, tell, current.faults)
+def _better(one: Fit, other: Fit) -> Fit:
+    return min(one, other, key=lambda found: found.chi2)
 
 
-def _chi2(found: Fit) -> float:
-    return found.chi2
+def _settings(found: Fit, effects: Iterable[str]) -> dict[str, Mapping[str, float]]:
+    """Of these effects, as a fit found them."""
+    return {name: found.calibration.actuator.effects[name] for name in effects}
 
 
 def stands_for(before: Fit, name: str) -> str:
@@ -178,14 +177,19 @@ def _holds(before: float, after: float, fall: float) -> bool:
     return after < (1.0 - least) * before
 
 
-def _refitted(data: Data, current: Fit, effects: Mapping[str, Mapping[str, float]], tell: Progress) -> Fit:
-    return fit(data, _with_effects(current.actuator, effects), current.starts, tell, current.faults)
-
-
-def _with_effects(actuator: Actuator, effects: Mapping[str, Mapping[str, float]]) -> Actuator:
+def _refitted(
+    data: Data,
+    current: Fit,
+    effects: Mapping[str, Mapping[str, float]],
+    start: Mapping[str, float],
+    tell: Progress,
+    held: tuple[str, ...] = (),
+) -> Fit:
+    """The model with the effects, fitted from a start; held: parameters that stay as the file has them."""
+    actuator = current.actuator
     for name, settings in effects.items():
         actuator = with_effect(actuator, name, settings)
-    return actuator
+    return fit(data, actuator, start, tell, current.faults, held)
 
 
 def _held_back(found: Fit, effects: Mapping[str, Mapping[str, float]]) -> bool:

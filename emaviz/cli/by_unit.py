@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterable
 from copy import copy
+from dataclasses import replace
 from fnmatch import fnmatchcase
 from pathlib import Path
+from typing import Any
 
 from ema_model.actuator import Actuator, save_actuator
 from ema_model.comparison.summary import plain
@@ -47,14 +50,10 @@ def is_asked(arguments: argparse.Namespace) -> bool:
 
 def run(arguments: argparse.Namespace, actuator: Actuator) -> int:
     """Reads, compares the units, writes and prints."""
-    from dataclasses import replace
-
     from ema_model.units.compare import compare_units
     from ema_model.units.summary import as_dict
 
-    for name, default in _NOT_OF_UNITS.items():
-        if getattr(arguments, name) != default:
-            raise InputError(f"{_WORD.get(name, f'--{name}')}: has no meaning where units are compared; leave it out")
+    _refuse(arguments, _NOT_OF_UNITS)
     actuator = replace(actuator, effects={**actuator.effects, **given.effects_of(arguments, actuator.axes)})
     progress = output.Progress()
     try:
@@ -69,19 +68,14 @@ def run(arguments: argparse.Namespace, actuator: Actuator) -> int:
             write_units_report(result, arguments.report)
     finally:
         progress.done()
-    if arguments.save_actuator:
-        save_actuator(result.type_actuator, arguments.save_actuator)
-    output.write_json(arguments, as_dict(result))
-    print(result)
-    return 0
+    return _told(arguments, result, as_dict(result), result.type_actuator)
 
 
 def run_discovery(arguments: argparse.Namespace, actuator: Actuator, signals: tuple[str, ...] | None) -> int:
     """Reads, looks for what the units lack, writes and prints."""
     from ema_model.units.discovery import as_dict, discover_units
 
-    if arguments.record:
-        raise InputError("--record: has no meaning where units are compared; leave it out")
+    _refuse(arguments, ["record"])
     progress = output.Progress()
     try:
         fitted, held = read_units(arguments, actuator, progress)
@@ -101,9 +95,21 @@ def run_discovery(arguments: argparse.Namespace, actuator: Actuator, signals: tu
             write_units_discovery_report(result, arguments.report)
     finally:
         progress.done()
+    return _told(arguments, result, plain(as_dict(result)), result.compared.type_actuator)
+
+
+def _refuse(arguments: argparse.Namespace, options: Iterable[str]) -> None:
+    """InputError for one of these options that is given."""
+    for name in options:
+        if getattr(arguments, name) != _NOT_OF_UNITS[name]:
+            raise InputError(f"{_WORD.get(name, f'--{name}')}: has no meaning where units are compared; leave it out")
+
+
+def _told(arguments: argparse.Namespace, result: object, document: dict[str, Any], of_type: Actuator) -> int:
+    """Saves the type, writes and prints."""
     if arguments.save_actuator:
-        save_actuator(result.compared.type_actuator, arguments.save_actuator)
-    output.write_json(arguments, plain(as_dict(result)))
+        save_actuator(of_type, arguments.save_actuator)
+    output.write_json(arguments, document)
     print(result)
     return 0
 

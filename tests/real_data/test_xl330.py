@@ -21,8 +21,7 @@ def compared(data_folder, actuators):
 def test_calibration_converges_on_all_twelve(compared):
     assert len(compared.recordings) == 12
     assert compared.calibration.converged
-    # friction that grows with the load is missing, for which the arm's moment stands in, as far as it may
-    assert set(compared.calibration.outside_tolerance) <= {"effects.pendulum_load.moment_Nm"}
+    assert not compared.calibration.outside_tolerance
 
 
 def test_coulomb_viscous_error_is_what_is_known_of_it(compared):

@@ -22,7 +22,7 @@ _WIDTH, _HEIGHT = 120, 44  # of a small picture, pixels
 class EffectCharts:
     """A chart for each signal, and one of what changes in it; unseen until there is a run."""
 
-    def __init__(self, gui: viser.GuiApi, axes: Axes, height: int = 118) -> None:
+    def __init__(self, gui: viser.GuiApi, axes: Axes, height: int = 98) -> None:
         empty = np.array([0.0, 1.0])
         lines = legend((REFERENCE, "without"), (MONITOR, "with the effect"), (DIFFERENCE, "difference, below"))
         self._legend = add_html(gui, lines, visible=False)

@@ -32,15 +32,18 @@ def test_an_arm_that_hangs_elsewhere_than_the_file_says_is_found_there(tmp_path)
 
 @pytest.mark.xfail(reason="the drive computes a sample late, which torque constant and with it all torques take up")
 def test_the_arms_moment_is_found(tmp_path):
-    """0.517 for 0.617 N·m, with an interval of ± 0.001."""
+    """0.553 for 0.617 N·m, with an interval of ± 0.007."""
     found, truth = discovered(tmp_path, "gravity")
     hidden = truth["hidden"]["gravity"]["parameters"]
     assert found.effects[0].parameters["moment_Nm"].value == pytest.approx(hidden["pendulum"], rel=0.1)
 
 
-def test_a_spring_is_found_though_the_files_tolerances_nearly_take_it_up(tmp_path):
+@pytest.mark.parametrize(
+    "unit", [22, pytest.param(5, marks=pytest.mark.xfail(reason="beside settled parameters the score sees too little"))]
+)
+def test_a_spring_is_found_though_the_files_tolerances_nearly_take_it_up(tmp_path, unit):
     """Without it the arm's moment goes to its bound, and the error is at the floor all the same."""
-    found, _ = discovered(tmp_path, "spring")
+    found, _ = discovered(tmp_path, "spring", unit)
     assert [one.name for one in found.effects] == ["hinge_moment"], found
     assert not found.parameters_outside_tolerance and found.ladder[-1].rmse <= BAND
 

@@ -9,7 +9,7 @@ from ema_model.faults import HEALTHY
 from ema_model.simulation.with_effect import RUNS, WithEffect
 from emaviz.figures.effect_signature import EffectCharts
 from emaviz.page.discover.effect import about
-from emaviz.page.inset import COLUMNS
+from emaviz.page.inset import COLUMNS, NEXT_COLUMN
 from emaviz.page.library import WORKSPACE
 from emaviz.page.page import Page
 from emaviz.page.playback import PlaybackStrip
@@ -37,6 +37,7 @@ class EffectPage:
         self._run = gui.add_dropdown("Run", tuple(RUNS), visible=False)
         self._place = gui.add_folder("What each parameter does", visible=False)
         self._status = add_html(gui)
+        add_html(gui, NEXT_COLUMN)  # a signal and its difference stay together
         self._charts = EffectCharts(gui, page.session.actuator.axes)
         page.workspaces.entered.connect(self._enter)
         self._run.on_update(lambda event: event.client and self._ask())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,7 +13,7 @@ from ema_model.estimation.floor import Floor, floor
 from ema_model.estimation.problem import Problem
 from ema_model.estimation.unknowns import K_SIGMA, Unknown, loads_of, starts_of, unknowns_of
 from ema_model.faults import HEALTHY, NAMES
-from ema_model.identification.model_bias import Twins, twins
+from ema_model.identification.model_bias import Twins, errors_near, of_errors, twins
 from ema_model.models import ClosedLoop
 from ema_model.models.closed_loop import LOAD
 
@@ -144,9 +144,10 @@ def refine(given: Setting, k: ArrayLike, seed: int = 0, tell: Tell = _silent) ->
                 lambda text, done: tell(f"{text}, {said}", 0.5 + 0.5 * done),
             )
             more += again + again2
-            if not _better(problem, given, x, start, seed + 2 * _ROUNDS + 1):
+            errors = errors_near(problem, np.array([x, start]), seed + 2 * _ROUNDS + 1)
+            if not _better(problem, given, x, start, [of_errors(problem, one) for one in errors]):
                 x, spread = start, 0.0  # the twin does not follow where the Monitor Model led
-            found = twins(problem, x, seed + 2 * _ROUNDS + 1, found)
+            found = of_errors(problem, errors[0 if spread > 0.0 else 1], found)
             _reweight(problem, given, found)
             problem.believe(1.0)
     residuals, slopes = problem.jacobians(x[None, :])
@@ -202,17 +203,17 @@ def current_error(found: Fitted, k: ArrayLike | None = None) -> float:
     return float(np.sqrt(np.mean(np.concatenate(parts) ** 2))) if parts else float("nan")
 
 
-def _better(problem: Problem, given: Setting, x: Array, other: Array, seed: int) -> bool:
-    """Whether the Reference Model itself is closer to the recordings at x than at the other."""
-    _reweight(problem, given, twins(problem, other, seed))
+def _better(problem: Problem, given: Setting, x: Array, other: Array, found: Sequence[Twins | None]) -> bool:
+    """Whether the Reference Model itself is closer to the recordings at x than at the other; found: twins of both."""
+    _reweight(problem, given, found[1])
     # both are counted with the same weights
     weights = [problem.over_sigma(i, name, np.ones(rows.stop - rows.start)) for i, name, rows in problem.parts()]
-    return _cost(problem, given, x, seed, weights) < _cost(problem, given, other, seed, weights)
+    return _cost(problem, given, x, found[0], weights) < _cost(problem, given, other, found[1], weights)
 
 
-def _cost(problem: Problem, given: Setting, x: Array, seed: int, weights: list[Array]) -> float:
+def _cost(problem: Problem, given: Setting, x: Array, found: Twins | None, weights: list[Array]) -> float:
     """χ² at x with its own twin, for given 1/σ of each part, and the prior."""
-    _reweight(problem, given, twins(problem, x, seed))
+    _reweight(problem, given, found)
     residual = problem.residuals(x[None, :])[0]
     total = float(np.sum(residual[problem.values :] ** 2))
     for weight, (i, name, rows) in zip(weights, problem.parts()):

@@ -22,6 +22,7 @@ from ema_model.estimation.unknowns import K_SIGMA
 from ema_model.faults import NAMES
 
 Array = NDArray[np.float64]
+Errors = list[dict[str, Array]]  # of twins, by window and signal: (twins, blocks)
 
 TWINS = 4
 # σ of the twins' x about the answer.  In saturation the ripple repeats for the same k, but not for one that a fit may
@@ -52,29 +53,48 @@ def twins(
     about: a root of the covariance of x (unknowns, unknowns) that the twins are drawn from, in place of a hair of each
     fault: what is known of the difference is then what holds wherever x may be.
     """
-    if not problem.model.actuator.has_reference_model:
+    return of_errors(problem, errors_near(problem, x[None, :], seed, about)[0], before)
+
+
+def of_errors(problem: Problem, errors: Errors | None, before: Twins | None = None) -> Twins | None:
+    """What `twins` makes of the twins' errors, or of none."""
+    if errors is None:
         return None
-    near = np.repeat(x[None, :], TWINS, axis=0)
-    random = np.random.default_rng([seed, 2])
-    if about is None:
-        near[:, : len(NAMES)] += _HAIR * random.standard_normal((TWINS, len(NAMES)))
-    else:
-        near += random.standard_normal(near.shape) @ about.T
-    near = problem.clip(near)
     added, spread, deviations = [], [], []
-    for i, window in enumerate(problem.model.windows):
-        try:
-            errors = _errors(problem, near, i)
-        except FloatingPointError:
-            return None
-        means = {name: error.mean(axis=0) for name, error in errors.items()}
-        own = {name: error - means[name] for name, error in errors.items()}
+    for i, (window, error) in enumerate(zip(problem.model.windows, errors)):
+        means = {name: one.mean(axis=0) for name, one in error.items()}
+        own = {name: one - means[name] for name, one in error.items()}
         if before:  # the more twins, the better known is their spread
             own = {name: np.concatenate([before.deviations[i][name], one]) for name, one in own.items()}
         added.append(means)
         deviations.append(own)
         spread.append({name: _spread(one, means[name], name, window.block_s) for name, one in own.items()})
     return Twins(added, spread, deviations)
+
+
+def errors_near(problem: Problem, points: Array, seed: int, about: Array | None = None) -> list[Errors | None]:
+    """Reference less Monitor Model of the twins of each of a few points (n, unknowns), all simulated at once.
+
+    None where they diverge, or there is no Reference Model.
+    """
+    if not problem.model.actuator.has_reference_model:
+        return [None] * len(points)
+    random = np.random.default_rng([seed, 2])
+    near = np.repeat(points, TWINS, axis=0)
+    if about is None:
+        hairs = _HAIR * random.standard_normal((TWINS, len(NAMES)))
+        near[:, : len(NAMES)] += np.tile(hairs, (len(points), 1))
+    else:
+        near += np.tile(random.standard_normal((TWINS, points.shape[1])) @ about.T, (len(points), 1))
+    near = problem.clip(near)
+    try:
+        errors = [_errors(problem, near, i) for i in range(len(problem.model.windows))]
+    except FloatingPointError:
+        if len(points) == 1:
+            return [None]
+        return [errors_near(problem, one[None, :], seed, about)[0] for one in points]
+    rows = [slice(first, first + TWINS) for first in range(0, len(near), TWINS)]
+    return [[{name: one[part] for name, one in window.items()} for window in errors] for part in rows]
 
 
 def _spread(deviations: Array, mean: Array, name: str, block_s: float) -> Array:
@@ -90,5 +110,5 @@ def _spread(deviations: Array, mean: Array, name: str, block_s: float) -> Array:
 def _errors(problem: Problem, x: Array, place: int) -> dict[str, Array]:
     """Reference less Monitor Model for x (n, unknowns), both under a constant load and an even supply: (n, blocks)."""
     monitor = problem.simulate(x, place, even=True)
-    twin = [problem.model.twin(place, *problem.rig(one, place)) for one in x]
-    return {name: np.array([one[name] for one in twin]) - monitor[name] for name in problem.weights[place]}
+    twin = problem.model.twins(place, *problem.rig(x, place))
+    return {name: twin[name] - monitor[name] for name in problem.weights[place]}

@@ -18,6 +18,9 @@ from ema_model.identification.objective import Objective
 from ema_model.identification.optimisers import OPTIMISERS, Optimiser, create
 from ema_model.identification.search import search
 from ema_model.identification.uncertainty import Uncertainty, uncertainty
+from ema_model.simulation.one_stack import stack_at_hand
+from ema_model.simulation.precompile import compile_ahead, compile_here, wait_for
+from ema_model.stacks import Stack
 from ema_model.text import InWords
 
 Array = NDArray[np.float64]
@@ -107,6 +110,8 @@ def steps(
             known = "" if algorithm in OPTIMISERS else f" and {ROBUST}"
             raise InputError(f"{error}{known}") from None
         running = _optimise(objective, optimiser)
+    twins = _stack_of_twins(objective)
+    compile_ahead(twins)
     compile_s = warm_up(objective)
     history: list[Progress] = []
     stopped = False
@@ -119,7 +124,7 @@ def steps(
     started = time.perf_counter()
     last = history[-1]
     given = setting(objective, parameters_known=parameters_known)
-    first_compile = _warm_up_fit(given)
+    first_compile = _warm_up_fit(given) + _warm_up_twins(twins)
     if algorithm == ROBUST:
         found = refine_best(given, last.population, seed, on_fit)
     else:
@@ -235,3 +240,20 @@ def _warm_up_fit(given: Setting) -> float:
         plant.signals(0)
         return time.perf_counter() - started
     return 0.0
+
+
+def _stack_of_twins(objective: Objective) -> list[tuple[Stack, str]]:
+    """The kernel that the fit's twins need; none without a Reference Model."""
+    if not objective.actuator.has_reference_model:
+        return []
+    return [(stack_at_hand(objective.actuator, objective.effects, "reduced", "runs"), "runs")]
+
+
+def _warm_up_twins(kernels: list[tuple[Stack, str]]) -> float:
+    """The same for the twins, whose kernel another process may have begun to compile."""
+    started = time.perf_counter()
+    for stack, kernel in kernels:
+        wait_for(stack, kernel)
+        if not stack.reference.runs.signatures:
+            compile_here(stack, kernel)
+    return time.perf_counter() - started if kernels else 0.0

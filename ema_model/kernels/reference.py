@@ -1,74 +1,20 @@
-"""The Reference Model's kernel: three phases, one hysteresis relay per leg, floating star (T 3.2)."""
+"""The Reference Model's outer kernels: one run, with all that it shows, or several at once, of those that are compared.
+
+Both advance by the same step, and give the same to the last bit: several runs in lanes take hardly longer than one.
+"""
 
 from __future__ import annotations
 
-from ema_model.physics.backlash import advance_play
-from ema_model.physics.elementary import clamp, rotate
-from ema_model.physics.friction import advance_rotor, borello_friction
-from ema_model.physics.inverter import relay
+import numpy as np
+
 from ema_model.physics.jit import kernel
-from ema_model.physics.phases import (
-    air_gap,
-    equivalent_current,
-    minus_120,
-    plus_120,
-    winding_coefficients,
-)
-from ema_model.physics.rows import (
-    BUS_VOLTAGE,
-    COS_ELECTRICAL,
-    COS_ROTOR,
-    CURRENT_A,
-    CURRENT_B,
-    CURRENT_C,
-    DYNAMIC_FRICTION,
-    ECCENTRICITY,
-    ECCENTRICITY_COS,
-    ECCENTRICITY_SIN,
-    EMF_CONSTANT,
-    GEAR_RATIO,
-    HALF_PLAY,
-    HYSTERESIS,
-    INVERSE_INDUCTANCE,
-    INVERSE_INERTIA,
-    LANES,
-    OMEGA,
-    PLAY,
-    POLE_PAIRS,
-    REFERENCE_STATE_ROWS,
-    RESISTANCE,
-    SIN_ELECTRICAL,
-    SIN_ROTOR,
-    STATIC_FRICTION,
-    STOP_HIGH,
-    STOP_LOW,
-    THETA,
-    TORQUE_CONSTANT,
-    TORQUE_LIMIT,
-    TURNS_A,
-    TURNS_B,
-    TURNS_C,
-    VISCOUS,
-    VOLTAGE_RATIO,
-)
+from ema_model.physics.rows import BUS_VOLTAGE, GEAR_RATIO, LANES, VOLTAGE_RATIO
 
-from .composition import (
-    advance_states,
-    back_emf,
-    bus_voltage,
-    current_reading,
-    electric_torque,
-    friction,
-    inverse_inertia,
-    moving_friction,
-    position_reading,
-    shaft_torque,
-    user_position,
-    winding_resistance,
-)
-from .drive_step import advance_drive, is_driven, plain_demand
+from .composition import current_reading, position_reading, user_position
+from .drive_step import is_driven
+from .reference_step import CONSTANT, FIRST, STATE, advance, advance_demand, begun, constants
 
-FIRST = len(REFERENCE_STATE_ROWS)  # row of the effects' own states
+RUNS = 16  # at once: 8 do not vectorise, 32 take twice as long
 
 
 @kernel
@@ -80,45 +26,14 @@ def run(state, p, command, load, period, substeps, dt, result):
     result: (samples, 11), written here: equivalent current (mean over the sample's period), motor speed,
     motor angle, user position (at its end), phase currents, motor torque and leg voltages (means).
     """
-    theta = state[THETA * LANES]
-    omega = state[OMEGA * LANES]
-    play = state[PLAY * LANES]
-    sin_r = state[SIN_ROTOR * LANES]
-    cos_r = state[COS_ROTOR * LANES]
-    sin_e = state[SIN_ELECTRICAL * LANES]
-    cos_e = state[COS_ELECTRICAL * LANES]
-    current_a = state[CURRENT_A * LANES]
-    current_b = state[CURRENT_B * LANES]
-    current_c = state[CURRENT_C * LANES]
-    leg_a, leg_b, leg_c = 1.0, 1.0, 1.0
-    driven = is_driven(p)
-
-    tau = p[GEAR_RATIO * LANES]
-    torque_limit = p[TORQUE_LIMIT * LANES]
     s = state.copy()
-    bus = p[BUS_VOLTAGE * LANES]
-    ratio = p[VOLTAGE_RATIO * LANES]
-    voltage = ratio * bus
-    inertia = inverse_inertia(p[INVERSE_INERTIA * LANES], s, FIRST, p, 0)
-    winding = winding_resistance(p[RESISTANCE * LANES], s, FIRST, p, 0)
-    q = 0.0
-    band = p[HYSTERESIS * LANES]
-    emf = p[EMF_CONSTANT * LANES]
-    turns_a, turns_b, turns_c = p[TURNS_A * LANES], p[TURNS_B * LANES], p[TURNS_C * LANES]
-    # turns physics: R_i = N_i R, L_i = N_i² L
-    inverse_a = p[INVERSE_INDUCTANCE * LANES] / (turns_a * turns_a)
-    inverse_b = p[INVERSE_INDUCTANCE * LANES] / (turns_b * turns_b)
-    inverse_c = p[INVERSE_INDUCTANCE * LANES] / (turns_c * turns_c)
-    star = 1.0 / (inverse_a + inverse_b + inverse_c)
-    resistance_a = winding * turns_a
-    resistance_b = winding * turns_b
-    resistance_c = winding * turns_c
-    eccentricity = p[ECCENTRICITY * LANES]
-    cos_phase, sin_phase = p[ECCENTRICITY_COS * LANES], p[ECCENTRICITY_SIN * LANES]
-    static = p[STATIC_FRICTION * LANES]
+    x = begun(s, 0)
+    constant = constants(s, p, 0)
+    driven = is_driven(p)
+    tau = p[GEAR_RATIO * LANES]
+    voltage = p[VOLTAGE_RATIO * LANES] * p[BUS_VOLTAGE * LANES]
     scale = 1.0 / (period * substeps)
     interval = 0
-
     for sample in range(result.shape[0]):
         mean_q, mean_a, mean_b, mean_c, mean_torque = 0.0, 0.0, 0.0, 0.0, 0.0
         mean_va, mean_vb, mean_vc = 0.0, 0.0, 0.0
@@ -129,103 +44,22 @@ def run(state, p, command, load, period, substeps, dt, result):
             load_step = (load[interval + 1] - user_load) / substeps
             interval += 1
             for _ in range(substeps):
-                rigid = tau * play
-                user = user_position(rigid, theta, tau, s, FIRST, p, 0)
-                told = position_reading(user, s, FIRST, p, 0)
                 if driven:
-                    current_ref = advance_drive(s, FIRST, p, 0, demand, told, omega, 1.0, dt)
-                else:
-                    current_ref = plain_demand(p, 0, demand, told, omega)
-
-                amplitude = -(2.0 / 3.0) * current_ref
-                sin_b = minus_120(sin_e, cos_e)[0]
-                sin_c = plus_120(sin_e, cos_e)[0]
-                leg_a = relay(leg_a, amplitude * sin_e - current_a, band)
-                leg_b = relay(leg_b, amplitude * sin_b - current_b, band)
-                leg_c = relay(leg_c, amplitude * sin_c - current_c, band)
-
-                gap_a, gap_b, gap_c = air_gap(sin_r, cos_r, eccentricity, cos_phase, sin_phase)
-                volts = ratio * bus_voltage(bus, q, s, FIRST, p, 0)
-                k_a, k_b, k_c = winding_coefficients(sin_e, cos_e, gap_a, gap_b, gap_c, turns_a, turns_b, turns_c)
-                against_a = back_emf(emf * k_a * omega, omega, current_a, s, FIRST, p, 0)
-                drive_a = leg_a * volts - resistance_a * current_a - against_a
-                against_b = back_emf(emf * k_b * omega, omega, current_b, s, FIRST, p, 0)
-                drive_b = leg_b * volts - resistance_b * current_b - against_b
-                against_c = back_emf(emf * k_c * omega, omega, current_c, s, FIRST, p, 0)
-                drive_c = leg_c * volts - resistance_c * current_c - against_c
-                neutral = star * (drive_a * inverse_a + drive_b * inverse_b + drive_c * inverse_c)
-                current_a += dt * inverse_a * (drive_a - neutral)
-                current_b += dt * inverse_b * (drive_b - neutral)
-                current_c += dt * inverse_c * (drive_c - neutral)
-
-                q = equivalent_current(current_a, current_b, current_c, sin_e, cos_e)
-                developed = p[TORQUE_CONSTANT * LANES] * (k_a * current_a + k_b * current_b + k_c * current_c)
-                motor_torque = clamp(
-                    electric_torque(developed, theta, omega, q, s, FIRST, p, 0), -torque_limit, torque_limit
-                )
-                active = shaft_torque(
-                    motor_torque - tau * user_load - p[VISCOUS * LANES] * omega,
-                    theta,
-                    omega,
-                    q,
-                    user,
-                    tau,
-                    user_load,
-                    s,
-                    FIRST,
-                    p,
-                    0,
-                )
-                dynamic = moving_friction(
-                    p[DYNAMIC_FRICTION * LANES], static, omega, motor_torque, user_load, tau, s, FIRST, p, 0
-                )
-                resisting = friction(
-                    borello_friction(omega, active, static, dynamic), omega, active, static, dynamic, s, FIRST, p, 0
-                )
-                theta1, omega1 = advance_rotor(
-                    theta,
-                    omega,
-                    active - resisting,
-                    inertia,
-                    p[STOP_LOW * LANES],
-                    p[STOP_HIGH * LANES],
-                    dt,
-                )
-                turned = theta1 - theta
-                sin_r, cos_r = rotate(sin_r, cos_r, turned)
-                sin_e, cos_e = rotate(sin_e, cos_e, p[POLE_PAIRS * LANES] * turned)
-                play1 = advance_play(play, theta1, p[HALF_PLAY * LANES])
-                advance_states(
-                    dt,
-                    theta,
-                    omega,
-                    rigid,
-                    tau * play1,
-                    tau * (play1 - play),
-                    tau,
-                    user_load,
-                    active,
-                    static,
-                    dynamic,
-                    s,
-                    FIRST,
-                    p,
-                    0,
-                )
-                theta, omega, play = theta1, omega1, play1
-
-                mean_q += current_reading(q, s, FIRST, p, 0)
-                mean_a += current_a
-                mean_b += current_b
-                mean_c += current_c
+                    advance_demand(x[0], x[2], x[1], s, p, 0, demand, dt)
+                x, motor_torque = advance(x, constant, s, p, 0, demand, user_load, driven, dt)
+                mean_q += current_reading(x[13], s, FIRST, p, 0)
+                mean_a += x[7]
+                mean_b += x[8]
+                mean_c += x[9]
                 mean_torque += motor_torque
-                mean_va += leg_a
-                mean_vb += leg_b
-                mean_vc += leg_c
+                mean_va += x[10]
+                mean_vb += x[11]
+                mean_vc += x[12]
                 demand += demand_step
                 user_load += load_step
+        theta, play = x[0], x[2]
         result[sample, 0] = mean_q * scale
-        result[sample, 1] = omega
+        result[sample, 1] = x[1]
         result[sample, 2] = theta
         result[sample, 3] = position_reading(user_position(tau * play, theta, tau, s, FIRST, p, 0), s, FIRST, p, 0)
         result[sample, 4] = mean_a * scale
@@ -235,3 +69,95 @@ def run(state, p, command, load, period, substeps, dt, result):
         result[sample, 8] = mean_va * voltage * scale
         result[sample, 9] = mean_vb * voltage * scale
         result[sample, 10] = mean_vc * voltage * scale
+
+
+@kernel
+def runs(state, p, command, load, period, substeps, dt, result):
+    """RUNS runs under one command, each under a constant load: what of `run` is compared, (samples, 4, RUNS).
+
+    state, p: rows of LANES, of which the first RUNS are simulated; command: as of `run`; load: (RUNS,).
+    result: written here: equivalent current, motor speed, motor angle, user position.
+    """
+    s = state.copy()
+    driven = is_driven(p)
+    kept = np.empty(CONSTANT * RUNS)
+    x = np.empty(STATE * RUNS)
+    mean = np.empty(RUNS)
+    for i in range(RUNS):
+        given = constants(s, p, i)
+        for j in range(CONSTANT):
+            kept[j * RUNS + i] = given[j]
+        first = begun(s, i)
+        for j in range(STATE):
+            x[j * RUNS + i] = first[j]
+    scale = 1.0 / (period * substeps)
+    interval = 0
+    for sample in range(result.shape[0]):
+        mean[:] = 0.0
+        for _ in range(period):
+            demand = command[interval]
+            demand_step = (command[interval + 1] - demand) / substeps
+            interval += 1
+            for _ in range(substeps):
+                if driven:
+                    for i in range(RUNS):
+                        advance_demand(x[i], x[2 * RUNS + i], x[RUNS + i], s, p, i, demand, dt)
+                for i in range(RUNS):
+                    new = advance(
+                        (
+                            x[0 * RUNS + i],
+                            x[1 * RUNS + i],
+                            x[2 * RUNS + i],
+                            x[3 * RUNS + i],
+                            x[4 * RUNS + i],
+                            x[5 * RUNS + i],
+                            x[6 * RUNS + i],
+                            x[7 * RUNS + i],
+                            x[8 * RUNS + i],
+                            x[9 * RUNS + i],
+                            x[10 * RUNS + i],
+                            x[11 * RUNS + i],
+                            x[12 * RUNS + i],
+                            x[13 * RUNS + i],
+                        ),
+                        (
+                            kept[0 * RUNS + i],
+                            kept[1 * RUNS + i],
+                            kept[2 * RUNS + i],
+                            kept[3 * RUNS + i],
+                            kept[4 * RUNS + i],
+                            kept[5 * RUNS + i],
+                            kept[6 * RUNS + i],
+                            kept[7 * RUNS + i],
+                        ),
+                        s,
+                        p,
+                        i,
+                        demand,
+                        load[i],
+                        driven,
+                        dt,
+                    )[0]
+                    x[0 * RUNS + i] = new[0]
+                    x[1 * RUNS + i] = new[1]
+                    x[2 * RUNS + i] = new[2]
+                    x[3 * RUNS + i] = new[3]
+                    x[4 * RUNS + i] = new[4]
+                    x[5 * RUNS + i] = new[5]
+                    x[6 * RUNS + i] = new[6]
+                    x[7 * RUNS + i] = new[7]
+                    x[8 * RUNS + i] = new[8]
+                    x[9 * RUNS + i] = new[9]
+                    x[10 * RUNS + i] = new[10]
+                    x[11 * RUNS + i] = new[11]
+                    x[12 * RUNS + i] = new[12]
+                    x[13 * RUNS + i] = new[13]
+                    mean[i] += current_reading(new[13], s, FIRST, p, i)
+                demand += demand_step
+        for i in range(RUNS):
+            theta, play, tau = x[i], x[2 * RUNS + i], p[GEAR_RATIO * LANES + i]
+            user = user_position(tau * play, theta, tau, s, FIRST, p, i)
+            result[sample, 0, i] = mean[i] * scale
+            result[sample, 1, i] = x[RUNS + i]
+            result[sample, 2, i] = theta
+            result[sample, 3, i] = position_reading(user, s, FIRST, p, i)

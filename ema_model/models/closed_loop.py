@@ -25,6 +25,7 @@ from ema_model.recordings.noise import least_noise, sample_noise
 from ema_model.simulation.one_stack import own_stack, stack_at_hand
 from ema_model.simulation.pack import initial_state, monitor_rows
 from ema_model.simulation.precompile import wait_for
+from ema_model.simulation.reference_runs import simulate_references
 from ema_model.simulation.run import Run, simulate_reference
 from ema_model.stacks import exclusive
 
@@ -129,6 +130,40 @@ class ClosedLoop:
         blocks = {name: shown[name][1:].reshape(1, -1, window.samples_per_block).mean(axis=2) for name in COMPARED}
         sensed = self._sensed(blocks, actuator, window.block_s)
         return {name: sensed[name][0] for name in window.measured}
+
+    def twins(
+        self,
+        place: int,
+        actuator: Actuator,
+        k: Array,
+        turned_rad: ArrayLike,
+        play_rad: ArrayLike,
+        effects: Effects,
+    ) -> Signals:
+        """As in `Model`."""
+        window = self.windows[place]
+        actuator = actuator.varied(window.values)
+        if not actuator.has_reference_model:
+            return {}
+        others = dict(effects)
+        pull = np.asarray(others.pop(LOAD, {"torque_Nm": 0.0})["torque_Nm"])
+        count = len(window.command)
+        shown = simulate_references(
+            Recorded(np.arange(count) * window.step_s, window.command),
+            count // window.steps_per_sample,
+            1.0 / (window.steps_per_sample * window.step_s),
+            actuator,
+            k,
+            others,
+            load_Nm=window.load.mean() + pull,
+            start_rad=window.user_rad + np.asarray(turned_rad) * actuator.transmission.gear_ratio,
+            start_speed_rad_s=window.speed_rad_s,
+            start_play_rad=window.play_rad + np.asarray(play_rad),
+            start_integral_Nm=window.integral_Nm(actuator, k, turned_rad, play_rad),
+        )
+        blocks = {name: shown[name].reshape(len(k), -1, window.samples_per_block).mean(axis=2) for name in COMPARED}
+        sensed = self._sensed(blocks, actuator, window.block_s)
+        return {name: sensed[name] for name in window.measured}
 
     def noise(self, place: int, stated: Mapping[str, float]) -> dict[str, float]:
         """As in `Model`; the longest run of the whole recording tells it."""

@@ -100,6 +100,10 @@ class InverseDynamics:
         """None: the Reference Model follows commands."""
         return {}
 
+    def twins(self, place: int, *args: object, **options: object) -> Signals:
+        """None."""
+        return {}
+
     def noise(self, place: int, stated: Mapping[str, float]) -> dict[str, float]:
         """As in `Model`, of the sensors after the filter."""
         window = self.windows[place]

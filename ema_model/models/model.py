@@ -97,6 +97,18 @@ class Model(Protocol):
         """
         ...
 
+    def twins(
+        self,
+        place: int,
+        actuator: Actuator,
+        k: Array,
+        turned_rad: ArrayLike,
+        play_rad: ArrayLike,
+        effects: Effects,
+    ) -> Signals:
+        """Those of a few at once, k (n, 8), all else as of `signals`: (n, blocks) each."""
+        ...
+
     def noise(self, place: int, stated: Mapping[str, float]) -> dict[str, float]:
         """White noise of the measured signals, rms per block; stated: rms per sample, in place of the estimate."""
         ...

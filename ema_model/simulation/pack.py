@@ -66,7 +66,7 @@ def monitor_rows(actuator: Actuator, k: ArrayLike, stack: Stack, effects: Effect
 
 
 def reference_rows(actuator: Actuator, k: ArrayLike, stack: Stack, effects: EffectSettings) -> Array:
-    """Parameters of the Reference Model for one k (8,) → (rows·LANES,), of which lane 0 is read."""
+    """Parameters of the Reference Model: k (8,) or (n, 8), n up to LANES → (rows·LANES,); otherwise as the other's."""
     fault = faults.physical(np.asarray(k, dtype=float))
     motor, inverter = actuator.motor, actuator.inverter
     values = _shared_rows(actuator, fault) | {
@@ -107,11 +107,11 @@ def initial_state(
 
 def initial_reference_state(
     actuator: Actuator,
-    user_rad: float = 0.0,
-    speed_rad_s: float = 0.0,
-    play: float = 0.0,
+    user_rad: ArrayLike = 0.0,
+    speed_rad_s: ArrayLike = 0.0,
+    play: ArrayLike = 0.0,
     stack: Stack | None = None,
-    integral_Nm: float = 0.0,
+    integral_Nm: ArrayLike = 0.0,
 ) -> Array:
     """The same for the Reference Model, (rows·LANES,)."""
     rows = REFERENCE_STATE_ROWS + (stack.states if stack else ())

@@ -24,7 +24,7 @@ from ema_model.physics.rows import LANES
 from ema_model.simulation.pack import initial_reference_state, initial_state, monitor_rows, reference_rows
 from ema_model.stacks import Stack, exclusive, find_stack
 
-MODULES = {"traces": "monitor", "currents": "inverse", "run": "reference"}  # of the kernels
+MODULES = {"traces": "monitor", "currents": "inverse", "run": "reference", "runs": "reference"}  # of the kernels
 _POLL_S = 0.02
 
 
@@ -95,7 +95,11 @@ def compile_here(stack: Stack, kernel: str) -> None:
     else:
         rows = reference_rows(actuator, HEALTHY, stack, {})
         state, pair = initial_reference_state(actuator, stack=stack), np.zeros(2)
-        stack.reference.run(state, rows, pair, pair, 1, 1, 1e-6, np.empty((1, 11)))
+        if kernel == "run":
+            stack.reference.run(state, rows, pair, pair, 1, 1, 1e-6, np.empty((1, 11)))
+        else:
+            lanes = stack.reference.RUNS
+            stack.reference.runs(state, rows, pair, np.zeros(lanes), 1, 1, 1e-6, np.empty((1, 4, lanes)))
 
 
 if __name__ == "__main__":

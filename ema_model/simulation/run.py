@@ -93,6 +93,13 @@ def _steps_per_sample(run: Run, step_s: float) -> int:
     return period
 
 
+def reference_steps(run: Run) -> tuple[NDArray[np.floating], int, float]:
+    """The times at which the Reference Model is told its inputs, how many of them a sample, and how far apart, s."""
+    period = _steps_per_sample(run, MONITOR_STEP_S)
+    dt = 1.0 / run.sample_rate_Hz / period
+    return np.arange(run.samples * period + 1) * dt, period, dt
+
+
 def simulate_reference(
     run: Run,
     actuator: Actuator,
@@ -118,9 +125,7 @@ def simulate_reference(
             "use the monitor model"
         )
     stack = stack_at_hand(actuator, effects, "reduced", "run")
-    period = _steps_per_sample(run, MONITOR_STEP_S)
-    dt = 1.0 / run.sample_rate_Hz / period
-    times = np.arange(run.samples * period + 1) * dt
+    times, period, dt = reference_steps(run)
     demand = run.command.at(times)
     load = run.load_at(times)
     start = float(demand[0]) if start_rad is None else start_rad

@@ -111,6 +111,7 @@ def calibrate(
     actuator = replace(model.actuator.varied(problem.parameters(x)), faults=named(fitted_k))
     found = calibrated(problem, x, covariance)
     chosen = tuple(u.name for u in problem.unknowns if u.kind in ("parameter", "fault"))
+    shown, before = _signals(problem, np.array([x, np.zeros(len(x))]))
     return Calibration(
         converged=fit.converged,
         parameters={name: found[name] for name in chosen},
@@ -120,8 +121,8 @@ def calibrate(
         residual=fit.residual,
         chi2_per_value=chi2,
         covariance_scale=scale,
-        signals=_signals(problem, x),
-        before=_signals(problem, np.zeros(len(x))),
+        signals=shown,
+        before=before,
         sensitivities=_split(problem, fit.jacobian, weighted=False),
         weighted_sensitivities=_split(problem, fit.jacobian, weighted=True),
         x=x,
@@ -214,10 +215,10 @@ def default_free(actuator: Actuator) -> tuple[str, ...]:
     return tuple(path for path, tolerance in actuator.tolerances.items() if tolerance.free)
 
 
-def _signals(problem: Problem, x: Array) -> list[dict[str, Array]]:
-    """The model's at one x, per window."""
-    shown = [problem.simulate(x[None, :], i) for i in range(len(problem.model.windows))]
-    return [{name: values[0] for name, values in one.items()} for one in shown]
+def _signals(problem: Problem, x: Array) -> list[list[dict[str, Array]]]:
+    """The model's at each x (n, unknowns), per window."""
+    shown = [problem.simulate(x, i) for i in range(len(problem.model.windows))]
+    return [[{name: values[i] for name, values in one.items()} for one in shown] for i in range(len(x))]
 
 
 def _split(problem: Problem, jacobian: Array, *, weighted: bool) -> list[dict[str, Array]]:

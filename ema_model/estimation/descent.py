@@ -57,13 +57,16 @@ class Descent:
     damping: Array
     moving: NDArray[np.bool_]
     evaluations: int = 0
+    known: tuple[Array, Array] | None = None  # residuals and their derivatives where the first step begins
 
     @classmethod
-    def begin(cls, problem: Problem, x: Array) -> Descent:
-        """At these starts (n, unknowns)."""
-        x = problem.clip(np.atleast_2d(np.asarray(x, dtype=float)))
+    def begin(cls, problem: Problem, x: Array, known: tuple[Array, Array] | None = None) -> Descent:
+        """At these starts (n, unknowns); known: the problem's `jacobians` there, if they were asked for before."""
+        given = np.atleast_2d(np.asarray(x, dtype=float))
+        x = problem.clip(given)
         n = len(x)
-        return cls(problem, x, np.full(n, np.inf), np.ones(n), np.ones(n, dtype=bool))
+        known = known if np.array_equal(x, given) else None
+        return cls(problem, x, np.full(n, np.inf), np.ones(n), np.ones(n, dtype=bool), known=known)
 
     @property
     def done(self) -> bool:
@@ -74,15 +77,13 @@ class Descent:
         """One step of those that still move."""
         problem = self.problem
         chosen = np.flatnonzero(self.moving)
-        residuals, slopes = problem.jacobians(self.x[chosen], in_whole_blocks=True)
-        self.evaluations += problem.points_in_whole_blocks(len(chosen))
+        if self.known is None:
+            self.known = problem.jacobians(self.x[chosen], in_whole_blocks=True)
+            self.evaluations += problem.points_in_whole_blocks(len(chosen))
+        (residuals, slopes), self.known = self.known, None
         self.cost[chosen] = np.sum(residuals**2, axis=1)
-        trials = np.concatenate(
-            [
-                problem.clip(np.array([_newton(problem, x, r, j, damping * d) for d in _DAMPINGS]))
-                for x, r, j, damping in zip(self.x[chosen], residuals, slopes, self.damping[chosen])
-            ]
-        )
+        dampings = np.outer(self.damping[chosen], _DAMPINGS)
+        trials = problem.clip(_newton(problem, self.x[chosen], residuals, slopes, dampings).reshape(dampings.size, -1))
         costs = np.sum(problem.residuals(trials) ** 2, axis=1).reshape(len(chosen), -1)
         self.evaluations += len(trials)
         trials = trials.reshape(len(chosen), len(_DAMPINGS), -1)
@@ -103,20 +104,28 @@ class Descent:
         self.damping, self.moving = self.damping[rows], self.moving[rows]
 
 
-def _newton(problem: Problem, x: Array, residual: Array, slopes: Array, damping: float) -> Array:
-    """The damped Gauss–Newton point, with what stands at a bound and would leave it held there."""
-    hessian = slopes.T @ slopes
-    gradient = slopes.T @ residual
-    diagonal = np.diag(hessian)
-    hessian = hessian + np.diag(1e-2 * damping * np.maximum(diagonal, 1e-6 * diagonal.max(initial=1e-12)))
-    free = np.ones(len(x), dtype=bool)
-    move = np.zeros(len(x))
-    for _ in range(len(x)):
-        move[:] = 0.0
-        part = np.ix_(free, free)
-        move[free] = -np.linalg.solve(hessian[part], gradient[free])
-        leaves = free & (((x <= problem.low) & (move < 0.0)) | ((x >= problem.high) & (move > 0.0)))
+def _newton(problem: Problem, x: Array, residuals: Array, slopes: Array, dampings: Array) -> Array:
+    """The damped Gauss–Newton points of x (n, unknowns) for dampings (n, d), (n, d, unknowns).
+
+    What stands at a bound and would leave it is held there.
+    """
+    turned = np.swapaxes(slopes, 1, 2)
+    hessians = (turned @ slopes)[:, None]
+    gradients = (turned @ residuals[:, :, None])[:, None, :, 0]
+    diagonals = np.diagonal(hessians, axis1=2, axis2=3)
+    most = diagonals.max(axis=2, initial=1e-12, keepdims=True)
+    damped = 1e-2 * dampings[:, :, None] * np.maximum(diagonals, 1e-6 * most)
+    each = np.eye(x.shape[1])
+    systems = hessians + damped[..., None] * each
+    low, high = (x <= problem.low)[:, None], (x >= problem.high)[:, None]
+    free = np.ones(damped.shape, dtype=bool)
+    moves = np.zeros(damped.shape)
+    for _ in range(x.shape[1]):
+        both = free[..., :, None] & free[..., None, :]
+        wanted = np.where(free, -gradients, 0.0)
+        moves = np.linalg.solve(np.where(both, systems, each), wanted[..., None])[..., 0]
+        leaves = free & ((low & (moves < 0.0)) | (high & (moves > 0.0)))
         if not leaves.any():
             break
         free &= ~leaves
-    return x + move
+    return x[:, None] + moves

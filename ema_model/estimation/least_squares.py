@@ -43,11 +43,11 @@ def descended(
     tell is called before each evaluation and may raise to stop.
     """
     taken = problem if soft is None else _Soft(problem, soft)
-    return _by_marquardt(taken, _by_trust_region(taken, start, tell), tell)
+    return _by_marquardt(taken, *_by_trust_region(taken, start, tell), tell)
 
 
-def _by_trust_region(problem: Bounded, start: Array, tell: Callable[[], None]) -> Array:
-    """The lowest point that was seen."""
+def _by_trust_region(problem: Bounded, start: Array, tell: Callable[[], None]) -> tuple[Array, tuple[Array, Array]]:
+    """The lowest point that was seen, and the problem's `jacobians` there."""
     from scipy.optimize import least_squares  # takes a third of a second to import
 
     way = _Way(problem, tell)
@@ -65,11 +65,11 @@ def _by_trust_region(problem: Bounded, start: Array, tell: Callable[[], None]) -
         )
     except _Ended:
         pass
-    return way.x
+    return way.x, way.lowest
 
 
-def _by_marquardt(problem: Bounded, start: Array, tell: Callable[[], None]) -> Descended:
-    descent = Descent.begin(problem, start)
+def _by_marquardt(problem: Bounded, start: Array, known: tuple[Array, Array], tell: Callable[[], None]) -> Descended:
+    descent = Descent.begin(problem, start, known)
     before, idle, steps = np.inf, 0, 0
     while not descent.done and idle < _MOST_IDLE and steps < _LONGEST:
         tell()
@@ -91,6 +91,7 @@ class _Way:
         self.x, self._cost = np.zeros(0), np.inf
         self._problem, self._tell = problem, tell
         self._at, self._jacobian = np.zeros(0), np.zeros((0, 0))
+        self.lowest = np.zeros((1, 0)), np.zeros((1, 0, 0))
         self._idle = 0
 
     def residual(self, x: Array) -> Array:
@@ -100,7 +101,7 @@ class _Way:
         cost = 0.5 * float(residual @ residual)
         idle = abs(self._cost - cost) < _IDLE + _IDLE_SHARE * cost
         if cost < self._cost:
-            self.x, self._cost = self._at, cost
+            self.x, self._cost, self.lowest = self._at, cost, (residual[None], self._jacobian[None])
         self._idle = self._idle + 1 if idle else 0
         if self._idle == _MOST_IDLE:
             raise _Ended

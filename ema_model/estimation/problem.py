@@ -130,12 +130,20 @@ class Problem:
         """A window's part of the residuals of x (n, unknowns): (n, values); of a run that diverges a very great one."""
         shown, measured = self.simulate(x, window), self.model.windows[window].measured
         added = self.added[window] if self.added else {}
-        parts = [
-            (shown[name] - measured[name] + added.get(name, 0.0)) * weight
-            for name, weight in self.weights[window].items()
-        ]
-        found = np.concatenate([np.zeros((len(x), 0)), *parts], axis=1)
-        return np.clip(np.nan_to_num(found, nan=_DIVERGED), -_DIVERGED, _DIVERGED)
+        weights = self.weights[window]
+        found = np.empty((len(x), sum(map(len, weights.values()))))
+        first = 0
+        for name, weight in weights.items():
+            part = found[:, first : first + len(weight)]
+            np.subtract(shown[name], measured[name], out=part)
+            if name in added:
+                part += added[name]
+            part *= weight
+            first += len(weight)
+        np.clip(found, -_DIVERGED, _DIVERGED, out=found)
+        if np.isnan(found).any():
+            found[np.isnan(found)] = _DIVERGED
+        return found
 
     def _places(self, window: int) -> dict[str, int]:
         """Of the kinds that are not all windows' alike: where a window's own stands."""

@@ -27,6 +27,7 @@ _COMMANDS: tuple[tuple[str, dict[str, float], float], ...] = (
     ("step", {"final_rad": 0.005}, 0.5),
     ("staircase", {"step_rad": 0.002}, 0.5),
 )
+_STEP_S = 5e-5  # of the model, as exact as an estimate of what a run would tell need be
 _CURRENT_A = 0.2  # noise of a block, where the recording does not tell
 
 
@@ -75,6 +76,7 @@ def _information(found: Fitted, run: Run) -> Array | None:
     try:
         recording = simulate_monitor(run, plant.actuator, found.k, plant.effects, plant.stack.circuit)
         own = ClosedLoop([recording], plant.actuator, effects=plant.effects, circuit=plant.stack.circuit)
+        own = own.at_longer_steps(_STEP_S)
     except (InputError, FloatingPointError):
         return None
     window = own.windows[0]

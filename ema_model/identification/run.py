@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -95,12 +96,13 @@ def steps(
     they do not move and their tolerances do not widen the intervals.  settings: the algorithm's own.
     Raises InputError for an unknown algorithm or impossible settings.
     """
+    prepared = cache(lambda: setting(objective, parameters_known=parameters_known))
     if algorithm == ROBUST:
         if settings:
             raise InputError(f"the robust algorithm has no setting {quoted(next(iter(settings)))!r}")
         _check_size("population", population, 2)
         _check_size("iterations", iterations, 1)
-        running = _robust(objective, population, iterations, seed, parameters_known)
+        running = _robust(objective, prepared, population, iterations, seed)
     else:
         try:
             optimiser = create(
@@ -115,7 +117,6 @@ def steps(
     compile_s = warm_up(objective)
     history: list[Progress] = []
     stopped = False
-    given: Setting | None = None
     for at in running:
         history.append(at)
         stopped = bool((yield at))
@@ -123,7 +124,7 @@ def steps(
             break
     started = time.perf_counter()
     last = history[-1]
-    given = setting(objective, parameters_known=parameters_known)
+    given = prepared()
     first_compile = _warm_up_fit(given) + _warm_up_twins(twins)
     if algorithm == ROBUST:
         found = refine_best(given, last.population, seed, on_fit)
@@ -178,14 +179,14 @@ def _optimise(objective: Objective, optimiser: Optimiser) -> Generator[Progress,
 
 
 def _robust(
-    objective: Objective, population: int, iterations: int, seed: int, parameters_known: bool
+    objective: Objective, prepared: Callable[[], Setting], population: int, iterations: int, seed: int
 ) -> Generator[Progress, None, None]:
     """Niches that go downhill together."""
     started = time.perf_counter()
-    given = setting(objective, parameters_known=parameters_known)
+    given = prepared()
     compiled = _warm_up_fit(given)
     evaluations, waited = 0, compiled
-    problem = given.coarse()
+    problem = given.coarse(given.rough_plant)
     for number, basins in enumerate(search(problem, population, iterations, seed)):
         k = problem.k(basins.x)
         rmse = objective(k)

@@ -6,6 +6,7 @@ In an open loop the recorded current, torque or force is what is put in, and the
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -74,6 +75,12 @@ class ClosedLoop:
             for i, (m, parts) in enumerate(zip(self.measurements, chosen))
             for window in cut(m, actuator, recording=i, block_s=block_s, stretches=parts)
         ]
+
+    def at_longer_steps(self, most_s: float) -> ClosedLoop:
+        """The same, simulated at steps of up to most_s, as far as a sample holds whole ones: for a rough look."""
+        longer = copy(self)
+        longer.windows = [window.at_longer_steps(most_s) for window in self.windows]
+        return longer
 
     def signals(
         self,
@@ -229,14 +236,18 @@ class ClosedLoop:
                 window.step_s,
                 result,
             )
-            lanes[:, :, part] = result.transpose(2, 0, 3, 1).reshape(4, len(rows) * LANES, -1)[:, : len(k)]
+            for block, shown in enumerate(result):
+                ours = lanes[:, block * LANES : (block + 1) * LANES, part]
+                ours[...] = shown.transpose(1, 2, 0)[:, : ours.shape[1]]
         return self._sensed(dict(zip(COMPARED, lanes)), actuator, window.block_s)
 
     def _sensed(self, true: Signals, actuator: Actuator, block_s: float) -> Signals:
         """Signals (n, blocks) as the actuator's sensors show them."""
         sensors = actuator.sensors
-        current = _each(sensors.current_gain) * true["current_A"] + _each(sensors.current_bias_A)
-        shown = {**true, "current_A": current}
+        gain, bias = _each(sensors.current_gain), _each(sensors.current_bias_A)
+        shown = true
+        if np.any(gain != 1.0) or np.any(bias != 0.0):
+            shown = {**true, "current_A": gain * true["current_A"] + bias}
         late = _each(sensors.delay_s) - self.actuator.sensors.delay_s  # beyond what the window's command has
         if not np.any(late):
             return shown

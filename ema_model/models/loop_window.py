@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -52,6 +52,13 @@ class LoopWindow(Window):
         return integral_at_start(
             actuator, k, float(self.command[0]), self.user_rad + away, self.speed_rad_s, self.current_A
         )
+
+    def at_longer_steps(self, most_s: float) -> LoopWindow:
+        """The same at the longest steps up to most_s, s, of which a sample holds a whole number."""
+        steps = self.steps_per_sample
+        times = max(n for n in range(1, steps + 1) if steps % n == 0 and (n == 1 or n * self.step_s <= most_s + 1e-12))
+        inputs = {name: getattr(self, name)[::times] for name in ("command", "load", "supply")}
+        return replace(self, **inputs, steps_per_sample=steps // times, step_s=self.step_s * times)
 
     @property
     def steps_per_block(self) -> int:

@@ -13,6 +13,7 @@ from emaviz.colours import FITTED, HELD_OUT
 from emaviz.figures import theme
 
 _WIDE = 15.0  # times the floor, from which on the scale is logarithmic
+_TOP = 1.2  # of a straight scale, times the largest error
 _LABEL = 0.14  # height of a number and its distance from its point, of the chart's height
 
 
@@ -66,12 +67,12 @@ def figure(found: Discovery, *, dark: bool = False) -> go.Figure:
         low, high = math.log10(0.4 * min(shown)), math.log10(2.0 * max(shown))
         chart.update_yaxes(type="log", range=[low, high], dtick=1)
     else:
-        chart.update_yaxes(range=[0.0, 1.2 * max(shown)], rangemode="tozero")
+        chart.update_yaxes(range=[0.0, _TOP * max(shown)], rangemode="tozero")
     return chart
 
 
 def _beside(value: float, above: bool, largest: float) -> str:
     """Where the number of a point stands: above or below it, but not on the line of the floor."""
-    label = _LABEL * 1.2 * largest
+    label = _LABEL * _TOP * largest
     over_floor = largest <= _WIDE and (value < 1.0 < value + label if above else value - label < 1.0 < value)
     return "middle right" if over_floor else "top center" if above else "bottom center"

@@ -31,11 +31,12 @@ class Entry:
 
 
 def setting(name: str, value: Any) -> tuple[str, str]:
-    """A setting as a person reads it: ('amplitude', '5 mrad') of ('amplitude_rad', '0.005')."""
+    """A setting as a person reads it: ('amplitude', '5.00 mrad') of ('amplitude_rad', '0.005')."""
     return in_sentence(parameter_title(name)), _told(value, unit_of(name))
 
 
 def _told(value: Any, unit: str) -> str:
+    """A recording keeps its settings as text."""
     try:
         read = json.loads(value) if isinstance(value, str) else value
     except ValueError:

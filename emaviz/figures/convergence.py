@@ -24,7 +24,7 @@ class LiveConvergence:
         self._algorithms: tuple[str, ...] = ()
         self._iterations = 150
         self._legend: Any = add_html(gui)
-        self._handle: Any = gui.add_uplot(
+        self.handle: Any = gui.add_uplot(
             data=(np.array([0.0, 1.0]), np.array([1.0, 1.0])),
             series=({"label": "iteration"}, _UNSEEN),
             title="Convergence",
@@ -39,12 +39,12 @@ class LiveConvergence:
         """A new race: its colours and the length of its axis, which build the chart anew."""
         if tuple(algorithms) != self._algorithms:
             self._algorithms = tuple(algorithms)
-            self._handle.data = (np.array([0.0, 1.0]), *(np.array([1.0, 1.0]) for _ in algorithms))
-            self._handle.series = ({"label": "iteration"}, *(_line(name) for name in algorithms))
+            self.handle.data = (np.array([0.0, 1.0]), *(np.array([1.0, 1.0]) for _ in algorithms))
+            self.handle.series = ({"label": "iteration"}, *(_line(name) for name in algorithms))
             self._legend.content = legend(*((colour(name), TITLES.get(name, name)) for name in algorithms))
         if iterations != self._iterations:
             self._iterations = iterations
-            self._handle.scales = _scales(iterations)
+            self.handle.scales = _scales(iterations)
 
     def show(self, rmse: Mapping[str, Sequence[float]]) -> None:
         """Draws the errors so far, A, by algorithm."""
@@ -52,7 +52,7 @@ class LiveConvergence:
             return
         count = max([2, *map(len, rmse.values())])
         lines = [_to_length(values, count) for values in rmse.values()]
-        self._handle.data = (np.arange(count, dtype=float), *lines)
+        self.handle.data = (np.arange(count, dtype=float), *lines)
 
 
 def colour(algorithm: str) -> str:

@@ -35,7 +35,12 @@ class Row:
 def table(rows: Sequence[Row]) -> Html:
     """HTML, the newest race first."""
     if not rows:
-        return html('<div style="padding:6px 12px;opacity:.7">Nothing has been identified yet.</div>')
+        return html(
+            '<div style="padding:6px 12px;font-size:13px;line-height:1.5">Nothing has been identified yet.'
+            '<div style="opacity:.75">Press <b>Identify</b> on the left. Each algorithm of each run then has a row '
+            "here: error of k [%] where the faults are known, rmse of the current [A], time [s], number of "
+            "simulations, and the performance coefficient [%], which compares algorithms that ran together.</div></div>"
+        )
     heads = ("", "Err [%]", "rmse [A]", "time [s]", "simulations", "PC [%]")
     head = joined(html("<th {}>{}</th>", _NUMBER, name) for name in heads)
     body = []

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ema_model.faults import FAULTS, NAMES
 from emaviz.colours import TRUTH
-from emaviz.text.html import Html, escape, unescaped
+from emaviz.text.html import Html, escape, html, unescaped
 
 Array = NDArray[np.floating]
 
@@ -18,7 +18,7 @@ _WIDTH, _PLANE_HEIGHT, _LINES_HEIGHT = 460, 330, 330
 _LEFT, _RIGHT, _TOP, _BOTTOM = 44, 14, 10, 36
 _MOST_DRAWN = 150  # candidates of one swarm
 # of a window: with what stands above it, the picture is seen whole; its letters grow no larger than others
-_FITS = "max-height:min(calc(100vh - 560px),640px);min-height:200px"
+_FITS = "max-height:min(calc(100vh - 240px),640px);min-height:200px"
 _INK = 'fill="currentColor"'
 
 
@@ -44,9 +44,9 @@ def plane(swarms: Sequence[Swarm], x: int, y: int, truth: Array | None = None, t
         return _LEFT + (right - _LEFT) * k[:, x], low - (low - _TOP) * k[:, y]
 
     parts = [_grid(right, low)]
-    parts.append(_text((_LEFT + right) / 2, _PLANE_HEIGHT - 4, FAULTS[x].label, "middle"))
+    parts.append(_text((_LEFT + right) / 2, _PLANE_HEIGHT - 4, f"{FAULTS[x].label} [–]", "middle"))
     turned = f'transform="rotate(-90 12 {(_TOP + low) / 2:.0f})"'
-    parts.append(_text(12, (_TOP + low) / 2, FAULTS[y].label, "middle", turned))
+    parts.append(_text(12, (_TOP + low) / 2, f"{FAULTS[y].label} [–]", "middle", turned))
     for swarm, trail in zip(swarms, trails):
         if len(trail) > 1:
             points = " ".join(f"{px:.1f},{py:.1f}" for px, py in zip(*at(trail)))
@@ -68,7 +68,9 @@ def plane(swarms: Sequence[Swarm], x: int, y: int, truth: Array | None = None, t
         parts.append(
             f'<path d="M{px - 9:.1f} {py:.1f}h18M{px:.1f} {py - 9:.1f}v18" stroke="{TRUTH}" stroke-width="2.5"/>'
         )
-    return _picture(parts, _PLANE_HEIGHT)
+    return _picture(parts, _PLANE_HEIGHT) + _key(
+        "● candidates", "◯ best, with its path", "✚ true value" if truth is not None else ""
+    )
 
 
 def lines(swarms: Sequence[Swarm], truth: Array | None = None) -> Html:
@@ -94,7 +96,9 @@ def lines(swarms: Sequence[Swarm], truth: Array | None = None) -> Html:
         parts.append(f'<path d="{way(swarm.best)}" fill="none" stroke="{swarm.colour}" stroke-width="3"/>')
     if truth is not None:
         parts.append(f'<path d="{way(truth)}" fill="none" stroke="{TRUTH}" stroke-width="2.2" stroke-dasharray="6 4"/>')
-    return _picture(parts, _LINES_HEIGHT)
+    return _picture(parts, _LINES_HEIGHT) + _key(
+        "thin: candidates", "bold: best", "dashed: true values" if truth is not None else ""
+    )
 
 
 _SHORT = dict(zip(NAMES, ("friction", "backlash", "short A", "short B", "short C", "eccentr.", "its phase", "gain")))
@@ -113,6 +117,14 @@ def _grid(right: float, low: float) -> str:
 
 def _text(x: float, y: float, text: str, anchor: str, more: str = "") -> str:
     return f'<text x="{x:.0f}" y="{y:.0f}" text-anchor="{anchor}" {_INK} {more}>{escape(text)}</text>'
+
+
+def _key(*marks: str) -> Html:
+    """What the marks mean; all values are severities without a unit, 0 … 1."""
+    return html(
+        '<div style="font-size:12px;opacity:.75;text-align:center;padding:2px 8px 6px">{} · severities, 0 … 1</div>',
+        " · ".join(mark for mark in marks if mark),
+    )
 
 
 def _picture(parts: Sequence[str], height: int) -> Html:

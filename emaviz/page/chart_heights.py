@@ -6,11 +6,13 @@ from collections.abc import Sequence
 from typing import Any
 
 from emaviz.server.viser_private import Inside
+from emaviz.text.html import Html, unescaped
 
 # Heights by which windows are told apart: charts are laid out for the tallest that is no taller than the window.
 WINDOWS_PX = (600, 640, 680, 700, 740, 780, 820, 860, 900, 940, 980, 1020, 1060, 1100, 1150, 1200, 1300, 1400)
 _USUAL_PX = 900  # of a window, for which charts are built
-_LEAST_PX = 112
+_LEAST_PX = 64
+_LOW_PX, _TITLE_SAVED_PX = 800, 2  # in windows lower than that, a chart's title is so much smaller
 
 
 class ChartHeights:
@@ -28,6 +30,12 @@ class ChartHeights:
     def fit(self, client: int, window_px: int) -> None:
         """Lays one window out for its height, one of `WINDOWS_PX`."""
         for stack in self._stacks:
-            more = (window_px - _USUAL_PX) // len(stack)
+            more = (window_px - _USUAL_PX) // len(stack) + (_TITLE_SAVED_PX if window_px < _LOW_PX else 0)
             for chart, usual in stack:
                 self._inside.set_height(client, chart, max(usual + more, _LEAST_PX))
+
+
+def style() -> Html:
+    """Titles in low windows, which leave the height to the charts."""
+    title = "font-size:13px;line-height:16px"
+    return unescaped(f"<style>@media (max-height:{_LOW_PX - 1}px){{.u-title{{{title}}}}}</style>")

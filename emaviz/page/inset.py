@@ -11,13 +11,16 @@ from emaviz.text.html import Html, unescaped
 COLUMNS = Html('<div class="emaviz-columns"></div>')  # stands in a tab whose parts take two columns where there is room
 NEXT_COLUMN = Html('<div class="emaviz-next-column"></div>')  # stands in the folder that begins the second one
 ALL_COLUMNS = Html('<div class="emaviz-all-columns"></div>')  # stands in a folder that is as wide as both
+PLOTS_EARLY = Html(
+    '<div class="emaviz-early"></div>'
+)  # what follows gives way to the second column where there is one only
 _LEAST_WIDTH_PX, _TWO_COLUMNS_PX = 900, 1240  # of a window
 _CLICK_PX = 4  # a pointer that moves further turns the actuator
 
 _SCRIPT = """
 (() => {
   window.emavizInset?.end();
-  let asked = false, grown = false, down = null;
+  let asked = false, low = false, grown = false, down = null;
   const root = document.documentElement, body = document.body, button = document.createElement('button');
   button.className = 'emaviz-grow';
   body.append(button);
@@ -28,6 +31,7 @@ _SCRIPT = """
     const can = asked && at && left && both && innerWidth >= LEAST, inset = can && !grown;
     if (left) root.style.setProperty('--emaviz-left', `${left.getBoundingClientRect().width}px`);
     body.classList.toggle('emaviz-inset', inset);
+    body.classList.toggle('emaviz-low-inset', inset && low);
     button.style.display = can ? 'block' : 'none';
     if (!can) return;
     const box = at.getBoundingClientRect();
@@ -50,7 +54,7 @@ _SCRIPT = """
   document.addEventListener('pointerup', released, true);
   const timer = setInterval(dress, 100);
   window.emavizInset = {
-    enter: (inset) => { asked = inset; grown = false; dress(); },
+    enter: (inset, lower) => { asked = inset; low = lower; grown = false; dress(); },
     end: () => {
       clearInterval(timer);
       button.remove();
@@ -63,7 +67,7 @@ _SCRIPT = """
 
 
 def script() -> str:
-    """To run in every page: `window.emavizInset.enter(inset)` lays it out for a workspace."""
+    """To run in every page: `window.emavizInset.enter(inset, lower)` lays it out for a workspace."""
     return _SCRIPT.replace("LEAST", str(_LEAST_WIDTH_PX)).replace("CLICK", str(_CLICK_PX))
 
 
@@ -74,6 +78,7 @@ def style() -> Html:
     return unescaped(
         "<style>"
         ":root{--emaviz-inset:clamp(150px,calc(46vh - 138px),330px)}"
+        "body.emaviz-low-inset{--emaviz-inset:clamp(130px,calc(46vh - 138px),180px)}"
         f"{inset} [data-dock-root] > div:has(> canvas){{inset:auto auto 8px 8px!important;"
         "width:calc(var(--emaviz-left) - 16px)!important;height:var(--emaviz-inset)!important;z-index:6;"
         "border:1px solid rgba(134,142,150,.55);border-radius:6px;overflow:hidden;cursor:pointer}"
@@ -91,5 +96,9 @@ def style() -> Html:
         f"{columns} > div{{break-inside:avoid}}"
         f"{columns} > div:has(.emaviz-next-column){{break-before:column}}"
         f"{columns} > div:has(.emaviz-all-columns){{column-span:all}}}}"
+        f"@media (max-width:{_TWO_COLUMNS_PX - 1}px){{{columns}:has(> div > .emaviz-early)"
+        "{display:flex;flex-direction:column}"
+        f"{columns} > div:has(> .emaviz-early) ~ div{{order:2}}"
+        f"{columns} > div:has(> .emaviz-early) ~ div:has(.emaviz-next-column){{order:1}}}}"
         "</style>"
     )

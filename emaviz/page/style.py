@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from emaviz.figures.theme import DARK
-from emaviz.page import inset
+from emaviz.page import chart_heights, inset
 from emaviz.text.html import Html, html, unescaped
 
 STRIP = Html('<div class="emaviz-strip"></div>')  # stands in the panel that becomes the strip
@@ -45,7 +45,7 @@ def page() -> Html:
         f"div:has(> div > .emaviz-long) {_LABEL}{{width:10.4em!important}}"
         "</style>"
     )
-    return rules + _strip() + inset.style()
+    return rules + _strip() + inset.style() + chart_heights.style()
 
 
 def _strip() -> Html:

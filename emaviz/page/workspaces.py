@@ -54,7 +54,7 @@ _SCRIPT = """
     wanted = null;
     if (now.name === told) return;
     told = now.name;
-    window.emavizInset?.enter(now.inset);
+    window.emavizInset?.enter(now.inset, now.lower);
     const address = new URL(location.href);
     address.searchParams.set('view', told);
     history.replaceState(history.state, '', address);
@@ -98,6 +98,7 @@ class Workspace:
     place: int
     share: float = 0.58  # of what the left panel leaves of a window, that its results have beside the actuator
     inset: bool = True  # whether the actuator is small there until it is clicked, and results have the width
+    lower: bool = False  # whether the small actuator leaves more of the height to the controls above it
 
 
 class Workspaces:
@@ -140,7 +141,7 @@ class Workspaces:
         every += [step["button"] for steps in sizes.values() for step in steps]
         add_html(gui, unseen(every))
         views = [
-            {"name": name, "title": one.title, "inset": one.inset, "button": id_of(buttons[name])}
+            {"name": name, "title": one.title, "inset": one.inset, "lower": one.lower, "button": id_of(buttons[name])}
             for name, one in self._members.items()
         ]
         self._inside.run(inset.script())

@@ -99,3 +99,41 @@ def test_a_file_that_cannot_be_opened_is_told_beside_the_button_and_stays(page, 
     beside.wait_for(timeout=20_000)
     page.wait_for_timeout(1_000)
     assert beside.is_visible()
+
+
+SCROLLED = "[...document.querySelectorAll('[data-dock-region=right] .mantine-ScrollArea-viewport')]"
+
+
+def test_explore_does_not_scroll_in_a_small_window(page):
+    page.set_viewport_size({"width": 1100, "height": 700})
+    go(page, "Explore")
+    over = f"{SCROLLED}.filter(one => one.offsetParent).map(one => one.scrollHeight - one.clientHeight)"
+    wait_until(lambda: all(px <= 0 for px in page.evaluate(over)), 10.0)
+    charts = page.evaluate(f"{CHARTS}.map(one => [one.getBoundingClientRect().bottom, one.clientHeight])")
+    assert len(charts) == 4
+    assert all(bottom <= 700.0 - 68.0 and height > 80.0 for bottom, height in charts)
+
+
+def test_the_population_is_framed_beside_the_convergence_and_an_empty_history_says_what_it_will_hold(page):
+    go(page, "Identify")
+    page.get_by_text("severities, 0 … 1").wait_for(timeout=20_000)
+    assert "k1 friction [–]" in page.locator(".emaviz-picture:visible").inner_text()
+    picture = page.locator(".emaviz-picture:visible").bounding_box()
+    convergence = page.evaluate(f"{CHARTS}.at(0).getBoundingClientRect().right")
+    assert picture["x"] >= convergence and picture["y"] < 150.0
+    page.get_by_role("tab", name="History", exact=True).click()
+    page.get_by_text("number of simulations").wait_for(timeout=10_000)
+    assert not page.get_by_role("button", name="Clear the table").is_visible()
+    page.get_by_role("tab", name="Search", exact=True).click()
+
+
+def test_discover_has_a_lower_inset_than_compare(page):
+    heights = {}
+    for name in ("Compare", "Discover"):
+        go(page, name)
+        page.wait_for_timeout(500)
+        _, top, _, bottom = box(page, PICTURE)
+        heights[name] = bottom - top
+        controls = page.evaluate("document.querySelector('[data-dock-region=left]').getBoundingClientRect().bottom")
+        assert 0.0 < top - controls < 20.0, "the controls have what the actuator leaves"
+    assert heights["Discover"] < heights["Compare"] - 60.0

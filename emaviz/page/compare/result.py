@@ -17,7 +17,7 @@ from emaviz.page.compare import WORKSPACE
 from emaviz.page.compare.moment import motion_of
 from emaviz.page.compare.plots import ComparePlots, View
 from emaviz.page.compare.raw_lines import RawLines
-from emaviz.page.inset import ALL_COLUMNS, COLUMNS, NEXT_COLUMN
+from emaviz.page.inset import ALL_COLUMNS, COLUMNS, NEXT_COLUMN, PLOTS_EARLY
 from emaviz.page.kept import Cleared
 from emaviz.page.page import Page
 from emaviz.page.playback import PlaybackStrip
@@ -61,6 +61,8 @@ class ResultPanel:
         gui = page.server.gui
         add_html(gui, COLUMNS)
         self._headline = add_html(gui, html("<div {}>Nothing is compared yet: upload a measurement.</div>", _BOX))
+        add_html(gui, PLOTS_EARLY)
+        self._numbers = add_html(gui, visible=False)
         self._place = gui.add_folder("Preview of the columns", visible=False)
         with self._place:
             add_html(gui, ALL_COLUMNS)
@@ -109,10 +111,11 @@ class ResultPanel:
         if self._comparison is not None:
             self._place.visible = False
             self._headline.content = headline(self._comparison)
+            self._numbers.content = numbers(self._comparison)
             self._show_answer(True)
 
     def _show_answer(self, visible: bool) -> None:
-        for folder in (self._answer, self._next, self._plots_folder, self._save):
+        for folder in (self._numbers, self._answer, self._next, self._plots_folder, self._save):
             folder.visible = visible
 
     # --- the comparison ---------------------------------------------------------------------------------------------
@@ -203,16 +206,24 @@ class ResultPanel:
 
 
 def headline(comparison: Comparison) -> Html:
-    """The sentences and, for each signal, error against floor."""
+    """The sentences."""
     first, *others = comparison.sentences or ("",)
     regions = {region.sentence for region in comparison.worst_regions}  # which stand in their own list
     severity = "good" if comparison.adequate else "bad"
     return html(
-        "<div {}>{}{}{}{}{}</div>",
+        "<div {}>{}{}{}</div>",
         _BOX,
         large(first, severity),
         joined(html("<div>{}</div>", text) for text in others if text not in regions),
         warned(comparison.warnings),
+    )
+
+
+def numbers(comparison: Comparison) -> Html:
+    """For each signal, error against floor."""
+    return html(
+        "<div {}>{}{}</div>",
+        _BOX,
         shown(errors(comparison)),
         folded("Each measurement", errors_by_recording(comparison, comparison.primary)),
     )

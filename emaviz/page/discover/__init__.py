@@ -4,4 +4,4 @@ import viser
 
 from emaviz.page.workspaces import Workspace
 
-WORKSPACE = Workspace("discover", "Discover", viser.Icon.BULB, 4)
+WORKSPACE = Workspace("discover", "Discover", viser.Icon.BULB, 4, lower=True)

@@ -19,6 +19,7 @@ from emaviz.figures.identified_table import Row, table
 from emaviz.page.identify import WORKSPACE
 from emaviz.page.identify.landscape import LandscapeView
 from emaviz.page.identify.swarm import SwarmView
+from emaviz.page.inset import COLUMNS
 from emaviz.page.page import Page
 from emaviz.page.playback import PlaybackStrip
 from emaviz.scene.motion import PLAYED, motion
@@ -53,7 +54,9 @@ class IdentifyResult:
         self.rows: list[Row] = []
         gui = page.server.gui
         with panel.add_tab(_SEARCH, viser.Icon.CHART_DOTS):
+            add_html(gui, COLUMNS)
             self._convergence = LiveConvergence(gui)
+            page.workspaces.heights.add([self._convergence.handle], spare_px=160)
             self._swarm = SwarmView(page)
         with panel.add_tab(_ANSWER, viser.Icon.TARGET_ARROW):
             self._whose = gui.add_dropdown("Algorithm shown", (_BEST, *ALGORITHMS.values()))
@@ -72,10 +75,12 @@ class IdentifyResult:
             self._landscape = LandscapeView(page, slow)
         with panel.add_tab("History", viser.Icon.TABLE):
             self._table = add_html(gui, table([]))
-            clear = gui.add_button("Clear the table", icon=viser.Icon.ERASER, color="gray")
+            self._clear_table: Any = gui.add_button(
+                "Clear the table", icon=viser.Icon.ERASER, color="gray", visible=False
+            )
         self._try.on_click(lambda event: page.screen.post("separating", lambda: self._try_separating(event.client)))
         self._whose.on_update(lambda _: slow.post("answer", self._draw_answer))
-        clear.on_click(lambda _: page.screen.post("runs", self._clear))
+        self._clear_table.on_click(lambda _: page.screen.post("runs", self._clear))
         page.workspaces.entered.connect(lambda name: name == WORKSPACE.name and self.draw())
 
     # --- from the compute thread ------------------------------------------------------------------------------------
@@ -135,6 +140,7 @@ class IdentifyResult:
         """The table of runs."""
         self.rows = rows[-_MOST_ROWS:]
         self._table.content = table(self.rows)
+        self._clear_table.visible = bool(self.rows)
 
     def _clear(self) -> None:
         self.show_rows([])

@@ -7,6 +7,7 @@ import numpy as np
 from ema_model.faults import FAULTS, HEALTHY
 from emaviz.figures import swarm
 from emaviz.figures.convergence import colour
+from emaviz.page.inset import NEXT_COLUMN
 from emaviz.page.page import Page
 from emaviz.session.identify.race import Frame, Race, Track
 from emaviz.text.html import add_html
@@ -26,8 +27,10 @@ class SwarmView:
         self._kind = gui.add_dropdown("Population view", (_PLANE, _LINES))
         self._x = gui.add_dropdown("Across", _NAMES, initial_value=_NAMES[0])
         self._y = gui.add_dropdown("Upwards", _NAMES, initial_value=_NAMES[5])
-        self._picture = add_html(gui, swarm.plane([], 0, 5))
         self._iteration = gui.add_slider("Iteration", 0, 150, 1, 150, disabled=True, hint="Looks back once it is over")
+        with gui.add_folder("Population"):
+            add_html(gui, NEXT_COLUMN)
+            self._picture = add_html(gui, swarm.plane([], 0, 5))
         for entry in (self._kind, self._iteration):
             entry.on_update(lambda event: event.client and page.screen.post("swarm view", self._changed))
         for entry in (self._x, self._y):

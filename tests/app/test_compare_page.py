@@ -148,6 +148,16 @@ def test_from_a_file_to_the_region_where_the_model_fails(compare, app, rig_file)
         page.get_by_role("tab", name=tab, exact=True).click()
         wait_until(lambda title=title: any(title in drawn for drawn, _ in figures(page)))
 
+    page.get_by_role("tab", name="Time", exact=True).click()
+    page.set_viewport_size({"width": 1100, "height": 700})
+    chart, verdict = page.locator(".js-plotly-plot:visible").first, page.get_by_text(comparison.sentences[0]).first
+    try:  # the first chart stands below the verdict, seen without scrolling
+        wait_until(lambda: chart.bounding_box()["y"] + chart.bounding_box()["height"] < 700.0 - 68.0, 10.0)
+        assert verdict.bounding_box()["y"] < chart.bounding_box()["y"]
+        assert chart.bounding_box()["height"] > 150.0
+    finally:
+        page.set_viewport_size({"width": 1400, "height": 900})
+
 
 def test_data_health_tells_a_clock_that_is_late(compare, app, recording, tmp_path):
     page, path = compare, tmp_path / "two clocks.csv"

@@ -107,7 +107,8 @@ def _identification(contents: Contents) -> rrb.Blueprint:
         tabs.append(rrb.Horizontal(*results, name="Results"))
     if contents.config:
         tabs.append(rrb.TextDocumentView(origin="/config", name="Settings"))
-    over_time = _signals_tab(contents)
+    # On the timeline it opens with, plots over time are empty: only what has no static curves needs them.
+    over_time = None if contents.curves else _signals_tab(contents)
     if over_time is not None:
         over_time.name = "Over time (below, choose the timeline: sim_time)"
         tabs.append(over_time)

@@ -67,6 +67,18 @@ def test_what_was_not_recorded_has_no_view():
     assert tabs == ["Identification"]
 
 
+def test_no_tab_is_empty_on_the_timeline_that_it_opens_with():
+    chart = Chart.of("current_A", TIME, CURRENT)
+    held = Contents(signals={"measurement": ["current_A"]}, charts={"current_A": chart})
+    assert _tabs(held)[-1].startswith("Over time"), "without static curves they stand nowhere else"
+    held.curves["current_A"] = chart
+    assert _tabs(held) == ["Identification", "Signals"]
+
+
+def _tabs(contents):
+    return [tab.name for tab in build(contents).root_container.contents]
+
+
 def test_a_curve_keeps_its_peaks_within_its_axes():
     values = CURRENT.copy()
     values[1234] = 9.0

@@ -72,12 +72,17 @@ class Page:
         def tried() -> None:
             nonlocal started
             if not self.session.ready.is_set():
-                self.notify("One moment", "The models are still being compiled.", "yellow")
+                self._wait("One moment", "The models are still being compiled.", button)
             elif not (started := begin()):
-                self.one_at_a_time()
+                self.one_at_a_time(button)
 
         return self.checked(tried, button) and started
 
-    def one_at_a_time(self) -> None:
-        """Says that another long run goes on."""
-        self.notify("One at a time", "Another long run goes on; stop it first.", "yellow")
+    def one_at_a_time(self, button: Any = None) -> None:
+        """Says that another long run goes on; with a button by raising InputError, which `checked` says beside it."""
+        self._wait("One at a time", "Another long run goes on; stop it first.", button)
+
+    def _wait(self, title: str, text: str, button: Any) -> None:
+        if button is not None:
+            raise InputError(text)
+        self.notify(title, text, "yellow")

@@ -137,3 +137,18 @@ def test_discover_has_a_lower_inset_than_compare(page):
         controls = page.evaluate("document.querySelector('[data-dock-region=left]').getBoundingClientRect().bottom")
         assert 0.0 < top - controls < 20.0, "the controls have what the actuator leaves"
     assert heights["Discover"] < heights["Compare"] - 60.0
+
+
+def test_a_scene_that_cannot_be_written_is_told_beside_its_button_and_stays(page, app, monkeypatch):
+    monkeypatch.setattr(app.comparing.folder, "scenes", app.comparing.folder.folder / "absent")
+    go(page, "Explore")
+    page.get_by_role("tab", name="Export", exact=True).click()
+    page.get_by_role("button", name="Scene as HTML").click()
+    beside = page.locator(".emaviz-beside").filter(has_text="No link to the scene")
+    beside.wait_for(timeout=30_000)
+    page.wait_for_timeout(1_000)
+    assert beside.is_visible()
+    monkeypatch.undo()
+    page.get_by_role("button", name="Scene as HTML").click()
+    page.get_by_role("link", name="actuator.html").wait_for(timeout=30_000)
+    assert not beside.is_visible()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import viser
@@ -40,10 +41,10 @@ class ExportControls:
         gui.add_markdown(
             "The actuator with its motion, in one **HTML** file that opens offline, and a link to it here."
         )
-        self._button("Scene as HTML", viser.Icon.CUBE, self._send_scene)
+        self._scene = self._button("Scene as HTML", viser.Icon.CUBE, self._send_scene)
         self._link = add_html(gui)
 
-    def _button(self, label: str, icon: viser.IconName, act: Callable[[viser.ClientHandle], None]) -> None:
+    def _button(self, label: str, icon: viser.IconName, act: Callable[[viser.ClientHandle], None]) -> Any:
         button = self._page.server.gui.add_button(label, icon=icon, color="gray")
 
         @button.on_click
@@ -52,9 +53,12 @@ class ExportControls:
             if client is None:
                 return
             if self._page.session.simulation is None:
-                self._page.notify("One moment", "Nothing has been simulated yet.", "yellow")
+                self._page.say_beside(button, "Nothing has been simulated yet.")
                 return
+            self._page.say_beside(button, "")
             self._page.screen.post(f"export {label}", lambda: act(client))
+
+        return button
 
     def _run(self) -> Simulation:
         simulation = self._page.session.simulation
@@ -103,6 +107,7 @@ class ExportControls:
         try:
             path.write_bytes(page.encode())
         except OSError as error:
-            self._page.notify("No link to the scene", f"{path.name}: cannot be written ({error.strerror})")
+            text = f"No link to the scene: {path.name} cannot be written ({error.strerror})"
+            self._page.say_beside(self._scene, text)
             return
         self._link.content = said(html('<a href="{}{}" target="_blank">Open {} ↗</a>', SCENES, path.name, path.name))

@@ -12,7 +12,7 @@ from ema_model.quantities.axes import Axes
 from ema_model.simulation.with_effect import SHOWN, WithEffect
 from emaviz.colours import DIFFERENCE, MONITOR, REFERENCE
 from emaviz.figures.decimate import envelope
-from emaviz.figures.signals import charts, legend, time_axis, value_axis
+from emaviz.figures.signals import LAST_MORE_PX, charts, legend, time_axis, value_axis
 from emaviz.text.html import add_html
 
 _POINTS, _SMALL_POINTS = 800, 160
@@ -22,12 +22,13 @@ _WIDTH, _HEIGHT = 120, 44  # of a small picture, pixels
 class EffectCharts:
     """A chart for each signal, and one of what changes in it; unseen until there is a run."""
 
-    def __init__(self, gui: viser.GuiApi, axes: Axes, height: int = 98) -> None:
+    def __init__(self, gui: viser.GuiApi, axes: Axes, height: int = 92) -> None:
         empty = np.array([0.0, 1.0])
         lines = legend((REFERENCE, "without"), (MONITOR, "with the effect"), (DIFFERENCE, "difference, below"))
         self._legend = add_html(gui, lines, visible=False)
         self._charts: list[tuple[Any, Any, Any]] = []
         for chart in (one for one in charts(axes) if one.signal in SHOWN):
+            last = chart.signal == SHOWN[-1]
             both = gui.add_uplot(
                 data=(empty, empty, empty),
                 series=({}, _line("without", REFERENCE, 1.5), _line("with", MONITOR, 1.5)),
@@ -39,8 +40,9 @@ class EffectCharts:
                 data=(empty, empty),
                 series=({}, _line("difference", DIFFERENCE, 1.5)),
                 title="",
-                axes=(time_axis(chart.signal == SHOWN[-1]), value_axis(chart.difference_unit)),
-                **_layout(height - 10, above=8),  # its topmost number has no title above it
+                axes=(time_axis(last), value_axis(chart.difference_unit)),
+                # its topmost number has no title above it
+                **_layout(height - 10 + (LAST_MORE_PX if last else 0), above=8),
             )
             self._charts.append((chart, both, change))
 

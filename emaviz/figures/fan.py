@@ -12,7 +12,7 @@ from ema_model.quantities.axes import Axes
 from ema_model.recordings import Measurement
 from emaviz.colours import COMMAND
 from emaviz.figures.decimate import envelope
-from emaviz.figures.signals import CURSOR, PADDING, POINTS, charts, legend, time_axis, value_axis
+from emaviz.figures.signals import CURSOR, LAST_MORE_PX, PADDING, POINTS, charts, legend, time_axis, value_axis
 from emaviz.text.html import add_html
 
 SHADES = ("#fcc487", "#f59f4a", "#ea7317", "#c94f0a", "#a13a06")  # the model's colour, ever darker
@@ -22,7 +22,7 @@ _SHOWN = ("current_A", "user_position_rad", "motor_speed_rad_s")
 class LiveFan:
     """Charts in a panel of the page; empty, and unseen, until there is a fan."""
 
-    def __init__(self, gui: viser.GuiApi, axes: Axes, height: int = 166) -> None:
+    def __init__(self, gui: viser.GuiApi, axes: Axes, height: int = 155) -> None:
         self._legend: Any = add_html(gui)
         self._charts: list[tuple[Any, Any]] = []
         empty, shown = np.array([0.0, 1.0]), [one for one in charts(axes) if one.signal in _SHOWN]
@@ -43,7 +43,7 @@ class LiveFan:
                 cursor=CURSOR,
                 legend={"show": False},
                 padding=PADDING,
-                height=height + (16 if last else 0),
+                height=height + (LAST_MORE_PX if last else 0),
                 visible=False,
             )
             self._charts.append((chart, handle))

@@ -13,7 +13,7 @@ from ema_model.identification.run import ALGORITHMS as TITLES
 from emaviz.colours import DIFFERENCE, REFERENCE
 from emaviz.figures.convergence import colour
 from emaviz.figures.decimate import envelope
-from emaviz.figures.signals import CURSOR, PADDING, PLANT_LINE, POINTS, legend, time_axis, value_axis
+from emaviz.figures.signals import CURSOR, LAST_MORE_PX, PADDING, PLANT_LINE, POINTS, legend, time_axis, value_axis
 from emaviz.text.html import add_html
 
 Array = NDArray[np.float64]
@@ -29,7 +29,7 @@ MEASURED: Any = {**PLANT_LINE, "label": "measured"}
 class LiveFit:
     """Two charts on one time base: the currents, and monitor − measured."""
 
-    def __init__(self, gui: viser.GuiApi, height: int = 190) -> None:
+    def __init__(self, gui: viser.GuiApi, height: int = 171) -> None:
         empty = np.array([0.0, 1.0])
         self._algorithms: tuple[str, ...] = ()
         self._legend: Any = add_html(gui)
@@ -52,7 +52,7 @@ class LiveFit:
             series=({"label": "t [s]"}, _line("left", REFERENCE)),
             title="Monitor − measured",
             axes=(time_axis(True), value_axis("A")),
-            height=height,
+            height=height + LAST_MORE_PX,
             **common,
         )
         self.handles = [self._currents, self._left]

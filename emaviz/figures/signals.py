@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 POINTS = 800  # of a line, at most
 PADDING = (10, 4, 0, 0)  # top, right, bottom, left, px: the uppermost tick needs half a line
 _GREY = "#868e96"
+_VALUES_PX, _LABEL_PX = 22, 16  # of a time axis
+LAST_MORE_PX = _VALUES_PX + _LABEL_PX  # by which the last chart of a column is taller than those above it
 
 
 @dataclass(frozen=True)
@@ -76,7 +78,7 @@ def legend(*names: tuple[str, str]) -> Html:
 class LiveSignals:
     """The charts in a panel of the page."""
 
-    def __init__(self, gui: viser.GuiApi, axes: Axes, height: int = 132) -> None:
+    def __init__(self, gui: viser.GuiApi, axes: Axes, height: int = 127) -> None:
         empty = np.array([0.0, 1.0])
         self._legend: Any = add_html(gui, legend(*_SHOWN))
         self._frozen = False
@@ -94,7 +96,7 @@ class LiveSignals:
                 cursor=CURSOR,
                 legend={"show": False},
                 padding=PADDING,
-                height=height + (16 if last else 0),
+                height=height + (LAST_MORE_PX if last else 0),
             )
             self._charts.append((chart, handle))
 
@@ -133,7 +135,7 @@ _EQUIVALENT = ((REFERENCE, "equivalent current of the phases, plant"), (MONITOR,
 class LivePhases:
     """Phase currents, and the equivalent current that they make."""
 
-    def __init__(self, gui: viser.GuiApi, height: int = 290) -> None:
+    def __init__(self, gui: viser.GuiApi, height: int = 279) -> None:
         empty = np.array([0.0, 1.0])
         add_html(gui, legend(*((colour, f"phase {name}, plant") for colour, name in zip(PHASES, "ABC"))))
         common = {
@@ -162,7 +164,7 @@ class LivePhases:
             ),
             title="Equivalent single-phase current",
             axes=(time_axis(True), value_axis("A")),
-            height=height + 16,
+            height=height + LAST_MORE_PX,
             **common,  # type: ignore[arg-type]
         )
         self.handles = [self._phases, self._equivalent]
@@ -198,14 +200,16 @@ def beneath(frozen: Array, shown: Array) -> Array:
 CURSOR: Any = {"sync": {"key": "time"}, "drag": {"x": False, "y": False}}
 
 
-def time_axis(labelled: bool) -> Any:
-    """The axis below a chart; only the last of a column needs its label."""
-    return {**AXIS, "label": "time [s]" if labelled else "", "size": 30, "labelSize": 16 if labelled else 0}
+def time_axis(last: bool) -> Any:
+    """The axis below a chart: the last of a column has the values and the label, those above it the lines alone."""
+    if last:
+        return {**AXIS, "label": "time [s]", "size": 30}
+    return {**AXIS, "label": "", "stroke": "#00000000", "size": 30 - _VALUES_PX, "labelSize": 0}
 
 
 def value_axis(unit: str) -> Any:
     """The axis at the left of a chart."""
-    return {**AXIS, "scale": "y", "label": f"[{unit}]", "size": 48, "space": 16}
+    return {**AXIS, "scale": "y", "label": f"[{unit}]", "size": 48, "space": 12}
 
 
 def _difference_axis(unit: str) -> Any:
@@ -220,7 +224,7 @@ def _difference_axis(unit: str) -> Any:
 
 
 AXIS: dict[str, Any] = {
-    "stroke": _GREY, "labelSize": 16, "labelGap": 0, "font": "11px system-ui", "labelFont": "12px system-ui",
+    "stroke": _GREY, "labelSize": _LABEL_PX, "labelGap": 0, "font": "11px system-ui", "labelFont": "12px system-ui",
     "grid": {"stroke": "#86868625", "width": 1}, "ticks": {"stroke": "#86868640", "width": 1, "size": 5},
 }  # fmt: skip
 

@@ -11,9 +11,8 @@ from emaviz.text.html import Html, unescaped
 COLUMNS = Html('<div class="emaviz-columns"></div>')  # stands in a tab whose parts take two columns where there is room
 NEXT_COLUMN = Html('<div class="emaviz-next-column"></div>')  # stands in the folder that begins the second one
 ALL_COLUMNS = Html('<div class="emaviz-all-columns"></div>')  # stands in a folder that is as wide as both
-PLOTS_EARLY = Html(
-    '<div class="emaviz-early"></div>'
-)  # what follows gives way to the second column where there is one only
+# Stands before what gives way to the second column where there is one only.
+PLOTS_EARLY = Html('<div class="emaviz-early"></div>')
 _LEAST_WIDTH_PX, _TWO_COLUMNS_PX = 900, 1240  # of a window
 _CLICK_PX = 4  # a pointer that moves further turns the actuator
 

@@ -112,6 +112,9 @@ def test_explore_does_not_scroll_in_a_small_window(page):
     charts = page.evaluate(f"{CHARTS}.map(one => [one.getBoundingClientRect().bottom, one.clientHeight])")
     assert len(charts) == 4
     assert all(bottom <= 700.0 - 68.0 and height > 80.0 for bottom, height in charts)
+    within = page.evaluate(f"{CHARTS}.map(one => one.querySelector('.u-over').clientHeight)")
+    assert all(height > 45.0 for height in within), "room for a signal and three values at its axis"
+    assert max(within) - min(within) <= 4.0, "the last chart has its time axis besides"
 
 
 def test_the_population_is_framed_beside_the_convergence_and_an_empty_history_says_what_it_will_hold(page):

@@ -34,7 +34,10 @@ _CANDIDATES = 3
 _RIVAL = 4.0  # χ², within which another basin may be the right one
 FAULTS = len(NAMES)  # the first of an identification's unknowns
 _SETTLED = 1e-3 / K_SIGMA  # of x's faults, between two rounds
-_LONGER_S = (5e-5, 2e-5)  # steps for a search, which need not be exact: what it finds is refined at the actuator's own
+LONGER_STEPS_S = (
+    5e-5,
+    2e-5,
+)  # steps for a search, which need not be exact: what it finds is refined at the actuator's own
 _LOOKS = 31  # beside the healthy one: together a block of lanes
 _ALIKE = 0.5  # floors, by which these may change the signals
 _SPREADS = (0.0, 0.05, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0)
@@ -60,7 +63,7 @@ class Setting:
         looks = np.concatenate([[HEALTHY], np.random.default_rng(0).random((_LOOKS, FAULTS))])
         x = exact.clip(exact.at(looks))
         shown = exact.residuals(x)
-        for longest_s in _LONGER_S:
+        for longest_s in LONGER_STEPS_S:
             plant = self.plant.at_longer_steps(longest_s)
             other = self.coarse(plant).residuals(x)
             if np.sqrt(np.median(np.mean((other - shown) ** 2, axis=1))) < _ALIKE:

@@ -48,10 +48,10 @@ def signatures(found: Fit, prints: Mapping[str, Sequence[Fingerprint]]) -> dict[
 
     At the strength that suits best, and only what the parameters cannot do as well.
     """
-    usual = movable(found)
+    beyond = _beyond_all(*movable(found), [one.columns for its in prints.values() for one in its if not one.frees])
     told = {}
     for name, its in prints.items():
-        own = [_beyond(*(movable(found, one.frees) if one.frees else usual), one.columns) for one in its]
+        own = [_beyond(*movable(found, one.frees), one.columns) if one.frees else next(beyond) for one in its]
         parts = [columns @ np.linalg.lstsq(columns, -found.residual, rcond=None)[0] for columns in own]
         told[name] = min(parts, key=lambda part: float(np.sum((found.residual + part) ** 2)))
     return told

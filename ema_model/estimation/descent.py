@@ -51,7 +51,7 @@ class Problem(Protocol):
         ...
 
     def has_room_for(self, others: int) -> bool:
-        """Whether these need no block of lanes of their own beside one candidate."""
+        """Whether these fit in the block of lanes of one candidate's derivatives, and leave those as they are."""
         ...
 
 

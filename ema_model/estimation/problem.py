@@ -130,8 +130,8 @@ class Problem:
         return found, np.swapaxes(slopes, 1, 2), np.concatenate([*beside, others * self.prior], axis=1)
 
     def has_room_for(self, others: int) -> bool:
-        """Whether so many candidates need no further block of lanes beside the derivatives of one."""
-        return (1 + self.count) % LANES + others <= LANES and (1 + self.count) % LANES > 0
+        """Whether so many candidates fit in one block of lanes with the derivatives of one, all to both sides."""
+        return 1 + 2 * self.count + others <= LANES
 
     def points_in_whole_blocks(self, n: int) -> int:
         """How many of a window `jacobians` of n candidates simulates in whole blocks, at most."""

@@ -156,8 +156,8 @@ def test_a_run_that_diverges_is_a_very_great_error_that_a_descent_can_count(reco
 def test_others_beside_the_derivatives_are_what_they_are_alone(recording):
     identifying = setting(Objective([recording], ACTUATOR), parameters_known=True).coarse()
     x = identifying.at(np.array([[0.2, 0.1, 0.0, 0.0, 0.0, 0.1, 0.5, 0.5], [0.3, 0.2, 0.0, 0.0, 0.0, 0.0, 0.5, 0.6]]))
-    assert identifying.has_room_for(1) and not identifying.has_room_for(32)
+    assert identifying.has_room_for(3) and not identifying.has_room_for(16)
     residual, slopes, beside = identifying.jacobians_beside(x[:1], x[1:], in_whole_blocks=True)
     alone, its = identifying.jacobians(x[:1], in_whole_blocks=True)
-    assert np.array_equal(beside, identifying.residuals(x[1:])) and np.array_equal(residual, alone)
-    assert slopes == pytest.approx(its, abs=0.05 * np.max(np.abs(its)))
+    assert np.array_equal(beside, identifying.residuals(x[1:]))
+    assert np.array_equal(residual, alone) and np.array_equal(slopes, its)

@@ -6,6 +6,7 @@ DIFFERENCE = "#e03131"
 COMMAND = "#868e96"
 FAULT = "#ff5a00"  # on the actuator: what is broken, and nothing else
 FITTED, HELD_OUT = "#1098ad", "#9c36b5"  # what was fitted, and what was not
+LIMIT = "#c2255c"  # what calls for attention: a threshold, a unit that differs
 TRUTH = "#2b8a3e"
 GHOST = "#9c6ade"  # a frozen run
 PHASES = ("#c9a200", "#0fa58a", "#c2459e")  # A, B, C, in the charts and in the windings: none is a model's or a fault's

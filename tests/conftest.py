@@ -10,6 +10,8 @@ import pytest
 from hypothesis import settings
 from support.browser import SOFTWARE_GL, Browser
 
+LONGEST = ("real_data", "units", "discovery")  # folders
+
 # As `emaviz` says it, before any test imports numpy: two processes' threads would wait for each other.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # Tests take what a first use takes; what is compiled behind it, they would wait for elsewhere.
@@ -25,6 +27,11 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
     if not whole or config.option.capture == "no" or "not study" not in config.option.markexpr:
         return 0
     return min(4, os.cpu_count() or 1)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Files that take a minute begin first: a process that is given one last would keep the other waiting."""
+    items.sort(key=lambda item: item.path.parent.name not in LONGEST)
 
 
 @pytest.fixture(scope="session")

@@ -31,6 +31,11 @@ FLOOR_NOTE = (
 )
 
 
+def verdict_name(found: Discovery) -> str:
+    """The verdict as a name of two words: 'effects found'."""
+    return found.verdict.replace("_", " ")
+
+
 def headline(found: Discovery) -> str:
     """The verdict in one sentence; in two where the controller is not the file's."""
     if found.controller_seen is None:
@@ -54,7 +59,7 @@ def _answer(found: Discovery) -> str:
         return "Motion and current are explained; the user's position beyond the motor's is not."
     if found.verdict == "unknown_effect" and found.curve is None:
         return f"Something is missing that none of the known effects explains: {remains(found)}."
-    text = VERDICTS.get(found.verdict, found.verdict.replace("_", " "))
+    text = VERDICTS.get(found.verdict, verdict_name(found))
     return f"{text[:1].upper()}{text[1:]}."
 
 
@@ -176,7 +181,7 @@ def document_of(found: Discovery) -> Document:
     asked = next_experiment(found)
     return Document(
         [
-            Lines([f"{found.verdict}: {headline(found)}", *sentences(found)]),
+            Lines([f"{verdict_name(found)}: {headline(found)}", *sentences(found)]),
             *(Note(warning) for warning in found.warnings),
             *added(found),
             *(table for table in tables if table is not None),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -34,13 +35,17 @@ _CANDIDATES = 3
 _RIVAL = 4.0  # χ², within which another basin may be the right one
 FAULTS = len(NAMES)  # the first of an identification's unknowns
 _SETTLED = 1e-3 / K_SIGMA  # of x's faults, between two rounds
-LONGER_STEPS_S = (
-    5e-5,
-    2e-5,
-)  # steps for a search, which need not be exact: what it finds is refined at the actuator's own
+LONGER_STEPS_S = 5e-5, 2e-5  # for a search, which need not be exact: what it finds is refined at the actuator's own
 _LOOKS = 31  # beside the healthy one: together a block of lanes
 _ALIKE = 0.5  # floors, by which these may change the signals
 _SPREADS = (0.0, 0.05, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0)
+
+
+class Rough(NamedTuple):
+    """What a search simulates in the plant's place."""
+
+    plant: ClosedLoop
+    evaluations: int  # that it took to choose it
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,18 +62,18 @@ class Setting:
         return Problem(plant or self.plant, self.floors, self.faults)
 
     @cached_property
-    def rough_plant(self) -> ClosedLoop:
-        """The same at the longest steps that hardly change the signals at most of some random k."""
+    def rough(self) -> Rough:
+        """The plant at the longest steps that hardly change the signals at most of some random k."""
         exact = self.coarse()
         looks = np.concatenate([[HEALTHY], np.random.default_rng(0).random((_LOOKS, FAULTS))])
         x = exact.clip(exact.at(looks))
         shown = exact.residuals(x)
-        for longest_s in LONGER_STEPS_S:
+        for tried, longest_s in enumerate(LONGER_STEPS_S, 1):
             plant = self.plant.at_longer_steps(longest_s)
             other = self.coarse(plant).residuals(x)
             if np.sqrt(np.median(np.mean((other - shown) ** 2, axis=1))) < _ALIKE:
-                return plant
-        return self.plant
+                return Rough(plant, (1 + tried) * len(x))
+        return Rough(self.plant, (1 + len(LONGER_STEPS_S)) * len(x))
 
     def problem(self, *, with_base: bool, plant: ClosedLoop | None = None) -> Problem:
         """The faults and what is not exactly known, with the actuator's base parameters or without."""
@@ -141,7 +146,7 @@ def refine(given: Setting, k: ArrayLike, seed: int = 0, tell: Tell = _silent) ->
     """
     problem = given.problem(with_base=False)
     phases = 2 if any(one.is_base for one in given.others) else 1
-    rough = given.problem(with_base=False, plant=given.rough_plant)  # the rounds to come go on from it exactly
+    rough = given.problem(with_base=False, plant=given.rough.plant)  # the rounds to come go on from it exactly
     x, _, evaluations = _descend(rough, rough.at(k))
     x, found, more = _with_twins(given, problem, x, None, seed, lambda text, share: tell(text, share / phases))
     spread = 0.0
@@ -192,6 +197,7 @@ def _with_twins(
             x, _, more = _descend(problem, x)
             return x, None, evaluations + more
         known = problem.jacobians(x[None, :], in_whole_blocks=True)
+        evaluations += problem.points_in_whole_blocks(1)
         cost = float(known[0][0] @ known[0][0])
         moved = float(np.max(np.abs(x - best)[:FAULTS]))
         if cost < least:

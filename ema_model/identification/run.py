@@ -135,6 +135,7 @@ def steps(
         found = refine(given, last.k, seed, on_fit)
     on_fit("intervals", 1.0)
     polishes = (polish or algorithm == ROBUST) and not stopped
+    looked = 0 if algorithm == ROBUST else given.rough.evaluations  # which the robust search has counted itself
     k = found.k if polishes else last.k
     sure = uncertainty(found, k)
     after = time.perf_counter() - started - first_compile
@@ -144,7 +145,7 @@ def steps(
         seed=seed,
         k=k,
         rmse=float(objective(k)[0]),
-        evaluations=last.evaluations + (found.evaluations if polishes else 0),
+        evaluations=last.evaluations + (looked + found.evaluations if polishes else 0),
         elapsed_s=last.elapsed_s + (after if polishes else 0.0),
         compile_s=compile_s + first_compile,
         rmse_history=np.array([at.rmse for at in history]),
@@ -209,12 +210,12 @@ def _robust(
     started = time.perf_counter()
     given = prepared()
     compiled = _warm_up_fit(given)
-    evaluations, waited = 0, compiled
-    problem = given.coarse(given.rough_plant)
+    waited = compiled
+    problem = given.coarse(given.rough.plant)
     for number, basins in enumerate(search(problem, population, iterations, seed)):
         k = problem.k(basins.x)
         rmse = objective(k)
-        evaluations = basins.evaluations
+        evaluations = given.rough.evaluations + basins.evaluations
         elapsed = time.perf_counter() - started - waited
         at = time.perf_counter()
         last = number if basins.done else iterations

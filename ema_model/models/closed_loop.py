@@ -106,9 +106,6 @@ class ClosedLoop:
         place: int,
         actuator: Actuator | None = None,
         k: ArrayLike | None = None,
-        turned_rad: float = 0.0,
-        play_rad: float = 0.0,
-        effects: Effects | None = None,
     ) -> Signals:
         """The three-phase Reference Model's signals, of those that are measured, as in `Model`."""
         window = self.windows[place]
@@ -116,28 +113,25 @@ class ClosedLoop:
         if not actuator.has_reference_model:
             return {}
         k = actuator.k if k is None else k
-        others = dict(self.effects if effects is None else effects)
-        pull = others.pop(LOAD, {"torque_Nm": 0.0})["torque_Nm"]  # needs no kernels of its own
-        count = len(window.command)
+        load, others = _load_and_others(window, self.effects)
         run = Run(
-            Recorded(np.arange(count) * window.step_s, window.command),
-            duration_s=count * window.step_s,
+            _command(window),
+            duration_s=len(window.command) * window.step_s,
             sample_rate_Hz=1.0 / (window.steps_per_sample * window.step_s),
-            load_torque_Nm=float(window.load.mean() + pull),
+            load_torque_Nm=float(load),
         )
         shown = simulate_reference(
             run,
             actuator,
             k,
             others,
-            start_rad=window.user_rad + turned_rad * actuator.transmission.gear_ratio,
+            start_rad=window.user_rad,
             start_speed_rad_s=window.speed_rad_s,
-            start_play_rad=window.play_rad + play_rad,
-            start_integral_Nm=float(window.integral_Nm(actuator, k, turned_rad, play_rad)),
+            start_play_rad=window.play_rad,
+            start_integral_Nm=float(window.integral_Nm(actuator, k)),
         )
-        blocks = {name: shown[name][1:].reshape(1, -1, window.samples_per_block).mean(axis=2) for name in COMPARED}
-        sensed = self._sensed(blocks, actuator, window.block_s)
-        return {name: sensed[name][0] for name in window.measured}
+        measured = self._measured(window, actuator, {name: shown[name][None, 1:] for name in COMPARED})
+        return {name: values[0] for name, values in measured.items()}
 
     def twins(
         self,
@@ -153,25 +147,21 @@ class ClosedLoop:
         actuator = actuator.varied(window.values)
         if not actuator.has_reference_model:
             return {}
-        others = dict(effects)
-        pull = np.asarray(others.pop(LOAD, {"torque_Nm": 0.0})["torque_Nm"])
-        count = len(window.command)
+        load, others = _load_and_others(window, effects)
         shown = simulate_references(
-            Recorded(np.arange(count) * window.step_s, window.command),
-            count // window.steps_per_sample,
+            _command(window),
+            len(window.command) // window.steps_per_sample,
             1.0 / (window.steps_per_sample * window.step_s),
             actuator,
             k,
             others,
-            load_Nm=window.load.mean() + pull,
+            load_Nm=load,
             start_rad=window.user_rad + np.asarray(turned_rad) * actuator.transmission.gear_ratio,
             start_speed_rad_s=window.speed_rad_s,
             start_play_rad=window.play_rad + np.asarray(play_rad),
             start_integral_Nm=window.integral_Nm(actuator, k, turned_rad, play_rad),
         )
-        blocks = {name: shown[name].reshape(len(k), -1, window.samples_per_block).mean(axis=2) for name in COMPARED}
-        sensed = self._sensed(blocks, actuator, window.block_s)
-        return {name: sensed[name] for name in window.measured}
+        return self._measured(window, actuator, shown)
 
     def noise(self, place: int, stated: Mapping[str, float]) -> dict[str, float]:
         """As in `Model`; the longest run of the whole recording tells it."""
@@ -242,6 +232,12 @@ class ClosedLoop:
                 ours[...] = shown.transpose(1, 2, 0)[:, : ours.shape[1]]
         return self._sensed(dict(zip(COMPARED, lanes)), actuator, window.block_s)
 
+    def _measured(self, window: LoopWindow, actuator: Actuator, shown: Signals) -> Signals:
+        """Of a model's samples (n, samples) after the start, what was measured, as sensors show it: (n, blocks)."""
+        blocks = {name: shown[name].reshape(len(shown[name]), -1, window.samples_per_block) for name in COMPARED}
+        sensed = self._sensed({name: of.mean(axis=2) for name, of in blocks.items()}, actuator, window.block_s)
+        return {name: sensed[name] for name in window.measured}
+
     def _sensed(self, true: Signals, actuator: Actuator, block_s: float) -> Signals:
         """Signals (n, blocks) as the actuator's sensors show them."""
         sensors = actuator.sensors
@@ -254,6 +250,18 @@ class ClosedLoop:
             return shown
         with np.errstate(invalid="ignore", over="ignore"):  # of one that diverges
             return {name: y - late * np.gradient(y, block_s, axis=1) for name, y in shown.items()}
+
+
+def _command(window: LoopWindow) -> Recorded:
+    """What a window's model is told, at its steps."""
+    return Recorded(np.arange(len(window.command)) * window.step_s, window.command)
+
+
+def _load_and_others(window: LoopWindow, effects: Effects) -> tuple[Array, Effects]:
+    """The constant load, N·m, of the recording and of the effects, which needs no kernel of its own; and the others."""
+    pull = effects.get(LOAD, {"torque_Nm": 0.0})["torque_Nm"]
+    others = {name: settings for name, settings in effects.items() if name != LOAD}
+    return window.load.mean() + np.asarray(pull), others
 
 
 def _each(value: ArrayLike) -> Array:

@@ -91,9 +91,6 @@ class Model(Protocol):
         place: int,
         actuator: Actuator | None = None,
         k: ArrayLike | None = None,
-        turned_rad: float = 0.0,
-        play_rad: float = 0.0,
-        effects: Effects | None = None,
     ) -> Signals:
         """The same of the model of higher fidelity, where there is one, for one k (8,), `even`: (blocks,) each.
 

@@ -10,7 +10,7 @@ from ema_model.commands import Command
 from ema_model.simulation.one_stack import stack_at_hand
 from ema_model.simulation.pack import EffectSettings, initial_reference_state, reference_rows
 from ema_model.simulation.precompile import wait_for
-from ema_model.simulation.run import REFERENCE_SUBSTEPS, Run, reference_steps
+from ema_model.simulation.run import REFERENCE_SUBSTEPS, Run, finite, reference_steps
 
 Array = NDArray[np.float64]
 
@@ -56,7 +56,7 @@ def simulate_references(
         result,
     )
     shown: dict[str, Array] = dict(zip(SHOWN, result.transpose(1, 2, 0)[:, : len(k)]))
-    for name, values in shown.items():
-        if not np.all(np.isfinite(values)):
-            raise FloatingPointError(f"the reference model diverged: {actuator.axes.signal(name)} is not finite")
+    for lane in range(len(k)):
+        one = {name: values[lane] for name, values in shown.items()}
+        finite({**one, "time_s": run.time_s[1:]}, "the reference model", actuator.axes)
     return shown

@@ -149,7 +149,7 @@ def simulate_reference(
     if voltages:
         for column, name in enumerate(("leg_a_voltage_V", "leg_b_voltage_V", "leg_c_voltage_V"), 8):
             signals[name] = np.concatenate([[0.0], result[:, column]])
-    return Measurement(_finite(signals, "the reference model", actuator.axes), name="reference model")
+    return Measurement(finite(signals, "the reference model", actuator.axes), name="reference model")
 
 
 def simulate_monitor(
@@ -203,7 +203,7 @@ def simulate_monitors(
         result,
     )
     runs = (_signals(run, actuator, result[i // LANES, :, :, i % LANES], start) for i in range(len(k)))
-    return tuple(Measurement(_finite(one, "the monitor model", actuator.axes), name="monitor model") for one in runs)
+    return tuple(Measurement(finite(one, "the monitor model", actuator.axes), name="monitor model") for one in runs)
 
 
 def _signals(run: Run, actuator: Actuator, result: Array, start_rad: float) -> dict[str, Array]:
@@ -230,7 +230,8 @@ def _signals(run: Run, actuator: Actuator, result: Array, start_rad: float) -> d
     return signals
 
 
-def _finite(signals: dict[str, Array], what: str, axes: Axes) -> dict[str, Array]:
+def finite(signals: dict[str, Array], what: str, axes: Axes) -> dict[str, Array]:
+    """The same signals, "time_s" among them.  Raises FloatingPointError if one of them is not finite."""
     for name, values in signals.items():
         if not np.all(np.isfinite(values)):
             at = signals["time_s"][int(np.argmin(np.isfinite(values)))]

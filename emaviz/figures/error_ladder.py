@@ -13,6 +13,8 @@ from emaviz.colours import FITTED, HELD_OUT
 from emaviz.figures import theme
 
 _WIDE = 15.0  # times the floor, from which on the scale is logarithmic
+_TOP = 1.2  # of a straight scale, times the largest error
+_LABEL = 0.14  # height of a number and its distance from its point, of the chart's height
 
 
 def figure(found: Discovery, *, dark: bool = False) -> go.Figure:
@@ -25,6 +27,7 @@ def figure(found: Discovery, *, dark: bool = False) -> go.Figure:
     held = [rung.holdout_rmse for rung in found.ladder]
     if any(value is not None for value in held):
         lines.append(("held out", HELD_OUT, "diamond", [float("nan") if v is None else v for v in held]))
+    shown = [1.0, *(value for *_, values in lines for value in values if math.isfinite(value) and value > 0.0)]
     for name, colour, symbol, values in lines:
         other = next((line[3] for line in lines if line[0] != name), values)
         chart.add_trace(
@@ -38,7 +41,7 @@ def figure(found: Discovery, *, dark: bool = False) -> go.Figure:
                 text=[number(value) for value in values],
                 # The number of the upper line above it, of the lower one below.
                 textposition=[
-                    "top center" if value > its or (value == its and name == "fitted") else "bottom center"
+                    _beside(value, value > its or (value == its and name == "fitted"), max(shown))
                     for value, its in zip(values, other)
                 ],
                 textfont={"color": colour, "size": 12},
@@ -57,7 +60,6 @@ def figure(found: Discovery, *, dark: bool = False) -> go.Figure:
             hoverinfo="skip",
         )
     )
-    shown = [1.0, *(value for *_, values in lines for value in values if math.isfinite(value) and value > 0.0)]
     chart.update_xaxes(
         tickvals=places, ticktext=titles, range=[-0.5, len(places) - 0.5], showgrid=False, zeroline=False, nticks=0
     )
@@ -65,5 +67,12 @@ def figure(found: Discovery, *, dark: bool = False) -> go.Figure:
         low, high = math.log10(0.4 * min(shown)), math.log10(2.0 * max(shown))
         chart.update_yaxes(type="log", range=[low, high], dtick=1)
     else:
-        chart.update_yaxes(range=[0.0, 1.2 * max(shown)], rangemode="tozero")
+        chart.update_yaxes(range=[0.0, _TOP * max(shown)], rangemode="tozero")
     return chart
+
+
+def _beside(value: float, above: bool, largest: float) -> str:
+    """Where the number of a point stands: above or below it, but not on the line of the floor."""
+    label = _LABEL * _TOP * largest
+    over_floor = largest <= _WIDE and (value < 1.0 < value + label if above else value - label < 1.0 < value)
+    return "middle right" if over_floor else "top center" if above else "bottom center"

@@ -9,12 +9,12 @@ import plotly.graph_objects as go
 from ema_model.faults import BY_NAME
 from ema_model.quantities.interval import HALF_90
 from ema_model.tracking.result import FaultTrack, Tracked
-from emaviz.colours import COMMAND, DIFFERENCE, MONITOR, REFERENCE
+from emaviz.colours import COMMAND, MONITOR, REFERENCE
 from emaviz.figures import theme
 
 CLICKED = "flights"  # by which a page knows the chart, of which a point's text is its flight
 _BAND = "rgba(240,140,0,0.18)"
-_FAN = "rgba(224,49,49,0.18)"
+_FAN = "rgba(240,140,0,0.30)"
 
 
 def figure(
@@ -63,7 +63,7 @@ def figure(
         chart.add_trace(go.Scatter(x=[start, now], y=[back, one.level], mode="lines", line=line, name="trend"))
     for jump in one.jumps:
         number = next(i for i, flight in enumerate(result.flights, 1) if flight.name == jump.flight)
-        chart.add_vline(x=number - 0.5, line={"width": 1, "dash": "dot", "color": DIFFERENCE})
+        chart.add_vline(x=number - 0.5, line={"width": 1, "dash": "dot", "color": theme.EDGE})
     if one.threshold is not None:
         chart.add_hline(y=one.threshold, line={"width": 1, "dash": "dash", "color": theme.MARK})
     if one.remaining is not None and one.threshold is not None:
@@ -77,7 +77,7 @@ def figure(
             **hidden,
         )
         chart.add_trace(fan)
-        middle = {"color": DIFFERENCE, "width": 1.5}
+        middle = {"color": MONITOR, "width": 1.5, "dash": "dash"}
         x, y = [now, now + left.p50], [one.level, end]
         chart.add_trace(go.Scatter(x=x, y=y, mode="lines", line=middle, name="to threshold"))
     return chart

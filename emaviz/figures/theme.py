@@ -13,7 +13,7 @@ from typing import Any
 import plotly.graph_objects as go
 
 from ema_model.estimation.floor import BAND_SIGMAS
-from emaviz.colours import COMMAND, DIFFERENCE, MONITOR, REFERENCE
+from emaviz.colours import COMMAND, DIFFERENCE, LIMIT, MONITOR, REFERENCE
 
 MEASURED = REFERENCE
 MODEL = MONITOR
@@ -24,7 +24,7 @@ MODULATORS = {"1": DIFFERENCE, "current": "#1098ad", "sign_speed": "#9c36b5"}
 FLOOR = "rgba(134,142,150,0.30)"
 EDGE = "#868e96"
 SHADE = "rgba(224,49,49,0.16)"
-MARK = "#c2255c"
+MARK = LIMIT
 POINTS = 4000  # of a trace, at most
 FLOOR_NAME = f"floor ±{BAND_SIGMAS:g}σ"
 _INDEX = re.compile(r"\b(Δ?[A-Za-zθω])_([A-Za-z]+)\b")

@@ -12,7 +12,7 @@ from ema_model.recordings import SIGNALS
 from emaviz.colours import DIFFERENCE, MONITOR, REFERENCE
 from emaviz.figures.lines import line
 from emaviz.figures.theme import DARK, LIGHT, plain
-from emaviz.recording.entry import Entry, as_text
+from emaviz.recording.entry import Entry, setting
 from emaviz.recording.read import IdentificationTrace, Recording
 from emaviz.text.html import Html, html, joined
 
@@ -64,9 +64,9 @@ def table(first: Entry, second: Entry) -> Html:
     rows = [_row("", _named("A", FIRST), _named("B", SECOND))]
     names = [n for n in dict.fromkeys([*first.settings, *second.settings])]
     for name in names:
-        a, b = (as_text(one.settings.get(name, "–")) for one in (first, second))
-        if a != b:
-            rows.append(_row(name, a, b))
+        told = [setting(name, one.settings.get(name, "–")) for one in (first, second)]
+        if told[0] != told[1]:
+            rows.append(_row(told[0][0], told[0][1], told[1][1]))
     if not any(first.settings.get(n) != second.settings.get(n) for n in names) and names:
         rows.append(_row("settings", "the same", "the same"))
     answers = (first.answer, second.answer)

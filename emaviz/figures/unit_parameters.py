@@ -11,7 +11,7 @@ from ema_model.actuator.naming import on_axes
 from ema_model.quantities.interval import HALF_90
 from ema_model.quantities.numbers import Quantity
 from ema_model.units.result import UnitsCompared
-from emaviz.colours import DIFFERENCE, REFERENCE
+from emaviz.colours import LIMIT, REFERENCE
 from emaviz.figures import theme
 
 _TYPE = "rgba(134,142,150,0.30)"
@@ -20,7 +20,7 @@ _HEAD_PX, _AXIS_PX, _ROW_PX = 46, 58, 17  # of the whole, below each chart, and 
 
 
 def figure(result: UnitsCompared, *, dark: bool = False) -> go.Figure:
-    """Those that the recordings tell, what differs first; units that differ are red, the type is the grey band."""
+    """Those that the recordings tell, what differs first; units that differ are diamonds, the type is the grey band."""
     paths = shown(result)
     if not paths:
         return theme.missing("Parameters of each unit", "the recordings tell none of them", dark=dark)
@@ -49,7 +49,11 @@ def figure(result: UnitsCompared, *, dark: bool = False) -> go.Figure:
                 y=names,
                 error_x={"array": axis.factor * HALF_90 * one.sigma, "thickness": 1.5, "width": 4, "color": theme.EDGE},
                 mode="markers",
-                marker={"size": 7, "color": [DIFFERENCE if unit in differs else REFERENCE for unit in result.units]},
+                marker={
+                    "size": [10 if unit in differs else 7 for unit in result.units],
+                    "symbol": ["diamond" if unit in differs else "circle" for unit in result.units],
+                    "color": [LIMIT if unit in differs else REFERENCE for unit in result.units],
+                },
                 showlegend=False,
                 hovertemplate="%{y}: %{x:.5g} ± %{error_x.array:.2g}<extra></extra>",
             ),

@@ -7,6 +7,9 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from typing import Any
 
+from ema_model.quantities.numbers import amount, number
+from ema_model.quantities.titles import in_sentence, parameter_title, unit_of
+
 
 @dataclass(frozen=True)
 class Entry:
@@ -27,6 +30,19 @@ class Entry:
         return self.found.get(self.best or "")
 
 
-def as_text(value: Any) -> str:
-    """A setting as a person reads it."""
-    return value if isinstance(value, str) else json.dumps(value)
+def setting(name: str, value: Any) -> tuple[str, str]:
+    """A setting as a person reads it: ('amplitude', '5.00 mrad') of ('amplitude_rad', '0.005')."""
+    return in_sentence(parameter_title(name)), _told(value, unit_of(name))
+
+
+def _told(value: Any, unit: str) -> str:
+    """A recording keeps its settings as text."""
+    try:
+        read = json.loads(value) if isinstance(value, str) else value
+    except ValueError:
+        return str(value)
+    if isinstance(read, bool) or not isinstance(read, int | float):
+        return ", ".join(map(str, read)) if isinstance(read, list) else str(value)
+    if isinstance(read, int) and not unit:
+        return str(read)
+    return amount(read, unit) if unit else number(read)

@@ -15,6 +15,7 @@ from ema_model.actuator import load_actuator
 from ema_model.errors import InputError
 from emaviz.figures import two_recordings
 from emaviz.recording import RecordingWriter, read
+from emaviz.recording.entry import setting
 from emaviz.recording.viewer import ViewerHost
 from emaviz.session.archive import Recorded
 from emaviz.session.session import Session
@@ -51,6 +52,21 @@ def races(tmp_path_factory):
     second = identify(session)
     yield first, second
     session.close()
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "told"),
+    [
+        ("amplitude_rad", 0.005, ("amplitude", "5.00 mrad")),
+        ("noise_A", "0.1", ("noise", "0.100 A")),
+        ("iterations", "150", ("iterations", "150")),
+        ("algorithms", ["do", "hba"], ("algorithms", "do, hba")),
+        ("command", "chirp", ("command", "chirp")),
+        ("seed", "–", ("seed", "–")),
+    ],
+)
+def test_settings_are_told_in_words_and_units(name, value, told):
+    assert setting(name, value) == told
 
 
 @pytest.fixture

@@ -8,6 +8,7 @@ from support.on_page import choose, fill, wait_until
 
 from ema_model.actuator import load_actuator
 from emaviz.cli import main
+from emaviz.colours import LIMIT
 from emaviz.page.units.tab import UnitsTab
 
 pytestmark = pytest.mark.browser
@@ -39,7 +40,8 @@ def test_units_are_compared(page, app):
     own = found.alone["motor.dynamic_friction_Nm"]
     assert all(abs(value - true) < 1e-3 for value, true in zip(own.value, FRICTION.values()))
     parameters, matrix = tab.result._parameters.figure, tab.result._transfer.figure
-    assert list(parameters.data[0].marker.color).count("#e03131") == 1, "the unit that differs is red"
+    marker = parameters.data[0].marker
+    assert list(marker.color).count(LIMIT) == list(marker.symbol).count("diamond") == 1, "the unit that differs"
     assert matrix.data[0].text[0][2].endswith("A") and "×" in matrix.data[0].text[0][2]
     page.get_by_role("button", name="Save the type as an actuator").click()
     wait_until(lambda: len(folder.actuator_files()) == 2)

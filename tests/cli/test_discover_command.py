@@ -28,7 +28,7 @@ def test_effect_is_found_and_the_model_saved(rig, tmp_path, capsys):
     arguments = [*held, "--json", str(out), "--save-actuator", str(better), "--max-effects", "1"]
     assert main(["discover", str(rig / "sine.csv"), *arguments]) == 0
     printed = capsys.readouterr().out
-    assert printed.startswith("effects_found") and "error ladder" in printed and "+ Cogging torque" in printed
+    assert printed.startswith("effects found") and "error ladder" in printed and "+ Cogging torque" in printed
     result = json.loads(out.read_text())
     assert result["schema"] == 1 and result["verdict"] == "effects_found"
     assert [one["name"] for one in result["effects"]] == ["cogging_torque"]

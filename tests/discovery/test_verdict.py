@@ -90,7 +90,7 @@ def test_verdict_and_ladder_never_contradict(healthy, lacking):
 def test_what_remains_is_told_in_every_place(healthy, lacking):
     part = result_of(sharper(lacking[1], 4.0))
     assert headline(part).startswith("Found in part: load-dependent friction; ") and "cause unknown" in headline(part)
-    assert str(part).startswith("partly_explained: ") and "times the floor remains, cause unknown" in str(part)
+    assert str(part).startswith("partly explained: ") and "times the floor remains, cause unknown" in str(part)
     nothing = result_of(sharper(healthy, 30.0))
     assert "times the floor remains, cause unknown" in headline(nothing) and not nothing.effects
     assert set(IN_WORDS) == set(VERDICTS)

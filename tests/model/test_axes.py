@@ -24,7 +24,7 @@ from ema_model.recordings import Measurement
 from ema_model.recordings.checks import check_needed
 from ema_model.recordings.health.card import health
 from ema_model.recordings.prepared import prepared
-from ema_model.simulation.run import Run, _finite
+from ema_model.simulation.run import Run, finite
 from ema_model.simulation.words import run_in_words
 from emaviz.cli.given import effects_of
 from emaviz.figures.signals import charts
@@ -328,4 +328,4 @@ def test_a_new_effect_at_the_user_is_one_file(tmp_path):
 
 def test_a_run_that_diverges_names_the_axis_own_signal():
     with pytest.raises(FloatingPointError, match="command_m is not finite"):
-        _finite({"time_s": Run().time_s, "command_rad": np.full(Run().samples + 1, np.nan)}, "the model", SCREW)
+        finite({"time_s": Run().time_s, "command_rad": np.full(Run().samples + 1, np.nan)}, "the model", SCREW)

@@ -14,6 +14,7 @@ ACTUATOR = load_actuator()
 SAMPLES, RATE_HZ = 400, 10_000.0
 TIME = np.arange(SAMPLES * 10) * 1e-5
 COMMAND = Recorded(TIME, 0.01 * np.sin(2.0 * np.pi * 40.0 * TIME))
+STILL = dict.fromkeys(("load_Nm", "start_rad", "start_speed_rad_s", "start_play_rad", "start_integral_Nm"), 0.0)
 
 
 @pytest.mark.parametrize("integral", [0.0, 2.0], ids=["plain", "with an integral action"])
@@ -39,33 +40,10 @@ def test_each_lane_is_a_run_of_its_own(integral):
 
 def test_too_many_are_refused():
     with pytest.raises(ValueError, match="33 runs at once; 16 are the most"):
-        simulate_references(
-            COMMAND,
-            SAMPLES,
-            RATE_HZ,
-            ACTUATOR,
-            np.zeros((33, 8)),
-            {},
-            load_Nm=0.0,
-            start_rad=0.0,
-            start_speed_rad_s=0.0,
-            start_play_rad=0.0,
-            start_integral_Nm=0.0,
-        )
+        simulate_references(COMMAND, SAMPLES, RATE_HZ, ACTUATOR, np.zeros((33, 8)), {}, **STILL)
 
 
 def test_one_that_diverges_is_told():
     with pytest.raises(FloatingPointError, match="diverged"):
-        simulate_references(
-            COMMAND,
-            SAMPLES,
-            RATE_HZ,
-            ACTUATOR.varied({"motor.inductance_H": np.array([1e-9, 1e-9])}),
-            np.zeros((2, 8)),
-            {},
-            load_Nm=0.0,
-            start_rad=0.0,
-            start_speed_rad_s=0.0,
-            start_play_rad=0.0,
-            start_integral_Nm=0.0,
-        )
+        actuator = ACTUATOR.varied({"motor.inductance_H": np.array([1e-9, 1e-9])})
+        simulate_references(COMMAND, SAMPLES, RATE_HZ, actuator, np.zeros((2, 8)), {}, **STILL)

@@ -14,6 +14,7 @@ from support.discovered import with_cogging, with_unknown
 from ema_model.discovery import Discovery
 from ema_model.discovery.result import Experiment
 from ema_model.errors import InputError
+from emaviz.figures import error_ladder
 from emaviz.report import write_discovery_report
 from emaviz.text.mathml import mathml
 
@@ -69,6 +70,13 @@ def test_each_effect_has_equation_cause_parameters_and_rivals(report, found):
     assert "magnets pull" in text and "Could as well be: torque ripple" in text
     low, high = found.calibration.parameters["effects.cogging_torque.amplitude_Nm"].interval90
     assert f"{low:.4f} … {high:.4f}" in text and "N·m" in text and ">12<" in text
+
+
+def test_no_number_of_the_ladder_lies_on_the_floor(found):
+    rungs = [replace(found.ladder[0], rmse=rmse, holdout_rmse=held) for rmse, held in ((3.0, 2.0), (0.9, 0.3))]
+    fitted, held_out, _ = error_ladder.figure(replace(found, ladder=rungs)).data
+    assert fitted.textposition == ("top center", "middle right"), "0.9 with a number above it would reach over 1"
+    assert held_out.textposition == ("bottom center", "bottom center")
 
 
 def test_ladder_tells_every_signal_in_its_unit(report, found):

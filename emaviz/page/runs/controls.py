@@ -17,7 +17,7 @@ from emaviz.page.identify.controls import recording_link
 from emaviz.page.page import Page
 from emaviz.page.runs import WORKSPACE
 from emaviz.page.runs.result import RunsResult
-from emaviz.recording.entry import Entry, as_text
+from emaviz.recording.entry import Entry, setting
 from emaviz.recording.viewer import ViewerHost
 from emaviz.session.archive import Recorded
 from emaviz.session.worker import Worker
@@ -130,7 +130,7 @@ class RunsPanel:
             self._result.show(Html(), None)
             return
         entry = self._recorded.entry(name)
-        self._card.content = _card(entry)
+        self._card.content = html("<div {}>{}</div>", _BOX, _size(entry))  # what it says stands on the right
         self._glance(entry)
         self._link.content = recording_link(self._viewer, self._recorded.path(name))
         self._name.value = name.removesuffix(".rrd")
@@ -197,7 +197,7 @@ class RunsPanel:
 
 def _card(entry: Entry) -> Html:
     """Settings and results of one recording."""
-    size = f"{entry.at:%Y-%m-%d %H:%M:%S} · {entry.size_bytes / 1e6:.1f} MB"
+    size = _size(entry)
     if not entry.found:
         said = f"{entry.says}" if entry.says else "Signals without a result."
         return html("<div {}>{}<br><b>{}</b> {}</div>", _BOX, size, entry.kind.capitalize(), said)
@@ -212,7 +212,7 @@ def _card(entry: Entry) -> Html:
         for name, answer in entry.found.items()
     )
     settings = [
-        html("{} <b>{}</b>", name, as_text(value))
+        html("{} <b>{}</b>", *setting(name, value))
         for name, value in entry.settings.items()
         if value not in ("", "none", None)
     ]
@@ -223,6 +223,10 @@ def _card(entry: Entry) -> Html:
         results,
         joined(settings, " · "),
     )
+
+
+def _size(entry: Entry) -> str:
+    return f"{entry.at:%Y-%m-%d %H:%M:%S} · {entry.size_bytes / 1e6:.1f} MB"
 
 
 def _result(answer: dict[str, Any]) -> str:

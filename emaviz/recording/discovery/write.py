@@ -15,6 +15,7 @@ from ema_model.discovery import Discovery, as_dict
 from ema_model.discovery.labels import rung_title
 from ema_model.discovery.tables import candidates
 from ema_model.discovery.tracks import PAUSE_S, Track, one_after_another, primary, tracks
+from ema_model.discovery.words import verdict_name
 from ema_model.errors import InputError
 from ema_model.estimation.floor import BAND_SIGMAS
 from ema_model.estimation.words import calibration_table, convergence, warnings
@@ -64,11 +65,11 @@ def write_discovery(found: Discovery, path: str | Path, configuration: Mapping[s
 
 
 def _in_words(found: Discovery) -> list[Block]:
-    """What is shown of it in words, without the verdict's name, which is for programs."""
+    """What is shown of it in words, without the verdict's name: it stands above."""
     first, *others = found.document.blocks
     assert isinstance(first, Lines), "it begins with the verdict"
     named, *more = first.lines
-    return [Lines([named.removeprefix(f"{found.verdict}: "), *more]), *others]
+    return [Lines([named.removeprefix(f"{verdict_name(found)}: "), *more]), *others]
 
 
 def _configuration(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ema_model.discovery.words import headline, sentences
+from ema_model.discovery.words import headline, sentences, verdict_name
 from emaviz.report.discovery.subject import Told
 from emaviz.report.markup import bullets, escape, paragraph
 from emaviz.report.section import Figures, Section
@@ -22,7 +22,7 @@ class Verdict(Section[Told]):
         found = subject.found
         kind = _KINDS.get(found.verdict, "bad")
         return (
-            f'<p><span class="verdict {kind}">{escape(found.verdict.replace("_", " "))}</span></p>'
+            f'<p><span class="verdict {kind}">{escape(verdict_name(found))}</span></p>'
             + paragraph(headline(found), "answer")
             + "".join(paragraph(sentence) for sentence in sentences(found))
             + bullets(found.warnings, "warning")

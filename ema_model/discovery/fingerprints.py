@@ -5,7 +5,7 @@ They share one stack, in which every lane has one of them on and all others do n
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,6 +20,7 @@ Lane = tuple[Effect, dict[str, float]]
 
 _FAR = 30.0  # times what there is to explain
 _ATTEMPTS = 3
+_LONGEST_STEP_S = 2e-5  # at which no score differs in its first three digits from that at 1e-5
 _DIVERGED = 1e100  # floors, from which on a change has no meaning: its square would overflow
 
 
@@ -102,22 +103,39 @@ def _top_speed(found: Fit) -> float:
 
 
 def _changes(data: Data, found: Fit, lanes: list[Lane]) -> Array:
-    """What each lane's effect changes, over the floor: (lanes, values)."""
+    """What each lane's effect changes, over the floor: (lanes, values).
+
+    Only what the drive does within a step of its own needs the model's shortest steps.
+    """
+    of_drive = np.array([effect.family == "drive" for effect, _ in lanes])
+    parts = [(np.flatnonzero(of_drive), 0.0), (np.flatnonzero(~of_drive), _LONGEST_STEP_S)]
+    changes = {lane: row for rows, longest_s in parts for lane, row in _changed(data, found, lanes, rows, longest_s)}
+    return np.array([changes[lane] for lane in range(len(lanes))])
+
+
+def _changed(
+    data: Data, found: Fit, lanes: list[Lane], rows: NDArray[np.intp], longest_s: float
+) -> Iterator[tuple[int, Array]]:
+    """The same for some of the lanes, by their place, at steps of up to longest_s."""
+    if not len(rows):
+        return
     actuator: Actuator = found.calibration.actuator
     resting = {effect.name: effect.neutral for effect, _ in lanes} | actuator.effects
     varied = {
-        name: {parameter: np.full(len(lanes) + 1, value) for parameter, value in values.items()}
+        name: {parameter: np.full(len(rows) + 1, value) for parameter, value in values.items()}
         for name, values in resting.items()
     }
-    for lane, (effect, settings) in enumerate(lanes, 1):
+    for lane, row in enumerate(rows, 1):
+        effect, settings = lanes[row]
         for parameter, value in effect.settings(settings).items():
             varied[effect.name][parameter][lane] = value
-    plant = data.plant(replace(actuator, effects=resting))
+    plant = data.plant(replace(actuator, effects=resting)).at_longer_steps(longest_s)
     model = replace(actuator, effects=varied)
-    k = np.tile(found.calibration.k, (len(lanes) + 1, 1))
+    k = np.tile(found.calibration.k, (len(rows) + 1, 1))
     shown = [plant.signals(i, model, k, *found.calibration.start_of(i)) for i in range(len(plant.windows))]
     signals = data.over_floor(plant, shown)
-    return signals[1:] - signals[0]
+    signals[1:] -= signals[0]
+    yield from zip(rows, signals[1:])
 
 
 def _gentler(effect: Effect, settings: dict[str, float], size: float, error: float) -> dict[str, float] | None:

@@ -73,6 +73,7 @@ def used_left(data: Data, before: Fit, after: Fit) -> tuple[str, Array, Array]:
     return primary, np.clip(own, -most, most), np.clip(left[used.chosen] * used.weight, -most, most)
 
 
+@lru_cache(maxsize=4)  # of a fit and of the one before it
 def residuals_left(data: Data, found: Fit) -> Residuals:
     """The residuals of a fit beside the variables that may explain them."""
     fitted, k = found.calibration.actuator, found.calibration.k

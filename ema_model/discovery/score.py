@@ -6,7 +6,7 @@ A fingerprint counts only as far as the calibrated parameters, within their prio
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -36,7 +36,11 @@ def scored(found: Fit, prints: Sequence[Fingerprint]) -> list[Candidate]:
 def scored_all(found: Fit, prints: Sequence[Fingerprint]) -> list[Candidate]:
     """A candidate for each fingerprint, in their order."""
     usual = movable(found)
-    return [_scored(found, one, *(movable(found, one.frees) if one.frees else usual)) for one in prints]
+    beyond = _beyond_all(*usual, [one.columns for one in prints if not one.frees])
+    return [
+        _scored(found, one, *movable(found, one.frees)) if one.frees else _scored(found, one, *usual, next(beyond))
+        for one in prints
+    ]
 
 
 def signatures(found: Fit, prints: Mapping[str, Sequence[Fingerprint]]) -> dict[str, Array]:
@@ -44,10 +48,10 @@ def signatures(found: Fit, prints: Mapping[str, Sequence[Fingerprint]]) -> dict[
 
     At the strength that suits best, and only what the parameters cannot do as well.
     """
-    usual = movable(found)
+    beyond = _beyond_all(*movable(found), [one.columns for its in prints.values() for one in its if not one.frees])
     told = {}
     for name, its in prints.items():
-        own = [_beyond(*(movable(found, one.frees) if one.frees else usual), one.columns) for one in its]
+        own = [_beyond(*movable(found, one.frees), one.columns) if one.frees else next(beyond) for one in its]
         parts = [columns @ np.linalg.lstsq(columns, -found.residual, rcond=None)[0] for columns in own]
         told[name] = min(parts, key=lambda part: float(np.sum((found.residual + part) ** 2)))
     return told
@@ -61,7 +65,8 @@ def scored_together(found: Fit, prints: Sequence[Fingerprint], most: int) -> lis
     chosen: list[Candidate] = []
     while left and len(chosen) < most:
         gram = jacobian.T @ jacobian + np.diag(prior)
-        candidates = [_scored(found, one, jacobian, gram) for one in left]
+        beyond = _beyond_all(jacobian, gram, [one.columns for one in left])
+        candidates = [_scored(found, one, jacobian, gram, next(beyond)) for one in left]
         best = int(np.argmax([candidate.predicted_drop for candidate in candidates]))
         chosen.append(candidates[best])
         columns = left.pop(best).columns
@@ -80,7 +85,8 @@ def scored_beside(found: Fit, prints: Sequence[Fingerprint], known: Sequence[Can
     gram = jacobian.T @ jacobian + np.diag(np.r_[np.ones(count), np.full(jacobian.shape[1] - count, 1e-6)])
     left = found.residual - jacobian @ np.linalg.solve(gram, jacobian.T @ found.residual)
     beside = replace(found, calibration=replace(found.calibration, residual=left))
-    return [_scored(beside, one, jacobian, gram) for one in prints]
+    beyond = _beyond_all(jacobian, gram, [one.columns for one in prints])
+    return [_scored(beside, one, jacobian, gram, next(beyond)) for one in prints]
 
 
 def movable(found: Fit, but: Sequence[str] = ()) -> tuple[Array, Array]:
@@ -100,20 +106,30 @@ def _beyond(jacobian: Array, gram: Array, columns: Array) -> Array:
     return columns - jacobian @ np.linalg.solve(gram, jacobian.T @ columns)
 
 
-def amounts_of(found: Fit, columns: Array, jacobian: Array, gram: Array) -> tuple[Array, Array, Array]:
+def _beyond_all(jacobian: Array, gram: Array, columns: Sequence[Array]) -> Iterator[Array]:
+    """The same of many, solved together."""
+    if columns:
+        widths = np.cumsum([one.shape[1] for one in columns])
+        yield from np.split(_beyond(jacobian, gram, np.concatenate(columns, axis=1)), widths[:-1], axis=1)
+
+
+def amounts_of(
+    found: Fit, columns: Array, jacobian: Array, gram: Array, beyond: Array | None = None
+) -> tuple[Array, Array, Array]:
     """How much of some columns the residual asks for beyond what the parameters can do, and what that is worth.
 
     The amounts a (columns,), and E and t, such that χ² falls by 2 a·t − a·E·a with any amounts.
+    beyond: what of the columns the parameters cannot do, if it is known.
     """
-    own = _beyond(jacobian, gram, columns)
+    own = _beyond(jacobian, gram, columns) if beyond is None else beyond
     energy = columns.T @ own
     toward = -(own.T @ found.residual)  # the residual is model − measurement
     ridge = energy + 1e-9 * (np.trace(energy) + 1e-300) * np.eye(len(energy))
     return np.linalg.solve(ridge, toward), energy, toward
 
 
-def _scored(found: Fit, one: Fingerprint, jacobian: Array, gram: Array) -> Candidate:
-    amounts, energy, toward = amounts_of(found, one.columns, jacobian, gram)
+def _scored(found: Fit, one: Fingerprint, jacobian: Array, gram: Array, beyond: Array | None = None) -> Candidate:
+    amounts, energy, toward = amounts_of(found, one.columns, jacobian, gram, beyond)
     effect = find(one.name, found.actuator.axes)
     if one.frees:
         return _beyond_the_file(found, one, effect, amounts, float(toward @ amounts))

@@ -46,6 +46,14 @@ class Problem(Protocol):
         """How many are simulated for those derivatives of n candidates."""
         ...
 
+    def jacobians_beside(self, x: Array, others: Array, *, in_whole_blocks: bool) -> tuple[Array, Array, Array]:
+        """`jacobians`, and the residuals of others (l, count) that are simulated with them."""
+        ...
+
+    def has_room_for(self, others: int) -> bool:
+        """Whether these fit in the block of lanes of one candidate's derivatives, and leave those as they are."""
+        ...
+
 
 @dataclass(eq=False)
 class Descent:
@@ -57,6 +65,7 @@ class Descent:
     damping: Array
     moving: NDArray[np.bool_]
     evaluations: int = 0
+    _best: int = 0  # of the dampings, in the last step
     known: tuple[Array, Array] | None = None  # residuals and their derivatives where the first step begins
 
     @classmethod
@@ -84,10 +93,12 @@ class Descent:
         self.cost[chosen] = np.sum(residuals**2, axis=1)
         dampings = np.outer(self.damping[chosen], _DAMPINGS)
         trials = problem.clip(_newton(problem, self.x[chosen], residuals, slopes, dampings).reshape(dampings.size, -1))
-        costs = np.sum(problem.residuals(trials) ** 2, axis=1).reshape(len(chosen), -1)
+        residuals_there, expected = self._tried(trials)
+        costs = np.sum(residuals_there**2, axis=1).reshape(len(chosen), -1)
         self.evaluations += len(trials)
         trials = trials.reshape(len(chosen), len(_DAMPINGS), -1)
         best = np.argmin(costs, axis=1)
+        stayed = np.zeros(len(chosen), dtype=bool)
         for place, i in enumerate(chosen):
             fall = self.cost[i] - costs[place, best[place]]
             if fall > 0.0:
@@ -97,9 +108,28 @@ class Descent:
             else:
                 self.damping[i] *= 100.0
                 self.moving[i] = self.damping[i] < 1e5
+                stayed[place] = self.moving[i]
+        self._best = int(best[-1])
+        if expected is not None and not stayed.any() and self.moving.any() and best[0] == expected[0]:
+            self.known = expected[1]
+        if stayed.any() and stayed.sum() == self.moving.sum():  # all that go on stand where they stood
+            self.known = residuals[stayed], slopes[stayed]
+
+    def _tried(self, trials: Array) -> tuple[Array, tuple[int, tuple[Array, Array]] | None]:
+        """Residuals of the trials; of one start, with the derivatives at the one that is expected to be best.
+
+        The lanes that these fill are there anyway, and most often the next step needs them.
+        """
+        problem, at = self.problem, self._best
+        if len(trials) != len(_DAMPINGS) or not problem.has_room_for(len(trials) - 1):
+            return problem.residuals(trials), None
+        others = np.delete(trials, at, axis=0)
+        here, slopes, beside = problem.jacobians_beside(trials[at : at + 1], others, in_whole_blocks=True)
+        return np.insert(beside, at, here[0], axis=0), (at, (here, slopes))
 
     def keep(self, rows: NDArray[np.intp]) -> None:
         """Goes on with these starts only."""
+        self.known = None
         self.x, self.cost = self.x[rows], self.cost[rows]
         self.damping, self.moving = self.damping[rows], self.moving[rows]
 

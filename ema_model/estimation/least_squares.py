@@ -126,6 +126,7 @@ class _Soft:
         self._problem, self._scale = problem, scale
         self.low, self.high, self.count = problem.low, problem.high, problem.count
         self.clip, self.points_in_whole_blocks = problem.clip, problem.points_in_whole_blocks
+        self.has_room_for = problem.has_room_for
 
     def residuals(self, x: Array) -> Array:
         return self._softened(self._problem.residuals(x))[0]
@@ -134,6 +135,11 @@ class _Soft:
         residuals, slopes = self._problem.jacobians(x, in_whole_blocks=in_whole_blocks)
         softened, share = self._softened(residuals)
         return softened, slopes * share[:, :, None]
+
+    def jacobians_beside(self, x: Array, others: Array, *, in_whole_blocks: bool) -> tuple[Array, Array, Array]:
+        residuals, slopes, beside = self._problem.jacobians_beside(x, others, in_whole_blocks=in_whole_blocks)
+        softened, share = self._softened(residuals)
+        return softened, slopes * share[:, :, None], self._softened(beside)[0]
 
     def _softened(self, residuals: Array) -> tuple[Array, Array]:
         """And their derivative by the residuals."""

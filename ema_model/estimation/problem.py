@@ -98,20 +98,26 @@ class Problem:
         in_whole_blocks: no block of lanes is begun for a part of it; the unknowns that bend the signals least then
         have a difference to one side, which a step on the way may have.
         """
+        return self.jacobians_beside(x, np.zeros((0, self.count)), in_whole_blocks=in_whole_blocks)[:2]
+
+    def jacobians_beside(self, x: Array, others: Array, *, in_whole_blocks: bool) -> tuple[Array, Array, Array]:
+        """The same, and the residuals of other candidates (l, unknowns) that are simulated with them, (l, m)."""
         n = len(x)
         low, high = np.maximum(x - self._step, self.low), np.minimum(x + self._step, self.high)
         far = np.where(high - x >= x - low, high, low)
-        residuals, slopes = [], np.zeros((n, self.count, self.values + self.count))
+        residuals, beside, slopes = [], [], np.zeros((n, self.count, self.values + self.count))
         first = 0
         for window in range(len(self.weights)):
             acting = self._acting[window]
-            both = _room(n, len(acting)) if in_whole_blocks else len(acting)
+            both = _room(n, len(acting), len(others)) if in_whole_blocks else len(acting)
             sides, side = acting[:both], acting[both:]
             lanes = 1 + 2 * len(sides) + len(side)
             points = np.repeat(x[:, None, :], lanes, axis=1)
             for at, moved, to in ((1, sides, low), (1 + both, sides, high), (1 + 2 * both, side, far)):
                 points[:, at + np.arange(len(moved)), moved] = to[:, moved]
-            errors = self._errors(points.reshape(-1, self.count), window).reshape(n, lanes, -1)
+            shown = self._errors(np.concatenate([points.reshape(-1, self.count), others]), window)
+            beside.append(shown[n * lanes :])
+            errors = shown[: n * lanes].reshape(n, lanes, -1)
             rows = slice(first, first + errors.shape[2])
             here, below, above, there = np.split(errors, [1, 1 + both, 1 + 2 * both], axis=1)
             slopes[:, sides, rows] = (above - below) / (high - low)[:, sides, None]
@@ -120,11 +126,16 @@ class Problem:
             first = rows.stop
         at = np.arange(self.count)
         slopes[:, at, self.values + at] = self.prior
-        return np.concatenate([*residuals, x * self.prior], axis=1), np.swapaxes(slopes, 1, 2)
+        found = np.concatenate([*residuals, x * self.prior], axis=1)
+        return found, np.swapaxes(slopes, 1, 2), np.concatenate([*beside, others * self.prior], axis=1)
+
+    def has_room_for(self, others: int) -> bool:
+        """Whether so many candidates fit in one block of lanes with the derivatives of one, all to both sides."""
+        return 1 + 2 * self.count + others <= LANES
 
     def points_in_whole_blocks(self, n: int) -> int:
         """How many of a window `jacobians` of n candidates simulates in whole blocks, at most."""
-        return n * (1 + self.count + _room(n, self.count))
+        return n * (1 + self.count + _room(n, self.count, 0))
 
     def _errors(self, x: Array, window: int) -> Array:
         """A window's part of the residuals of x (n, unknowns): (n, values); of a run that diverges a very great one."""
@@ -213,7 +224,10 @@ class Problem:
         return Rig(actuator, self.k(x), own.get("turned", 0.0), own.get("play", 0.0), effects)
 
 
-def _room(n: int, count: int) -> int:
-    """Of `count` unknowns, those that can be moved to both sides in the blocks of lanes that one side fills."""
-    blocks = -(-n * (1 + count) // LANES)
-    return min(count, blocks * LANES // n - (1 + count))
+def _room(n: int, count: int, others: int) -> int:
+    """Of `count` unknowns, those that can be moved to both sides in the blocks of lanes that one side fills.
+
+    others: candidates that stand in the same blocks.
+    """
+    blocks = -(-(n * (1 + count) + others) // LANES)
+    return min(count, (blocks * LANES - others) // n - (1 + count))

@@ -35,7 +35,7 @@ _CANDIDATES = 3
 _RIVAL = 4.0  # χ², within which another basin may be the right one
 FAULTS = len(NAMES)  # the first of an identification's unknowns
 _SETTLED = 1e-3 / K_SIGMA  # of x's faults, between two rounds
-_LONGER_S = (5e-5, 2e-5)  # steps for a search, which need not be exact: what it finds is refined at the actuator's own
+LONGER_STEPS_S = 5e-5, 2e-5  # for a search, which need not be exact: what it finds is refined at the actuator's own
 _LOOKS = 31  # beside the healthy one: together a block of lanes
 _ALIKE = 0.5  # floors, by which these may change the signals
 _SPREADS = (0.0, 0.05, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0)
@@ -68,12 +68,12 @@ class Setting:
         looks = np.concatenate([[HEALTHY], np.random.default_rng(0).random((_LOOKS, FAULTS))])
         x = exact.clip(exact.at(looks))
         shown = exact.residuals(x)
-        for tried, longest_s in enumerate(_LONGER_S, 1):
+        for tried, longest_s in enumerate(LONGER_STEPS_S, 1):
             plant = self.plant.at_longer_steps(longest_s)
             other = self.coarse(plant).residuals(x)
             if np.sqrt(np.median(np.mean((other - shown) ** 2, axis=1))) < _ALIKE:
                 return Rough(plant, (1 + tried) * len(x))
-        return Rough(self.plant, (1 + len(_LONGER_S)) * len(x))
+        return Rough(self.plant, (1 + len(LONGER_STEPS_S)) * len(x))
 
     def problem(self, *, with_base: bool, plant: ClosedLoop | None = None) -> Problem:
         """The faults and what is not exactly known, with the actuator's base parameters or without."""

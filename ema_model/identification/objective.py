@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -54,7 +54,13 @@ class Objective(ClosedLoop):
         self.fitness = fitness
         self.target = np.concatenate([self._target(window) for window in self.windows])
         self.blocks = len(self.target)
-        self._groups = [_Group(windows, [self._target(w) for w in windows]) for windows in _alike(self.windows)]
+        self._groups = self._grouped()
+
+    def at_longer_steps(self, most_s: float) -> Self:
+        """As in `Model`."""
+        longer = super().at_longer_steps(most_s)
+        longer._groups = longer._grouped()
+        return longer
 
     def __call__(self, k: ArrayLike) -> Array:
         """RMSE, A, of each individual: k (n, 8) → (n,); infinite where the model diverges."""
@@ -111,6 +117,9 @@ class Objective(ClosedLoop):
             )
             parts.append(result[:, :, 0, :].transpose(0, 2, 1).reshape(len(rows) * LANES, -1)[: len(k)])
         return np.concatenate(parts, axis=1)
+
+    def _grouped(self) -> list[_Group]:
+        return [_Group(windows, [self._target(w) for w in windows]) for windows in _alike(self.windows)]
 
     def _target(self, window: LoopWindow) -> Array:
         """The window's equivalent current, A, (blocks,), the sensor's gain and bias taken off."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -76,8 +77,8 @@ class ClosedLoop:
             for window in cut(m, actuator, recording=i, block_s=block_s, stretches=parts)
         ]
 
-    def at_longer_steps(self, most_s: float) -> ClosedLoop:
-        """The same, simulated at steps of up to most_s, as far as a sample holds whole ones: for a rough look."""
+    def at_longer_steps(self, most_s: float) -> Self:
+        """As in `Model`."""
         longer = copy(self)
         longer.windows = [window.at_longer_steps(most_s) for window in self.windows]
         return longer

@@ -96,6 +96,10 @@ class InverseDynamics:
             "motor_torque_Nm": _each(actuator.motor.torque_constant_Nm_A) * current,
         }
 
+    def at_longer_steps(self, most_s: float) -> InverseDynamics:
+        """Itself, which has no steps."""
+        return self
+
     def twin(self, place: int, *args: object, **options: object) -> Signals:
         """None: the Reference Model follows commands."""
         return {}

@@ -63,6 +63,10 @@ class Model(Protocol):
         """Whether it follows the command, from a start that is not exactly known; else the motion is given."""
         ...
 
+    def at_longer_steps(self, most_s: float) -> Model:
+        """The same, simulated at steps of up to most_s, s, where it has steps and a sample holds whole ones."""
+        ...
+
     def signals(
         self,
         place: int,

@@ -13,16 +13,22 @@ from ema_model.estimation.least_squares import descended
 def problem(residuals, slopes, low=(-3.0, -3.0), high=(3.0, 3.0)):
     """Of two unknowns; residuals (values,) and slopes (values, 2) of one x."""
     low, high = np.array(low), np.array(high)
+
+    def each(x):
+        return np.array([residuals(one) for one in x])
+
+    def derivatives(x):
+        return np.array([slopes(one) for one in x])
+
     return SimpleNamespace(
         low=low,
         high=high,
         count=2,
         clip=lambda x: np.clip(x, low, high),
-        residuals=lambda x: np.array([residuals(one) for one in x]),
-        jacobians=lambda x, in_whole_blocks: (
-            np.array([residuals(one) for one in x]),
-            np.array([slopes(one) for one in x]),
-        ),
+        residuals=each,
+        jacobians=lambda x, in_whole_blocks: (each(x), derivatives(x)),
+        jacobians_beside=lambda x, others, in_whole_blocks: (each(x), derivatives(x), each(others)),
+        has_room_for=lambda others: True,
         points_in_whole_blocks=lambda n: n,
     )
 

@@ -151,3 +151,13 @@ def test_a_run_that_diverges_is_a_very_great_error_that_a_descent_can_count(reco
     after = problem.residuals(start)[0]
     assert np.isfinite(after @ after) and after @ after > 1e6 * (before @ before)
     np.testing.assert_array_equal(after[:20], before[:20])
+
+
+def test_others_beside_the_derivatives_are_what_they_are_alone(recording):
+    identifying = setting(Objective([recording], ACTUATOR), parameters_known=True).coarse()
+    x = identifying.at(np.array([[0.2, 0.1, 0.0, 0.0, 0.0, 0.1, 0.5, 0.5], [0.3, 0.2, 0.0, 0.0, 0.0, 0.0, 0.5, 0.6]]))
+    assert identifying.has_room_for(3) and not identifying.has_room_for(16)
+    residual, slopes, beside = identifying.jacobians_beside(x[:1], x[1:], in_whole_blocks=True)
+    alone, its = identifying.jacobians(x[:1], in_whole_blocks=True)
+    assert np.array_equal(beside, identifying.residuals(x[1:]))
+    assert np.array_equal(residual, alone) and np.array_equal(slopes, its)

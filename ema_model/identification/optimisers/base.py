@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from typing import ClassVar, TypeAlias
 
 import numpy as np
@@ -99,6 +99,21 @@ class Optimiser(ABC):
         except StopIteration:
             self._candidates = None
             self.iteration += 1
+
+    def rescore(self, fitness: Callable[[np.ndarray], np.ndarray]) -> None:
+        """Takes another fitness, (n, D) → (n,), from here on: of the population and the best, between iterations.
+
+        ValueError within an iteration.
+        """
+        if self._candidates is not None:
+            raise ValueError("an iteration is under way: candidates are waiting for their fitness")
+        f = np.asarray(fitness(np.concatenate([self.population_x, self.best_x[None]])), dtype=float)
+        f = np.where(np.isfinite(f), f, np.inf)
+        self.evaluations += len(f)
+        leader = int(np.argmin(f))
+        self.population_f = f[:-1]
+        self.best_x = (self.best_x if leader == len(f) - 1 else self.population_x[leader]).copy()
+        self.best_f = float(f[leader])
 
 
 def check_range(what: str, value: float, low: float, high: float = np.inf) -> float:

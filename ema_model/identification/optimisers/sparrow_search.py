@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import ClassVar
 
 import numpy as np
@@ -49,6 +50,11 @@ class SparrowSearch(Optimiser):
         self.producers = min(max(wanted, 1), self.population - 1)  # there is always one to lead and one to follow
         self.scouts = round(check_range("scout_share", scout_share, 0.0, 1.0) * self.population)
         self._x, self._f = self.population_x, self.population_f  # where the sparrows stand, beside personal bests
+
+    def rescore(self, fitness: Callable[[np.ndarray], np.ndarray]) -> None:
+        super().rescore(fitness)
+        self._f = fitness(self._x)
+        self.evaluations += len(self._x)
 
     def _iteration(self, t: int) -> Stages:
         if t == 1:

@@ -10,6 +10,7 @@ import traceback
 import webbrowser
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import viser
 
@@ -168,8 +169,11 @@ class App:
             self.first_picture_s = time.perf_counter() - started
             self._first.set()
 
-    def _refused(self, line: str) -> None:
-        self.page.notify("The file cannot be read", line)
+    def _refused(self, line: str, button: Any) -> None:
+        if button is not None:
+            self.page.say_beside(button, line)
+        elif line:
+            self.page.notify("The file cannot be read", line)
 
     def _theme(self, dark: bool) -> None:
         self.server.gui.configure_theme(show_logo=False, show_share_button=False, brand_color=_BRAND, dark_mode=dark)

@@ -72,7 +72,8 @@ class _Transfer:
 class Uploads:
     """Receives what upload buttons of this page send.
 
-    done(path): a file is kept; told(line): one was refused.  Both are called on the server's thread.
+    done(path): a file is kept; told(line, button): one was refused, or, with no line, the button's last was kept;
+    no button is one that was dropped on the page.  Both are called on the server's thread.
     """
 
     def __init__(
@@ -80,12 +81,12 @@ class Uploads:
         server: viser.ViserServer,
         folder: DataFolder,
         done: Callable[[Path], None],
-        told: Callable[[str], None],
+        told: Callable[[str, Any], None],
         most_bytes: int = PAGE_BYTES,
     ) -> None:
         self.most_bytes = most_bytes
         self._server, self._folder, self._done, self._told = server, folder, done, told
-        self._buttons: set[str] = set()
+        self._buttons: dict[str, Any] = {}  # by the name that messages give; None where it is unseen
         self._transfers: dict[str, _Transfer] = {}
         self._inside = Inside(server)
         self._inside.take_transfers(self._start, self._part)
@@ -93,9 +94,8 @@ class Uploads:
 
     def add_button(self, label: str, suffixes: str, **options: Any) -> None:
         """An upload button at this place of the page; suffixes: ".csv,.mat"."""
-        options.setdefault("hint", f"Up to {megabytes(self.most_bytes)}")
-        button = self._server.gui.add_upload_button(label, mime_type=suffixes, **options)
-        self._buttons.add(id_of(button))
+        button = self._button(label, suffixes, **options)
+        self._buttons[id_of(button)] = button
 
     def add_drop(self, suffixes: str) -> None:
         """Lets files be dropped anywhere: through an unseen button here, which must stand outside of all tabs.
@@ -103,8 +103,12 @@ class Uploads:
         A tab's own button is there only once that tab was opened.
         """
         add_html(self._server.gui, _UNSEEN)
-        self.add_button("Drop", suffixes)
+        self._buttons[id_of(self._button("Drop", suffixes))] = None
         self._inside.run(_DROP)
+
+    def _button(self, label: str, suffixes: str, **options: Any) -> Any:
+        options.setdefault("hint", f"Up to {megabytes(self.most_bytes)}")
+        return self._server.gui.add_upload_button(label, mime_type=suffixes, **options)
 
     def _start(self, client: int, message: TransferStart) -> None:
         if message.source_component_uuid not in self._buttons or message.transfer_uuid in self._transfers:
@@ -119,7 +123,7 @@ class Uploads:
         self._transfers[message.transfer_uuid] = transfer
         if transfer.parts == 0:
             self._inside.acknowledge(client, message.source_component_uuid, message.transfer_uuid, 0, 0)
-            self._finish(message.transfer_uuid)
+            self._finish(message.transfer_uuid, self._button_of(message.source_component_uuid))
 
     def _accepted(self, client: int, message: TransferStart) -> _Transfer:
         name = shown(sanitised(str(message.filename)), 100)
@@ -164,16 +168,21 @@ class Uploads:
             return
         self._inside.acknowledge(client, source, message.transfer_uuid, transfer.written, transfer.bytes)
         if transfer.next_part == transfer.parts:
-            self._finish(message.transfer_uuid)
+            self._finish(message.transfer_uuid, self._button_of(source))
 
-    def _finish(self, uuid: str) -> None:
+    def _finish(self, uuid: str, button: Any) -> None:
         transfer = self._transfers.pop(uuid)
         try:
             path = self._folder.keep(transfer.path, transfer.filename)
         except InputError as error:
-            self._told(str(error))
+            self._told(str(error), button)
             return
+        self._told("", button)
         self._done(path)
+
+    def _button_of(self, source: str | None) -> Any:
+        """None of an unseen one."""
+        return None if source is None else self._buttons.get(source)
 
     def _drop(self, uuid: str) -> None:
         transfer = self._transfers.pop(uuid, None)
@@ -189,6 +198,6 @@ class Uploads:
     def _refuse(self, client: int, source: str | None, uuid: str, total: int, line: str) -> None:
         """Tells why, and gives the browser its button back, which waits for the whole file to be acknowledged."""
         self._inside.acknowledge(client, source, uuid, total, total)
-        self._told(line)
+        self._told(line, self._button_of(source))
         # the browser's own message says that the upload succeeded
         asyncio.get_running_loop().call_later(_SETTLE_S, self._inside.take_away, client, f"upload-{uuid}")

@@ -274,11 +274,26 @@ def test_too_large_an_upload_is_refused(compare, app, tmp_path, monkeypatch):
     large.write_bytes(b"0" * 700_000)  # in two parts
     before = set(app.comparing.folder.uploads.iterdir())
     upload(page, large)
-    page.get_by_text("over the page's limit of 0.1 MB").wait_for()
+    beside = page.locator(".emaviz-beside").filter(has_text="over the page's limit of 0.1 MB")
+    beside.wait_for()
     page.get_by_role("button", name="Upload a measurement").click(trial=True)  # enabled again
     # viser says so itself, and would take it away after 4 s only
     wait_until(lambda: page.get_by_text("uploaded successfully").count() == 0, seconds=2.5)
     assert set(app.comparing.folder.uploads.iterdir()) == before
+    assert beside.is_visible()
+    small = tmp_path / "small.csv"
+    small.write_bytes(b"no table")
+    upload(page, small)
+    wait_until(lambda: not beside.is_visible())
+
+
+def test_a_comparison_that_must_wait_is_told_beside_its_button(compare, app, rig_file, monkeypatch):
+    upload(compare, rig_file)
+    start = compare.get_by_role("button", name="Compare", exact=True)
+    wait_until(lambda: start.is_enabled() and not app.session.worker.busy, 60.0)
+    monkeypatch.setattr(app.comparing, "compare", lambda: False)  # as while a search goes on
+    start.click()
+    compare.locator(".emaviz-beside").filter(has_text="Another long run goes on; stop it first.").wait_for()
 
 
 def test_a_kind_of_file_that_is_none_of_ours_is_refused(compare, app, tmp_path):

@@ -10,7 +10,7 @@ import pytest
 from ema_model.comparison.result import SignalError
 from ema_model.comparison.verdict import judge
 from ema_model.comparison.words import held_out
-from emaviz.page.compare.result import headline
+from emaviz.page.compare.result import numbers
 from emaviz.recording.markdown import written
 from emaviz.report.comparison.errors_per_signal import ErrorsPerSignal
 
@@ -33,7 +33,7 @@ def test_an_error_reads_alike_wherever_it_is_told(sizes, comparison):
     assert f"{size} {unit} rms" in sentence and f"{least} {unit}" in sentence
     row = next(line for line in str(told).splitlines() if line.startswith("  Equivalent current ")).split()
     assert row[3] == size and row[4] == least and row[-1] == unit  # behind its name and what it was before
-    page, notebook = headline(told), told._repr_html_()
+    page, notebook = numbers(told), told._repr_html_()
     report = ErrorsPerSignal().body(told, None)  # pyright: ignore[reportArgumentType]
     for one in (page, notebook, report):
         cells = re.findall(r">([^<>]+)</td>", one)

@@ -146,18 +146,14 @@ class ComparePanel:
         """Starts a comparison; of one that runs already, and is out of date, a second one follows."""
         try:
             started = self._comparing.compare()
+            self._again = not started and self._comparing.running
+            if not started and not self._again:
+                self._page.one_at_a_time(self._start)
         except InputError as error:
             if told:
                 self._page.say_beside(self._start, str(error))
             else:
                 self._line.say(str(error))
-            return
-        if started:
-            self._again = False
-        elif self._comparing.running:
-            self._again = True
-        else:
-            self._page.one_at_a_time()
 
     def _began(self) -> None:
         self._start.disabled = True

@@ -57,7 +57,8 @@ class LoopWindow(Window):
         """The same at the longest steps up to most_s, s, of which a sample holds a whole number."""
         steps = self.steps_per_sample
         times = max(n for n in range(1, steps + 1) if steps % n == 0 and (n == 1 or n * self.step_s <= most_s + 1e-12))
-        inputs = {name: getattr(self, name)[::times] for name in ("command", "load", "supply")}
+        # in one piece, as at the own step: a kernel is compiled anew for an array that is not
+        inputs = {name: np.ascontiguousarray(getattr(self, name)[::times]) for name in ("command", "load", "supply")}
         return replace(self, **inputs, steps_per_sample=steps // times, step_s=self.step_s * times)
 
     @property

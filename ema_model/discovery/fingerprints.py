@@ -5,7 +5,7 @@ They share one stack, in which every lane has one of them on and all others do n
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -109,16 +109,12 @@ def _changes(data: Data, found: Fit, lanes: list[Lane]) -> Array:
     """
     of_drive = np.array([effect.family == "drive" for effect, _ in lanes])
     parts = [(np.flatnonzero(of_drive), 0.0), (np.flatnonzero(~of_drive), _LONGEST_STEP_S)]
-    changes = {lane: row for rows, longest_s in parts for lane, row in _changed(data, found, lanes, rows, longest_s)}
-    return np.array([changes[lane] for lane in range(len(lanes))])
+    changes = [_changed(data, found, lanes, rows, longest_s) for rows, longest_s in parts if len(rows)]
+    return np.concatenate(changes)[np.argsort(np.concatenate([rows for rows, _ in parts]))]
 
 
-def _changed(
-    data: Data, found: Fit, lanes: list[Lane], rows: NDArray[np.intp], longest_s: float
-) -> Iterator[tuple[int, Array]]:
+def _changed(data: Data, found: Fit, lanes: list[Lane], rows: NDArray[np.intp], longest_s: float) -> Array:
     """The same for some of the lanes, by their place, at steps of up to longest_s."""
-    if not len(rows):
-        return
     actuator: Actuator = found.calibration.actuator
     resting = {effect.name: effect.neutral for effect, _ in lanes} | actuator.effects
     varied = {
@@ -134,8 +130,7 @@ def _changed(
     k = np.tile(found.calibration.k, (len(rows) + 1, 1))
     shown = [plant.signals(i, model, k, *found.calibration.start_of(i)) for i in range(len(plant.windows))]
     signals = data.over_floor(plant, shown)
-    signals[1:] -= signals[0]
-    yield from zip(rows, signals[1:])
+    return signals[1:] - signals[0]
 
 
 def _gentler(effect: Effect, settings: dict[str, float], size: float, error: float) -> dict[str, float] | None:

@@ -66,7 +66,7 @@ def scored_together(found: Fit, prints: Sequence[Fingerprint], most: int) -> lis
     while left and len(chosen) < most:
         gram = jacobian.T @ jacobian + np.diag(prior)
         beyond = _beyond_all(jacobian, gram, [one.columns for one in left])
-        candidates = [_scored(found, one, jacobian, gram, next(beyond)) for one in left]
+        candidates = [_scored(found, one, jacobian, gram, own) for one, own in zip(left, beyond)]
         best = int(np.argmax([candidate.predicted_drop for candidate in candidates]))
         chosen.append(candidates[best])
         columns = left.pop(best).columns
@@ -86,7 +86,7 @@ def scored_beside(found: Fit, prints: Sequence[Fingerprint], known: Sequence[Can
     left = found.residual - jacobian @ np.linalg.solve(gram, jacobian.T @ found.residual)
     beside = replace(found, calibration=replace(found.calibration, residual=left))
     beyond = _beyond_all(jacobian, gram, [one.columns for one in prints])
-    return [_scored(beside, one, jacobian, gram, next(beyond)) for one in prints]
+    return [_scored(beside, one, jacobian, gram, own) for one, own in zip(prints, beyond)]
 
 
 def movable(found: Fit, but: Sequence[str] = ()) -> tuple[Array, Array]:

@@ -65,8 +65,8 @@ class Descent:
     damping: Array
     moving: NDArray[np.bool_]
     evaluations: int = 0
+    known: tuple[Array, Array] | None = None  # residuals and their derivatives where the next step begins
     _best: int = 0  # of the dampings, in the last step
-    known: tuple[Array, Array] | None = None  # residuals and their derivatives where the first step begins
 
     @classmethod
     def begin(cls, problem: Problem, x: Array, known: tuple[Array, Array] | None = None) -> Descent:

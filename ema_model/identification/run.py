@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from ema_model import faults
 from ema_model.actuator import Actuator
 from ema_model.errors import InputError, quoted
-from ema_model.identification.fit import LONGER_STEPS_S, Setting, current_error, refine, refine_best, setting
+from ema_model.identification.fit import FAULTS, LONGER_STEPS_S, Setting, current_error, refine, refine_best, setting
 from ema_model.identification.objective import Objective
 from ema_model.identification.optimisers import OPTIMISERS, Optimiser, create
 from ema_model.identification.search import search
@@ -40,7 +40,7 @@ class Progress:
     algorithm: str
     iteration: int
     iterations: int
-    rmse: float  # A, the best so far; of a metaheuristic's first iterations within `_NEARLY`
+    rmse: float  # A, the best so far
     k: Array  # (8,), of the best
     population: Array  # (n, 8)
     population_rmse: Array  # (n,), A
@@ -60,7 +60,7 @@ class Identification(InWords):
     evaluations: int
     elapsed_s: float  # without compilation
     compile_s: float
-    rmse_history: Array  # (iterations + 1,), A, as `Progress` told it
+    rmse_history: Array  # (iterations + 1,), A
     k_history: Array  # (iterations + 1, 8)
     stopped: bool  # by the user, before its last iteration
     uncertainty: Uncertainty
@@ -144,7 +144,7 @@ def steps(
         algorithm=algorithm,
         seed=seed,
         k=k,
-        rmse=float(objective(k)[0]),
+        rmse=float(objective(k)[0]) if polishes else last.rmse,
         evaluations=last.evaluations + (looked + found.evaluations if polishes else 0),
         elapsed_s=last.elapsed_s + (after if polishes else 0.0),
         compile_s=compile_s + first_compile,
@@ -163,44 +163,53 @@ def steps(
 def _optimise(objective: Objective, optimiser: Optimiser) -> Generator[Progress, None, None]:
     """One of the metaheuristics, as its paper has it.
 
-    Most of a long search simulates at longer steps, where these hardly change the fitness; its end is exact.
+    Most of a long search simulates at longer steps, where these hardly change the fitness; its end, and what is told
+    of the best on the way, are exact.
     """
-    elapsed, iteration = 0.0, -1
+    elapsed, iteration, beside = 0.0, -1, 0
     fitness = exact = objective
+    leader = k = np.full(FAULTS, np.nan)
+    rmse = np.inf
     while not optimiser.done:
         started = time.perf_counter()
         if iteration < 0 and optimiser.iterations >= _LONG:
-            fitness = _roughly(objective, optimiser.ask())
+            fitness, beside = _roughly(objective, optimiser.ask())
         elif fitness is not exact and iteration >= _ROUGH * optimiser.iterations:
             fitness = exact
             optimiser.rescore(exact)
         while optimiser.iteration == iteration or not optimiser.evaluations:
             optimiser.tell(fitness(optimiser.ask()))
         iteration = optimiser.iteration
+        if not np.array_equal(leader, optimiser.best_x):
+            leader, its = optimiser.best_x.copy(), float(optimiser.best_f)
+            if fitness is not exact:
+                its, beside = float(exact(leader)[0]), beside + 1
+            if its < rmse or iteration == 0:
+                k, rmse = leader, its
         elapsed += time.perf_counter() - started
         yield Progress(
             optimiser.name,
             optimiser.iteration,
             optimiser.iterations,
-            float(optimiser.best_f),
-            optimiser.best_x.copy(),
+            rmse,
+            k.copy(),
             optimiser.population_x.copy(),
             optimiser.population_f.copy(),
-            optimiser.evaluations,
+            optimiser.evaluations + beside,
             elapsed,
         )
 
 
-def _roughly(objective: Objective, k: Array) -> Objective:
-    """The objective at longer steps, where it says nearly the same of k (n, 8); else itself."""
+def _roughly(objective: Objective, k: Array) -> tuple[Objective, int]:
+    """The objective at longer steps, where it says nearly the same of k (n, 8); else itself; and how many it took."""
     exact = objective(k)
-    for longest_s in LONGER_STEPS_S:
+    for tried, longest_s in enumerate(LONGER_STEPS_S, 1):
         rough = objective.at_longer_steps(longest_s)
         with np.errstate(invalid="ignore"):  # of those that diverge
             off = np.abs(rough(k) / exact - 1.0)
         if np.median(np.nan_to_num(off)) < _NEARLY:
-            return rough
-    return objective
+            return rough, (1 + tried) * len(k)
+    return objective, (1 + len(LONGER_STEPS_S)) * len(k)
 
 
 def _robust(

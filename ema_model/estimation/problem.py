@@ -19,6 +19,7 @@ from ema_model.physics.rows import LANES
 
 Array = NDArray[np.float64]
 
+_EXACT = 1e-4  # of a tolerance, within which a parameter counts as its file's value
 _DIVERGED = 1e6  # floors, that a run which diverges counts as at most
 
 SIGNALS = ("current_A", "motor_torque_Nm", "motor_position_rad", "user_position_rad")  # that are fitted
@@ -82,9 +83,9 @@ class Problem:
         ]
         self.values = sum(len(values) for weights in self.weights for values in weights.values())
 
-    def believe(self, spread: float) -> None:
-        """Takes the base parameters to be within `spread` of their tolerances."""
-        self.prior[self.base] = 1.0 / spread
+    def believe(self, spread: ArrayLike) -> None:
+        """Takes the base parameters to be within `spread` of their tolerances: of all, or of each (base parameters,)."""
+        self.prior[self.base] = 1.0 / np.maximum(spread, _EXACT)
 
     def residuals(self, x: Array) -> Array:
         """(n, unknowns) → (n, values + unknowns)."""

@@ -38,7 +38,10 @@ _SETTLED = 1e-3 / K_SIGMA  # of x's faults, between two rounds
 LONGER_STEPS_S = 5e-5, 2e-5  # for a search, which need not be exact: what it finds is refined at the actuator's own
 _LOOKS = 31  # beside the healthy one: together a block of lanes
 _ALIKE = 0.5  # floors, by which these may change the signals
-_SPREADS = (0.0, 0.05, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0)
+_SWEEPS = 30  # over the base parameters, at most
+_SWEPT = 0.01  # of a spread, that a sweep changes when it is the last
+_WORTH = 4.0  # logarithm of the likelihood that a spread must gain: there are many to choose from
+_SEEN = 1e-6  # (σ of the noise)², by which a parameter's tolerance must change the signals
 
 
 class Rough(NamedTuple):
@@ -92,7 +95,7 @@ class Fitted:
     slopes: Array  # (values + unknowns, unknowns)
     twins: Twins | None
     k: Array  # (8,)
-    spread: float  # how far the data want the base parameters from the file's values, 1 being the tolerances
+    spreads: Array  # (base parameters,): how far the data want each from its file's value, 1 being its tolerance
     evaluations: int
     rivals: tuple[Fitted, ...] = ()  # other basins that fit within the floor as well
 
@@ -149,7 +152,7 @@ def refine(given: Setting, k: ArrayLike, seed: int = 0, tell: Tell = _silent) ->
     rough = given.problem(with_base=False, plant=given.rough.plant)  # the rounds to come go on from it exactly
     x, _, evaluations = _descend(rough, rough.at(k))
     x, found, more = _with_twins(given, problem, x, None, seed, lambda text, share: tell(text, share / phases))
-    spread = 0.0
+    spreads = np.zeros(0)
     if any(one.is_base for one in given.others):
         full = given.problem(with_base=True)
         start = np.zeros(full.count)
@@ -157,9 +160,9 @@ def refine(given: Setting, k: ArrayLike, seed: int = 0, tell: Tell = _silent) ->
         found = twins(full, start, seed + _ROUNDS)
         _reweight(full, given, found)
         problem, x = full, start
-        spread = _spread(problem, x)
-        if spread > 0.0:
-            problem.believe(spread)
+        spreads = _spreads(problem, x)
+        if spreads.any():
+            problem.believe(spreads)
             x, _, again = _descend(problem, x)
             said = "with the parameters' tolerances"
             x, found, again2 = _with_twins(
@@ -173,14 +176,14 @@ def refine(given: Setting, k: ArrayLike, seed: int = 0, tell: Tell = _silent) ->
             more += again + again2
             errors = errors_near(problem, np.array([x, start]), seed + 2 * _ROUNDS + 1)
             if not _better(problem, given, x, start, [of_errors(problem, one) for one in errors]):
-                x, spread = start, 0.0  # the twin does not follow where the Monitor Model led
-            found = of_errors(problem, errors[0 if spread > 0.0 else 1], found)
+                x, spreads = start, np.zeros_like(spreads)  # the twin does not follow where the Monitor Model led
+            found = of_errors(problem, errors[0 if spreads.any() else 1], found)
             _reweight(problem, given, found)
             problem.believe(1.0)
     residuals, slopes = problem.jacobians(x[None, :])
     residual = residuals[0]
     return Fitted(
-        problem, x, float(residual @ residual), residual, slopes[0], found, problem.k(x), spread, evaluations + more
+        problem, x, float(residual @ residual), residual, slopes[0], found, problem.k(x), spreads, evaluations + more
     )
 
 
@@ -267,12 +270,13 @@ def _descend(problem: Problem, x: Array, known: tuple[Array, Array] | None = Non
     return descent.x[0], float(descent.cost[0]), descent.evaluations
 
 
-def _spread(problem: Problem, x: Array) -> float:
-    """How far the base parameters are from their file's values, in units of their tolerances, as the data say.
+def _spreads(problem: Problem, x: Array) -> Array:
+    """How far each base parameter is from its file's value, in its tolerances, as the data say: (base parameters,).
 
     x: the best fit with the file's values.  The likelihood of the data with k and the base parameters integrated
-    out, these with a prior of `spread` σ, at its maximum (empirical Bayes).  A rig that is as its file says gets its
-    k with hardly any cost of tolerances that it does not use.
+    out, each of these with a prior of its own `spread` σ, at its maximum (automatic relevance determination: MacKay,
+    Neural Computation 4, 1992; Tipping, JMLR 1, 2001).  A rig that is as its file says gets its k with hardly any
+    cost of tolerances that it does not use, and one parameter that is off does not set the others free.
     """
     residuals, all_slopes = problem.jacobians(x[None, :])
     residual, slopes, base = residuals[0], all_slopes[0], problem.base
@@ -282,7 +286,32 @@ def _spread(problem: Problem, x: Array) -> float:
     columns = slopes[:, base].copy()
     columns[problem.values :] = 0.0  # their prior is what is asked for
     columns -= q @ (q.T @ columns)
-    u, s, _ = np.linalg.svd(columns, full_matrices=False)
-    z = u.T @ (residual - q @ (q.T @ residual))
-    likelihood = [-0.5 * np.sum(np.log1p((t * s) ** 2) + z**2 / (1.0 + (t * s) ** 2)) for t in _SPREADS]
-    return _SPREADS[int(np.argmax(likelihood))]
+    return most_likely_spreads(columns.T @ columns, columns.T @ residual)
+
+
+def most_likely_spreads(inner: Array, shown: Array) -> Array:
+    """The prior σ of each of n numbers, 0 to 1, at which data are likeliest: (n,), found one after another.
+
+    0 where that hardly makes them likelier: of many numbers one gains a little by chance.
+
+    inner (n, n): of their derivatives, over the noise; shown (n,): of these with what is left without them.
+    Of one number alone the best is known: √(q² − s) / s (Tipping and Faul, AISTATS 2003, eq. 20).
+    """
+    spreads = np.zeros(len(shown))
+    for _ in range(_SWEEPS):
+        before = spreads.copy()
+        for one in range(len(spreads)):
+            spreads[one] = 0.0
+            on = np.flatnonzero(spreads)
+            scaled = np.eye(len(on)) + spreads[on, None] * inner[np.ix_(on, on)] * spreads[on]
+            both = np.linalg.solve(scaled, spreads[on, None] * np.column_stack([inner[on, one], shown[on]]))
+            across = inner[on, one] * spreads[on]
+            s, q = np.array([inner[one, one], shown[one]]) - across @ both
+            if q * q > s > _SEEN:
+                spread = min(1.0, np.sqrt(q * q - s) / s)
+                more = spread * spread * s
+                if 0.5 * (q * q / s * more / (1.0 + more) - np.log1p(more)) > _WORTH:
+                    spreads[one] = spread
+        if np.max(np.abs(spreads - before)) < _SWEPT:
+            break
+    return spreads

@@ -155,7 +155,7 @@ def _curvature(found: Fitted) -> tuple[Array, NDArray[np.floating]]:
     """The weight by which each unknown was held to its prior, and the inverse of the fit's Hessian with it."""
     problem, rows = found.problem, slice(0, found.problem.values)
     held = problem.prior.copy()  # as the fit had it; what is really unknown is the whole tolerance
-    held[problem.base] /= max(found.spread, _LEAST_SPREAD)
+    held[problem.base] /= np.maximum(found.spreads, _LEAST_SPREAD)
     return held, np.linalg.inv(found.slopes[rows].T @ found.slopes[rows] + np.diag(held**2))
 
 
@@ -190,10 +190,8 @@ def _unbounded(found: Fitted) -> Array:
     problem, x = found.problem, found.x
     moves = np.ones(problem.count, dtype=bool)
     prior = problem.prior.copy()
-    if found.spread > 0.0:
-        prior[problem.base] /= found.spread
-    else:
-        moves &= ~problem.base
+    moves[problem.base] = found.spreads > 0.0
+    prior[moves & problem.base] /= found.spreads[found.spreads > 0.0]
     rows = slice(0, problem.values)
     slopes, residual = found.slopes[rows][:, moves], found.residual[rows]
     hessian = slopes.T @ slopes + np.diag(prior[moves] ** 2)

@@ -16,6 +16,7 @@ from ema_model.estimation.descent import Descent
 from ema_model.estimation.feldman_cousins import above_zero, length_of_vector
 from ema_model.estimation.unknowns import to_k, to_vector
 from ema_model.identification.fit import refine, setting
+from ema_model.identification.fit import most_likely_spreads
 from ema_model.identification.model_bias import TWINS, _spread
 from ema_model.identification.objective import Objective
 from ema_model.identification.run import identify
@@ -192,3 +193,28 @@ def test_impossible_settings_are_refused(options):
     with pytest.raises(InputError) as error:
         of({"k1": 0.25}, **options)
     assert "\n" not in str(error.value)
+
+
+def test_one_parameter_that_is_off_sets_no_other_free():
+    """Fifteen, of which the data tell each to a tenth of its tolerance; some are alike by half."""
+    random, count = np.random.default_rng(5), 15
+    freed = np.zeros((2, count))
+    for _ in range(40):
+        columns = 10.0 / np.sqrt(500) * random.standard_normal((500, count))
+        columns[:, 1] = 0.5 * columns[:, 1] + 0.5 * columns[:, 2]
+        noise = random.standard_normal(500)
+        for number, off in enumerate((0.0, 1.5)):
+            spreads = most_likely_spreads(columns.T @ columns, columns.T @ (noise + off * columns[:, 1]))
+            assert np.all((spreads >= 0.0) & (spreads <= 1.0))
+            freed[number] += spreads > 0.0
+    assert freed[0].sum() <= 2 and freed[1, 1] >= 38
+    assert np.delete(freed[1], 1).sum() <= 8  # now and then the one that it is alike
+
+
+def test_a_single_spread_is_the_likeliest():
+    s, q = 30.0, 25.0
+    tried = np.linspace(0.0, 1.0, 2001)
+    likelihood = 0.5 * q**2 * tried**2 / (1.0 + tried**2 * s) - 0.5 * np.log1p(tried**2 * s)
+    assert most_likely_spreads(np.array([[s]]), np.array([q]))[0] == pytest.approx(
+        tried[np.argmax(likelihood)], abs=1e-3
+    )

@@ -84,7 +84,7 @@ class Problem:
         self.values = sum(len(values) for weights in self.weights for values in weights.values())
 
     def believe(self, spread: ArrayLike) -> None:
-        """Takes the base parameters to be within `spread` of their tolerances: of all, or of each (base parameters,)."""
+        """Takes base parameters to be within `spread` of their tolerances: of all, or of each (base parameters,)."""
         self.prior[self.base] = 1.0 / np.maximum(spread, _EXACT)
 
     def residuals(self, x: Array) -> Array:

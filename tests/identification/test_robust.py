@@ -15,8 +15,7 @@ from ema_model.errors import InputError
 from ema_model.estimation.descent import Descent
 from ema_model.estimation.feldman_cousins import above_zero, length_of_vector
 from ema_model.estimation.unknowns import to_k, to_vector
-from ema_model.identification.fit import refine, setting
-from ema_model.identification.fit import most_likely_spreads
+from ema_model.identification.fit import most_likely_spreads, refine, setting
 from ema_model.identification.model_bias import TWINS, _spread
 from ema_model.identification.objective import Objective
 from ema_model.identification.run import identify

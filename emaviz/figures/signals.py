@@ -21,6 +21,7 @@ POINTS = 800  # of a line, at most
 PADDING = (10, 4, 0, 0)  # top, right, bottom, left, px: the uppermost tick needs half a line
 _GREY = "#868e96"
 _VALUES_PX, _LABEL_PX = 22, 16  # of a time axis
+LEAST_SPACE_PX = 12  # between two values of an axis, which a low chart needs; `chart_heights.py` gives high ones more
 LAST_MORE_PX = _VALUES_PX + _LABEL_PX  # by which the last chart of a column is taller than those above it
 
 
@@ -209,7 +210,7 @@ def time_axis(last: bool) -> Any:
 
 def value_axis(unit: str) -> Any:
     """The axis at the left of a chart."""
-    return {**AXIS, "scale": "y", "label": f"[{unit}]", "size": 48, "space": 12}
+    return {**AXIS, "scale": "y", "label": f"[{unit}]", "size": 48, "space": LEAST_SPACE_PX}
 
 
 def _difference_axis(unit: str) -> Any:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from emaviz.figures.signals import LEAST_SPACE_PX
 from emaviz.server.viser_private import Inside
 from emaviz.text.html import Html, unescaped
 
@@ -12,6 +13,7 @@ from emaviz.text.html import Html, unescaped
 WINDOWS_PX = (600, 640, 680, 700, 740, 780, 820, 860, 900, 940, 980, 1020, 1060, 1100, 1150, 1200, 1300, 1400)
 _USUAL_PX = 900  # of a window, for which charts are built
 _LEAST_PX = 64
+_VALUES = 6  # of a chart's height, which its title shares: at most so many values stand at an axis
 _LOW_PX, _TITLE_SAVED_PX = 800, 2  # in windows lower than that, a chart's title is so much smaller
 
 
@@ -32,7 +34,19 @@ class ChartHeights:
         for stack in self._stacks:
             more = (window_px - _USUAL_PX) // len(stack) + (_TITLE_SAVED_PX if window_px < _LOW_PX else 0)
             for chart, usual in stack:
-                self._inside.set_height(client, chart, max(usual + more, _LEAST_PX))
+                height = max(usual + more, _LEAST_PX)
+                self._inside.set_height(client, chart, height)
+                if any("space" in axis for axis in chart.axes or ()):
+                    self._inside.set_axes(client, chart, spaced(chart.axes, height))
+
+
+def spaced(axes: Sequence[Any], height_px: int) -> tuple[dict[str, Any], ...]:
+    """A chart's axes for its height: those that say a least space between values, px, get it in proportion.
+
+    A high chart would else have a value for every line of text; a low one needs that to have two.
+    """
+    space = max(LEAST_SPACE_PX, height_px // _VALUES)
+    return tuple({**axis, "space": space} if "space" in axis else dict(axis) for axis in axes)
 
 
 def style() -> Html:

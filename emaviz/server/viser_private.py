@@ -95,6 +95,10 @@ class Inside:
         """How high a chart is in one page."""
         self._push(client, _messages.GuiUpdateMessage(chart._impl.uuid, {"height": height_px}))
 
+    def set_axes(self, client: int, chart: Any, axes: tuple[dict[str, Any], ...]) -> None:
+        """How a chart's axes are drawn in one page."""
+        self._push(client, _messages.GuiUpdateMessage(chart._impl.uuid, {"axes": axes}))
+
     def pages(self) -> tuple[int, ...]:
         """The pages that are open, by their numbers."""
         return tuple(self._server.get_clients())

@@ -65,7 +65,7 @@ class LibraryPanel:
             self._none.visible = shown == 0
 
     def _run_all(self) -> None:
-        self._page.begins(self._library.draw_all)
+        self._page.begins(self._library.draw_all, self._draw)
 
     def _drawn(self, felt: WithEffect) -> None:
         self._pictures[felt.name] = small_picture(felt)

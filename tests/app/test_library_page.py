@@ -1,0 +1,20 @@
+"""Library on the page: what its long run is refused for stands beside its button."""
+
+from __future__ import annotations
+
+import pytest
+from support.on_page import wait_until
+
+from emaviz.page.library.tab import LibraryTab
+
+pytestmark = pytest.mark.browser
+
+
+def test_pictures_that_must_wait_are_told_beside_their_button(shared_page, app, monkeypatch):
+    page = shared_page
+    page.get_by_role("tab", name="Library", exact=True).click()
+    button = page.get_by_role("button", name="Run them all for their pictures")
+    wait_until(lambda: button.is_visible() and not app.session.worker.busy, 60.0)
+    monkeypatch.setattr(app.tab(LibraryTab)._library, "draw_all", lambda: False)  # as while a search goes on
+    button.click()
+    page.locator(".emaviz-beside").filter(has_text="Another long run goes on; stop it first.").wait_for()

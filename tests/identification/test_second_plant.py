@@ -29,6 +29,14 @@ def recording(k: tuple[float, ...], noise_A: float = NOISE_A, seed: int = 0) -> 
     return Measurement(SecondPlant(k).recorded(0.5, noise_A, seed), name="second plant")
 
 
+def drawn(random: np.random.Generator) -> np.ndarray:
+    """Several faults at once: of the first five each is there or not."""
+    k = random.random(8) * (0.7, 0.6, 0.4, 0.4, 0.4, 0.6, 0.6, 0.4)
+    k[:5] *= random.random(5) < 0.5
+    k[6:] += 0.2, 0.3
+    return k
+
+
 def test_the_two_programs_agree_on_a_faulty_actuator():
     k = VECTORS[4]
     mine, other = simulate_reference(Run(), load_actuator(), np.array(k)), recording(k, 0.0)
@@ -48,3 +56,19 @@ def test_the_worst_error_over_several_faults_at_once(known):
         errors.append(faults.error_percent(found.k, np.array(k), wrap=True))
         print(f"{k}: {errors[-1]:.2f} %, {np.round(found.k, 4)}")
     assert max(errors) <= 1.0
+
+
+@pytest.mark.study
+def test_random_faults_within_tolerances():
+    actuator, errors, inside = load_actuator(), [], []
+    for seed in range(30):
+        random = np.random.default_rng([90, seed])
+        k = drawn(random)
+        found = identify(Objective([recording(tuple(k), seed=100 + seed)], actuator), ROBUST, seed=seed)
+        low, high = found.uncertainty.interval90.T
+        errors.append(faults.error_percent(found.k, k, wrap=True))
+        inside.append((low <= k) & (k <= high))
+    above = sum(error > 1.0 for error in errors)
+    print(f"median {np.median(errors):.2f} %, worst {max(errors):.2f} %, above 1 %: {above} of {len(errors)}")
+    print("90 % intervals that hold k1 … k8, %:", *np.round(100.0 * np.mean(inside, axis=0)).astype(int))
+    assert np.median(errors) <= 1.0 and np.mean(inside) >= 0.86

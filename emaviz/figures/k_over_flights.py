@@ -65,7 +65,12 @@ def figure(
         number = next(i for i, flight in enumerate(result.flights, 1) if flight.name == jump.flight)
         chart.add_vline(x=number - 0.5, line={"width": 1, "dash": "dot", "color": theme.EDGE})
     if one.threshold is not None:
-        chart.add_hline(y=one.threshold, line={"width": 1, "dash": "dash", "color": theme.MARK})
+        chart.add_hline(
+            y=one.threshold,
+            line={"width": 1, "dash": "dash", "color": theme.MARK},
+            annotation={"text": "threshold", "font": {"color": theme.MARK}},
+            annotation_position="bottom left",
+        )
     if one.remaining is not None and one.threshold is not None:
         left, end = one.remaining, one.threshold
         hidden = {"line": {"width": 0}, "hoverinfo": "skip", "mode": "lines", "showlegend": False}

@@ -10,6 +10,7 @@ from emaviz.colours import MONITOR, REFERENCE
 from emaviz.figures import theme
 
 _POINTS = 400
+_ROOM = 0.15  # of the axis, that a label left of its point needs
 _TITLE = "Probability of crossing within the next flights"
 
 
@@ -21,8 +22,9 @@ def figure(left: Remaining, *, came: int | None = None, dark: bool = False) -> g
     chart.add_trace(go.Scatter(x=x, y=y, mode="lines", line={"color": MONITOR, "width": 2}, showlegend=False))
     for share, at in ((0.05, left.p05), (0.5, left.p50), (0.95, left.p95)):
         mark = {"size": 8, "color": theme.MARK}
-        label = [f"{share:.0%}: {at:.0f}"]
-        side = "top right" if share < 0.1 else "bottom right"  # inside of the axes
+        label = [f"{100.0 * share:.0f} %: {at:.0f}"]
+        beside = "top left" if at > _ROOM * x[-1] else "top right"  # of the curve, and inside of the axes
+        side = beside if share < 0.1 else "bottom right"
         chart.add_trace(
             go.Scatter(x=[at], y=[share], mode="markers+text", text=label, textposition=side, marker=mark,
                        showlegend=False)

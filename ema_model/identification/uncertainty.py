@@ -190,8 +190,9 @@ def _unbounded(found: Fitted) -> Array:
     problem, x = found.problem, found.x
     moves = np.ones(problem.count, dtype=bool)
     prior = problem.prior.copy()
-    moves[problem.base] = found.spreads > 0.0
-    prior[moves & problem.base] /= found.spreads[found.spreads > 0.0]
+    freed = found.spreads > 0.0
+    moves[problem.base] = freed
+    prior[moves & problem.base] /= found.spreads[freed]
     rows = slice(0, problem.values)
     slopes, residual = found.slopes[rows][:, moves], found.residual[rows]
     hessian = slopes.T @ slopes + np.diag(prior[moves] ** 2)

@@ -48,7 +48,7 @@ def figure(first: Recording, second: Recording, signal: str, *, dark: bool = Fal
     title, unit = SIGNALS[signal].title, SIGNALS[signal].unit or "-"
     drawn.update_yaxes(title_text=f"{title}<br>[{unit}]", row=1, col=1)
     drawn.update_yaxes(title_text=f"residual<br>[{unit}]", row=2, col=1)
-    drawn.update_yaxes(title_text="best rmse<br>[A]", type="log", row=3, col=1)
+    drawn.update_yaxes(title_text="rmse of the best<br>[A]", type="log", row=3, col=1)
     drawn.update_xaxes(title_text="time [s]", matches="x", row=2, col=1)
     drawn.update_xaxes(title_text="iteration", row=3, col=1)
     drawn.update_layout(

@@ -25,7 +25,7 @@ class ChartHeights:
         self._stacks: list[list[tuple[Any, int]]] = []
 
     def add(self, charts: Sequence[Any], spare_px: int = 0) -> None:
-        """A stack of uPlot charts; spare_px: what the usual window has left below it."""
+        """A stack of uPlot charts, with their axes; spare_px: what the usual window has left below it."""
         more = spare_px // max(len(charts), 1)
         self._stacks.append([(one, int(one.height) + more) for one in charts])
 
@@ -35,9 +35,7 @@ class ChartHeights:
             more = (window_px - _USUAL_PX) // len(stack) + (_TITLE_SAVED_PX if window_px < _LOW_PX else 0)
             for chart, usual in stack:
                 height = max(usual + more, _LEAST_PX)
-                self._inside.set_height(client, chart, height)
-                if any("space" in axis for axis in chart.axes or ()):
-                    self._inside.set_axes(client, chart, spaced(chart.axes, height))
+                self._inside.lay_out(client, chart, height, spaced(chart.axes, height))
 
 
 def spaced(axes: Sequence[Any], height_px: int) -> tuple[dict[str, Any], ...]:

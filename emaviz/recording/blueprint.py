@@ -129,7 +129,7 @@ def _dashboard(contents: Contents) -> rrb.Container:
         for signal in contents.charts
     ]
     errors = [f"{algorithm_path(name)}/log10_rmse" for name in names]
-    convergence = plot("Convergence: log10 of best RMSE [A]", errors, legend=len(names) > 1, linked=False)
+    convergence = plot("Convergence: log10 of the RMSE of the best [A]", errors, legend=len(names) > 1, linked=False)
     kinds = ["best", "interval"]
     kinds += ["truth"] if contents.truth else []
     kinds += ["population"] if len(names) == 1 else []  # of several it would hide all else
@@ -247,7 +247,9 @@ def _identification_tab(name: str, algorithm: Algorithm) -> rrb.Container:
     left: list[rrb.Container | rrb.View] = []
     right: list[rrb.Container | rrb.View] = []
     if algorithm.iterations:
-        left.append(plot("Convergence: log10 of best RMSE [A]", [f"{root}/log10_rmse"], legend=False, linked=False))
+        left.append(
+            plot("Convergence: log10 of the RMSE of the best [A]", [f"{root}/log10_rmse"], legend=False, linked=False)
+        )
         right.append(rrb.Grid(*(_k_view(root, k) for k in K_NAMES), grid_columns=2))
     if algorithm.result:
         left.append(rrb.TextDocumentView(origin=f"{root}/result", name="Result"))

@@ -38,7 +38,11 @@ def iteration_style(path: str) -> Style:
         return line(f"true {name} [-]", style.TRUTH_COLOUR, 2.0)
     # Series of one name share an entry of the legend.
     title = TITLES.get(algorithm, algorithm)
-    return line(f"{title}, log10 of best RMSE [A]" if kind == "log10_rmse" else f"{title}, best RMSE [A]", colour, 2.0)
+    return line(
+        f"{title}, log10 of the RMSE of the best [A]" if kind == "log10_rmse" else f"{title}, RMSE of the best [A]",
+        colour,
+        2.0,
+    )
 
 
 def line(name: str, colour: Colour, width: float) -> Style:

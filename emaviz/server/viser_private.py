@@ -91,13 +91,9 @@ class Inside:
         placed = gui._next_layout_counter(), gui._layout_run_id
         self._push(client, _messages.GuiSetPanelWidthMessage(panel._placement_uuid, width_px, *placed))
 
-    def set_height(self, client: int, chart: Any, height_px: int) -> None:
-        """How high a chart is in one page."""
-        self._push(client, _messages.GuiUpdateMessage(chart._impl.uuid, {"height": height_px}))
-
-    def set_axes(self, client: int, chart: Any, axes: tuple[dict[str, Any], ...]) -> None:
-        """How a chart's axes are drawn in one page."""
-        self._push(client, _messages.GuiUpdateMessage(chart._impl.uuid, {"axes": axes}))
+    def lay_out(self, client: int, chart: Any, height_px: int, axes: tuple[dict[str, Any], ...]) -> None:
+        """How high a chart is in one page, and how its axes are drawn there."""
+        self._push(client, _messages.GuiUpdateMessage(chart._impl.uuid, {"height": height_px, "axes": axes}))
 
     def pages(self) -> tuple[int, ...]:
         """The pages that are open, by their numbers."""

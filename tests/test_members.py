@@ -23,7 +23,7 @@ from ema_model.physics.jit import scalar
 
 
 @scalar
-def shaft_torque(torque, theta, omega, current, user, gear, load, drag):
+def shaft_torque(torque, theta, omega, current, user, gear, load, time, drag):
     """− τ² c ω, added."""
     return torque - gear * gear * drag * omega
 

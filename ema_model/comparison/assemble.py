@@ -134,7 +134,7 @@ def _modelled_load(actuator: Actuator, user: Array) -> Array | None:
             continue
         for place in effect.places:
             if place.__name__ == "shaft_torque":
-                pulls = [place(0.0, u / tau, 0.0, 0.0, u, tau, 0.0, *settings.values()) for u in user]
+                pulls = [place(0.0, u / tau, 0.0, 0.0, u, tau, 0.0, 0.0, *settings.values()) for u in user]
                 total = (0.0 if total is None else total) - np.array(pulls) / tau
     return total
 

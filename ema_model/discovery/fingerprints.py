@@ -5,7 +5,7 @@ They share one stack, in which every lane has one of them on and all others do n
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,6 +17,7 @@ from ema_model.effects import Effect, find
 
 Array = NDArray[np.float64]
 Lane = tuple[Effect, dict[str, float]]
+Ranges = Mapping[str, tuple[float, float]]  # by variable
 
 _FAR = 30.0  # times what there is to explain
 _ATTEMPTS = 3
@@ -38,18 +39,31 @@ class Fingerprint:
     frees: tuple[str, ...] = ()  # the calibrated parameters of the file's effect, whose columns they are
 
 
-def variants(effect: Effect, orders: Sequence[float], top_rad_s: float = 0.0) -> list[list[dict[str, float]]]:
-    """Settings to try; those of one entry are columns of one fingerprint.  top_rad_s: the motor's top speed."""
+def variants(
+    effect: Effect, orders: Sequence[float], top_rad_s: float = 0.0, ranges: Ranges | None = None
+) -> list[list[dict[str, float]]]:
+    """Settings to try; those of one entry are columns of one fingerprint.
+
+    top_rad_s: the motor's top speed; ranges: of the variables, for effects that begin at a place along one.
+    """
     names = [parameter.name for parameter in effect.parameters]
     first = effect.parameters[0].name
     middle = effect.severities[1]
     if "phase_rad" in names and "order" in names:
+        low, high = next((one.low, one.high) for one in effect.parameters if one.name == "order")
         return [
             [{first: middle, "order": float(order), "phase_rad": phase} for phase in (0.0, 0.5 * np.pi)]
             for order in orders
+            if low <= order <= high
         ]
     if "phase_rad" in names:
         return [[{first: middle, "phase_rad": phase} for phase in (0.0, 0.5 * np.pi)]]
+    if effect.placed:
+        low, high = (ranges or {}).get(effect.against, (0.0, 0.0))
+        places = [
+            {name: low + s * (high - low) for name, s in zip(effect.placed, at)} for at in zip(*effect.placed.values())
+        ]
+        return [[{first: middle, **place}] for place in places] if high > low else []
     low, high = effect.parameters[0].low, effect.parameters[0].high
     speeds = [share * top_rad_s for share in effect.at_speeds]
     return [[{first: one}] for one in (*effect.severities, *(speed for speed in speeds if low <= speed <= high))]
@@ -58,8 +72,8 @@ def variants(effect: Effect, orders: Sequence[float], top_rad_s: float = 0.0) ->
 def fingerprints(data: Data, found: Fit, names: Iterable[str], orders: Sequence[float]) -> list[Fingerprint]:
     """Those of all effects that are not yet in the model, at the model's calibrated parameters."""
     effects = [find(name, found.actuator.axes) for name in names if name not in found.effects]
-    top = _top_speed(found)
-    tried = [(effect, settings) for effect in effects for settings in variants(effect, orders, top)]
+    top, ranges = _top_speed(found), _ranges(found)
+    tried = [(effect, settings) for effect in effects for settings in variants(effect, orders, top, ranges)]
     lanes = [(effect, one) for effect, settings in tried for one in settings]
     if not lanes:
         return []
@@ -100,6 +114,18 @@ def _top_speed(found: Fit) -> float:
     windows = zip(found.plant.windows, found.calibration.signals)
     shown = [window.context.get("motor_speed_rad_s", signals.get("motor_speed_rad_s")) for window, signals in windows]
     return float(max((np.max(np.abs(one)) for one in shown if one is not None), default=0.0))
+
+
+def _ranges(found: Fit) -> Ranges:
+    """What the user's position and the time go through in the recordings."""
+    user, tau = [], found.actuator.transmission.gear_ratio
+    for window, signals in zip(found.plant.windows, found.calibration.signals):
+        motor = signals.get("motor_position_rad", window.context.get("motor_position_rad"))
+        shown = signals.get("user_position_rad", None if motor is None else tau * motor)
+        user += [] if shown is None else [np.min(shown), np.max(shown)]
+    longest = max(float(window.time_s[-1]) for window in found.plant.windows)
+    ranges = {"time": (0.0, longest)}
+    return ranges | ({"user_position": (float(min(user)), float(max(user)))} if user else {})
 
 
 def _changes(data: Data, found: Fit, lanes: list[Lane]) -> Array:

@@ -20,7 +20,12 @@ from ema_model.effects import catalogue_name, find
 from ema_model.quantities.numbers import number
 from ema_model.quantities.titles import in_sentence
 
-_READINGS = {"current_reading": "current_A", "position_reading": "user_position_rad"}
+_READINGS = {
+    "current_reading": "current_A",
+    "position_reading": "user_position_rad",
+    "motor_angle_reading": "motor_position_rad",
+    "motor_speed_reading": "motor_speed_rad_s",
+}
 
 
 def against(data: Data, before: Fit, after: Fit, keys: Sequence[str], settled: Callable[[Fit], Fit]) -> str:
@@ -86,10 +91,9 @@ def ratio(data: Data, found: Fit) -> float:
 def _unmeasured(data: Data, key: str) -> str:
     """A sensor's error, where nothing was recorded of that sensor."""
     effect = find(catalogue_name(key))
-    for place in effect.places:
-        signal = _READINGS.get(place.__name__)
-        if signal is not None and not any(signal in one for one in data.measurements):
-            return "the signal that it falsifies was not recorded"
+    signals = [_READINGS[place.__name__] for place in effect.places if place.__name__ in _READINGS]
+    if signals and not any(signal in one for one in data.measurements for signal in signals):
+        return "the signal that it falsifies was not recorded"
     return ""
 
 

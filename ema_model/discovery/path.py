@@ -276,6 +276,8 @@ def _change(trial: Trial, parameter: str) -> Change:
 def _may_act(name: str, actuator: Actuator) -> bool:
     """Whether an effect is of something that is there: of a drive only where its controller is simulated."""
     effect = find(name)
+    if effect.turns and actuator.axes.motor == "linear":
+        return False
     kinds = actuator.controller.kind, actuator.inverter.kind
     places = {function.__name__ for function in effect.places}
     return effect.family != "drive" or not idle(places, bool(effect.states), *kinds)

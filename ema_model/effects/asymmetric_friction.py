@@ -8,7 +8,7 @@ from ema_model.physics.jit import scalar
 
 
 @scalar
-def moving_friction(level, static, omega, motor_torque, load, gear, ratio):
+def moving_friction(level, static, omega, motor_torque, load, gear, theta, user, time, ratio):
     """T_d (1 + a sgn ω)."""
     return level * (1.0 + ratio * sign(omega))
 

@@ -10,7 +10,7 @@ from ema_model.physics.jit import scalar
 
 
 @scalar
-def shaft_torque(torque, theta, omega, current, user, gear, load, amplitude, order, phase):
+def shaft_torque(torque, theta, omega, current, user, gear, load, time, amplitude, order, phase):
     """A sin(hθ + φ), added."""
     return torque + amplitude * sine(order * theta + phase)
 

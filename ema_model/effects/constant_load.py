@@ -7,7 +7,7 @@ from ema_model.physics.jit import scalar
 
 
 @scalar
-def shaft_torque(torque, theta, omega, current, user, gear, recorded, load):
+def shaft_torque(torque, theta, omega, current, user, gear, recorded, time, load):
     """− τ T_0, added."""
     return torque - gear * load
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from ema_model.errors import InputError, quoted
@@ -17,19 +17,21 @@ from ema_model.quantities.variables import VARIABLES
 __all__ = ["ADVANCE", "MOTOR", "NEITHER", "PLACES", "USER", "Effect", "Parameter"]  # what effects' files need
 
 # Where effects can act: the arguments of each place.  The first is the value that the base model, or the
-# effect before, has found there; an effect's function returns it changed.
+# effect before, has found there; an effect's function returns it changed.  time, s, counts from the recording's start.
 PLACES = {
-    "moving_friction": ("level", "static", "omega", "motor_torque", "load", "gear"),
+    "moving_friction": ("level", "static", "omega", "motor_torque", "load", "gear", "theta", "user", "time"),
     "friction": ("torque", "omega", "active", "static", "dynamic"),
     "electric_torque": ("torque", "theta", "omega", "current"),
-    "shaft_torque": ("torque", "theta", "omega", "current", "user", "gear", "load"),
+    "shaft_torque": ("torque", "theta", "omega", "current", "user", "gear", "load", "time"),
     "back_emf": ("emf", "omega", "current"),
-    "winding_resistance": ("resistance",),
+    "winding_resistance": ("resistance", "time"),
     "bus_voltage": ("volts", "current"),
     "inverse_inertia": ("inverse",),
     "user_position": ("user", "theta", "gear"),
     "position_reading": ("user",),
     "current_reading": ("current",),
+    "motor_angle_reading": ("theta",),
+    "motor_speed_reading": ("omega", "theta"),
     # the drive's controller, in the order in which it works (`ema_model.kernels.drive_step`)
     "position_error": ("error", "begins", "dt"),
     "speed_reading": ("speed", "begins", "dt"),
@@ -125,6 +127,8 @@ class Effect:
 
     `places` are scalar functions named after the place where they act (`PLACES` lists
     the places and their arguments); each takes the effect's parameters, in order, as its last arguments.
+    `placed`: parameters that are places along `against`, each with the shares of its range in the recordings at which
+    one begins to look for it; all have as many.
     """
 
     title: str
@@ -142,6 +146,8 @@ class Effect:
     duplicates: str = ""  # path of the base parameter that does the same, e.g. "motor.inertia_kgm2"
     is_load: bool = False  # pulls at the user from outside, so that its torque counts as the load
     at_speeds: tuple[float, ...] = ()  # of a first parameter that is a speed: shares of the top speed to look for it at
+    placed: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    turns: bool = False  # of a part that turns: there is none on a linear axis
     against: str = "time"  # of `quantities.variables`: what its residual follows; time where it follows nothing else
     nothing: float = 0.0  # the first parameter, the others at their defaults, with which kernels go on as without it
     name: str = ""  # of the file; the catalogue fills it in

@@ -7,7 +7,7 @@ from ema_model.physics.jit import scalar
 
 
 @scalar
-def shaft_torque(torque, theta, omega, current, user, gear, load, stiffness, offset):
+def shaft_torque(torque, theta, omega, current, user, gear, load, time, stiffness, offset):
     """− τ (H θ_user + H_0), added."""
     return torque - gear * (stiffness * user + offset)
 

@@ -10,7 +10,7 @@ from ema_model.physics.jit import scalar
 
 
 @scalar
-def shaft_torque(torque, theta, omega, current, user, gear, load, moment, angle):
+def shaft_torque(torque, theta, omega, current, user, gear, load, time, moment, angle):
     """− τ M sin(θ_user − θ_0), added."""
     return torque - gear * moment * sine(user - angle)
 

@@ -16,7 +16,7 @@ def user_position(user, theta, gear, stiffness, damping, inertia, deflection, sp
 
 @scalar
 def shaft_torque(
-    torque, theta, omega, current, user, gear, load, stiffness, damping, inertia, deflection, speed, twist
+    torque, theta, omega, current, user, gear, load, time, stiffness, damping, inertia, deflection, speed, twist
 ):
     """The twisted shaft's torque in place of the load, which acts on the user's side of it; a rigid one's as it is."""
     twisted = torque + gear * (load - twist)

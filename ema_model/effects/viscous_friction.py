@@ -7,7 +7,7 @@ from ema_model.physics.jit import scalar
 
 
 @scalar
-def shaft_torque(torque, theta, omega, current, user, gear, load, coefficient):
+def shaft_torque(torque, theta, omega, current, user, gear, load, time, coefficient):
     """− C ω, added."""
     return torque - coefficient * omega
 

@@ -7,7 +7,7 @@ from ema_model.physics.jit import scalar
 
 
 @scalar
-def winding_resistance(resistance, ratio):
+def winding_resistance(resistance, time, ratio):
     """R (1 + r)."""
     return resistance * (1.0 + ratio)
 

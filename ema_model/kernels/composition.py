@@ -25,6 +25,8 @@ __all__ = [
     "friction",
     "integral_gain",
     "inverse_inertia",
+    "motor_angle_reading",
+    "motor_speed_reading",
     "moving_friction",
     "position_error",
     "position_reading",
@@ -39,7 +41,7 @@ __all__ = [
 
 
 @scalar
-def moving_friction(level, static, omega, motor_torque, load, gear, s, first, p, i):
+def moving_friction(level, static, omega, motor_torque, load, gear, theta, user, time, s, first, p, i):
     """Friction in motion, N·m, from its Coulomb level."""
     return level
 
@@ -57,7 +59,7 @@ def electric_torque(torque, theta, omega, current, s, first, p, i):
 
 
 @scalar
-def shaft_torque(torque, theta, omega, current, user, gear, load, s, first, p, i):
+def shaft_torque(torque, theta, omega, current, user, gear, load, time, s, first, p, i):
     """Torque at the motor's shaft, friction apart, N·m, from that of motor, load and viscous drag."""
     return torque
 
@@ -69,7 +71,7 @@ def back_emf(emf, omega, current, s, first, p, i):
 
 
 @scalar
-def winding_resistance(resistance, s, first, p, i):
+def winding_resistance(resistance, time, s, first, p, i):
     """Resistance, Ω, of the equivalent winding or of a phase."""
     return resistance
 
@@ -102,6 +104,18 @@ def position_reading(user, s, first, p, i):
 def current_reading(current, s, first, p, i):
     """What the recorded equivalent current is, A."""
     return current
+
+
+@scalar
+def motor_angle_reading(theta, s, first, p, i):
+    """What the motor's encoder tells of its angle, rad."""
+    return theta
+
+
+@scalar
+def motor_speed_reading(omega, theta, s, first, p, i):
+    """What the motor's encoder tells of its speed, rad/s."""
+    return omega
 
 
 @scalar

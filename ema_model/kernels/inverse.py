@@ -24,13 +24,14 @@ _ROUNDS = 4  # effects that depend on the current itself are found by substituti
 
 
 @scalar
-def needed_current(s, p, i, theta, omega, acceleration, load, still):
+def needed_current(s, p, i, theta, omega, acceleration, load, time, still):
     """I with T(I) = J dω/dt + C ω + τ T_load + T_f sgn ω − effects on the shaft, A (T 3.13 solved for the motor).
 
     Friction's sign goes over softly below the speed `still`, rad/s, under which the direction is not known.
     """
     constant = p[TORQUE_CONSTANT * LANES + i]
     gear = p[GEAR_RATIO * LANES + i]
+    user = gear * theta
     static = p[STATIC_FRICTION * LANES + i]
     dynamic = p[DYNAMIC_FRICTION * LANES + i]
     direction = clamp(omega / still, -1.0, 1.0)
@@ -42,16 +43,18 @@ def needed_current(s, p, i, theta, omega, acceleration, load, still):
     current = base / constant
     for _ in range(_ROUNDS):
         torque = electric_torque(constant * current, theta, omega, current, s, 0, p, i)
-        resisting = direction * moving_friction(dynamic, static, omega, torque, load, gear, s, 0, p, i)
-        required = base + resisting - shaft_torque(0.0, theta, omega, current, gear * theta, gear, load, s, 0, p, i)
+        level = moving_friction(dynamic, static, omega, torque, load, gear, theta, user, time, s, 0, p, i)
+        added = shaft_torque(0.0, theta, omega, current, user, gear, load, time, s, 0, p, i)
+        required = base + direction * level - added
         current += (required - torque) / constant
     return current_reading(current, s, 0, p, i)
 
 
 @parallel_kernel
-def currents(parameters, theta, omega, acceleration, load, still, result):
-    """The current of every sample for a population: parameters (blocks, rows·LANES), the motion (samples,) each.
+def currents(parameters, theta, omega, acceleration, load, time, still, result):
+    """The current of every sample for a population: parameters (blocks, rows·LANES).
 
+    The motion, the load and the time: (samples,) each.
     result: (blocks, samples, LANES), A, written here.  Effects' own states stay at 0.
     """
     for block in numba.prange(parameters.shape[0]):
@@ -59,4 +62,6 @@ def currents(parameters, theta, omega, acceleration, load, still, result):
         s = np.zeros(_MOST_STATES * LANES)
         for n in range(theta.size):
             for i in range(LANES):
-                result[block, n, i] = needed_current(s, p, i, theta[n], omega[n], acceleration[n], load[n], still)
+                result[block, n, i] = needed_current(
+                    s, p, i, theta[n], omega[n], acceleration[n], load[n], time[n], still
+                )

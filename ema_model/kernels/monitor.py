@@ -10,10 +10,10 @@ import numba
 import numpy as np
 
 from ema_model.physics.jit import parallel_kernel
-from ema_model.physics.rows import LANES, OMEGA, THETA, TOLD
+from ema_model.physics.rows import LANES, TOLD
 
 from .drive_step import is_driven
-from .monitor_step import advance, advance_demand, sense, shown_current
+from .monitor_step import advance, advance_demand, sense, shown_angle, shown_current, shown_speed
 
 
 @parallel_kernel
@@ -96,8 +96,8 @@ def traces(states, parameters, command, load, supply, period, group, dt, result)
                         total[i] += shown_current(s, p, i)
                     step += 1
                 for i in range(LANES):
-                    total[LANES + i] += s[OMEGA * LANES + i]
-                    total[2 * LANES + i] += s[THETA * LANES + i]
+                    total[LANES + i] += shown_speed(s, p, i)
+                    total[2 * LANES + i] += shown_angle(s, p, i)
                     total[3 * LANES + i] += s[TOLD * LANES + i]
             for i in range(LANES):
                 result[block, value, 0, i] = total[i] * of_steps

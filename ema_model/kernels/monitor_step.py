@@ -40,6 +40,7 @@ from ema_model.physics.rows import (
     STOP_HIGH,
     STOP_LOW,
     THETA,
+    TIME,
     TOLD,
     TORQUE_CONSTANT,
     TORQUE_LIMIT,
@@ -57,6 +58,8 @@ from .composition import (
     electric_torque,
     friction,
     inverse_inertia,
+    motor_angle_reading,
+    motor_speed_reading,
     moving_friction,
     position_reading,
     shaft_torque,
@@ -80,8 +83,9 @@ def sense(s, p, i):
 @scalar
 def advance_demand(s, p, i, command, supply, dt):
     """What the drive of lane i asks for, in full, for the step that `advance` is about to take."""
-    told, omega = s[TOLD * LANES + i], s[OMEGA * LANES + i]
-    s[DEMAND * LANES + i] = advance_drive(s, FIRST, p, i, command, told, omega, supply, dt)
+    s[DEMAND * LANES + i] = advance_drive(
+        s, FIRST, p, i, command, s[TOLD * LANES + i], shown_speed(s, p, i), supply, dt
+    )
 
 
 @scalar
@@ -103,8 +107,9 @@ def advance(s, p, i, command, load, supply, driven, dt):
     gear = p[GEAR_RATIO * LANES + i]
     rigid = gear * play
     user = s[USER * LANES + i]
+    time = s[TIME * LANES + i]
 
-    plain = plain_demand(p, i, command, s[TOLD * LANES + i], omega)
+    plain = plain_demand(p, i, command, s[TOLD * LANES + i], motor_speed_reading(omega, theta, s, FIRST, p, i))
     demand = s[DEMAND * LANES + i] if driven else plain
 
     flux = flux_factor(
@@ -130,7 +135,7 @@ def advance(s, p, i, command, load, supply, driven, dt):
         demand,
         back_emf(p[EMF_CONSTANT * LANES + i] * flux * omega, omega, before, s, FIRST, p, i),
         p[VOLTAGE_RATIO * LANES + i] * bus_voltage(bus * supply, before, s, FIRST, p, i),
-        winding_resistance(p[RESISTANCE * LANES + i], s, FIRST, p, i),
+        winding_resistance(p[RESISTANCE * LANES + i], time, s, FIRST, p, i),
         p[INVERSE_INDUCTANCE * LANES + i],
         dt,
     )
@@ -140,9 +145,10 @@ def advance(s, p, i, command, load, supply, driven, dt):
     motor_torque = clamp(electric_torque(developed, theta, omega, current, s, FIRST, p, i), -limit, limit)
 
     passive = motor_torque - gear * load - p[VISCOUS * LANES + i] * omega
-    active = shaft_torque(passive, theta, omega, current, user, gear, load, s, FIRST, p, i)
+    active = shaft_torque(passive, theta, omega, current, user, gear, load, time, s, FIRST, p, i)
     static = p[STATIC_FRICTION * LANES + i]
-    dynamic = moving_friction(p[DYNAMIC_FRICTION * LANES + i], static, omega, motor_torque, load, gear, s, FIRST, p, i)
+    level = p[DYNAMIC_FRICTION * LANES + i]
+    dynamic = moving_friction(level, static, omega, motor_torque, load, gear, theta, user, time, s, FIRST, p, i)
     resisting = friction(
         borello_friction(omega, active, static, dynamic), omega, active, static, dynamic, s, FIRST, p, i
     )
@@ -168,6 +174,7 @@ def advance(s, p, i, command, load, supply, driven, dt):
     s[SIN_ELECTRICAL * LANES + i] = sin_2e1
     s[COS_ELECTRICAL * LANES + i] = cos_2e1
     s[CURRENT * LANES + i] = current
+    s[TIME * LANES + i] = time + dt
     advance_states(
         dt,
         theta,
@@ -192,3 +199,15 @@ def advance(s, p, i, command, load, supply, driven, dt):
 def shown_current(s, p, i):
     """The equivalent current as its sensor shows it, A."""
     return current_reading(s[CURRENT * LANES + i], s, FIRST, p, i)
+
+
+@scalar
+def shown_angle(s, p, i):
+    """The motor's angle as its encoder shows it, rad."""
+    return motor_angle_reading(s[THETA * LANES + i], s, FIRST, p, i)
+
+
+@scalar
+def shown_speed(s, p, i):
+    """The motor's speed as its encoder shows it, rad/s."""
+    return motor_speed_reading(s[OMEGA * LANES + i], s[THETA * LANES + i], s, FIRST, p, i)

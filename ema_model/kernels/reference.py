@@ -10,7 +10,7 @@ import numpy as np
 from ema_model.physics.jit import kernel
 from ema_model.physics.rows import BUS_VOLTAGE, GEAR_RATIO, LANES, VOLTAGE_RATIO
 
-from .composition import current_reading, position_reading, user_position
+from .composition import current_reading, motor_angle_reading, motor_speed_reading, position_reading, user_position
 from .drive_step import is_driven
 from .reference_step import CONSTANT, FIRST, STATE, advance, advance_demand, begun, constants
 
@@ -59,8 +59,8 @@ def run(state, p, command, load, period, substeps, dt, result):
                 user_load += load_step
         theta, play = x[0], x[2]
         result[sample, 0] = mean_q * scale
-        result[sample, 1] = x[1]
-        result[sample, 2] = theta
+        result[sample, 1] = motor_speed_reading(x[1], theta, s, FIRST, p, 0)
+        result[sample, 2] = motor_angle_reading(theta, s, FIRST, p, 0)
         result[sample, 3] = position_reading(user_position(tau * play, theta, tau, s, FIRST, p, 0), s, FIRST, p, 0)
         result[sample, 4] = mean_a * scale
         result[sample, 5] = mean_b * scale
@@ -126,9 +126,6 @@ def runs(state, p, command, load, period, substeps, dt, result):
                             kept[2 * RUNS + i],
                             kept[3 * RUNS + i],
                             kept[4 * RUNS + i],
-                            kept[5 * RUNS + i],
-                            kept[6 * RUNS + i],
-                            kept[7 * RUNS + i],
                         ),
                         s,
                         p,
@@ -158,6 +155,6 @@ def runs(state, p, command, load, period, substeps, dt, result):
             theta, play, tau = x[i], x[2 * RUNS + i], p[GEAR_RATIO * LANES + i]
             user = user_position(tau * play, theta, tau, s, FIRST, p, i)
             result[sample, 0, i] = mean[i] * scale
-            result[sample, 1, i] = x[RUNS + i]
-            result[sample, 2, i] = theta
+            result[sample, 1, i] = motor_speed_reading(x[RUNS + i], theta, s, FIRST, p, i)
+            result[sample, 2, i] = motor_angle_reading(theta, s, FIRST, p, i)
             result[sample, 3, i] = position_reading(user, s, FIRST, p, i)

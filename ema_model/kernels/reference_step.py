@@ -47,6 +47,7 @@ from ema_model.physics.rows import (
     STOP_HIGH,
     STOP_LOW,
     THETA,
+    TIME,
     TORQUE_CONSTANT,
     TORQUE_LIMIT,
     TURNS_A,
@@ -63,6 +64,7 @@ from .composition import (
     electric_torque,
     friction,
     inverse_inertia,
+    motor_speed_reading,
     moving_friction,
     position_reading,
     shaft_torque,
@@ -72,14 +74,13 @@ from .composition import (
 from .drive_step import advance_drive, plain_demand
 
 STATE = 14  # numbers in the state
-CONSTANT = 8
+CONSTANT = 5
 FIRST = len(REFERENCE_STATE_ROWS)  # row of the effects' own states
 
 
 @scalar
 def constants(s, p, i):
-    """What stays as it is over a run of lane i: the inertia, the windings (R_i = N_i R, L_i = N_i² L)."""
-    winding = winding_resistance(p[RESISTANCE * LANES + i], s, FIRST, p, i)
+    """What stays as it is over a run of lane i: the inertia, the windings' inductances (L_i = N_i² L)."""
     inverse = p[INVERSE_INDUCTANCE * LANES + i]
     turns_a, turns_b, turns_c = p[TURNS_A * LANES + i], p[TURNS_B * LANES + i], p[TURNS_C * LANES + i]
     inverse_a = inverse / (turns_a * turns_a)
@@ -91,9 +92,6 @@ def constants(s, p, i):
         inverse_a,
         inverse_b,
         inverse_c,
-        winding * turns_a,
-        winding * turns_b,
-        winding * turns_c,
     )
 
 
@@ -102,7 +100,8 @@ def advance_demand(theta, play, omega, s, p, i, demand, dt):
     """What the drive of lane i asks for, in full, for the step that `advance` is about to take."""
     tau = p[GEAR_RATIO * LANES + i]
     told = position_reading(user_position(tau * play, theta, tau, s, FIRST, p, i), s, FIRST, p, i)
-    s[DEMAND * LANES + i] = advance_drive(s, FIRST, p, i, demand, told, omega, 1.0, dt)
+    read = motor_speed_reading(omega, theta, s, FIRST, p, i)
+    s[DEMAND * LANES + i] = advance_drive(s, FIRST, p, i, demand, told, read, 1.0, dt)
 
 
 @scalar
@@ -113,15 +112,16 @@ def advance(state, constant, s, p, i, demand, load, driven, dt):
     equivalent current); s: of which the drive's and the effects' rows are renewed.
     """
     theta, omega, play, sin_r, cos_r, sin_e, cos_e, current_a, current_b, current_c, leg_a, leg_b, leg_c, q = state
-    inertia, star, inverse_a, inverse_b, inverse_c, resistance_a, resistance_b, resistance_c = constant
+    inertia, star, inverse_a, inverse_b, inverse_c = constant
     tau = p[GEAR_RATIO * LANES + i]
     limit = p[TORQUE_LIMIT * LANES + i]
     emf = p[EMF_CONSTANT * LANES + i]
     static = p[STATIC_FRICTION * LANES + i]
+    time = s[TIME * LANES + i]
     rigid = tau * play
     user = user_position(rigid, theta, tau, s, FIRST, p, i)
     told = position_reading(user, s, FIRST, p, i)
-    plain = plain_demand(p, i, demand, told, omega)
+    plain = plain_demand(p, i, demand, told, motor_speed_reading(omega, theta, s, FIRST, p, i))
     current_ref = s[DEMAND * LANES + i] if driven else plain
 
     amplitude = -(2.0 / 3.0) * current_ref
@@ -136,15 +136,15 @@ def advance(state, constant, s, p, i, demand, load, driven, dt):
         sin_r, cos_r, p[ECCENTRICITY * LANES + i], p[ECCENTRICITY_COS * LANES + i], p[ECCENTRICITY_SIN * LANES + i]
     )
     volts = p[VOLTAGE_RATIO * LANES + i] * bus_voltage(p[BUS_VOLTAGE * LANES + i], q, s, FIRST, p, i)
-    k_a, k_b, k_c = winding_coefficients(
-        sin_e, cos_e, gap_a, gap_b, gap_c, p[TURNS_A * LANES + i], p[TURNS_B * LANES + i], p[TURNS_C * LANES + i]
-    )
+    turns_a, turns_b, turns_c = p[TURNS_A * LANES + i], p[TURNS_B * LANES + i], p[TURNS_C * LANES + i]
+    k_a, k_b, k_c = winding_coefficients(sin_e, cos_e, gap_a, gap_b, gap_c, turns_a, turns_b, turns_c)
+    winding = winding_resistance(p[RESISTANCE * LANES + i], time, s, FIRST, p, i)  # R_i = N_i R
     against_a = back_emf(emf * k_a * omega, omega, current_a, s, FIRST, p, i)
-    drive_a = leg_a * volts - resistance_a * current_a - against_a
+    drive_a = leg_a * volts - winding * turns_a * current_a - against_a
     against_b = back_emf(emf * k_b * omega, omega, current_b, s, FIRST, p, i)
-    drive_b = leg_b * volts - resistance_b * current_b - against_b
+    drive_b = leg_b * volts - winding * turns_b * current_b - against_b
     against_c = back_emf(emf * k_c * omega, omega, current_c, s, FIRST, p, i)
-    drive_c = leg_c * volts - resistance_c * current_c - against_c
+    drive_c = leg_c * volts - winding * turns_c * current_c - against_c
     neutral = star * (drive_a * inverse_a + drive_b * inverse_b + drive_c * inverse_c)
     current_a += dt * inverse_a * (drive_a - neutral)
     current_b += dt * inverse_b * (drive_b - neutral)
@@ -154,8 +154,9 @@ def advance(state, constant, s, p, i, demand, load, driven, dt):
     developed = p[TORQUE_CONSTANT * LANES + i] * (k_a * current_a + k_b * current_b + k_c * current_c)
     motor_torque = clamp(electric_torque(developed, theta, omega, q, s, FIRST, p, i), -limit, limit)
     passive = motor_torque - tau * load - p[VISCOUS * LANES + i] * omega
-    active = shaft_torque(passive, theta, omega, q, user, tau, load, s, FIRST, p, i)
-    dynamic = moving_friction(p[DYNAMIC_FRICTION * LANES + i], static, omega, motor_torque, load, tau, s, FIRST, p, i)
+    active = shaft_torque(passive, theta, omega, q, user, tau, load, time, s, FIRST, p, i)
+    level = p[DYNAMIC_FRICTION * LANES + i]
+    dynamic = moving_friction(level, static, omega, motor_torque, load, tau, theta, user, time, s, FIRST, p, i)
     resisting = friction(
         borello_friction(omega, active, static, dynamic), omega, active, static, dynamic, s, FIRST, p, i
     )
@@ -167,6 +168,7 @@ def advance(state, constant, s, p, i, demand, load, driven, dt):
     sin_e, cos_e = rotate(sin_e, cos_e, p[POLE_PAIRS * LANES + i] * turned)
     play1 = advance_play(play, theta1, p[HALF_PLAY * LANES + i])
     step = tau * (play1 - play)
+    s[TIME * LANES + i] = time + dt
     advance_states(dt, theta, omega, rigid, tau * play1, step, tau, load, active, static, dynamic, s, FIRST, p, i)
     return (
         theta1,

@@ -129,6 +129,7 @@ class ClosedLoop:
             start_speed_rad_s=window.speed_rad_s,
             start_play_rad=window.play_rad,
             start_integral_Nm=float(window.integral_Nm(actuator, k)),
+            start_time_s=window.begins_s,
         )
         measured = self._measured(window, actuator, {name: shown[name][None, 1:] for name in COMPARED})
         return {name: values[0] for name, values in measured.items()}
@@ -160,6 +161,7 @@ class ClosedLoop:
             start_speed_rad_s=window.speed_rad_s,
             start_play_rad=window.play_rad + np.asarray(play_rad),
             start_integral_Nm=window.integral_Nm(actuator, k, turned_rad, play_rad),
+            start_time_s=window.begins_s,
         )
         return self._measured(window, actuator, shown)
 
@@ -207,6 +209,7 @@ class ClosedLoop:
             window.play_rad + np.asarray(play_rad),
             self.stack,
             window.integral_Nm(actuator, k, turned_rad, play_rad),
+            window.begins_s,
         )
         wait_for(self.stack, "traces")
         lanes = np.empty((4, len(k), window.blocks))

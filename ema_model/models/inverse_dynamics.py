@@ -134,6 +134,7 @@ class InverseDynamics:
                 window.speed[part],
                 acceleration[part],
                 window.load[part],
+                window.since_s[part],
                 window.still,
                 result,
             )

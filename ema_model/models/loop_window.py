@@ -40,6 +40,7 @@ class LoopWindow(Window):
     speed_rad_s: float
     play_rad: float  # place in the play, rad at the motor
     current_A: float  # that the drive wanted
+    begins_s: float  # since the recording's start
 
     def integral_Nm(
         self, actuator: Actuator, k: ArrayLike, turned_rad: ArrayLike = 0.0, play_rad: ArrayLike = 0.0
@@ -122,6 +123,7 @@ def cut(
                 speed_rad_s=speed,
                 play_rad=play,
                 current_A=current,
+                begins_s=float(measurement.time_s[run.start] - measurement.time_s[0]),
                 values=values,
             )
         )

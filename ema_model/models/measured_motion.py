@@ -48,6 +48,7 @@ class Stretch(Window):
     position: Array  # (samples,), motor, rad
     speed: Array  # (samples,), rad/s, hardly filtered
     load: Array  # (samples,), N·m at the user
+    since_s: Array  # (samples,), since the recording's start
     still: float  # rad/s
     sensor_noise: dict[str, float]  # rms per block
     passed: float  # of a sample's white noise, by the filter and the mean over a block
@@ -131,6 +132,9 @@ def stretches_of(
                 position=position,
                 speed=speed,
                 load=np.zeros_like(position) if load is None else load[run],
+                since_s=np.zeros_like(position)
+                if measurement.is_map
+                else measurement.time_s[run] - measurement.time_s[0],
                 still=still,
                 command=None,
                 measured={target: measured},

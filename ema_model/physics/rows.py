@@ -104,6 +104,7 @@ STATE_ROWS = (
     "user",  # where the user stands, rad
     "told",  # what the position sensor tells of it, rad
     "begun",  # 0 before the drive's first step, then 1
+    "time",  # since the recording's start, s
     "demand",  # what the drive asks for in this step, where more than the plain cascade acts: A, or a share of the bus
 )
 (
@@ -120,6 +121,7 @@ STATE_ROWS = (
     USER,
     TOLD,
     BEGUN,
+    TIME,
     DEMAND,
 ) = range(len(STATE_ROWS))
 

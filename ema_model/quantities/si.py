@@ -22,6 +22,7 @@ _SMALL, _ALL_SIZES = "mµ", "mµk"
 _TABLE = (
     SiUnit("N·m·s²/rad", "Nms2_rad", "N·s²/m"),
     SiUnit("N·m·s/rad", "Nms_rad", "N·s/m"),
+    SiUnit("N·m/rad³", "Nm_rad3", "N/m³"),
     SiUnit("N·m/rad", "Nm_rad", "N/m"),
     SiUnit("N·m/A", "Nm_A", "N/A"),
     SiUnit("kg·m²", "kgm2", "kg"),
@@ -33,6 +34,7 @@ _TABLE = (
     # of linear axes
     SiUnit("N·s²/m", "Ns2_m"),
     SiUnit("N·s/m", "Ns_m"),
+    SiUnit("N/m³", "N_m3"),
     SiUnit("N/m", "N_m"),
     SiUnit("N/A", "N_A"),
     SiUnit("kg", "kg"),
@@ -43,6 +45,7 @@ _TABLE = (
     SiUnit("N", "N", prefixes=_ALL_SIZES),
     # of both
     SiUnit("1/s", "1_s"),
+    SiUnit("1/A", "1_A"),
     SiUnit("Ω", "Ohm"),
     SiUnit("Hz", "Hz"),
     SiUnit("H", "H"),

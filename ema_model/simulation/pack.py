@@ -94,15 +94,17 @@ def initial_state(
     play: ArrayLike = 0.0,
     stack: Stack | None = None,
     integral_Nm: ArrayLike = 0.0,
+    time_s: float = 0.0,
 ) -> Array:
     """State of the Monitor Model at the start, (blocks, rows·LANES); the states of the stack's effects are 0.
 
     user_rad: where the motor stands, as a user's angle; speed_rad_s: the motor's; play: where the user
     stands within the backlash, rad at the motor, 0 in the middle; integral_Nm: what the speed loop's integral action
-    has come to (see `integral_at_start`).
+    has come to (see `integral_at_start`); time_s: since the recording's start.
     """
     rows = STATE_ROWS + (stack.states if stack else ())
-    return _state(actuator, blocks, rows, 2.0 * actuator.motor.pole_pairs, user_rad, speed_rad_s, play, integral_Nm)
+    start = user_rad, speed_rad_s, play, integral_Nm, time_s
+    return _state(actuator, blocks, rows, 2.0 * actuator.motor.pole_pairs, *start)
 
 
 def initial_reference_state(
@@ -112,10 +114,12 @@ def initial_reference_state(
     play: ArrayLike = 0.0,
     stack: Stack | None = None,
     integral_Nm: ArrayLike = 0.0,
+    time_s: float = 0.0,
 ) -> Array:
     """The same for the Reference Model, (rows·LANES,)."""
     rows = REFERENCE_STATE_ROWS + (stack.states if stack else ())
-    return _state(actuator, 1, rows, actuator.motor.pole_pairs, user_rad, speed_rad_s, play, integral_Nm)[0]
+    start = user_rad, speed_rad_s, play, integral_Nm, time_s
+    return _state(actuator, 1, rows, actuator.motor.pole_pairs, *start)[0]
 
 
 def integral_at_start(
@@ -153,6 +157,7 @@ def _state(
     speed_rad_s: ArrayLike,
     play: ArrayLike,
     integral_Nm: ArrayLike,
+    time_s: float,
 ) -> Array:
     transmission = actuator.transmission
     held = np.clip(np.asarray(user_rad, dtype=float), transmission.stop_low_rad, transmission.stop_high_rad)
@@ -167,6 +172,7 @@ def _state(
         "sin_electrical": np.sin(electrical * rotor),
         "cos_electrical": np.cos(electrical * rotor),
         "integral": integral_Nm,
+        "time": time_s,
     }
     state = np.zeros((blocks, len(rows), LANES))
     for name, value in values.items():

@@ -91,7 +91,7 @@ def compile_here(stack: Stack, kernel: str) -> None:
         exclusive(stack.monitor.traces, state, rows, samples, samples, samples, 1, 1, actuator.step_s, result)
     elif kernel == "currents":
         result = np.empty((len(rows), 1, LANES))
-        exclusive(stack.inverse.currents, rows, samples, samples, samples, samples, 1.0, result)
+        exclusive(stack.inverse.currents, rows, samples, samples, samples, samples, samples, 1.0, result)
     else:
         rows = reference_rows(actuator, HEALTHY, stack, {})
         state, pair = initial_reference_state(actuator, stack=stack), np.zeros(2)

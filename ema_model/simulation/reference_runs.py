@@ -30,6 +30,7 @@ def simulate_references(
     start_speed_rad_s: ArrayLike,
     start_play_rad: ArrayLike,
     start_integral_Nm: ArrayLike,
+    start_time_s: float,
 ) -> dict[str, Array]:
     """Signals of `SHOWN` after the start, for k (n, 8): (n, samples) each, as `simulate_reference` gives for one.
 
@@ -46,7 +47,9 @@ def simulate_references(
     load = np.broadcast_to(np.asarray(load_Nm, dtype=float), len(k))
     result = np.empty((run.samples, len(SHOWN), lanes))
     stack.reference.runs(
-        initial_reference_state(actuator, start_rad, start_speed_rad_s, start_play_rad, stack, start_integral_Nm),
+        initial_reference_state(
+            actuator, start_rad, start_speed_rad_s, start_play_rad, stack, start_integral_Nm, start_time_s
+        ),
         reference_rows(actuator, k, stack, effects),
         command.at(times),
         np.pad(load, (0, lanes - len(k)), mode="edge"),

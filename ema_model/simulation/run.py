@@ -110,12 +110,14 @@ def simulate_reference(
     start_speed_rad_s: float = 0.0,
     start_play_rad: float = 0.0,
     start_integral_Nm: float = 0.0,
+    start_time_s: float = 0.0,
     voltages: bool = False,
 ) -> Measurement:
     """The three-phase Reference Model's signals; with `voltages`, also the legs' (V, against the bus's middle).
 
     k: without it, the actuator's own.  It starts at start_rad, a user's angle, or where the command starts; with a
-    motor speed, at a place in the play (rad at the motor), and with a speed loop's integral action, all 0 unless given.
+    motor speed, at a place in the play (rad at the motor), with a speed loop's integral action, and so long after the
+    recording's start, all 0 unless given.
     Raises InputError for settings of effects that do not exist, FloatingPointError if the model diverges.
     """
     effects = {name: find(name, actuator.axes).settings(dict(given)) for name, given in (effects or {}).items()}
@@ -132,7 +134,9 @@ def simulate_reference(
     result = np.empty((run.samples, 11))
     wait_for(stack, "run")
     stack.reference.run(
-        initial_reference_state(actuator, start, start_speed_rad_s, start_play_rad, stack, start_integral_Nm),
+        initial_reference_state(
+            actuator, start, start_speed_rad_s, start_play_rad, stack, start_integral_Nm, start_time_s
+        ),
         reference_rows(actuator, actuator.k if k is None else k, stack, effects),
         demand,
         load,

@@ -21,7 +21,7 @@ _LINES = {
     "current": "L di/dt = v − R i − k_e ω",
     "friction": "T_f = T_s at rest, T_d sgn ω in motion",
     "output": "θ_user = τ θ, with play",
-    "sensors": "read: θ_user, i",
+    "sensors": "read: θ_user, θ, ω, i",
     "drive": "I_ref = sat(K_P (ω_ref − ω) + K_I ∫(ω_ref − ω) dt), ω_ref = sat(G (θ_cmd − θ_user))",
 }
 _OF_PLACE = {
@@ -36,6 +36,8 @@ _OF_PLACE = {
     "user_position": "output",
     "position_reading": "sensors",
     "current_reading": "sensors",
+    "motor_angle_reading": "sensors",
+    "motor_speed_reading": "sensors",
     **dict.fromkeys(STAGES, "drive"),
 }
 

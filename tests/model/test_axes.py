@@ -275,7 +275,7 @@ from ema_model.physics.jit import scalar
 
 
 @scalar
-def shaft_torque(torque, theta, omega, current, user, gear, load, stiffness):
+def shaft_torque(torque, theta, omega, current, user, gear, load, time, stiffness):
     """− τ K θ_user, added."""
     return torque - gear * stiffness * user
 

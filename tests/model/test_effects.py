@@ -44,6 +44,11 @@ SHOWN = {
     "speed_loop_integral": (SINE, "motor_position_rad"),
     "bus_voltage_sag": (SATURATING, "motor_speed_rad_s"),
     "dead_time": (SATURATING, "motor_speed_rad_s"),
+    "encoder_eccentricity": (SINE, "motor_position_rad"),
+    "position_sensor_eccentricity": (SINE, "motor_position_rad"),
+    "position_sensor_gain": (SINE, "motor_position_rad"),
+    "position_sensor_nonlinearity": (SINE, "motor_position_rad"),
+    "resistance_drift": (SATURATING, "motor_speed_rad_s"),
     "winding_resistance": (SATURATING, "motor_speed_rad_s"),
     "gear_load_friction": (LOADED_SINE, "current_A"),
     "position_sensor_bias": (SINE, "motor_position_rad"),
@@ -211,7 +216,9 @@ def test_presliding_friction_of_steady_sliding_is_dynamic_friction():
 
 def test_asymmetric_friction_takes_its_share_each_way():
     law = CATALOGUE["asymmetric_friction"].places[0]
-    assert [law(0.05, 0.1, omega, 0.0, 0.0, GEAR, 0.2) for omega in (3.0, -3.0)] == pytest.approx([0.06, 0.04])
+    assert [law(0.05, 0.1, omega, 0.0, 0.0, GEAR, 0.0, 0.0, 0.0, 0.2) for omega in (3.0, -3.0)] == pytest.approx(
+        [0.06, 0.04]
+    )
 
 
 def test_bus_voltage_never_turns_round():

@@ -104,7 +104,7 @@ def needed(stack: Stack, effects: Effects) -> np.ndarray:
     motion = [50.0 * np.sin(2.0 * np.pi * time + phase) for phase in (0.0, 1.0, 2.0)]
     result = np.empty((1, 500, LANES))
     rows = monitor_rows(ACTUATOR, population()[:LANES], stack, effects)
-    exclusive(stack.inverse.currents, rows, *motion, np.full(500, LOAD_NM), 0.1, result)
+    exclusive(stack.inverse.currents, rows, *motion, np.full(500, LOAD_NM), np.zeros(500), 0.1, result)
     return result[0].T
 
 

@@ -187,7 +187,7 @@ turn = np.linspace(0.0, 6.0, 200)
 motion = [turn, 50.0 * np.sin(turn), 20.0 * np.cos(turn)]
 needed = np.empty((1, 200, LANES))
 rows = monitor_rows(load_actuator(), HEALTHY, stack, effects)
-exclusive(stack.inverse.currents, rows, *motion, np.full(200, 5.0), 0.1, needed)
+exclusive(stack.inverse.currents, rows, *motion, np.full(200, 5.0), np.zeros(200), 0.1, needed)
 print("RESULT", repr(float((needed ** 2).mean())))
 """
 

@@ -36,7 +36,7 @@ def torques(effect: Effect, theta, omega, current, user, *own) -> np.ndarray:
     """The effect's torque, N·m, at each of the points (n,), through its compiled function."""
     shaft_torque = effect.places[0]
     points = zip(theta, omega, current, user)
-    return np.array([shaft_torque(0.0, x, w, q, u, 0.01, 0.0, *own) for x, w, q, u in points])
+    return np.array([shaft_torque(0.0, x, w, q, u, 0.01, 0.0, 0.0, *own) for x, w, q, u in points])
 
 
 def points(n: int = 300) -> list[np.ndarray]:
@@ -79,9 +79,9 @@ def test_values_are_those_of_numpy(text, expected):
 def test_large_exponentials_keep_their_relative_accuracy():
     shaft_torque = user_torque("exp(theta)").places[0]
     x = np.linspace(-700.0, 700.0, 401)
-    found = np.array([shaft_torque(0.0, one, 0.0, 0.0, 0.0, 0.0, 0.0) for one in x])
+    found = np.array([shaft_torque(0.0, one, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0) for one in x])
     np.testing.assert_allclose(found, np.exp(x), rtol=1e-9)
-    assert shaft_torque(0.0, -800.0, 0.0, 0.0, 0.0, 0.0, 0.0) == 0.0
+    assert shaft_torque(0.0, -800.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0) == 0.0
 
 
 @pytest.mark.parametrize(("modulator", "factor"), [

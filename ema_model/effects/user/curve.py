@@ -16,10 +16,17 @@ from ema_model.errors import InputError, quoted
 from ema_model.quantities.variables import VARIABLES
 
 MOST_KNOTS = 24
-_ARGUMENTS = {"theta": "theta", "omega": "omega", "user": "user", "q": "current", "load": "load"}
-OF_VARIABLE = {"motor_angle": "theta", "motor_speed": "omega", "user_position": "user", "current": "q", "load": "load"}
+_ARGUMENTS = {"theta": "theta", "omega": "omega", "user": "user", "q": "current", "load": "load", "t": "time"}
+OF_VARIABLE = {
+    "motor_angle": "theta",
+    "motor_speed": "omega",
+    "user_position": "user",
+    "current": "q",
+    "load": "load",
+    "time": "t",
+}
 _UNITS = {name: VARIABLES[variable].unit for variable, name in OF_VARIABLE.items()}
-_SYMBOLS = {"theta": "θ", "omega": "ω", "user": "θ_user", "q": "q", "load": "T_load"}
+_SYMBOLS = {"theta": "θ", "omega": "ω", "user": "θ_user", "q": "q", "load": "T_load", "t": "t"}
 _FACTORS = {"1": "", "sign_speed": " * sign_of(omega)", "current": " * current"}
 _SHOWN = {"1": "", "sign_speed": " sgn ω", "current": " q"}
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 
 from ema_model.effects import NEITHER, Parameter, register
-from ema_model.effects.effect import ADVANCE, PLACES
+from ema_model.effects.effect import PLACES
 from ema_model.effects.user.expression import VARIABLES, Expression, Node, parse
 from ema_model.effects.user.module import generated_module
 from ema_model.effects.user.user_effect import UserEffect
@@ -33,7 +33,7 @@ def user_torque(text: str, ranges: Mapping[str, tuple[float, float]] | None = No
     """The effect of a torque in N·m, added at the shaft; it is registered, so that models find it by its name.
 
     text: see `expression.parse`; its parameters are 1 by default (or the nearest to it) in `ranges`, else −1000 … 1000.
-    t counts from the start of a run or window; inverse dynamics, which has no course of time, keeps it at 0.
+    t counts from the recording's start.
     The same expression given again takes the place of the one before.
     Raises InputError for a text that is no expression, and for ranges of no parameter or without width.
     """
@@ -46,7 +46,6 @@ def user_torque(text: str, ranges: Mapping[str, tuple[float, float]] | None = No
         if not (math.isfinite(low) and math.isfinite(high) and low < high):
             raise InputError(f"the range of {name} must go from a number to a larger one, not from {low} to {high}")
     name, module = generated_module("user_torque", kernels(expression), expression.parameters)
-    timed = "t" in expression.variables
     return register(
         UserEffect(
             title="User's torque",
@@ -64,8 +63,6 @@ def user_torque(text: str, ranges: Mapping[str, tuple[float, float]] | None = No
             shows="as the expression says",
             mistaken_for="",
             family="mechanics",
-            states=("time_s",) if timed else (),
-            advance_states=module.advance_states if timed else None,
             name=name,
             kind="user_torque",
             definition={"expression": expression.text},
@@ -81,25 +78,21 @@ def _parameter(name: str, limits: tuple[float, float]) -> Parameter:
 def kernels(expression: Expression) -> str:
     """Source of the effect's functions, made from the checked nodes alone; a torque without value fails the run."""
     own = [f"p{index}" for index in range(len(expression.parameters))]
-    states = ["time"] if "t" in expression.variables else []
     lines: list[str] = []
     value = _emit(expression.root, lines, {})
     source = [
         "@scalar",
-        f"def shaft_torque({', '.join([*PLACES['shaft_torque'], *own, *states])}):",
+        f"def shaft_torque({', '.join([*PLACES['shaft_torque'], *own])}):",
         *lines,
         # An infinite torque becomes NaN here: an end stop would hold the rotor and hide it.
         f"    return torque + ({value} + 0.0 * {value})",
         "",
         "",
         "@scalar",
-        f"def user_position({', '.join([*PLACES['user_position'], *own, *states])}):",
+        f"def user_position({', '.join([*PLACES['user_position'], *own])}):",
         # The play and the clamps of a controlled drive would hold back a NaN of the angle, and the current look sound.
         "    return user + 0.0 * theta",
     ]
-    if states:
-        head = f"def advance_states({', '.join([*ADVANCE, *own, *states])}):"
-        source += ["", "", "@scalar", head, "    return (time + dt,)"]
     return "\n".join([*source, ""])
 
 

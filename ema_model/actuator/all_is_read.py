@@ -61,6 +61,8 @@ def _check_effect_acts(actuator: Actuator, name: str, where: str) -> None:
     effect = find(name)
     places = {function.__name__ for function in effect.places}
     reason = idle(places, bool(effect.states), actuator.controller.kind, actuator.inverter.kind)
+    if not effect.has_part(actuator.axes):
+        reason = "on a linear axis nothing turns that it could be of"
     if reason:
         raise InputError(f"{where}: effects.{name}: {reason}; leave it out")
 

@@ -95,7 +95,7 @@ def compare(
         _compared(i, recordings[i], cards[i], plant, floors, before, after, actuator) for i in range(len(recordings))
     ]
     errors = _together(compared)
-    judgement = judge(residuals, errors, calibration if calibrate else None, actuator)
+    judgement = judge(residuals, errors, calibration if calibrate else None, actuator, [one.name for one in recordings])
     held: Sequence[Compared] = ()
     if unseen:
         tell("holding it against what was not fitted")
@@ -110,6 +110,7 @@ def compare(
         explained_by=judgement.explained_by,
         orders=judgement.orders,
         worst_regions=judgement.worst_regions,
+        events=judgement.events,
         adequate=judgement.adequate,
         sentences=judgement.sentences,
         warnings=judgement.warnings,

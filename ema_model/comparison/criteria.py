@@ -10,3 +10,9 @@ SLOW = 2.0
 # Healthy three-phase plants leave 0.70 … 0.76, a healthy hobby servo 0.93 … 1.04, a drive that the file does not
 # describe 2.7 … 67 (tests/discovery/test_discovery_study.py, test_foreign_rig_study.py).
 BAND = 1.25
+
+# Of what is left of a signal beyond its floor in one recording, that a step at one moment must explain to be told (one
+# in the middle is half a step and half an offset, which a parameter may take up); of
+# what a parabola over time explains, how many times as much it must explain; and of its standard deviation, how many
+# times it must be (some hundred moments are tried).  Studied in tests/comparison/test_events.py.
+EVENT_SHARE, EVENT_BEYOND_DRIFT, EVENT_T = 0.4, 1.2, 6.0

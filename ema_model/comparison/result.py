@@ -16,6 +16,7 @@ from ema_model.text import InWords
 
 if TYPE_CHECKING:
     from ema_model.actuator import Actuator
+    from ema_model.comparison.events import Event
     from ema_model.comparison.orders import Order
     from ema_model.estimation.calibrate import Calibration
     from ema_model.recordings import Measurement
@@ -85,4 +86,5 @@ class Comparison(InWords):
     adequate: bool
     sentences: Sequence[str]  # the answer in plain words, the first one first
     warnings: Sequence[str] = field(default_factory=tuple)
+    events: Sequence[Event] = field(default_factory=tuple)  # what happened at one moment of a recording
     holdout: Sequence[Compared] = field(default_factory=tuple)  # not fitted, beside the calibrated model

@@ -27,6 +27,21 @@ def order_sentence(order: float, amplitude: float, of: Quantity) -> str:
     return f"What is missing repeats {times} a turn with an amplitude of {of.scaled(amplitude).text(amplitude)}."
 
 
+def event_sentence(signal: str, axes: Axes, recording: str, time_s: float, change: float, by_direction: bool) -> str:
+    """One line on a step of a signal at one moment of a recording; change: measured less model, after less before."""
+    told = of_residual(signal, axes, None)
+    size, title = told.scaled(change).text(abs(change)), in_sentence(SIGNALS[signal].title)
+    when = f"From {number(time_s)} s of {recording or 'the recording'} on"
+    higher = "higher" if change > 0.0 else "lower"
+    if by_direction:
+        return f"{when}, the {title} is {size} {higher} in the direction of motion than before: a change of friction."
+    if SIGNALS[signal].kind in ("current", "torque", "force"):
+        return (
+            f"{when}, the {title} is {size} {higher} than before: a load that came on or off, or a sensor that jumped."
+        )
+    return f"{when}, the {title} is {size} {higher} than before: a position sensor that jumped."
+
+
 def region_sentence(
     signal: str,
     variable: str,

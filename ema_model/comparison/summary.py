@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ema_model.actuator.naming import on_axes
+from ema_model.comparison.events import Event
 from ema_model.comparison.result import Comparison, SignalError
 from ema_model.estimation import Calibrated, Calibration
 from ema_model.quantities.axes import Axes
@@ -50,6 +51,7 @@ def as_dict(comparison: Comparison) -> dict[str, Any]:
                 }
                 for one in comparison.worst_regions
             ],
+            "events": [event_dict(one) for one in comparison.events],
             "recordings": [
                 {
                     "name": one.name,
@@ -65,6 +67,19 @@ def as_dict(comparison: Comparison) -> dict[str, Any]:
             ],
         }
     )
+
+
+def event_dict(one: Event) -> dict[str, Any]:
+    """A step at one moment of a recording."""
+    return {
+        "recording": one.name,
+        "time_s": one.time_s,
+        "signal": one.signal,
+        "change": one.change,
+        "by_direction": one.by_direction,
+        "share": one.share,
+        "sentence": one.sentence,
+    }
 
 
 def _error(error: SignalError) -> dict[str, float]:

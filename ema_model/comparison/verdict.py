@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ema_model.actuator import Actuator
 from ema_model.actuator.naming import on_axes
 from ema_model.comparison.criteria import BAND, SLOW
+from ema_model.comparison.events import Event, events
 from ema_model.comparison.explain import Explanation, explain, used_blocks
 from ema_model.comparison.orders import Order, residual_orders
 from ema_model.comparison.regions import worst_regions
@@ -38,15 +39,23 @@ class Judgement:
     explained_by: Sequence[Explanation]
     orders: Sequence[Order]
     worst_regions: Sequence[Region]
+    events: Sequence[Event]
     adequate: bool
     sentences: Sequence[str]
     warnings: Sequence[str]
 
 
 def judge(
-    residuals: Residuals, errors: Mapping[str, SignalError], calibration: Calibration | None, actuator: Actuator
+    residuals: Residuals,
+    errors: Mapping[str, SignalError],
+    calibration: Calibration | None,
+    actuator: Actuator,
+    recordings: Sequence[str] = (),
 ) -> Judgement:
-    """Explains the residual of the first signal of interest: the current, where it is measured."""
+    """Explains the residual of the first signal of interest: the current, where it is measured.
+
+    recordings: their names, for what happened at one moment of one.
+    """
     primary = next(name for name in ORDER_OF_PRIMARY if name in residuals.values)
     explained = explain(residuals, primary, actuator.axes)
     orders = residual_orders(residuals, primary)
@@ -56,7 +65,8 @@ def judge(
     within = over_floor(residuals, names) <= BAND and not lasting(residuals, names)
     adequate = not significant and within and (calibration is None or calibration.converged)
     shown = actuator.axes.signal(primary)
-    sentences: list[str] = []
+    happened = [] if adequate else events(residuals, names, recordings, actuator.axes)
+    sentences = [one.sentence for one in happened]
     if not adequate:
         sentences += [one.sentence for one in significant[:1]]
         if orders and significant and significant[0].variable == "motor_angle":
@@ -69,6 +79,7 @@ def judge(
         explained_by=explained,
         orders=orders,
         worst_regions=() if adequate else regions,
+        events=happened,
         adequate=adequate,
         sentences=sentences,
         warnings=_warnings(residuals, primary, calibration, actuator),

@@ -11,7 +11,7 @@ from ema_model.discovery.harmonics import Further, further_orders
 from ema_model.discovery.model_fit import holdout_error
 from ema_model.discovery.objections import against, ratio
 from ema_model.discovery.path import Story
-from ema_model.discovery.refit import Trial, stands_for
+from ema_model.discovery.refit import Trial, price, stands_for
 from ema_model.effects import find
 
 Progress = Callable[[str], None]
@@ -58,26 +58,30 @@ def claimed(story: Story, accepted: Sequence[Trial], tell: Progress) -> Claim | 
 def _chosen(story: Story, accepted: Sequence[Trial]) -> tuple[Trial, list[Trial]]:
     """The best of the trials, and those that cannot be told from it.
 
-    Of what cannot be told apart, a parameter outside its tolerance comes after an effect, and one that takes parameters
-    farther from the file after one that does not.  Far above the floor what was not fitted tells them apart.
+    Of what cannot be told apart, a parameter outside its tolerance comes after an effect, and what takes parameters
+    farther from the file, or has more of its own, after what does not.  Far above the floor what was not fitted tells
+    them apart.
     """
     first = accepted[0]
     is_far = ratio(story.data, first.fit) > FAR
     tied = [
         trial
         for trial in accepted
-        if trial is first
-        or evidence(story.data, trial.fit, first.fit) < TIE
-        or (is_far and trial.drop > ALIKE * first.drop)
+        if _short_of(story, trial, first) < TIE or (is_far and trial.drop > ALIKE * first.drop)
     ]
     effects = [trial for trial in tied if not stands_for(story.current, trial.candidate.name)] or tied[:1]
     if not is_far or story.held is None:
-        best = min(effects, key=lambda trial: 0.0 if trial is first else evidence(story.data, trial.fit, first.fit))
+        best = min(effects, key=lambda trial: _short_of(story, trial, first) + price(story.data, story.current, trial))
         return best, [trial for trial in tied if trial is not best]
     unseen = {trial.candidate.name: holdout_error(story.held, trial.fit) for trial in tied}
     best = min(effects, key=lambda trial: unseen[trial.candidate.name])
     near = unseen[best.candidate.name] / ALIKE
     return best, [trial for trial in tied if trial is not best and unseen[trial.candidate.name] <= near]
+
+
+def _short_of(story: Story, trial: Trial, first: Trial) -> float:
+    """Evidence by which a trial tells less than another."""
+    return 0.0 if trial is first else evidence(story.data, trial.fit, first.fit)
 
 
 def _halves(story: Story, best: Trial, more: Trial) -> bool:

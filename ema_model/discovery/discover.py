@@ -14,7 +14,7 @@ from ema_model.comparison.explain import Explanation
 from ema_model.discovery.begin import begun
 from ema_model.discovery.next_experiment import next_experiment
 from ema_model.discovery.path import Story, refreshed
-from ema_model.discovery.remaining import at_floor
+from ema_model.discovery.remaining import at_floor, left_by
 from ema_model.discovery.repeated import repeated
 from ema_model.discovery.result import Candidate, Discovery, Experiment
 from ema_model.discovery.second_opinion import support_of
@@ -66,6 +66,7 @@ def result_of(
 ) -> Discovery:
     """What a story comes to; unknown: what its last model leaves."""
     calibration = with_intervals(story.data, story.current)
+    events = left_by(story.data, story.without_curve).events
     names = named_in(story)
     added = [replace(refreshed(one, calibration), supported_by=support_of(story, one.name)) for one in story.added]
     named = [one for one in added if one.name in names]
@@ -93,6 +94,7 @@ def result_of(
         not_claimed={name: why for name, why in story.refused.items() if name not in told},
         warnings=[
             *story.warnings,
+            *(one.sentence for one in events),
             *mismatch(story.controller_seen, calibration.actuator.axes),
             *([story.transmission_seen.sentence(calibration.actuator)] if story.transmission_seen else ()),
             *(one.sentence for one in story.disagreements),
@@ -104,6 +106,7 @@ def result_of(
         transmission_seen=story.transmission_seen,
         disagreements=story.disagreements,
         repeated=repeated(story.data, story.held, calibration.actuator),
+        events=events,
     )
 
 

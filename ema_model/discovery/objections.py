@@ -39,6 +39,7 @@ def against(data: Data, before: Fit, after: Fit, keys: Sequence[str], settled: C
         or _worse(data, before, after)
         or _little(data, before, after)
         or outdone(data, before, after)
+        or _dated(data, before, after)
         or _against_settled(data, before, after, keys, settled)
     )
 
@@ -81,6 +82,14 @@ def outdone(data: Data, before: Fit, after: Fit) -> str:
     if total - float(left @ left) >= enough or evidence(data, before, after) * scale >= enough:
         return ""
     return f"a curve over the {curve.variable.replace('_', ' ')} explains more"
+
+
+def _dated(data: Data, before: Fit, after: Fit) -> str:
+    """Whether what happened at one moment of a recording tells more than a model does."""
+    for one in left_by(data, before).events:
+        if before.chi2 - after.chi2 < AS_MUCH * one.gain:
+            return f"a step at {number(one.time_s)} s of {one.name or 'the recording'} explains more"
+    return ""
 
 
 def ratio(data: Data, found: Fit) -> float:

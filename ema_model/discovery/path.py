@@ -90,6 +90,11 @@ class Story:
         return self.steps[-1].fit
 
     @property
+    def without_curve(self) -> Fit:
+        """The last model that has no curve of what is unknown, which would take up anything."""
+        return next(step.fit for step in reversed(self.steps) if all(one.name in CATALOGUE for one in step.added))
+
+    @property
     def added(self) -> tuple[Added, ...]:
         """The effects in the last model."""
         return self.steps[-1].added
@@ -276,7 +281,7 @@ def _change(trial: Trial, parameter: str) -> Change:
 def _may_act(name: str, actuator: Actuator) -> bool:
     """Whether an effect is of something that is there: of a drive only where its controller is simulated."""
     effect = find(name)
-    if effect.turns and actuator.axes.motor == "linear":
+    if not effect.has_part(actuator.axes):
         return False
     kinds = actuator.controller.kind, actuator.inverter.kind
     places = {function.__name__ for function in effect.places}

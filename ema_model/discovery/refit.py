@@ -140,10 +140,13 @@ def stands_for(before: Fit, name: str) -> str:
 
 def worth(data: Data, current: Fit, trial: Trial) -> float:
     """How much a trial tells beyond what its parameters must (BIC), relative to what it leaves."""
+    return evidence(data, current, trial.fit) - price(data, current, trial)
+
+
+def price(data: Data, current: Fit, trial: Trial) -> float:
+    """What the parameters of a trial must tell before they tell anything (BIC)."""
     count = sum(fitted_count(name, current.actuator.axes) for name in trial.effects) + len(trial.faults)
-    return evidence(data, current, trial.fit) - count * math.log(
-        min(len(current.residual), effective_values(data, trial.fit))
-    )
+    return count * math.log(min(len(current.residual), effective_values(data, trial.fit)))
 
 
 def pays(current: Fit, trial: Trial, data: Data, held: Data | None) -> bool:

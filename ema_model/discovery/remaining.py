@@ -12,6 +12,7 @@ from ema_model.actuator import Actuator
 from ema_model.comparison.assemble import residuals_of
 from ema_model.comparison.criteria import BAND
 from ema_model.comparison.curves import orders_in
+from ema_model.comparison.events import Event, events
 from ema_model.comparison.explain import Explanation, advance_of, explain, used_blocks, without_spikes
 from ema_model.comparison.orders import Order
 from ema_model.comparison.orders import orders as orders_of
@@ -30,6 +31,7 @@ class Left:
 
     explained: list[Explanation]  # all that was tried
     orders: list[float]  # that the recordings can show, the strongest first
+    events: list[Event]  # what happened at one moment of a recording
 
     @property
     def explanation(self) -> Explanation | None:
@@ -57,7 +59,10 @@ def left_by(data: Data, found: Fit) -> Left:
     residuals = residuals_left(data, found)
     primary = next(name for name in ORDER_OF_PRIMARY if name in residuals.values)
     orders = _orders(residuals, primary, found.actuator)
-    return Left(explain(residuals, primary, found.actuator.axes), [one.order for one in orders])
+    fitted = [name for name in data.signals if name in residuals.values]
+    names = [one.name for one in data.measurements]
+    happened = [] if at_floor(data, found) else events(residuals, fitted, names, found.actuator.axes)
+    return Left(explain(residuals, primary, found.actuator.axes), [one.order for one in orders], happened)
 
 
 def used_left(data: Data, before: Fit, after: Fit) -> tuple[str, Array, Array]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
+from ema_model.comparison.events import Event
 from ema_model.comparison.explain import Explanation
 from ema_model.discovery.controller_seen import ControllerSeen
 from ema_model.discovery.model_fit import Data
@@ -145,6 +146,7 @@ class Discovery(InWords):
     transmission_seen: TransmissionSeen | None = None  # where no model covers it and it is not the file's
     disagreements: Sequence[Contradiction] = field(default_factory=tuple)  # held-out recordings at odds with the fitted
     repeated: Repeated | None = None  # where a command was recorded twice
+    events: Sequence[Event] = field(default_factory=tuple)  # what happened at one moment of a recording
 
     @property
     def floor_believable(self) -> bool:

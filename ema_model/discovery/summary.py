@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ema_model.actuator.naming import on_axes
-from ema_model.comparison.summary import calibration_dict, parameter_dict, plain
+from ema_model.comparison.summary import calibration_dict, event_dict, parameter_dict, plain
 from ema_model.discovery.controller_seen import ControllerSeen
 from ema_model.discovery.labels import rung_label
 from ema_model.discovery.result import Added, Discovery, Experiment, Rung
@@ -77,6 +77,7 @@ def as_dict(found: Discovery) -> dict[str, Any]:
                 }
                 for one in found.disagreements
             ],
+            "events": [event_dict(one) for one in found.events],
             "warnings": list(found.warnings),
         }
     )

@@ -147,7 +147,7 @@ class Effect:
     is_load: bool = False  # pulls at the user from outside, so that its torque counts as the load
     at_speeds: tuple[float, ...] = ()  # of a first parameter that is a speed: shares of the top speed to look for it at
     placed: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
-    turns: bool = False  # of a part that turns: there is none on a linear axis
+    turns: Side | None = None  # of a part that turns on that side: there is none on a linear axis
     against: str = "time"  # of `quantities.variables`: what its residual follows; time where it follows nothing else
     nothing: float = 0.0  # the first parameter, the others at their defaults, with which kernels go on as without it
     name: str = ""  # of the file; the catalogue fills it in
@@ -157,6 +157,10 @@ class Effect:
             raise ValueError(f"effect {self.title}: family must be one of {', '.join(FAMILIES)}")
         if self.against not in VARIABLES:
             raise ValueError(f"effect {self.title}: against must be one of {', '.join(VARIABLES)}")
+
+    def has_part(self, axes: Axes) -> bool:
+        """Whether an actuator with these axes has the part that it is of."""
+        return self.turns is None or not axes.is_linear(self.turns)
 
     @property
     def acts_in_drive(self) -> bool:

@@ -20,7 +20,7 @@ def motor_angle_reading(theta, amplitude, phase):
 @scalar
 def motor_speed_reading(omega, theta, amplitude, phase):
     """ω [1 + A cos(θ + φ)]."""
-    return omega * (1.0 + amplitude * sine(theta + phase + _QUARTER))
+    return omega + amplitude * omega * sine(theta + phase + _QUARTER)
 
 
 EFFECT = Effect(
@@ -33,7 +33,15 @@ EFFECT = Effect(
         "turn as well, and the speed loop answers with a current that no torque asked for."
     ),
     parameters=(
-        Parameter("amplitude_rad", "amplitude A at the motor, eccentricity over radius", 5e-3, 0.0, 0.1, side=MOTOR),
+        Parameter(
+            "amplitude_rad",
+            "amplitude A at the motor, eccentricity over radius",
+            5e-3,
+            0.0,
+            0.1,
+            side=MOTOR,
+            linear=(1e-5, 0.0, 1e-2),
+        ),
         Parameter("phase_rad", "phase φ", 0.0, -math.pi, math.pi, side=NEITHER),
     ),
     severities=(2e-3, 5e-3, 1e-2),
@@ -42,5 +50,5 @@ EFFECT = Effect(
     against="motor_angle",
     mistaken_for="screw lead error, cogging torque of order 1",
     family="sensor",
-    turns=True,
+    turns=MOTOR,
 )

@@ -34,5 +34,5 @@ EFFECT = Effect(
     against="user_position",
     mistaken_for="position sensor gain, position sensor bias",
     family="sensor",
-    turns=True,
+    turns=USER,
 )

@@ -9,7 +9,7 @@ from ema_model.physics.jit import scalar
 @scalar
 def position_reading(user, ratio):
     """θ_user (1 + g)."""
-    return user * (1.0 + ratio)
+    return user + ratio * user
 
 
 EFFECT = Effect(

@@ -30,7 +30,7 @@ def simulate_references(
     start_speed_rad_s: ArrayLike,
     start_play_rad: ArrayLike,
     start_integral_Nm: ArrayLike,
-    start_time_s: float,
+    start_time_s: float = 0.0,
 ) -> dict[str, Array]:
     """Signals of `SHOWN` after the start, for k (n, 8): (n, samples) each, as `simulate_reference` gives for one.
 

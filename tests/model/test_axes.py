@@ -40,6 +40,7 @@ TURN_SLIDE = {
     "speed": ("rad/s", "m/s"),
     "torque": ("N·m", "N"),
     "stiffness": ("N·m/rad", "N/m"),
+    "cubic stiffness": ("N·m/rad³", "N/m³"),
     "damping": ("N·m·s/rad", "N·s/m"),
     "derivative": ("N·m·s²/rad", "N·s²/m"),
     "constant": ("N·m/A", "N/A"),
@@ -61,6 +62,7 @@ AT_MOTOR = {
     "motor.rotor_offset_rad": "angle",
     "transmission.viscous_friction_Nms_rad": "damping",
     "effects.cogging_torque.amplitude_Nm": "torque",
+    "effects.encoder_eccentricity.amplitude_rad": "angle",
     "effects.presliding_friction.stiffness_Nm_rad": "stiffness",
     "effects.presliding_friction.damping_Nms_rad": "damping",
     "effects.screw_lead_error.period_rad": "angle",
@@ -80,7 +82,14 @@ AT_USER = {
     "effects.hinge_moment.offset_Nm": "torque",
     "effects.pendulum_load.moment_Nm": "torque",
     "effects.pendulum_load.angle_rad": "angle",
+    "effects.cubic_spring.stiffness_Nm_rad3": "cubic stiffness",
     "effects.dead_band.half_width_rad": "angle",
+    "effects.friction_zone.begin_rad": "angle",
+    "effects.friction_zone.end_rad": "angle",
+    "effects.one_sided_spring.contact_rad": "angle",
+    "effects.one_sided_spring.stiffness_Nm_rad": "stiffness",
+    "effects.position_sensor_eccentricity.amplitude_rad": "angle",
+    "effects.position_sensor_nonlinearity.curvature_1_rad": "share per angle",
     "effects.position_sensor_bias.bias_rad": "angle",
     "effects.screw_lead_error.amplitude_rad": "angle",
     "effects.torsional_compliance.stiffness_Nm_rad": "stiffness",
@@ -90,10 +99,14 @@ AT_USER = {
 }
 OF_BOTH = {  # on a rotary, a linear, a screw's and a rack's axes
     "controller.position_gain_1_s": ("1/s", "1/s", "rad/(m·s)", "m/(rad·s)"),
+    "effects.friction_drift.rate_1_s": ("1/s", "1/s", "1/s", "1/s"),
+    "effects.resistance_drift.rate_1_s": ("1/s", "1/s", "1/s", "1/s"),
     "effects.speed_loop_integral.rate_1_s": ("1/s", "1/s", "1/s", "1/s"),
+    "effects.torque_saturation.saturation_1_A": ("1/A", "1/A", "1/A", "1/A"),
     "transmission.gear_ratio": ("", "", "m/rad", "rad/m"),
     "effects.cogging_torque.order": ("", "rad/m", "", "rad/m"),
     "effects.torque_ripple.order": ("", "rad/m", "", "rad/m"),
+    "effects.position_dependent_friction.order": ("", "rad/m", "", "rad/m"),
 }
 OF_NONE = {"A": "A", "V": "V", "H": "H", "s": "s", "Ohm": "Ω", "rad": "rad", "": ""}  # by the name's ending
 PATHS = [f"{section}.{name}" for section in SECTIONS for name in numbers(section)]

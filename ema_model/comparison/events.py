@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ema_model.actuator import Actuator
 from ema_model.comparison.criteria import BAND, EVENT_BEYOND_DRIFT, EVENT_SHARE, EVENT_T
 from ema_model.comparison.explain import modulator_of, without_spikes
 from ema_model.comparison.residuals import Residuals
 from ema_model.comparison.sentences import event_sentence
-from ema_model.quantities.axes import Axes
 from ema_model.recordings import SIGNALS
 
 Array = NDArray[np.float64]
@@ -42,11 +42,14 @@ class Event:
     sentence: str
 
 
-def events(residuals: Residuals, signals: Sequence[str], names: Sequence[str], axes: Axes) -> list[Event]:
+def events(residuals: Residuals, signals: Sequence[str], names: Sequence[str], actuator: Actuator) -> list[Event]:
     """The step of each recording that has one; signals: by their names inside; names: of the recordings.
 
-    A step of the current comes first: positions give way to a load that comes on, and not the other way round.
+    A step of the current comes first: positions give way to a load that comes on, and not the other way round.  One of
+    a position must exceed the play, within which the user may stand at either flank.
     """
+    axes, play = actuator.axes, actuator.transmission.backlash_rad
+    least = {"user_position_rad": play, "motor_position_rad": play / actuator.transmission.gear_ratio}
     if residuals.is_map:
         return []
     found = []
@@ -56,6 +59,7 @@ def events(residuals: Residuals, signals: Sequence[str], names: Sequence[str], a
             for signal in signals
             for modulator in (("1", "sign_speed") if _drives(signal) else ("1",))
             if (step := _step(residuals, recording, signal, modulator)) is not None
+            and abs(step.change) > least.get(signal, 0.0)
         ]
         if not steps:
             continue

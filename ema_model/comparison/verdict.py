@@ -65,7 +65,7 @@ def judge(
     within = over_floor(residuals, names) <= BAND and not lasting(residuals, names)
     adequate = not significant and within and (calibration is None or calibration.converged)
     shown = actuator.axes.signal(primary)
-    happened = [] if adequate else events(residuals, names, recordings, actuator.axes)
+    happened = [] if adequate else events(residuals, names, recordings, actuator)
     sentences = [one.sentence for one in happened]
     if not adequate:
         sentences += [one.sentence for one in significant[:1]]

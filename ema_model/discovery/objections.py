@@ -85,7 +85,9 @@ def outdone(data: Data, before: Fit, after: Fit) -> str:
 
 
 def _dated(data: Data, before: Fit, after: Fit) -> str:
-    """Whether what happened at one moment of a recording tells more than a model does."""
+    """Whether what happened at one moment tells more than a model does; what brings the error to the floor tells all."""
+    if at_floor(data, after):
+        return ""
     for one in left_by(data, before).events:
         if before.chi2 - after.chi2 < AS_MUCH * one.gain:
             return f"a step at {number(one.time_s)} s of {one.name or 'the recording'} explains more"

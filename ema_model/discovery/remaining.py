@@ -61,7 +61,7 @@ def left_by(data: Data, found: Fit) -> Left:
     orders = _orders(residuals, primary, found.actuator)
     fitted = [name for name in data.signals if name in residuals.values]
     names = [one.name for one in data.measurements]
-    happened = [] if at_floor(data, found) else events(residuals, fitted, names, found.actuator.axes)
+    happened = [] if at_floor(data, found) else events(residuals, fitted, names, found.calibration.actuator)
     return Left(explain(residuals, primary, found.actuator.axes), [one.order for one in orders], happened)
 
 

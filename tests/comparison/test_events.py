@@ -61,14 +61,14 @@ def test_a_sensor_that_jumps_is_dated(signal, by):
         {"cogging_torque": {"amplitude_Nm": 0.02}},
         {"hinge_moment": {"stiffness_Nm_rad": 2000.0}},
         {"asymmetric_friction": {"ratio": 0.25}},
-        {"friction_drift": {"rate_1_s": 1.0}},
+        {"friction_drift": {"rate_1_s": 0.8}},
         {"one_sided_spring": {"stiffness_Nm_rad": 3000.0}},
     ],
     ids=lambda effects: next(iter(effects), "nothing"),
 )
 def test_what_lasts_is_no_event(effects):
     for commands in ([CHIRP], [("sine", {"amplitude_rad": 0.03, "frequency_Hz": 3}, 1.0)]):
-        assert not compare(recorded(5, commands=commands, effects=effects), ACTUATOR).events
+        assert not compare(recorded(83, commands=commands, effects=effects), ACTUATOR).events
 
 
 def test_a_load_that_comes_on_is_given_no_effects_name():

@@ -2,8 +2,8 @@
 
     pytest -m study -s tests/discovery/test_discovery_study.py
 
-Their rows are those of the plans `discovery`, `current_only`, `two_effects` and `outside`; see support/studied.py for
-where they are kept, and for the quick forms.
+Their rows are those of the plans `discovery`, `current_only`, `further_physics`, `two_effects` and `outside`; see
+support/studied.py for where they are kept, and for the quick forms.
 """
 
 from __future__ import annotations
@@ -49,6 +49,17 @@ def test_each_effect_is_named(plan):
     assert total["exact"] >= 0.90 * total["showable"]
     assert total["wrong"] <= 0.02 * total["showable"]
     assert total["floor"] >= total["exact"]
+
+
+@pytest.mark.parametrize("group", ["drive", "sensors", "actuator"])
+def test_further_physics_is_named_or_told_as_unknown(group):
+    """Of the drive, of sensors, of friction by place and time: a name, or none and the variable that it goes with."""
+    shown = [row for row in studied("further_physics")[group] if row["verdict"] is not None]
+    total = sum((tally(row) for row in shown), Counter())
+    open_ones = sum(not row["effects"] and bool(row["unknown"]) for row in shown)
+    outside = sum(not row["effects"] and bool(row["outside"]) for row in shown)
+    assert total["first"] + open_ones + outside >= 0.9 * len(shown)
+    assert total["wrong"] <= 0.01 * len(shown)
 
 
 def test_two_effects():

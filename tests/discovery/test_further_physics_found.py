@@ -1,0 +1,69 @@
+"""Sensors that are off, friction by place and time, saturation, springs that are not linear: named, at their values."""
+
+from __future__ import annotations
+
+import pytest
+from support.hidden_effects import ACTUATOR, recorded
+from support.representative import first_of
+
+from ema_model.discovery import discover
+from ema_model.discovery.fingerprints import variants
+from ema_model.effects import CATALOGUE, find
+
+CHIRP = ("chirp", {}, 0.5)
+SINE = ("sine", {"amplitude_rad": 0.03, "frequency_Hz": 3.0}, 1.0)
+# What is hidden, and what it is mistaken for most.
+CASES = {
+    "friction_zone": ({"ratio": 1.2, "begin_rad": 0.004, "end_rad": 0.02}, "hinge_moment", "load_dependent_friction"),
+    "encoder_eccentricity": ({"amplitude_rad": 5e-3, "phase_rad": 0.8}, "screw_lead_error", "cogging_torque"),
+    "position_sensor_gain": ({"ratio": 2e-3}, "position_sensor_eccentricity", "position_sensor_bias"),
+    "position_sensor_nonlinearity": ({"curvature_1_rad": 0.1}, "position_sensor_gain", "position_sensor_bias"),
+    "position_dependent_friction": ({"ratio": 0.4, "order": 2.0, "phase_rad": 0.5}, "cogging_torque", "torque_ripple"),
+    "friction_drift": ({"rate_1_s": 0.8}, "viscous_friction", "stribeck_friction"),
+    "torque_saturation": ({"saturation_1_A": 0.06}, "demagnetisation", "current_sensor_gain"),
+    "cubic_spring": ({"stiffness_Nm_rad3": 2e6}, "hinge_moment", "one_sided_spring"),
+    "one_sided_spring": ({"stiffness_Nm_rad": 4000.0, "contact_rad": -0.01}, "hinge_moment", "cubic_spring"),
+}
+
+
+@pytest.mark.parametrize("name", first_of(list(CASES)))
+def test_it_is_named_at_its_values(name):
+    values, *rivals = CASES[name]
+    found = discover(
+        recorded(83, commands=[CHIRP, SINE], effects={name: values}),
+        ACTUATOR,
+        candidates=[name, *rivals],
+        most_effects=1,
+    )
+    [one] = found.effects
+    assert one.name == name
+    for parameter, value in values.items():
+        if parameter in one.parameters:
+            low, high = one.parameters[parameter].interval90
+            assert one.parameters[parameter].value == pytest.approx(value, rel=0.1) or low <= value <= high
+        else:
+            assert one.chosen[parameter] == value
+
+
+def test_a_place_is_looked_for_along_the_recordings():
+    spring = find("one_sided_spring")
+    places = [one["contact_rad"] for [one] in variants(spring, [], ranges={"user_position": (-2.0, 2.0)})]
+    assert len(places) == len(spring.placed["contact_rad"]) and min(places) < -1.0 and max(places) > 1.0
+    assert variants(spring, []) == [], "the user's position is not known"
+    zone = find("friction_zone")
+    for [one] in variants(zone, [], ranges={"user_position": (0.0, 1.0)}):
+        assert 0.0 <= one["begin_rad"] < one["end_rad"] <= 1.0
+
+
+def test_an_order_beyond_an_effects_own_is_not_tried():
+    highest = next(one.high for one in find("position_dependent_friction").parameters if one.name == "order")
+    tried = variants(find("position_dependent_friction"), [1.0, highest, highest + 1.0])
+    assert [pair[0]["order"] for pair in tried] == [1.0, highest]
+
+
+@pytest.mark.parametrize("name", [name for name, effect in CATALOGUE.items() if effect.placed])
+def test_places_are_the_effects_own_parameters(name):
+    effect = CATALOGUE[name]
+    assert set(effect.placed) <= {one.name for one in effect.parameters}
+    assert len({len(shares) for shares in effect.placed.values()}) == 1
+    assert effect.against in ("user_position", "time")

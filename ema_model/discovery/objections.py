@@ -85,7 +85,7 @@ def outdone(data: Data, before: Fit, after: Fit) -> str:
 
 
 def _dated(data: Data, before: Fit, after: Fit) -> str:
-    """Whether what happened at one moment tells more than a model does; what brings the error to the floor tells all."""
+    """Whether what happened at one moment tells more than a model; what brings the error to the floor tells all."""
     if at_floor(data, after):
         return ""
     for one in left_by(data, before).events:

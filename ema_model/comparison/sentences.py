@@ -53,11 +53,11 @@ def region_sentence(
     told = of_residual(signal, axes, torque_constant)
     size = told.scaled(mean).text(abs(mean))
     if SIGNALS[signal].kind in ("current", "torque", "force"):
+        what = told.title.rpartition(" ")[2]
         if direction:
             more = "more" if mean * direction > 0.0 else "less"
-            return f"The motor needs {size} {more} {where}{moving} than the model."
+            return f"The motor needs {size} {more} {what} {where}{moving} than the model."
         way = "forward" if mean > 0.0 else "backward"
-        what = told.title.rpartition(" ")[2]
         return f"The motor needs {size} more {what} {way} {where} than the model."
     title = in_sentence(SIGNALS[signal].title)
     if SIGNALS[signal].kind == "position":

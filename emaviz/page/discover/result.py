@@ -74,7 +74,7 @@ class DiscoveryPanel:
             self._actuator = ActuatorSwitch(page, discovering, self._track, strip)
             self._residual: Any = gui.add_plotly(go.Figure(), config=CONFIG, aspect=0.5, visible=False)
             self._explained: Any = gui.add_plotly(go.Figure(), config=CONFIG, aspect=0.6, visible=False)
-        self._left_folder = gui.add_folder("What is left", visible=False, expand_by_default=False)
+        self._left_folder = gui.add_folder("Remaining residual", visible=False, expand_by_default=False)
         with self._left_folder:
             self._left: Any = gui.add_plotly(go.Figure(), config=CONFIG, aspect=0.5, visible=False)
         self._next = NextTest(page, discovering, load)
@@ -123,7 +123,7 @@ class DiscoveryPanel:
         self._ladder.figure = error_ladder.figure(found)
         self._equation.content = boxed(equation(found, look.added))
         named = all(one.name in CATALOGUE for one in look.added)
-        self._left_folder.label = "What is left" if named else "What had no name"
+        self._left_folder.label = "Remaining residual" if named else "Unexplained residual"
         if self._left_folder.visible:
             self._left.figure, self._left.visible = missing_curve.figure(found), True
         self._titles = {SIGNALS[name].title: name for name in found.ladder[0].signals}
@@ -174,7 +174,7 @@ def answer(look: Look) -> Html:
     found = look.found
     done = look.rmse <= AT_FLOOR
     if look.assessment is None:
-        first, others = sentences(found)[0], ["What is left is being looked at …"]
+        first, others = sentences(found)[0], ["Analysing the residual …"]
     elif not look.added and look.promising:  # before anything was added, of which a verdict could speak
         left = look.assessment.left.explanation
         first = "Physics is missing."

@@ -44,7 +44,7 @@ class ChartsPanel:
             self._freeze = gui.add_button(
                 "Freeze this run", icon=viser.Icon.SNOWFLAKE, color="gray", hint="Keeps it as a dashed line"
             )
-            self._melt = gui.add_button("Drop the frozen run", icon=viser.Icon.X, color="gray", visible=False)
+            self._melt = gui.add_button("Remove the frozen run", icon=viser.Icon.X, color="gray", visible=False)
             self.signals = LiveSignals(gui, page.session.actuator.axes)
             page.workspaces.heights.add(self.signals.handles, spare_px=-48)
             self._range = gui.add_multi_slider(

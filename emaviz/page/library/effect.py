@@ -35,7 +35,7 @@ class EffectPage:
         self._title = add_html(gui, note("Choose an effect on the left."))
         self._text = add_html(gui)
         self._run = gui.add_dropdown("Run", tuple(RUNS), visible=False)
-        self._place = gui.add_folder("What each parameter does", visible=False)
+        self._place = gui.add_folder("Parameters", visible=False)
         self._status = add_html(gui)
         add_html(gui, NEXT_COLUMN)  # a signal and its difference stay together
         self._charts = EffectCharts(gui, page.session.actuator.axes)

@@ -46,14 +46,14 @@ class RunsPanel:
         self._link = add_html(gui)
         with gui.add_folder("Compare two"):
             self._other: Any = gui.add_dropdown("With", (NONE,))
-            self._compare = gui.add_button("On the same axes", icon=viser.Icon.ARROWS_DIFF, disabled=True)
+            self._compare = gui.add_button("Overlay both runs", icon=viser.Icon.ARROWS_DIFF, disabled=True)
         with gui.add_folder("Rename or delete", expand_by_default=False):
             self._name = gui.add_text("New name", "")
             self._rename = gui.add_button("Rename", icon=viser.Icon.PENCIL, color="gray", disabled=True)
             self._delete = gui.add_button("Delete…", icon=viser.Icon.TRASH, color="red", disabled=True)
         with gui.add_folder("All, newest first"):
             self._list = add_html(gui)
-            again = gui.add_button("Read the folder again", icon=viser.Icon.REFRESH, color="gray")
+            again = gui.add_button("Refresh the list", icon=viser.Icon.REFRESH, color="gray")
         self._choice.on_update(lambda event: event.client and self._post(self._take_choice))
         self._open.on_click(lambda _: self._post(self._open_chosen, self._open))
         self._compare.on_click(lambda _: self._post(self._compare_two, self._compare))

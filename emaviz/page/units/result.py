@@ -6,6 +6,7 @@ from typing import Any
 
 import plotly.graph_objects as go
 
+from ema_model.text import COLOURS
 from ema_model.units.result import UnitsCompared
 from ema_model.units.words import document_of, lacking, notes, rests_on, sentences
 from emaviz.figures import transfer_matrix, unit_parameters
@@ -40,7 +41,7 @@ class UnitsResult:
             add_html(gui, NEXT_COLUMN)
             self._transfer: Any = gui.add_plotly(go.Figure(), config=_CONFIG, aspect=0.6)
         self._seal = Seal(page, comparing.practice, lambda: comparing.chosen, lambda: comparing.found)
-        self._words = gui.add_folder("All of it in numbers", visible=False, expand_by_default=False)
+        self._words = gui.add_folder("All results in numbers", visible=False, expand_by_default=False)
         with self._words:
             self._document = add_html(gui)
         self._save = gui.add_folder("Keep it", visible=False)
@@ -68,7 +69,7 @@ class UnitsResult:
 
 def said(found: UnitsCompared) -> Html:
     """The sentences, what the answer rests on, warnings, and which recordings lack."""
-    colour = "#e8590c" if found.differences or found.scattering else "#2b8a3e"
+    colour = COLOURS["warning" if found.differences or found.scattering else "good"]
     return html(
         '<div {}><div style="font-size:16px;font-weight:600;color:{};padding:4px 0">{}</div><div {}>{}</div>{}{}</div>',
         BOX,

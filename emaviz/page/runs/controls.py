@@ -26,6 +26,7 @@ from emaviz.text.html import Html, add_html, html, joined, said
 NONE = "–"
 _SHOWN = 25
 _LOOK_S = 2.0  # between two looks at the folder
+_UNSET = ("", "none", None, "0", "0.0", 0)  # settings that say that there is nothing of the kind, are not listed
 _BOX = Html('style="padding:2px 10px;font-size:12.5px;line-height:1.45"')
 
 
@@ -214,10 +215,10 @@ def _card(entry: Entry) -> Html:
     settings = [
         html("{} <b>{}</b>", *setting(name, value))
         for name, value in entry.settings.items()
-        if value not in ("", "none", None)
+        if name == "seed" or value not in _UNSET
     ]
     return html(
-        '<div {}>{}{}<div style="opacity:.75;font-size:11.5px">{}</div></div>',
+        '<div {}>{}{}<div style="opacity:.8;font-size:12.5px">{}</div></div>',
         _BOX,
         size,
         results,

@@ -145,6 +145,8 @@ class TrackPanel:
     # --- the run ----------------------------------------------------------------------------------------------------
 
     def _busy(self, busy: bool) -> None:
+        if busy:
+            self._practice.fold()
         with self._page.server.atomic():
             self._start.disabled = busy
             for control in (self._folder.control, self._fault, self._ends):

@@ -23,13 +23,17 @@ from emaviz.page.practice import Seal
 from emaviz.page.track.click import FlightClicks
 from emaviz.page.track.leads import FlightLead
 from emaviz.session.worker import Worker
-from emaviz.text.html import add_html, html
-from emaviz.text.notes import BOX, DIM, boxed
+from emaviz.text.html import Html, add_html, html
+from emaviz.text.notes import BOX, DIM, begin
 from emaviz.text.told import whole
 
 _CONFIG = {"displayModeBar": False}
 _NONE = "–"
-_NOTHING = "No flights are tracked yet: choose a folder of flights on the left."
+_STEPS = (
+    "Choose a folder of flights on the left, or a challenge to practise on; set the value at which the life ends.",
+    Html("Press <b>Track</b>: the faults of each flight are identified."),
+    "You see which fault drifts and how many flights remain, as a distribution; drag the day back along the life.",
+)
 _ASPECTS = (0.6, 0.42, 0.48)  # of the figures, height over width
 
 
@@ -48,7 +52,7 @@ class TrackResult:
         self._page, self._slow = page, slow
         self._history: History | None = None
         gui = page.server.gui
-        self._told = add_html(gui, boxed(_NOTHING))
+        self._told = add_html(gui, begin("No flights are tracked yet", _STEPS))
         self._life = gui.add_folder("The unit's life", visible=False)
         with self._life:
             add_html(gui, COLUMNS)
@@ -84,7 +88,7 @@ class TrackResult:
         if begun:
             self._seal.show()
         if history is None or last is None:
-            self._told.content = boxed(_NOTHING)
+            self._told.content = begin("No flights are tracked yet", _STEPS)
             return
         at_end = begun or self._today.value >= self._today.max
         first, end = min(history.looks), max(history.looks)

@@ -79,4 +79,4 @@ def _where(variable: str, low: float, high: float, typical: float, axes: Axes, d
             part = " (the start)" if high < 0.2 * duration_s else " (the end)" if low > 0.8 * duration_s else ""
         told = told.scaled(high)
         return f"from {number(told.factor * low)} to {told.text(high)}{part}"
-    return f"{VARIABLES[variable].place}{told.scaled(typical).text(typical)}"
+    return f"{VARIABLES[variable].place}{told.scaled(typical).text(float(f'{typical:.3g}'))}"

@@ -34,6 +34,15 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=lambda item: item.path.parent.name not in LONGEST)
 
 
+@pytest.fixture(autouse=True)
+def no_page_errors(request: pytest.FixtureRequest) -> Iterator[None]:
+    """A test fails by an error in the console of any page of it, unless it is of those that ask for one."""
+    yield
+    if "browser" in request.fixturenames:
+        errors = request.getfixturevalue("browser").errors()
+        assert request.node.get_closest_marker("page_errors") or not errors, "\n".join(errors)
+
+
 @pytest.fixture(scope="session")
 def browser() -> Iterator[Browser]:
     """Headless Chromium with software GL; without one the test is skipped, in CI it fails."""

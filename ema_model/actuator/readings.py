@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from ema_model.actuator.actuator import Actuator
 from ema_model.faults import physical
-from ema_model.quantities.numbers import amount, with_uncertainty
+from ema_model.quantities.numbers import Quantity, with_uncertainty
 from ema_model.quantities.sides import USER
 
 
@@ -58,12 +58,18 @@ def _backlash(actuator: Actuator) -> str:
     return actuator.axes.name("backlash_rad", USER)
 
 
+def _play(value: float, unit: str) -> str:
+    """'703 µrad', as an interval has it, in place of 0.703 mrad."""
+    shown = Quantity("", unit).scaled(value)
+    return (Quantity("", unit).scaled(1e-3 * value) if shown.factor * value < 1.0 else shown).text(value)
+
+
 def sentences(k: ArrayLike, actuator: Actuator) -> tuple[str, ...]:
     """The same as eight short phrases, one for each k."""
     r = readings(k, actuator)
     return (
         f"friction × {r['friction_factor']:.2f}",
-        f"backlash {amount(r[_backlash(actuator)], actuator.axes.unit('rad', USER))}",
+        f"backlash {_play(r[_backlash(actuator)], actuator.axes.unit('rad', USER))}",
         f"phase A: {r['turns_a']:.0%} of turns",
         f"phase B: {r['turns_b']:.0%} of turns",
         f"phase C: {r['turns_c']:.0%} of turns",

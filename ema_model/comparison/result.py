@@ -36,7 +36,7 @@ class Region:
     rmse: float  # in the signal's unit
     mean: float  # of the residual, likewise
     excess: float  # rmse over the floor there
-    sentence: str  # "The motor needs 35.2 mN·m more at 300 rad/s than the model."
+    sentence: str  # "The motor needs 35.2 mN·m more torque at 300 rad/s than the model."
     blocks: NDArray[np.bool_]  # (blocks,) of the joined residuals
 
 

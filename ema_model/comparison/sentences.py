@@ -68,11 +68,11 @@ def region_sentence(
     told = of_residual(signal, axes, torque_constant)
     size = told.scaled(mean).text(abs(mean))
     if SIGNALS[signal].kind in ("current", "torque", "force"):
+        what = told.title.rpartition(" ")[2]
         if direction:
             more = "more" if mean * direction > 0.0 else "less"
-            return f"The motor needs {size} {more} {where}{moving} than the model."
+            return f"The motor needs {size} {more} {what} {where}{moving} than the model."
         way = "forward" if mean > 0.0 else "backward"
-        what = told.title.rpartition(" ")[2]
         return f"The motor needs {size} more {what} {way} {where} than the model."
     title = in_sentence(SIGNALS[signal].title)
     if SIGNALS[signal].kind == "position":
@@ -94,4 +94,4 @@ def _where(variable: str, low: float, high: float, typical: float, axes: Axes, d
             part = " (the start)" if high < 0.2 * duration_s else " (the end)" if low > 0.8 * duration_s else ""
         told = told.scaled(high)
         return f"from {number(told.factor * low)} to {told.text(high)}{part}"
-    return f"{VARIABLES[variable].place}{told.scaled(typical).text(typical)}"
+    return f"{VARIABLES[variable].place}{told.scaled(typical).text(float(f'{typical:.3g}'))}"

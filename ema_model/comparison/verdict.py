@@ -144,7 +144,7 @@ def _warnings(residuals: Residuals, primary: str, calibration: Calibration | Non
         if outside:
             found.append(
                 f"At the edge of {'its' if len(outside) == 1 else 'their'} tolerance (3 σ): {', '.join(outside)}. "
-                "Either a value is wrong, or it stands in for what is missing."
+                "Either a value is wrong, or it compensates for missing physics."
             )
     share = float(np.mean(residuals.saturated))
     if share > 0.005:

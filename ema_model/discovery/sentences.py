@@ -15,7 +15,7 @@ from ema_model.quantities.titles import in_sentence
 
 LOOP_UNTOLD = (
     "In the closed loop no effect explains the whole error, and nothing shows another control law than the file's: how "
-    "the drive samples, filters or delays may differ. What the measured motion needs of the motor is told instead, "
+    "the drive samples, filters or delays may differ. What the measured motion needs of the motor is reported instead, "
     "without a controller."
 )
 NOT_REPEATABLE = (
@@ -40,9 +40,9 @@ def mismatch(seen: ControllerSeen | None, axes: Axes) -> list[str]:
     left, best = (f"{100.0 * share:.0f} %" for share in (seen.left_by_file, seen.left))
     form = "" if seen.holds else ", so that it is of another form"
     return [
-        f"The controller is not what the file says. {told}Of that current the file's controller leaves {left} untold, "
-        f"one of the same form at its best {best}{form}. What the measured motion needs of the motor is told instead, "
-        "without a controller."
+        f"The controller is not what the file says. {told}Of that current the file's controller leaves {left} "
+        f"unexplained, the best one of the same form {best}{form}. What the measured motion needs of the motor is "
+        "reported instead, without a controller."
     ]
 
 
@@ -57,7 +57,7 @@ def masked(added: Sequence[Added], axes: Axes) -> list[str]:
         ]
         if moved:
             came = ", ".join(moved).replace("-", "−")
-            lines.append(f"{find(one.name).title} had been masked: back toward the file's value came {came}.")
+            lines.append(f"{find(one.name).title} had been masked: back toward their nominal values moved {came}.")
     return lines
 
 

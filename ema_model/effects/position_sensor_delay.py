@@ -20,7 +20,7 @@ def advance_states(dt, theta, omega, rigid, rigid_next, user_step, gear, load, a
 
 EFFECT = Effect(
     title="Position sensor delay",
-    equation="θ_read = e^{−s T} θ_user ≈ (1 − s T/2) / (1 + s T/2) θ_user",
+    equation="θ_read = exp(−s T) θ_user ≈ (1 − s T/2) / (1 + s T/2) θ_user",
     source="Franklin, Powell, Emami-Naeini, Feedback Control of Dynamic Systems: Padé's approximation of a delay",
     explanation=(
         "A sensor that filters, converts and sends its reading over a bus tells the controller where the user was "

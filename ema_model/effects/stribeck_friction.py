@@ -20,7 +20,7 @@ def moving_friction(level, static, omega, motor_torque, load, gear, theta, user,
 
 EFFECT = Effect(
     title="Stribeck friction",
-    equation="T_f = sgn ω [T_d + (T_s − T_d) e^{−(ω/ω_s)²}]",
+    equation="T_f = sgn ω [T_d + (T_s − T_d) exp(−(ω/ω_s)²)]",
     source="Stribeck 1902; Armstrong-Hélouvry et al., Automatica 30(7), 1994",
     explanation=(
         "A lubricated contact at rest touches metal to metal. As it begins to slide, oil is drawn in and carries "

@@ -124,12 +124,12 @@ def way_sentences(found: Mapping[str, Way]) -> Sequence[str]:
         end, answer, highest = (amount(rmse, "A") for rmse in (way.rmse_A, way.answer_A, way.highest_A))
         if way.is_trap:
             said.append(
-                f"{title} ended in a trap: its rmse is {end} there, and on the straight way to the answer ({answer}) "
-                f"it rises to {highest} first."
+                f"{title} ended in a local minimum: its rmse is {end} there, and on the straight line to the answer "
+                f"({answer}) it rises to {highest} first."
             )
         elif way.is_worse:
             said.append(
-                f"{title} had not settled: from its end ({end}) the error falls all the way to the answer ({answer})."
+                f"{title} had not converged: from its end ({end}) the error falls steadily to the answer ({answer})."
             )
         else:
             said.append(f"{title} ended at the answer: {end}.")

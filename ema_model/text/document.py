@@ -9,7 +9,13 @@ from importlib import import_module
 from typing import Literal
 
 Severity = Literal["good", "bad", "warning", "note"]
-COLOURS: dict[Severity, str] = {"good": "#2b8a3e", "bad": "#e03131", "warning": "#e8590c", "note": "#868e96"}
+# As CSS has it, on light and on dark.  A warning has neither a fault's colour nor a model's.
+COLOURS: dict[Severity, str] = {
+    "good": "light-dark(#2b8a3e,#51cf66)",
+    "bad": "light-dark(#e03131,#ff8787)",
+    "warning": "light-dark(#c2255c,#faa2c1)",
+    "note": "#868e96",
+}
 _GAP = 3  # characters between the columns of plain text
 _STYLE = "border-collapse:collapse;margin:.6em 0;font-variant-numeric:tabular-nums"
 _CELL = "padding:1px 8px 1px 0;text-align:right;border:0;white-space:nowrap"

@@ -1,4 +1,4 @@
-"""How an effect looks in the current's residual, slight, clear and strong: against a variable and over time, as SVG."""
+"""How an effect looks in the current's residual at three severities, against a variable and over time, as SVG."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ema_model.quantities.shown import of_residual
 from ema_model.quantities.titles import in_sentence
 from ema_model.quantities.variables import is_turn, of_variable
 from ema_model.simulation.with_effect import WithEffect
-from emaviz.colours import DIFFERENCE, MONITOR, REFERENCE
+from emaviz.colours import DIFFERENCE
 from emaviz.figures.decimate import envelope
 from emaviz.figures.lines import scattered
 from emaviz.figures.svg import Series, chart, told
@@ -22,7 +22,7 @@ from emaviz.text.html import Html, html, joined
 
 Array = NDArray[np.float64]
 
-SEVERITIES = (("slight", REFERENCE), ("clear", MONITOR), ("strong", DIFFERENCE))
+SEVERITIES = (("low", "#ff9a9a"), ("medium", DIFFERENCE), ("high", "#991b1b"))  # shades of the residual's colour
 _SIGNAL = "current_A"
 _DOTS, _POINTS = 400, 600  # of a severity
 _SHARE, _FEWEST = 0.005, 200  # of a change's power that may lie before or behind what is shown; samples

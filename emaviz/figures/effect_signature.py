@@ -12,7 +12,8 @@ from ema_model.quantities.axes import Axes
 from ema_model.simulation.with_effect import SHOWN, WithEffect
 from emaviz.colours import DIFFERENCE, MONITOR, REFERENCE
 from emaviz.figures.decimate import envelope
-from emaviz.figures.signals import LAST_MORE_PX, charts, legend, time_axis, value_axis
+from emaviz.figures.signal_charts import charts
+from emaviz.figures.signals import LAST_MORE_PX, PLANT_LINE, legend, time_axis, value_axis
 from emaviz.text.html import add_html
 
 _POINTS, _SMALL_POINTS = 800, 160
@@ -31,7 +32,7 @@ class EffectCharts:
             last = chart.signal == SHOWN[-1]
             both = gui.add_uplot(
                 data=(empty, empty, empty),
-                series=({}, _line("without", REFERENCE, 1.5), _line("with", MONITOR, 1.5)),
+                series=({}, PLANT_LINE, _line("with", MONITOR, 1.5)),
                 title=chart.title,
                 axes=(time_axis(False), value_axis(chart.unit)),
                 **_layout(height),
@@ -45,6 +46,11 @@ class EffectCharts:
                 **_layout(height - 10 + (LAST_MORE_PX if last else 0), above=8),
             )
             self._charts.append((chart, both, change))
+
+    @property
+    def handles(self) -> list[Any]:
+        """The charts, from above."""
+        return [handle for _, *both in self._charts for handle in both]
 
     def show(self, felt: WithEffect) -> None:
         """Draws a run."""

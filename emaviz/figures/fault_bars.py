@@ -71,7 +71,7 @@ def fault_bars(
     legend += html(' &nbsp;<span style="color:{}">▮</span> truth', TRUTH) if truth is not None else ""
     legend += html(" &nbsp;━ 90 % interval") if ends is not None else ""
     legend += html(" &nbsp;│ healthy")
-    legend += html(" &nbsp;▒ too small to be seen") if detectable is not None else ""
+    legend += html(" &nbsp;▒ below the detection limit") if detectable is not None else ""
     return html(
         '<div style="padding:0 8px;font-size:12px"><table style="width:100%;border-collapse:collapse">'
         '{}</table><div style="opacity:.7;font-size:11px;padding-top:4px">{}</div></div>',

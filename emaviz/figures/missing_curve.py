@@ -16,7 +16,7 @@ def figure(found: Discovery, *, dark: bool = False) -> go.Figure:
     """The curve with its standard error; what is missing of the current is told as the motor's torque."""
     unknown = found.unknown
     if unknown is None:
-        return theme.missing("What is left", "nothing that a variable explains", dark=dark)
+        return theme.missing("Remaining residual", "nothing that a variable explains", dark=dark)
     axis, shown = of_variable(unknown.variable, found.actuator.axes), _residual(found)
     axis, shown = axis.scaled(unknown.centres), shown.scaled(unknown.curve)
     title = f"{shown.title} against {axis.title[0].lower()}{axis.title[1:]}"

@@ -1,4 +1,4 @@
-"""The model's equations as HTML, with the terms of added effects in colour."""
+"""The model's equations as HTML, the terms of added effects set off from the base model's."""
 
 from __future__ import annotations
 
@@ -10,11 +10,9 @@ from ema_model.discovery.labels import effect_title, settings
 from ema_model.discovery.result import Added
 from ema_model.effects import Effect, find
 from ema_model.effects.effect import STAGES
-from emaviz.colours import ALGORITHMS, MONITOR, TRUTH
 from emaviz.text.html import Html, html, joined
 from emaviz.text.mathml import mathml
 
-COLOURS = (MONITOR, ALGORITHMS["ssa"], ALGORITHMS["do"], TRUTH)
 # Where an effect acts, the equation of the base model that it stands in, in the order of the page.
 _LINES = {
     "motion": "J dω/dt = k_t i − T_f(ω) − τ T_load",
@@ -45,18 +43,17 @@ _OF_PLACE = {
 def equation(found: Discovery, added: Sequence[Added]) -> Html:
     """The lines that added effects change, each with its terms and their fitted values; "" without an effect."""
     by_line: dict[str, list[Html]] = {}
-    for i, one in enumerate(added):
+    for one in added:
         effect = find(one.key)
         values = ", ".join(f"{_symbol(effect, name)}{text}" for name, text in settings(found, one).items())
         if len(effect.parameters) > 6:
             values = f"{len(effect.parameters)} knots, fitted"
-        colour = COLOURS[i % len(COLOURS)]
         by_line.setdefault(_line(effect), []).append(
             html(
-                '<div style="padding-left:14px;color:{}"><b>{}:</b> '
+                '<div style="margin:2px 0 4px 6px;padding-left:8px;border-left:3px solid rgba(134,142,150,.55)">'
+                "<b>{}:</b> "
                 '<span style="font-size:15px">{}</span>'
                 '<div style="font-size:12px;opacity:.85">{}</div></div>',
-                colour,
                 effect_title(one.name),
                 mathml(effect.equation, "inline"),
                 values,

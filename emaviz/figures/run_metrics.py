@@ -11,7 +11,7 @@ import numpy as np
 from ema_model.quantities.axes import ROTARY, Axes
 from ema_model.quantities.sides import MOTOR, USER, Side
 from ema_model.recordings import Measurement
-from emaviz.figures.signals import charts
+from emaviz.figures.signal_charts import charts
 from emaviz.text.html import Html, html, joined
 
 _MISSING = "–"

@@ -9,7 +9,8 @@ from ema_model.quantities.axes import ROTARY, Axes
 from ema_model.recordings import Measurement
 from emaviz.colours import COMMAND, GHOST, MONITOR, REFERENCE
 from emaviz.figures.lines import line
-from emaviz.figures.signals import at, charts
+from emaviz.figures.signal_charts import charts
+from emaviz.figures.signals import at
 from emaviz.figures.theme import DARK, LIGHT
 
 _POINTS = 2500

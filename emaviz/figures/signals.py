@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from ema_model.quantities.axes import ROTARY, Axes
-from ema_model.quantities.shown import of_signal
+from ema_model.quantities.axes import Axes
 from ema_model.recordings import Measurement
 from emaviz.colours import COMMAND, DIFFERENCE, GHOST, MONITOR, PHASES, REFERENCE
 from emaviz.figures.decimate import envelope
+from emaviz.figures.signal_charts import SignalChart, charts, fitted
 from emaviz.text.html import Html, add_html, html, joined
 
 Array = NDArray[np.float64]
@@ -22,45 +22,8 @@ PADDING = (10, 4, 0, 0)  # top, right, bottom, left, px: the uppermost tick need
 _GREY = "#868e96"
 _VALUES_PX, _LABEL_PX = 22, 16  # of a time axis
 LEAST_SPACE_PX = 12  # between two values of an axis, which a low chart needs; `chart_heights.py` gives high ones more
+_FRAME = 3.0  # of the difference's axis over its largest value
 LAST_MORE_PX = _VALUES_PX + _LABEL_PX  # by which the last chart of a column is taller than those above it
-
-
-@dataclass(frozen=True)
-class SignalChart:
-    """What one chart shows, and in which units: a fixed prefix, so that the axis stands still while one drags."""
-
-    signal: str
-    title: str
-    unit: str
-    scale: float
-    difference_unit: str
-    difference_scale: float
-    with_command: bool
-
-
-_SCALES = {"": 1.0, "m": 1e3, "µ": 1e6}
-_PREFIXES = {  # of the signal, and of a difference in it
-    "current_A": ("", ""),
-    "user_position_rad": ("m", "µ"),
-    "motor_position_rad": ("", "m"),
-    "motor_speed_rad_s": ("", ""),
-}
-
-
-def charts(axes: Axes = ROTARY) -> tuple[SignalChart, ...]:
-    """A chart for each signal of a run, in the units of these axes."""
-    return tuple(
-        SignalChart(
-            name,
-            (signal := of_signal(name, axes)).title,
-            f"{prefix}{signal.unit}",
-            _SCALES[prefix],
-            f"{finer}{signal.unit}",
-            _SCALES[finer],
-            with_command=name == "user_position_rad",
-        )
-        for name, (prefix, finer) in _PREFIXES.items()
-    )
 
 
 _SHOWN = ((REFERENCE, "plant"), (MONITOR, "monitor"), (DIFFERENCE, "monitor − plant, right axis"), (COMMAND, "command"))
@@ -79,7 +42,15 @@ def legend(*names: tuple[str, str]) -> Html:
 class LiveSignals:
     """The charts in a panel of the page."""
 
-    def __init__(self, gui: viser.GuiApi, axes: Axes, height: int = 127) -> None:
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        axes: Axes,
+        set_axes: Callable[[Any, Sequence[Any]], None],
+        height: int = 127,
+    ) -> None:
+        """set_axes(chart, axes): gives a chart other axes, when another unit fits its range."""
+        self._set_axes = set_axes
         empty = np.array([0.0, 1.0])
         self._legend: Any = add_html(gui, legend(*_SHOWN))
         self._frozen = False
@@ -93,7 +64,7 @@ class LiveSignals:
                 series=_series(chart),
                 title=chart.title,
                 scales={"x": {"time": False}, "y": {"auto": True}, "difference": {"auto": True}},
-                axes=(time_axis(last), value_axis(chart.unit), _difference_axis(chart.difference_unit)),
+                axes=_axes(chart, last),
                 cursor=CURSOR,
                 legend={"show": False},
                 padding=PADDING,
@@ -115,8 +86,13 @@ class LiveSignals:
             self._legend.content = legend(*_SHOWN, *([(GHOST, "frozen")] if self._frozen else []))
         shown = _within(reference.time_s, window_s)
         time = reference.time_s[shown]
-        for chart, handle in self._charts:
+        for i, (chart, handle) in enumerate(self._charts):
             rm, mm = reference[chart.signal][shown], monitor[chart.signal][shown]
+            fitting = fitted(chart, np.concatenate([rm, mm]), _FRAME * (mm - rm))
+            if fitting != chart:
+                chart = fitting
+                self._charts[i] = chart, handle
+                self._set_axes(handle, _axes(chart, i == len(self._charts) - 1))
             difference = chart.difference_scale * (mm - rm)
             frozen = beneath(at(ghost, chart.signal, time), rm)
             lines = [difference, chart.scale * frozen, chart.scale * rm, chart.scale * mm]
@@ -124,7 +100,7 @@ class LiveSignals:
                 lines.append(chart.scale * reference["command_rad"][shown])
             # in the middle third of the chart, so that it does not cover the signals
             drawn = envelope(time, lines, POINTS)
-            most = 3.0 * max(float(np.max(np.abs(difference))), 1e-6)
+            most = _FRAME * max(float(np.max(np.abs(difference))), 1e-6)
             frame = np.full(len(drawn[0]), most)
             frame[0] = -most
             handle.data = (*drawn, frame)
@@ -211,6 +187,10 @@ def time_axis(last: bool) -> Any:
 def value_axis(unit: str) -> Any:
     """The axis at the left of a chart."""
     return {**AXIS, "scale": "y", "label": f"[{unit}]", "size": 48, "space": LEAST_SPACE_PX}
+
+
+def _axes(chart: SignalChart, last: bool) -> Any:
+    return time_axis(last), value_axis(chart.unit), _difference_axis(chart.difference_unit)
 
 
 def _difference_axis(unit: str) -> Any:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from emaviz.figures.signals import LEAST_SPACE_PX
@@ -11,10 +12,19 @@ from emaviz.text.html import Html, unescaped
 
 # Heights by which windows are told apart: charts are laid out for the tallest that is no taller than the window.
 WINDOWS_PX = (600, 640, 680, 700, 740, 780, 820, 860, 900, 940, 980, 1020, 1060, 1100, 1150, 1200, 1300, 1400)
-_USUAL_PX = 900  # of a window, for which charts are built
+_USUAL_WIDTH_PX, _USUAL_PX = 1400, 900  # of a window, for which charts are built
+_TWO_COLUMNS_PX = 1240  # wide, from where on what stands in two columns does
 _LEAST_PX = 64
 _VALUES = 6  # of a chart's height, which its title shares: at most so many values stand at an axis
 _LOW_PX, _TITLE_SAVED_PX = 800, 2  # in windows lower than that, a chart's title is so much smaller
+
+
+@dataclass(frozen=True)
+class _Stack:
+    """Charts with their heights in the usual window, and what they share besides in a window of two columns, px."""
+
+    charts: tuple[tuple[Any, int], ...]
+    beside_px: int
 
 
 class ChartHeights:
@@ -22,20 +32,48 @@ class ChartHeights:
 
     def __init__(self, inside: Inside) -> None:
         self._inside = inside
-        self._stacks: list[list[tuple[Any, int]]] = []
+        self._stacks: list[_Stack] = []
+        self._windows: dict[int, tuple[int, int]] = {}  # width and height, px, by client, as far as they have told
 
-    def add(self, charts: Sequence[Any], spare_px: int = 0) -> None:
-        """A stack of uPlot charts, with their axes; spare_px: what the usual window has left below it."""
+    def add(self, charts: Sequence[Any], spare_px: int = 0, beside_px: int = 0) -> None:
+        """A stack of uPlot charts, with their axes; spare_px: what the usual window has left below it.
+
+        beside_px: what it has left besides where the parts of its tab stand in two columns.
+        """
         more = spare_px // max(len(charts), 1)
-        self._stacks.append([(one, int(one.height) + more) for one in charts])
+        self._stacks.append(_Stack(tuple((one, int(one.height) + more) for one in charts), beside_px))
 
     def fit(self, client: int, window_px: int) -> None:
         """Lays one window out for its height, one of `WINDOWS_PX`."""
+        self._windows[client] = self._windows.get(client, (_USUAL_WIDTH_PX, 0))[0], window_px
+        self._lay_out(client)
+
+    def fit_width(self, client: int, window_px: int) -> None:
+        """Lays one window out for its width."""
+        before, height = self._windows.get(client, (_USUAL_WIDTH_PX, _USUAL_PX))
+        self._windows[client] = window_px, height
+        if (before >= _TWO_COLUMNS_PX) != (window_px >= _TWO_COLUMNS_PX):
+            self._lay_out(client)
+
+    def set_axes(self, chart: Any, axes: Sequence[Any]) -> None:
+        """Other axes of a chart, in every window as its height asks for."""
+        chart.axes = tuple(axes)
+        for client in self._inside.pages():
+            self._lay_out(client, chart)
+
+    def forget(self, client: int) -> None:
+        """A window was closed."""
+        self._windows.pop(client, None)
+
+    def _lay_out(self, client: int, only: Any = None) -> None:
+        width, window_px = self._windows.get(client, (_USUAL_WIDTH_PX, _USUAL_PX))
         for stack in self._stacks:
-            more = (window_px - _USUAL_PX) // len(stack) + (_TITLE_SAVED_PX if window_px < _LOW_PX else 0)
-            for chart, usual in stack:
-                height = max(usual + more, _LEAST_PX)
-                self._inside.lay_out(client, chart, height, spaced(chart.axes, height))
+            spare = window_px - _USUAL_PX + (stack.beside_px if width >= _TWO_COLUMNS_PX else 0)
+            more = spare // len(stack.charts) + (_TITLE_SAVED_PX if window_px < _LOW_PX else 0)
+            for chart, usual in stack.charts:
+                if only is None or chart is only:
+                    height = max(usual + more, _LEAST_PX)
+                    self._inside.lay_out(client, chart, height, spaced(chart.axes, height))
 
 
 def spaced(axes: Sequence[Any], height_px: int) -> tuple[dict[str, Any], ...]:

@@ -19,6 +19,7 @@ class PracticeButtons:
 
     def __init__(self, page: Page, practice: Practice, chosen: Callable[[str], None]) -> None:
         self._practice = practice
+        self._folder = ""
         gui = page.server.gui
         self._story = add_html(gui)
         with gui.add_folder("Challenges to practise on", expand_by_default=False):
@@ -38,8 +39,16 @@ class PracticeButtons:
 
     def show(self, folder: str) -> None:
         """The story of the challenge in a folder, if it holds one."""
+        self._folder = folder
         one = self._practice.held(folder)
-        self._story.content = boxed(html("<b>{}.</b> {}", one.title, one.story)) if one is not None else ""
+        self._story.content = "" if one is None else boxed(html("<b>{}.</b> {}", one.title, one.story))
+
+    def fold(self) -> None:
+        """The story gives way to a run and its result; a click on its title opens it."""
+        one = self._practice.held(self._folder)
+        if one is not None:
+            told = '<details><summary style="cursor:pointer"><b>{}</b>: the story</summary>{}</details>'
+            self._story.content = boxed(html(told, one.title, one.story))
 
 
 class Seal:

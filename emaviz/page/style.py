@@ -37,6 +37,8 @@ def page() -> Html:
         # five tabs of a narrow panel on the right in one line, too
         "[data-dock-region=right] [data-dock-tab]{padding-left:9px!important;padding-right:9px!important}"
         "@media (max-width: 1250px){[data-dock-region=right] [data-dock-tab] > div:has(svg){display:none!important}}"
+        # what is chosen from a list ends before the list's mark
+        "input[aria-haspopup=listbox]{text-overflow:ellipsis!important;padding-right:1.7em!important}"
         # handles for docking panels elsewhere, which nobody needs; what folds a panel away stays
         "[data-dock-region-handle]{cursor:default!important}[data-dock-region-handle] > div:first-child,"
         "[data-dock-region] [data-dock-griphandle]{display:none!important}"

@@ -128,7 +128,7 @@ class Workspaces:
             button.on_click(lambda event, name=name: event.client and self._came(event.client, name))
         sizes: dict[str, list[dict[str, Any]]] = {}
         fits: list[tuple[str, Sequence[int], Callable[[int, int], None]]] = [
-            ("innerWidth", docked.WINDOWS_PX, self._docked.fit),
+            ("innerWidth", docked.WINDOWS_PX, self._fit_width),
             ("innerHeight", chart_heights.WINDOWS_PX, self.heights.fit),
         ]
         for side, steps, fit in fits:
@@ -170,6 +170,11 @@ class Workspaces:
         self._docked.show(client.client_id, name)
         self._screen.post("workspace", lambda: self.entered(name))
 
+    def _fit_width(self, client: int, window_px: int) -> None:
+        self._docked.fit(client, window_px)
+        self.heights.fit_width(client, window_px)
+
     def _left(self, client: viser.ClientHandle) -> None:
+        self.heights.forget(client.client_id)
         with self._changing:
             self._at.pop(client.client_id, None)

@@ -35,6 +35,7 @@ _NAMES = (
     Label("horn", "horn", (1.34, 0.0, -0.02)),
     Label("surface", "control surface", (1.70, -0.22, 0.13)),
 )
+_PART_OF = {"k1": "bearing", "k2": "nut", "k3": "phase_a", "k4": "phase_b", "k5": "phase_c", "k6": "rotor"}
 _DRIVE_AT, _LOAD_AT = NAMED_AT, (1.68, 0.0, 0.13)
 _MOST_PLACED = 20  # places of a camera that are remembered
 
@@ -121,7 +122,8 @@ class ActuatorScene:
                 self._faults = faults
                 for part in (self._motor, self._drivetrain, self._drive):
                     part.mark(faults)
-            self._labels.tell([Label(one.fault, one.text, one.place, callout=True) for one in callouts], told)
+            marks = [Label(one.fault, one.text, one.place, True, _PART_OF.get(one.fault, "")) for one in callouts]
+            self._labels.tell(marks, told)
 
     def damage(self, turns: Sequence[float], eccentricity: float, phase_rad: float, play: float) -> None:
         """What a fault changes for good: live shares of the turns, the rotor's offset, the pin's room in the nut."""

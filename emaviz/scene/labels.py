@@ -41,6 +41,7 @@ class Label:
     text: str
     place: tuple[float, float, float]
     callout: bool = False
+    names: str = ""  # of the part that a callout names as well, so that its own label gives way
 
     def size_px(self) -> NDArray[np.float64]:
         """Width and height (2,), rather too large."""
@@ -173,6 +174,8 @@ class Labels:
     def _arrange(self) -> None:
         with self._arranging:
             names = self._names if self._picture[1] >= _LEAST_NAMED_PX else []
+            named = {one.names for one in self._callouts}
+            names = [one for one in names if one.name not in named]
             labels = [*self._callouts, *self._told, *names] if self._shown else []
             placed = self._lay_out(labels)
             for name in self._handles.keys() - {one.label.name for one in placed}:

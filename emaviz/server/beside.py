@@ -19,7 +19,8 @@ _SAY = r"""
     line = document.createElement('div');
     line.className = 'emaviz-beside';
     line.setAttribute('role', 'alert');
-    line.style.cssText = 'color:#e03131;font-size:12px;line-height:1.35;padding:2px 2px 0;overflow-wrap:anywhere';
+    line.style.cssText = 'font-size:12px;line-height:1.35;padding:2px 2px 0;overflow-wrap:anywhere;'
+      + 'color:light-dark(#e03131,#ff8787)';
     home.append(line);
     home.addEventListener(button ? 'click' : 'input', () => line.remove(), { once: true });
   }

@@ -35,6 +35,11 @@ _DROP = """
 (() => {
   if (window.__emavizDrop) return;
   window.__emavizDrop = true;
+  // a file that was refused can be chosen again: an input that keeps its value would say nothing of it
+  window.addEventListener('click', (event) => {
+    const chosen = event.target.matches?.('input[type=file]') ? event.target : null;
+    if (chosen) chosen.value = '';
+  }, true);
   const input = () => {
     const button = Array.from(document.querySelectorAll('button')).find(b => b.textContent === 'Drop');
     return button?.parentElement?.querySelector('input[type=file]') ?? document.querySelector('input[type=file]');
@@ -92,10 +97,11 @@ class Uploads:
         self._inside.take_transfers(self._start, self._part)
         server.on_client_disconnect(lambda client: self._forget(client.client_id))
 
-    def add_button(self, label: str, suffixes: str, **options: Any) -> None:
+    def add_button(self, label: str, suffixes: str, **options: Any) -> Any:
         """An upload button at this place of the page; suffixes: ".csv,.mat"."""
         button = self._button(label, suffixes, **options)
         self._buttons[id_of(button)] = button
+        return button
 
     def add_drop(self, suffixes: str) -> None:
         """Lets files be dropped anywhere: through an unseen button here, which must stand outside of all tabs.

@@ -287,6 +287,21 @@ def test_too_large_an_upload_is_refused(compare, app, tmp_path, monkeypatch):
     wait_until(lambda: not beside.is_visible())
 
 
+def test_a_file_that_cannot_be_read_is_told_beside_the_button_that_sent_it_as_often_as_it_is_chosen(compare, tmp_path):
+    path = tmp_path / "photo.csv"
+    path.write_bytes(b"\xff\xd8\xff\xe0" + bytes(range(256)) * 10)
+    button = compare.get_by_role("button", name="Upload a measurement")
+    beside = button.locator("xpath=..").locator(".emaviz-beside").filter(has_text="photo")
+    for _ in range(2):  # an input that kept its value would say nothing of the same file
+        with compare.expect_file_chooser() as chooser:
+            button.click()
+        wait_until(lambda: beside.count() == 0, 20.0)
+        chooser.value.set_files(str(path))
+        beside.wait_for(timeout=20_000)
+    assert compare.get_by_text("The file cannot be read").count(), "and in a toast"
+    assert not compare.get_by_text("The comparison has failed").count()
+
+
 def test_a_comparison_that_must_wait_is_told_beside_its_button(compare, app, rig_file, monkeypatch):
     upload(compare, rig_file)
     start = compare.get_by_role("button", name="Compare", exact=True)

@@ -246,7 +246,7 @@ def test_the_search_is_looked_at_from_all_sides_and_its_landscape_drawn(page, ap
     wait_until(lambda: page.evaluate(MAPS) is not None and page.evaluate(MAPS)["z"].startswith("41"))
     drawn = page.evaluate(MAPS)
     assert drawn["x"].startswith("k1") and {"truth", "answer, 90 %", "Dandelion ended"} <= set(drawn["names"])
-    page.get_by_text(re.compile("Dandelion (ended (in a trap|at the answer)|had not settled)")).wait_for()
+    page.get_by_text(re.compile("Dandelion (ended (in a local minimum|at the answer)|had not converged)")).wait_for()
     choose(page, "Through", "where Dandelion ended")
     choose(page, "Shown", "close to it")
     page.get_by_role("button", name="Draw the landscape").click()
@@ -326,12 +326,12 @@ def test_a_recording_is_chosen_and_watched_while_it_grows(page, app):
     assert len(names) >= 2
     (session.folder / names[0]).rename(session.folder / "moved by hand.rrd")
     show(page, "Runs")
-    page.get_by_role("button", name="Read the folder again").click()
+    page.get_by_role("button", name="Refresh the list").click()
     page.get_by_text("moved by hand.rrd").first.wait_for()
     choose(page, "Run", "moved by hand.rrd")
     wait_until(lambda: field(page, "New name").input_value() == "moved by hand")
     choose(page, "With", names[1])
-    page.get_by_role("button", name="On the same axes").click()
+    page.get_by_role("button", name="Overlay both runs").click()
     show(page, "Two runs")
     choose(page, "Signal", "motor_speed_rad_s")
     page.wait_for_function(

@@ -14,6 +14,7 @@ from ema_model.discovery.criteria import LEAST_BIC
 from ema_model.discovery.result import Change
 from ema_model.discovery.words import faults, headline, sentences
 from ema_model.errors import InputError
+from ema_model.text import COLOURS
 from emaviz.page.discover.result import answer
 from emaviz.session.discover.beside_truth import agrees, document_of
 from emaviz.session.discover.saved_story import story_of
@@ -51,7 +52,7 @@ def test_start_takes_the_fault_into_the_model(worn):
     assert headline(look.found) == "No physics is missing: the actuator has the fault k2 backlash."
     assert "k2 backlash" in faults(look.found)["k2"] and "mrad" in faults(look.found)["k2"]
     assert any("k2 backlash" in text for text in sentences(look.found))
-    assert "#2b8a3e" in answer(look), "at the floor"
+    assert COLOURS["good"] in answer(look), "at the floor"
 
 
 @pytest.mark.long

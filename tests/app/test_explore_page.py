@@ -229,7 +229,7 @@ def test_a_frozen_run_stays_while_the_plant_changes(page, app):
     page.get_by_role("tab", name="Metrics").click()
     page.get_by_text("frozen plant").wait_for()
     page.get_by_role("tab", name="Signals").click()
-    page.get_by_role("button", name="Drop the frozen run").click()
+    page.get_by_role("button", name="Remove the frozen run").click()
     wait_until(lambda: app.tab(ExploreTab).charts.ghost is None)
     app.tab(ExploreTab).panel.set_faults(HEALTHY)
 

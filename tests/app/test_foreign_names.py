@@ -113,12 +113,12 @@ def test_discover(page, app):
 @pytest.mark.long
 def test_recordings_and_sessions(page, app):
     tab(page, "Runs")
-    page.get_by_role("button", name="Read the folder again", exact=True).click()
+    page.get_by_role("button", name="Refresh the list", exact=True).click()
     seen(page, *(f"{name}.rrd" for name in hostile.NAMES), f"whole {FRAME}.rrd")
     for name in hostile.NAMES:
         choose(page, "Run", f"{name}.rrd")
         seen(page, f"Open {name}.rrd in Rerun", f"not healthy: {', '.join(hostile.NAMES)}")
-    page.get_by_role("button", name="On the same axes", exact=True).click()
+    page.get_by_role("button", name="Overlay both runs", exact=True).click()
     tab(page, "Two runs")
     seen(page, "simulations", f"A {MARKDOWN}.rrd")
     choose(page, "Saved", f"sessions/{FRAME}.emaviz")

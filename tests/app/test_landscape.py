@@ -76,7 +76,7 @@ def test_a_trap_has_a_ridge_before_the_answer():
     found = ways(bowl, {"ssa": far, "do": near, "hba": TRUTH}, TRUTH)
     assert found["ssa"].is_trap and not found["do"].is_trap and found["do"].is_worse and not found["hba"].is_worse
     first, second, third = way_sentences(found)
-    assert "trap" in first and "had not settled" in second and "ended at the answer" in third
+    assert "local minimum" in first and "had not converged" in second and "ended at the answer" in third
 
 
 def test_a_way_goes_the_short_way_round_the_angle():

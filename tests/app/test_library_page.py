@@ -13,7 +13,7 @@ pytestmark = pytest.mark.browser
 def test_pictures_that_must_wait_are_told_beside_their_button(shared_page, app, monkeypatch):
     page = shared_page
     page.get_by_role("tab", name="Library", exact=True).click()
-    button = page.get_by_role("button", name="Run them all for their pictures")
+    button = page.get_by_role("button", name="Simulate all for their thumbnails")
     wait_until(lambda: button.is_visible() and not app.session.worker.busy, 60.0)
     monkeypatch.setattr(app.tab(LibraryTab)._library, "draw_all", lambda: False)  # as while a search goes on
     button.click()

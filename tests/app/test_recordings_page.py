@@ -220,7 +220,7 @@ def test_recordings_are_opened_compared_renamed_and_deleted(watched, app):
     assert page.get_by_label("With", exact=True).input_value() == first.name
     page.get_by_text("iterations 8").first.wait_for()
 
-    page.get_by_role("button", name="On the same axes").click()
+    page.get_by_role("button", name="Overlay both runs").click()
     page.get_by_role("tab", name="Two runs").click()
     page.locator(".js-plotly-plot").first.wait_for(timeout=60_000)
     page.get_by_text("k2 backlash").last.wait_for()

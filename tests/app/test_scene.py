@@ -198,6 +198,13 @@ def test_each_fault_is_said_and_marked_at_its_place(scene, actuator, fault, text
     assert again == healthy, "mended, it looks as it did"
 
 
+@pytest.mark.parametrize("fault, part", [("k1", "bearing"), ("k2", "nut"), ("k4", "phase_b"), ("k6", "rotor")])
+def test_a_part_that_a_callout_names_has_no_second_label(scene, actuator, fault, part):
+    assert f"/labels/{part}" in drawn_nodes(scene, actuator)
+    broken = drawn_nodes(scene, actuator, **{fault: 0.7})
+    assert f"/labels/{fault}" in broken and f"/labels/{part}" not in broken
+
+
 def test_the_eccentric_rotor_is_off_towards_its_mark(scene, actuator):
     drawn_nodes(scene, actuator, k6=0.7, k7=0.7)
     scene.pose(1.2, 0.0)

@@ -28,17 +28,10 @@ RIGHT = {
 
 
 @pytest.fixture(scope="module")
-def errors():
-    """What the page's console has complained of."""
-    return []
-
-
-@pytest.fixture(scope="module")
-def tab(browser, app, errors):
+def tab(browser, app):
     """One window for all tests here."""
     app.strip.play(False)
     page = browser.new_page(viewport={"width": 1400, "height": 900})
-    page.on("pageerror", lambda error: errors.append(str(error)))
     page.goto(app.address)
     page.get_by_role("tab", name="Explore", exact=True).wait_for(timeout=60_000)
     page.set_default_timeout(20_000)
@@ -219,14 +212,6 @@ def test_keys_change_the_workspace_and_play(tab, app):
     wait_until(lambda: app.playback.playing, 10.0)
     tab.keyboard.press("Space")
     wait_until(lambda: not app.playback.playing, 10.0)
-
-
-# Plotly's own, of a chart whose panel is left while it is being drawn: it goes on drawing what is no longer there.
-PLOTLYS_OWN = "_redrawFromAutoMarginCount"
-
-
-def test_the_page_had_no_error(errors):
-    assert not [one for one in errors if PLOTLYS_OWN not in str(one)]
 
 
 def test_the_guide_belongs_to_its_challenge(tab, app):

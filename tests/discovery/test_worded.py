@@ -24,7 +24,7 @@ def test_parameters_that_masked_an_effect_are_named_as_on_the_page(tmp_path):
     moved = StoodIn("motor.torque_constant_Nm_A", -2.5, -0.4), StoodIn("friction.dynamic_Nm", 2.0, 0.1)
     lines = masked([replace(one, stood_in=moved)], found.actuator.axes)
     assert lines == [
-        "Cogging torque had been masked: back toward the file's value came motor torque constant (−2.5 → −0.4 σ), "
+        "Cogging torque had been masked: back toward their nominal values moved motor torque constant (−2.5 → −0.4 σ), "
         "friction dynamic (+2.0 → +0.1 σ)."
     ]
     told = replace(found, warnings=[*lines, untold("cogging_torque", "torque_ripple"), NOT_REPEATABLE])

@@ -27,7 +27,7 @@ from ema_model.recordings.prepared import prepared
 from ema_model.simulation.run import Run, finite
 from ema_model.simulation.words import run_in_words
 from emaviz.cli.given import effects_of
-from emaviz.figures.signals import charts
+from emaviz.figures.signal_charts import charts
 
 PROJECT = Path(__file__).parents[2]
 ROTARY, LINEAR = Axes(), Axes("linear", "linear")

@@ -21,15 +21,21 @@ window.cancelAnimationFrame = clearTimeout;
 """
 
 
+# Plotly's own, of a chart whose panel is left while it is being drawn: it goes on drawing what is no longer there.
+NOT_OURS = ("_redrawFromAutoMarginCount",)
+
+
 class Browser:
-    """A browser of Playwright's, whose pages are calm unless they are asked to be drawn."""
+    """A browser of Playwright's, whose pages are calm unless they are asked to be drawn, and whose errors are heard."""
 
     def __init__(self, chromium: Any) -> None:
         self._chromium = chromium
+        self._errors: list[str] = []
 
     def new_page(self, *, drawn: bool = False, **settings: Any) -> Any:
         """Of a context of its own."""
         page = self._chromium.new_page(**settings)
+        self._hear(page)
         if not drawn:
             page.add_init_script(CALM)
         return page
@@ -37,10 +43,20 @@ class Browser:
     def new_context(self, *, drawn: bool = False, **settings: Any) -> Any:
         """Whose pages are calm as well."""
         context = self._chromium.new_context(**settings)
+        context.on("page", self._hear)
         if not drawn:
             context.add_init_script(CALM)
         return context
 
+    def errors(self) -> list[str]:
+        """What pages have thrown, or written to their console as an error, since this was asked last."""
+        heard, self._errors = self._errors, []
+        return [one for one in heard if not any(text in one for text in NOT_OURS)]
+
     def close(self) -> None:
         """With all its pages."""
         self._chromium.close()
+
+    def _hear(self, page: Any) -> None:
+        page.on("pageerror", lambda error: self._errors.append(f"{page.url}: {error}"))
+        page.on("console", lambda said: said.type == "error" and self._errors.append(f"{page.url}: {said.text}"))

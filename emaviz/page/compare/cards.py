@@ -6,10 +6,11 @@ from collections.abc import Iterable
 
 from ema_model.recordings import SIGNALS, ColumnMapping, MappedColumn
 from ema_model.recordings.health.card import Finding, Health
+from ema_model.text import COLOURS
 from emaviz.session.opened import Opened
 from emaviz.text.html import Html, html, joined
 
-_MARKS = {"good": ("✓", "#2b8a3e"), "note": ("●", "#1c7ed6"), "warning": ("▲", "#e8590c")}
+_MARKS = {"good": ("✓", COLOURS["good"]), "note": ("●", "#1c7ed6"), "warning": ("▲", COLOURS["warning"])}
 _BOX = Html('style="padding:0 10px 6px;font-size:12.5px;line-height:1.4"')
 _DIM = Html('style="opacity:.65"')
 
@@ -36,7 +37,9 @@ def mapping_table(mapping: ColumnMapping) -> Html:
         signal = SIGNALS[entry.signal]
         unit = entry.unit or signal.unit
         sure = f"{100.0 * entry.confidence:.0f} %"
-        colour = "#2b8a3e" if entry.confidence >= 0.8 else "#e8590c" if entry.confidence < 0.6 else "inherit"
+        colour = (
+            COLOURS["good"] if entry.confidence >= 0.8 else COLOURS["warning"] if entry.confidence < 0.6 else "inherit"
+        )
         rows.append(
             html(
                 '<tr title="{}"><td><b>{}</b></td>'

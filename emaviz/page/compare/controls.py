@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import viser
 
@@ -32,9 +33,10 @@ class ComparePanel:
         self._page, self._comparing, self._result = page, comparing, result
         self._shown: str | None = None
         self._again = False
+        self._asked_at: Any = None  # by which control the last file was asked for
         gui = page.server.gui
         gui.add_markdown("Upload a measurement of a test bench, or **drop it anywhere** on the page.")
-        uploads.add_button("Upload a measurement", ",".join(FORMATS), icon=viser.Icon.UPLOAD)
+        self._upload = uploads.add_button("Upload a measurement", ",".join(FORMATS), icon=viser.Icon.UPLOAD)
         self._choice = gui.add_dropdown("Data folder", [_NONE])
         self._add_it = gui.add_button("Add this file", icon=viser.Icon.PLUS, color="gray")
         with gui.add_folder("Measurements"):
@@ -78,12 +80,14 @@ class ComparePanel:
         if path.suffix.lower() == ACTUATOR_SUFFIX:
             self._page.screen.post("actuator", lambda: self.asked.choose(UPLOADED + name))
         else:
+            self._asked_at = self._upload
             self._comparing.add(name)
         self._page.screen.post("files", self.refresh_files)
 
     def _add(self) -> None:
         name = str(self._choice.value)
         if name != _NONE:
+            self._asked_at = self._add_it
             self._comparing.add(name)
 
     def _remove_shown(self) -> None:
@@ -102,7 +106,11 @@ class ComparePanel:
 
     def _failed(self, what: str, why: str) -> None:
         """Beside what was asked for; no reason takes it away."""
-        control = {OPEN: self._add_it, MAP: self._mapping.use, LAY_OUT: self._mapping.header}.get(what)
+        if what == OPEN:  # beside the control that was used last, and no longer beside the other
+            for control in (self._upload, self._add_it):
+                self._page.say_beside(control, why if control is (self._asked_at or self._add_it) else "")
+            return
+        control = {MAP: self._mapping.use, LAY_OUT: self._mapping.header}.get(what)
         if control is not None:
             self._page.say_beside(control, why)
 

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 import viser
 
 from ema_model.recordings.formats.text_layout import ENCODINGS, Hints
+from ema_model.text import COLOURS
 from emaviz.page.page import Page
 from emaviz.session.compare.comparing import Comparing
 from emaviz.session.opened import Opened
@@ -39,7 +40,7 @@ class LayoutControls:
             return
         what = "As said" if said != Hints() else "Found"
         told = html("{}: {}.", what, head.told) if head.told else "No line with the columns' names is found."
-        why = html('<span style="color:#e8590c;overflow-wrap:anywhere">▲ {}</span>', opened.problem)
+        why = html('<span style="color:{};overflow-wrap:anywhere">▲ {}</span>', COLOURS["warning"], opened.problem)
         self._told.content = html("<div {}>{}</div>", _BOX, why if opened.problem else told)
         _offer(self.header, range(1, min(len(head.lines), _MOST_LINES) + 1), said.header_line)
         _offer(self._encoding, ENCODINGS.values(), said.encoding and ENCODINGS.get(said.encoding, said.encoding))

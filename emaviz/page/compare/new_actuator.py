@@ -11,6 +11,7 @@ from ema_model.actuator.describe import DRIVES
 from ema_model.actuator.keys import KINDS
 from ema_model.quantities.axes import KINDS as AXES
 from ema_model.quantities.axes import Axes
+from ema_model.text import COLOURS
 from emaviz.page.page import Page
 from emaviz.page.style import LONG_LABELS
 from emaviz.session.data_folder import DataFolder
@@ -83,7 +84,7 @@ class NewActuator:
     def _save(self) -> None:
         name, doubts = self._description().save(self._folder)
         self._take(name)
-        lines = joined(html('<div style="color:#e8590c">▲ {}</div>', line) for line in doubts)
+        lines = joined(html('<div style="color:{}">▲ {}</div>', COLOURS["warning"], line) for line in doubts)
         self._told.content = html("<div {}><b>{}</b> is made, and chosen above.{}</div>", _BOX, name, lines)
 
 

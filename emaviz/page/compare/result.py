@@ -24,6 +24,7 @@ from emaviz.page.playback import PlaybackStrip
 from emaviz.server.viser_private import selector_of
 from emaviz.session.opened import Opened
 from emaviz.text.html import Html, add_html, html, joined, unescaped
+from emaviz.text.notes import begin
 from emaviz.text.told import folded, large, shown, warned
 
 _BOX = Html('style="padding:2px 12px 6px;font-size:13px;line-height:1.45"')
@@ -34,6 +35,13 @@ _RESTING = (
 _CHOSEN = "background:rgba(224,49,49,.14)!important;color:inherit!important;border-left:3px solid #e03131;"
 _CONFIG = {"displayModeBar": False, "responsive": False}
 _PLAYING_REDRAW_S, _LEAST_MOVE_S = 1.0, 1e-4
+
+_STEPS = (
+    "Upload a measurement of a test bench, or drop a file anywhere on the page: CSV, Parquet, MATLAB, HDF5, TDMS, MDF, "
+    "ULog, MCAP and more. Columns and units are recognised; you can correct them.",
+    "The actuator's parameters are calibrated within their tolerances, and the model is run with the same command.",
+    "You see where the model fails and what its residual depends on, beside the noise floor.",
+)
 
 
 class ResultPanel:
@@ -60,7 +68,7 @@ class ResultPanel:
         self._buttons: list[Any] = []
         gui = page.server.gui
         add_html(gui, COLUMNS)
-        self._headline = add_html(gui, html("<div {}>Nothing is compared yet: upload a measurement.</div>", _BOX))
+        self._headline = add_html(gui, begin("Nothing is compared yet", _STEPS))
         add_html(gui, PLOTS_EARLY)
         self._numbers = add_html(gui, visible=False)
         self._place = gui.add_folder("Preview of the columns", visible=False)

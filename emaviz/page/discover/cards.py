@@ -30,9 +30,9 @@ def label(look: Look, one: Candidate) -> str:
     if look.is_worth(one):
         before, after = number(look.rmse), number(look.predicted_rmse(one))
         if look.share(one) < _LITTLE:
-            lines.append("explains a part, but hardly moves the error by itself")
+            lines.append("explains a part, but hardly reduces the error by itself")
         else:
-            lines.append(f"takes about {100.0 * look.share(one):.0f} % of the error: {before} → ≈ {after} × floor")
+            lines.append(f"removes about {100.0 * look.share(one):.0f} % of the error: {before} → ≈ {after} × floor")
         lines.append(f"{strength(look, one)} · {confidence(one)}")
         same = look.assessment.alike.get(one.name, ()) if look.assessment else ()
         if same:

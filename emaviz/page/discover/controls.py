@@ -55,10 +55,10 @@ class DiscoverPanel:
             ]
             self._undo = gui.add_button("Undo the last step", icon=viser.Icon.ARROW_BACK_UP, color="gray")
             self._all = gui.add_button("Find all", icon=viser.Icon.WAND, hint="Adds what pays, step by step")
-        self._little_folder = gui.add_folder("Would change little", visible=False, expand_by_default=False)
+        self._little_folder = gui.add_folder("Little effect on the error", visible=False, expand_by_default=False)
         with self._little_folder:
             self._little = [self._slot() for _ in CATALOGUE]
-        self._never_folder = gui.add_folder("These measurements cannot show", visible=False, expand_by_default=False)
+        self._never_folder = gui.add_folder("Not seen in these measurements", visible=False, expand_by_default=False)
         with self._never_folder:
             self._never = [self._slot() for _ in CATALOGUE]
         self._own = OwnEffect(page, discovering)

@@ -15,6 +15,7 @@ from ema_model.effects import Effect, find
 from ema_model.effects.effect import FAMILIES
 from ema_model.quantities.numbers import Quantity, number
 from ema_model.quantities.titles import in_sentence
+from ema_model.text import COLOURS
 from emaviz.figures import signature
 from emaviz.page.discover import cards
 from emaviz.page.page import Page
@@ -84,7 +85,7 @@ def head(look: Look, one: Candidate) -> Html:
     """What adding it is expected to do."""
     if one.untestable_reason:
         why = one.untestable_reason[:1].upper() + one.untestable_reason[1:]
-        return html('<div {}><span style="color:#e8590c">▲ {}.</span></div>', BOX, why)
+        return html('<div {}><span style="color:{}">▲ {}.</span></div>', BOX, COLOURS["warning"], why)
     if not look.is_worth(one):
         return html("<div {}>No evidence for it: adding it would not reduce the error significantly.</div>", BOX)
     lines: list[str] = [
@@ -99,7 +100,9 @@ def head(look: Look, one: Candidate) -> Html:
     same = look.assessment.alike.get(one.name, ()) if look.assessment else ()
     if same:
         names = ", ".join(in_sentence(effect_title(name)) for name in same)
-        lines.append(html('<span style="color:#e8590c">▲ These recordings cannot tell it from {}.</span>', names))
+        lines.append(
+            html('<span style="color:{}">▲ These recordings cannot tell it from {}.</span>', COLOURS["warning"], names)
+        )
     return boxed(joined(lines, "<br>"))
 
 

@@ -1,4 +1,4 @@
-"""Try this test next: the command and load that tell rivals apart; into Explore, or as CSV for a rig."""
+"""Suggested next test: the command and load that tell rivals apart; into Explore, or as CSV for a rig."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class NextTest:
     ) -> None:
         self._page, self._discovering = page, discovering
         gui = page.server.gui
-        self._folder = gui.add_folder("Try this test next", visible=False)
+        self._folder = gui.add_folder("Suggested next test", visible=False)
         with self._folder:
             self._text = add_html(gui, note(_ASK))
             self._find = gui.add_button("Find the best test", icon=viser.Icon.FLASK)

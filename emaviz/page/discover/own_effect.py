@@ -14,6 +14,7 @@ from ema_model.effects.user import UserEffect, user_torque
 from ema_model.effects.user.expression import FUNCTIONS, VARIABLES
 from ema_model.errors import InputError
 from ema_model.quantities.numbers import number as shown
+from ema_model.text import COLOURS
 from emaviz.figures import signature
 from emaviz.page.discover.sliders import ParameterSliders
 from emaviz.page.page import Page
@@ -91,7 +92,7 @@ class OwnEffect:
     def _check(self) -> None:
         """Reads the text as it stands; on the screen's thread."""
         self._typed = typed(str(self._text.value))
-        colour = "#2b8a3e" if self._typed.expression else "#e03131"
+        colour = COLOURS["good" if self._typed.expression else "bad"]
         self._checked.content = html('<div {}><span style="color:{}">{}</span></div>', BOX, colour, self._typed.line)
         self._sliders.list(self._typed.expression.parameters if self._typed.expression else ())
         self._hide("")
@@ -134,7 +135,9 @@ class OwnEffect:
 
     def _hide(self, why: str) -> None:
         self._plot.visible = False
-        self._said.content = html('<div {}><span style="color:#e8590c">{}</span></div>', BOX, why) if why else ""
+        self._said.content = (
+            html('<div {}><span style="color:{}">{}</span></div>', BOX, COLOURS["warning"], why) if why else ""
+        )
 
     def _begin(self) -> bool:
         return self._discovering.add_own(self._effect(), self._sliders.values)

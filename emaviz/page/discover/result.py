@@ -26,12 +26,13 @@ from emaviz.page.playback import PlaybackStrip
 from emaviz.session.discover import beside_truth
 from emaviz.session.discover.discovering import Discovering
 from emaviz.text.html import Html, add_html, html, joined
-from emaviz.text.notes import BOX, boxed
+from emaviz.text.notes import BOX, begin, boxed
 from emaviz.text.told import folded, large, shown, warned
 
-_RESTING = Html(
-    "Choose measurements on the left, and press <b>Start</b>: the model is calibrated, and what it leaves is held "
-    "against every effect of the library."
+_STEPS = (
+    "Choose measurements on the left: those of Compare, or one of the challenges.",
+    Html("Press <b>Start</b>: the model is calibrated, and its residual is compared with every effect of the library."),
+    "Add an effect: the error falls, also on what was held out. Then save the improved model, or use it in Explore.",
 )
 
 
@@ -56,7 +57,7 @@ class DiscoveryPanel:
         self._titles: dict[str, str] = {}
         gui = page.server.gui
         add_html(gui, COLUMNS)
-        self._headline = add_html(gui, boxed(_RESTING))
+        self._headline = add_html(gui, begin("No discovery yet", _STEPS))
         self._ladder: Any = gui.add_plotly(go.Figure(), config=CONFIG, aspect=0.5, visible=False)
         self._effect = EffectView(page, discovering)
         self._truth_folder = gui.add_folder("The challenge's truth", visible=False)
@@ -74,7 +75,7 @@ class DiscoveryPanel:
             self._actuator = ActuatorSwitch(page, discovering, self._track, strip)
             self._residual: Any = gui.add_plotly(go.Figure(), config=CONFIG, aspect=0.5, visible=False)
             self._explained: Any = gui.add_plotly(go.Figure(), config=CONFIG, aspect=0.6, visible=False)
-        self._left_folder = gui.add_folder("What is left", visible=False, expand_by_default=False)
+        self._left_folder = gui.add_folder("Remaining residual", visible=False, expand_by_default=False)
         with self._left_folder:
             self._left: Any = gui.add_plotly(go.Figure(), config=CONFIG, aspect=0.5, visible=False)
         self._next = NextTest(page, discovering, load)
@@ -115,7 +116,7 @@ class DiscoveryPanel:
         if not self._discovering.source.revealed:
             self._truth.content = ""
         if look is None:
-            self._headline.content = boxed(_RESTING)
+            self._headline.content = begin("No discovery yet", _STEPS)
             self._actuator.refresh()
             return
         found = look.found
@@ -123,7 +124,7 @@ class DiscoveryPanel:
         self._ladder.figure = error_ladder.figure(found)
         self._equation.content = boxed(equation(found, look.added))
         named = all(one.name in CATALOGUE for one in look.added)
-        self._left_folder.label = "What is left" if named else "What had no name"
+        self._left_folder.label = "Remaining residual" if named else "Unexplained residual"
         if self._left_folder.visible:
             self._left.figure, self._left.visible = missing_curve.figure(found), True
         self._titles = {SIGNALS[name].title: name for name in found.ladder[0].signals}
@@ -174,7 +175,7 @@ def answer(look: Look) -> Html:
     found = look.found
     done = look.rmse <= AT_FLOOR
     if look.assessment is None:
-        first, others = sentences(found)[0], ["What is left is being looked at …"]
+        first, others = sentences(found)[0], ["Analysing the residual …"]
     elif not look.added and look.promising:  # before anything was added, of which a verdict could speak
         left = look.assessment.left.explanation
         first = "Physics is missing."

@@ -47,7 +47,7 @@ class SourceControls:
         self._source = gui.add_dropdown("Measurements", tuple(self._names), hint="Of Compare, or of a challenge")
         uploads.add_button("Open a sealed challenge", CHALLENGE_SUFFIX, icon=viser.Icon.LOCK_OPEN, color="gray")
         self._about = add_html(gui)
-        self._held = gui.add_folder("Hold out, to judge by", visible=False, expand_by_default=False)
+        self._held = gui.add_folder("Hold out for validation", visible=False, expand_by_default=False)
         self._boxes: list[Any] = []
         self._source.on_update(lambda event: event.client and post("source", self._take))
         discovering.sealing.sealed.connect(lambda _: post("sealed listed", self._refresh))

@@ -44,8 +44,8 @@ class ChartsPanel:
             self._freeze = gui.add_button(
                 "Freeze this run", icon=viser.Icon.SNOWFLAKE, color="gray", hint="Keeps it as a dashed line"
             )
-            self._melt = gui.add_button("Drop the frozen run", icon=viser.Icon.X, color="gray", visible=False)
-            self.signals = LiveSignals(gui, page.session.actuator.axes)
+            self._melt = gui.add_button("Remove the frozen run", icon=viser.Icon.X, color="gray", visible=False)
+            self.signals = LiveSignals(gui, page.session.actuator.axes, page.workspaces.heights.set_axes)
             page.workspaces.heights.add(self.signals.handles, spare_px=-48)
             self._range = gui.add_multi_slider(
                 "Shown [%]", 0, 100, 1, (0, 100), min_range=1, hint="Of the run; zooms all charts, in full resolution"

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from ema_model.faults import HEALTHY, vector
 
 _MULTI_FAULT = np.array([0.0133, 0.05, 0.003, 0.0, 0.0, 0.012, 0.5, 0.35])  # T 5.3
-CUSTOM = "as the sliders stand"
+CUSTOM = "custom"
 
 PRESETS: dict[str, NDArray[np.float64]] = {
     "healthy": HEALTHY,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import viser
 
 from ema_model.simulation import plant
+from ema_model.text import COLOURS
 from emaviz.page.explore import WORKSPACE
 from emaviz.page.explore.charts import ChartsPanel
 from emaviz.page.explore.controls import ExplorePanel
@@ -15,7 +16,7 @@ from emaviz.session.archive import recovered
 from emaviz.session.session import Simulation
 from emaviz.text.html import add_html, html, said
 
-_NOTE = "padding:6px 12px;font-size:13px;line-height:1.45;border-left:3px solid #e8590c"
+_NOTE = f"padding:6px 12px;font-size:13px;line-height:1.45;border-left:3px solid {COLOURS['warning']}"
 
 
 class ExploreTab(Tab):

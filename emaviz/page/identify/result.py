@@ -56,7 +56,7 @@ class IdentifyResult:
         with panel.add_tab(_SEARCH, viser.Icon.CHART_DOTS):
             add_html(gui, COLUMNS)
             self._convergence = LiveConvergence(gui)
-            page.workspaces.heights.add([self._convergence.handle], spare_px=160)
+            page.workspaces.heights.add([self._convergence.handle], spare_px=160, beside_px=332)
             self._swarm = SwarmView(page)
         with panel.add_tab(_ANSWER, viser.Icon.TARGET_ARROW):
             self._whose = gui.add_dropdown("Algorithm shown", (_BEST, *ALGORITHMS.values()))

@@ -24,13 +24,13 @@ class SwarmView:
         self._race: Race | None = None
         self._chosen = False  # by hand, which two k
         gui = page.server.gui
+        with gui.add_folder("Population"):
+            add_html(gui, NEXT_COLUMN)
+            self._picture = add_html(gui, swarm.plane([], 0, 5))
         self._kind = gui.add_dropdown("Population view", (_PLANE, _LINES))
         self._x = gui.add_dropdown("Across", _NAMES, initial_value=_NAMES[0])
         self._y = gui.add_dropdown("Upwards", _NAMES, initial_value=_NAMES[5])
         self._iteration = gui.add_slider("Iteration", 0, 150, 1, 150, disabled=True, hint="Looks back once it is over")
-        with gui.add_folder("Population"):
-            add_html(gui, NEXT_COLUMN)
-            self._picture = add_html(gui, swarm.plane([], 0, 5))
         for entry in (self._kind, self._iteration):
             entry.on_update(lambda event: event.client and page.screen.post("swarm view", self._changed))
         for entry in (self._x, self._y):

@@ -33,7 +33,7 @@ class LibraryPanel:
         gui = page.server.gui
         self._search = gui.add_text("Search", "", hint="In names, equations and explanations")
         self._draw = gui.add_button(
-            "Run them all for their pictures",
+            "Simulate all for their thumbnails",
             icon=viser.Icon.PHOTO,
             hint="Each where it shows most; the first time, the library is compiled, which takes some seconds",
         )

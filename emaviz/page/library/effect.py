@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from ema_model.effects import Effect, find
@@ -35,10 +36,11 @@ class EffectPage:
         self._title = add_html(gui, note("Choose an effect on the left."))
         self._text = add_html(gui)
         self._run = gui.add_dropdown("Run", tuple(RUNS), visible=False)
-        self._place = gui.add_folder("What each parameter does", visible=False)
+        self._place = gui.add_folder("Parameters", visible=False)
         self._status = add_html(gui)
         add_html(gui, NEXT_COLUMN)  # a signal and its difference stay together
         self._charts = EffectCharts(gui, page.session.actuator.axes)
+        page.workspaces.heights.add(self._charts.handles)
         page.workspaces.entered.connect(self._enter)
         self._run.on_update(lambda event: event.client and self._ask())
 
@@ -52,8 +54,8 @@ class EffectPage:
         effect = find(name, self._page.session.actuator.axes)
         self._name = name
         self._title.content = html(
-            '<div {}><span style="font-size:17px;font-weight:600">{}</span>'
-            '<span style="font-size:16px;float:right">{}</span></div>',
+            '<div {}><div style="font-size:17px;font-weight:600">{}</div>'
+            '<div style="font-size:16px;padding:6px 0">{}</div></div>',
             BOX,
             effect.title,
             mathml(effect.equation, "inline"),
@@ -95,6 +97,7 @@ class EffectPage:
             slider = gui.add_slider(one.label, int(one.low), int(min(one.high, 48)), 1, int(middle))
         else:
             step = float(f"{(high - low) / 400.0:.0e}")
+            low, high = min(_inwards(low), middle), max(-_inwards(-high), middle)
             slider = gui.add_slider(one.label, low, high, step, middle, hint=one.meaning)
         slider.on_update(lambda event: event.client and self._ask())
         return slider
@@ -103,3 +106,11 @@ class EffectPage:
         if self._name:
             settings = {name: float(slider.value) for name, slider in self._sliders.items()}
             self._page.checked(lambda: self._library.feel(self._name, settings, str(self._run.value)), self._run)
+
+
+def _inwards(low: float) -> float:
+    """A lower end with four digits, not below it: −3.141 for −π, which a slider would write in full."""
+    if low == 0.0:
+        return low
+    grain = 10.0 ** (math.floor(math.log10(abs(low))) - 3)
+    return round(math.ceil(low / grain - 1e-9) * grain, 12)

@@ -26,6 +26,7 @@ from emaviz.text.html import Html, add_html, html, joined, said
 NONE = "–"
 _SHOWN = 25
 _LOOK_S = 2.0  # between two looks at the folder
+_UNSET = ("", "none", None, "0", "0.0", 0)  # settings that say that there is nothing of the kind, are not listed
 _BOX = Html('style="padding:2px 10px;font-size:12.5px;line-height:1.45"')
 
 
@@ -46,14 +47,14 @@ class RunsPanel:
         self._link = add_html(gui)
         with gui.add_folder("Compare two"):
             self._other: Any = gui.add_dropdown("With", (NONE,))
-            self._compare = gui.add_button("On the same axes", icon=viser.Icon.ARROWS_DIFF, disabled=True)
+            self._compare = gui.add_button("Overlay both runs", icon=viser.Icon.ARROWS_DIFF, disabled=True)
         with gui.add_folder("Rename or delete", expand_by_default=False):
             self._name = gui.add_text("New name", "")
             self._rename = gui.add_button("Rename", icon=viser.Icon.PENCIL, color="gray", disabled=True)
             self._delete = gui.add_button("Delete…", icon=viser.Icon.TRASH, color="red", disabled=True)
         with gui.add_folder("All, newest first"):
             self._list = add_html(gui)
-            again = gui.add_button("Read the folder again", icon=viser.Icon.REFRESH, color="gray")
+            again = gui.add_button("Refresh the list", icon=viser.Icon.REFRESH, color="gray")
         self._choice.on_update(lambda event: event.client and self._post(self._take_choice))
         self._open.on_click(lambda _: self._post(self._open_chosen, self._open))
         self._compare.on_click(lambda _: self._post(self._compare_two, self._compare))
@@ -214,10 +215,10 @@ def _card(entry: Entry) -> Html:
     settings = [
         html("{} <b>{}</b>", *setting(name, value))
         for name, value in entry.settings.items()
-        if value not in ("", "none", None)
+        if name == "seed" or value not in _UNSET
     ]
     return html(
-        '<div {}>{}{}<div style="opacity:.75;font-size:11.5px">{}</div></div>',
+        '<div {}>{}{}<div style="opacity:.8;font-size:12.5px">{}</div></div>',
         _BOX,
         size,
         results,

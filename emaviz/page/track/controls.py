@@ -37,16 +37,18 @@ class TrackPanel:
         hint = "Folders of the data folder that hold recordings"
         self._folder = FolderChoice(page, "Flights", hint, self._listed, lambda: following.chosen, self._take_folder)
         self._practice = PracticeButtons(page, following.practice, self.choose)
-        with gui.add_folder("The life ends where"):
+        with gui.add_folder("End of life"):
             self._faults = {BY_NAME[name].label: name for name in TRACKED}
             self._fault: Any = gui.add_dropdown("Fault", tuple(self._faults))
-            self._ends = gui.add_checkbox("has a threshold", False)
+            self._ends = gui.add_checkbox("With a threshold", False)
             self._threshold = gui.add_number("Threshold", 0.5, min=0.0, max=1.0, step=0.001, disabled=True)
             self._all = add_html(gui)
         self._start = gui.add_button("Track", icon=viser.Icon.TIMELINE, disabled=True)
         self._line = JobLine(page, following.job, pauses="it")
         self._watch = gui.add_checkbox(
-            "Take up new flights", following.watching, hint="Files that arrive in the folder add a point each"
+            "Add new flights",
+            following.watching,
+            hint="Files that arrive in the folder add a point each",
         )
         self._left_out = add_html(gui)
         self._fault.on_update(lambda event: event.client and post("fault", self._show_fault))
@@ -143,6 +145,8 @@ class TrackPanel:
     # --- the run ----------------------------------------------------------------------------------------------------
 
     def _busy(self, busy: bool) -> None:
+        if busy:
+            self._practice.fold()
         with self._page.server.atomic():
             self._start.disabled = busy
             for control in (self._folder.control, self._fault, self._ends):

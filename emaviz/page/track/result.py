@@ -9,6 +9,7 @@ import plotly.graph_objects as go
 import viser
 
 from ema_model.faults import BY_NAME
+from ema_model.text import COLOURS
 from ema_model.tracking.flight import Flight
 from ema_model.tracking.history import History
 from ema_model.tracking.result import Tracked
@@ -22,13 +23,17 @@ from emaviz.page.practice import Seal
 from emaviz.page.track.click import FlightClicks
 from emaviz.page.track.leads import FlightLead
 from emaviz.session.worker import Worker
-from emaviz.text.html import add_html, html
-from emaviz.text.notes import BOX, DIM, boxed
+from emaviz.text.html import Html, add_html, html
+from emaviz.text.notes import BOX, DIM, begin
 from emaviz.text.told import whole
 
 _CONFIG = {"displayModeBar": False}
 _NONE = "–"
-_NOTHING = "Nothing is followed yet: choose a folder of flights on the left."
+_STEPS = (
+    "Choose a folder of flights on the left, or a challenge to practise on; set the value at which the life ends.",
+    Html("Press <b>Track</b>: the faults of each flight are identified."),
+    "You see which fault drifts and how many flights remain, as a distribution; drag the day back along the life.",
+)
 _ASPECTS = (0.6, 0.42, 0.48)  # of the figures, height over width
 
 
@@ -47,7 +52,7 @@ class TrackResult:
         self._page, self._slow = page, slow
         self._history: History | None = None
         gui = page.server.gui
-        self._told = add_html(gui, boxed(_NOTHING))
+        self._told = add_html(gui, begin("No flights are tracked yet", _STEPS))
         self._life = gui.add_folder("The unit's life", visible=False)
         with self._life:
             add_html(gui, COLUMNS)
@@ -57,13 +62,13 @@ class TrackResult:
                 "Today, after flight", min=1, max=2, step=1, initial_value=2, hint="Drag it back: what was said then"
             )
             self._plots = [gui.add_plotly(go.Figure(), config=_CONFIG, aspect=aspect) for aspect in _ASPECTS]
-        self._place = gui.add_folder("A flight of it", visible=False)
+        self._place = gui.add_folder("One flight", visible=False)
         with self._place:
             self._flight: Any = gui.add_dropdown("Flight", (_NONE,))
             self._lead = lead(self._chosen)
             FlightClicks(page, self._clicked)
         self._seal = seal()
-        self._words = gui.add_folder("All that is known today", visible=False, expand_by_default=False)
+        self._words = gui.add_folder("All results in words", visible=False, expand_by_default=False)
         with self._words:
             self._document = add_html(gui)
         self._save = gui.add_folder("Keep it", visible=False)
@@ -83,7 +88,7 @@ class TrackResult:
         if begun:
             self._seal.show()
         if history is None or last is None:
-            self._told.content = boxed(_NOTHING)
+            self._told.content = begin("No flights are tracked yet", _STEPS)
             return
         at_end = begun or self._today.value >= self._today.max
         first, end = min(history.looks), max(history.looks)
@@ -146,7 +151,7 @@ def said(then: Tracked, name: str, history: History) -> str:
     number = len(then.flights)
     later = hindsight(then.faults[name], history.came(number, name))
     drifts = then.trusted and any(one.trend for one in then.faults.values())
-    colour = "#e8590c" if drifts or not then.trusted else "#2b8a3e"
+    colour = COLOURS["warning" if drifts or not then.trusted else "good"]
     return html(
         '<div {}><div style="font-size:16px;font-weight:600;color:{};padding:4px 0">{}</div><div {}>{}</div>{}</div>',
         BOX,

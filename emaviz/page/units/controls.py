@@ -93,6 +93,8 @@ class UnitsPanel:
             self._actuator.value = comparing.actuator_name
 
     def _busy(self, busy: bool) -> None:
+        if busy:
+            self._practice.fold()
         with self._page.server.atomic():
             for control in (self._start, self._folder.control, self._rule, self._actuator):
                 control.disabled = busy

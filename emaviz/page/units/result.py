@@ -6,6 +6,7 @@ from typing import Any
 
 import plotly.graph_objects as go
 
+from ema_model.text import COLOURS
 from ema_model.units.result import UnitsCompared
 from ema_model.units.words import document_of, lacking, notes, rests_on, sentences
 from emaviz.figures import transfer_matrix, unit_parameters
@@ -15,11 +16,15 @@ from emaviz.page.practice import Seal
 from emaviz.page.units.keep import UnitsKeep
 from emaviz.session.units.comparing_units import ComparingUnits
 from emaviz.text.html import Html, add_html, html, joined
-from emaviz.text.notes import BOX, DIM, boxed
+from emaviz.text.notes import BOX, DIM, begin
 from emaviz.text.told import warned, whole
 
 _CONFIG = {"displayModeBar": False}
-_NOTHING = "No units are compared yet: choose a folder of units on the left."
+_STEPS = (
+    "Choose a folder of units on the left, or a challenge to practise on.",
+    Html("Press <b>Compare units</b>: the type is calibrated on all, and what differs is freed for each unit."),
+    "You see which unit differs from the rest, in which parameter and by how much, checked by what is held out.",
+)
 _WIDTH_PX = 540  # of a figure on a usual panel, by which its share of height is made
 _HEAD_PX, _ROW_PX, _FEWEST_ROWS = 110, 34, 4  # of the matrix
 
@@ -31,7 +36,7 @@ class UnitsResult:
         self._page, self._comparing = page, comparing
         gui = page.server.gui
         add_html(gui, COLUMNS)
-        self._told = add_html(gui, boxed(_NOTHING))
+        self._told = add_html(gui, begin("No units are compared yet", _STEPS))
         self._figures = gui.add_folder("Parameters of each unit", visible=False)
         with self._figures:
             self._parameters: Any = gui.add_plotly(go.Figure(), config=_CONFIG, aspect=1.0)
@@ -40,7 +45,7 @@ class UnitsResult:
             add_html(gui, NEXT_COLUMN)
             self._transfer: Any = gui.add_plotly(go.Figure(), config=_CONFIG, aspect=0.6)
         self._seal = Seal(page, comparing.practice, lambda: comparing.chosen, lambda: comparing.found)
-        self._words = gui.add_folder("All of it in numbers", visible=False, expand_by_default=False)
+        self._words = gui.add_folder("All results in numbers", visible=False, expand_by_default=False)
         with self._words:
             self._document = add_html(gui)
         self._save = gui.add_folder("Keep it", visible=False)
@@ -55,7 +60,7 @@ class UnitsResult:
             self._keep.clear()
             self._seal.show()
             if found is None:
-                self._told.content = boxed(_NOTHING)
+                self._told.content = begin("No units are compared yet", _STEPS)
                 return
             self._told.content = said(found)
             self._parameters.figure = unit_parameters.figure(found)
@@ -68,7 +73,7 @@ class UnitsResult:
 
 def said(found: UnitsCompared) -> Html:
     """The sentences, what the answer rests on, warnings, and which recordings lack."""
-    colour = "#e8590c" if found.differences or found.scattering else "#2b8a3e"
+    colour = COLOURS["warning" if found.differences or found.scattering else "good"]
     return html(
         '<div {}><div style="font-size:16px;font-weight:600;color:{};padding:4px 0">{}</div><div {}>{}</div>{}{}</div>',
         BOX,

@@ -274,7 +274,8 @@ class Comparing:
             job()
         except InputError as error:
             self.events.failed(what, self._line(error))
-            raise
+            self.session.events.told(_CANNOT[what], self._line(error))
+            return
         self.events.failed(what, "")
 
     def _line(self, error: InputError) -> str:
@@ -282,11 +283,16 @@ class Comparing:
         return str(error).replace(f"{self.folder.folder}/", "")
 
     def _on_error(self, error: BaseException) -> None:
-        if isinstance(error, InputError):
-            self.session.events.told("The comparison has failed", self._line(error))
-            return
         traceback.print_exception(error)
         self.session.events.told("Something failed; the app goes on", f"{type(error).__name__}: {quoted(error)}")
+
+
+_CANNOT = {
+    OPEN: "The file cannot be read",
+    MAP: "These columns cannot be used",
+    LAY_OUT: "The text cannot be read like this",
+    SAVE: "It cannot be saved",
+}
 
 
 def _freed(actuator: Actuator) -> set[str]:

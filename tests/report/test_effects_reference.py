@@ -81,7 +81,7 @@ def test_an_effect_has_its_picture_with_titles_and_units(pages, name):
         assert any(re.fullmatch(rf"{variable_title(variable)} \[.+\]", one) for one in told)
         lines = heights(chart)
         assert [*lines] == ["low", "medium", "high"] and all(len(line) >= 20 for line in lines.values())
-        assert np.ptp(lines["strong"]) > 20.0, "the strong one is hardly seen"
+        assert np.ptp(lines["high"]) > 20.0, "the strong one is hardly seen"
     assert re.search(r'class="legend".*low:.*medium:.*high:', text)
 
 

@@ -16,20 +16,53 @@ from ema_model.estimation.calibrate import calibrated, problem_of
 
 Array = NDArray[np.float64]
 
+_PIECES = 12, 25  # of each window, whose pulls on the parameters are independent: the division that says least counts
 _ROUNDS = 3  # of fits, each without the parameters that the one before drove to their bounds
 
 
 @lru_cache(maxsize=16)  # a page asks at every look
 def with_intervals(data: Data, found: Fit) -> Calibration:
-    """A fit's calibration with 90 % intervals that count what is left as it is: as many values as it has shapes."""
+    """A fit's calibration with 90 % intervals that count what is left as it is: as many values as it has shapes.
+
+    At the floor, too, what is left may last, where a model is not quite the rig's.  How its pieces in time pull at each
+    parameter tells how far that may be off (White, Econometrica 48 (1980), by clusters); the wider interval counts.
+    """
     calibration = found.calibration
     jacobian = calibration.weighted_jacobian / np.sqrt(colour_of(data, found))[:, None]
     # Orthogonal to the last digit: beside a fine floor JᵀJ itself rounds the prior away.
     root = np.linalg.inv(np.linalg.qr(np.concatenate([jacobian, np.eye(jacobian.shape[1])]), mode="r"))
     problem = problem_of(found.plant, data.floors, free=calibration.free, signals=data.signals)
-    told = calibrated(problem, calibration.x, root @ root.T)
+    covariance = root @ root.T
+    wider = np.sqrt(np.maximum(1.0, _by_pieces(data, found) / np.diag(covariance)))
+    told = calibrated(problem, calibration.x, covariance * np.outer(wider, wider))
     parameters = {n: replace(one, interval90=told[n].interval90) for n, one in calibration.parameters.items()}
     return replace(calibration, parameters=parameters)
+
+
+def _by_pieces(data: Data, found: Fit) -> Array:
+    """Variance of each unknown, in σ² of its tolerance, from how pieces of the windows pull at it: (unknowns,)."""
+    calibration = found.calibration
+    jacobian, residual = calibration.weighted_jacobian, calibration.residual
+    root = np.linalg.inv(np.linalg.qr(np.concatenate([jacobian, np.eye(jacobian.shape[1])]), mode="r"))
+    inverse = root @ root.T
+    variances = []
+    for count in _PIECES:
+        pieces = _pieces(data, found, count)
+        pulls = np.zeros((pieces.max() + 1, jacobian.shape[1]))
+        np.add.at(pulls, pieces, jacobian * residual[:, None])
+        pulls = inverse @ (pulls - pulls.mean(axis=0)).T * np.sqrt(len(pulls) / (len(pulls) - 1.0))
+        variances.append(np.sum(pulls**2, axis=1) + np.sum(inverse**2, axis=1))  # the prior pulls as well
+    return np.maximum(*variances)
+
+
+def _pieces(data: Data, found: Fit, count: int) -> NDArray[np.intp]:
+    """Which piece of its window each value of a residual lies in, all signals of a moment in the same: (values,)."""
+    windows = [i for i, one in enumerate(found.plant.windows) for name in data.signals if name in one.measured]
+    parts = [
+        window * count + np.arange(rows.stop - rows.start) * count // (rows.stop - rows.start)
+        for window, (_, rows) in zip(windows, signals_of(data, found.plant))
+    ]
+    return np.unique(np.concatenate(parts), return_inverse=True)[1]
 
 
 def settled(data: Data, found: Fit, tell: Callable[[str], None]) -> Fit:

@@ -37,7 +37,7 @@ _RIVAL = 4.0  # χ², within which another basin may be the right one
 FAULTS = len(NAMES)  # the first of an identification's unknowns
 _SETTLED = 1e-3 / K_SIGMA  # of x's faults, between two rounds
 LONGER_STEPS_S = 5e-5, 2e-5  # for a search, which need not be exact: what it finds is refined at the actuator's own
-_LOOKS = 31  # beside the healthy one: together a block of lanes
+_LOOKS = 31  # beside the healthy one: together two blocks of lanes
 _ALIKE = 0.5  # floors, by which these may change the signals
 
 

@@ -22,6 +22,8 @@ Array = NDArray[np.float64]
 _EXACT = 1e-4  # of a tolerance, within which a parameter counts as its file's value
 _DIVERGED = 1e6  # floors, that a run which diverges counts as at most
 
+TOGETHER = 2 * LANES  # candidates: a block of lanes on each of two cores
+
 SIGNALS = ("current_A", "motor_torque_Nm", "motor_position_rad", "user_position_rad")  # that are fitted
 
 
@@ -131,8 +133,8 @@ class Problem:
         return found, np.swapaxes(slopes, 1, 2), np.concatenate([*beside, others * self.prior], axis=1)
 
     def has_room_for(self, others: int) -> bool:
-        """Whether so many candidates fit in one block of lanes with the derivatives of one, all to both sides."""
-        return 1 + 2 * self.count + others <= LANES
+        """Whether so many candidates stand together with the derivatives of one, all to both sides."""
+        return 1 + 2 * self.count + others <= TOGETHER
 
     def points_in_whole_blocks(self, n: int) -> int:
         """How many of a window `jacobians` of n candidates simulates in whole blocks, at most."""
@@ -226,9 +228,9 @@ class Problem:
 
 
 def _room(n: int, count: int, others: int) -> int:
-    """Of `count` unknowns, those that can be moved to both sides in the blocks of lanes that one side fills.
+    """Of `count` unknowns, those that can be moved to both sides in the blocks that one side fills, of `TOGETHER` each.
 
     others: candidates that stand in the same blocks.
     """
-    blocks = -(-(n * (1 + count) + others) // LANES)
-    return min(count, (blocks * LANES - others) // n - (1 + count))
+    blocks = -(-(n * (1 + count) + others) // TOGETHER)
+    return min(count, (blocks * TOGETHER - others) // n - (1 + count))

@@ -15,6 +15,7 @@ from ema_model.estimation.floor import Floor, floor
 from ema_model.estimation.problem import Problem
 from ema_model.estimation.unknowns import K_SIGMA, Unknown, loads_of, starts_of, unknowns_of
 from ema_model.faults import HEALTHY, NAMES
+from ema_model.identification.base_spreads import spreads_of
 from ema_model.identification.model_bias import Twins, errors_near, of_errors, twins
 from ema_model.models import ClosedLoop
 from ema_model.models.closed_loop import LOAD
@@ -36,12 +37,8 @@ _RIVAL = 4.0  # χ², within which another basin may be the right one
 FAULTS = len(NAMES)  # the first of an identification's unknowns
 _SETTLED = 1e-3 / K_SIGMA  # of x's faults, between two rounds
 LONGER_STEPS_S = 5e-5, 2e-5  # for a search, which need not be exact: what it finds is refined at the actuator's own
-_LOOKS = 31  # beside the healthy one: together a block of lanes
+_LOOKS = 31  # beside the healthy one: together two blocks of lanes
 _ALIKE = 0.5  # floors, by which these may change the signals
-_SWEEPS = 30  # over the base parameters, at most
-_SWEPT = 0.01  # of a spread, that a sweep changes when it is the last
-_WORTH = 4.0  # logarithm of the likelihood that a spread must gain: there are many to choose from
-_SEEN = 1e-6  # (σ of the noise)², by which a parameter's tolerance must change the signals
 
 
 class Rough(NamedTuple):
@@ -160,7 +157,7 @@ def refine(given: Setting, k: ArrayLike, seed: int = 0, tell: Tell = _silent) ->
         found = twins(full, start, seed + _ROUNDS)
         _reweight(full, given, found)
         problem, x = full, start
-        spreads = _spreads(problem, x)
+        spreads = spreads_of(problem, x)
         if spreads.any():
             problem.believe(spreads)
             x, _, again = _descend(problem, x)
@@ -175,9 +172,9 @@ def refine(given: Setting, k: ArrayLike, seed: int = 0, tell: Tell = _silent) ->
             )
             more += again + again2
             errors = errors_near(problem, np.array([x, start]), seed + 2 * _ROUNDS + 1)
-            if not _better(problem, given, x, start, [of_errors(problem, one) for one in errors]):
+            if not _better(problem, given, x, start, [of_errors(problem, at, e) for at, e in zip((x, start), errors)]):
                 x, spreads = start, np.zeros_like(spreads)  # the twin does not follow where the Monitor Model led
-            found = of_errors(problem, errors[0 if spreads.any() else 1], found)
+            found = of_errors(problem, x, errors[0 if spreads.any() else 1], found)
             _reweight(problem, given, found)
             problem.believe(1.0)
     residuals, slopes = problem.jacobians(x[None, :])
@@ -190,27 +187,36 @@ def refine(given: Setting, k: ArrayLike, seed: int = 0, tell: Tell = _silent) ->
 def _with_twins(
     given: Setting, problem: Problem, x: Array, found: Twins | None, seed: int, tell: Tell
 ) -> tuple[Array, Twins | None, int]:
-    """Twin and refit in turn, back halfway where the Reference Model does not follow; ends with the best x's twins."""
+    """Twin and refit in turn, back halfway where the Reference Model does not follow.
+
+    When the answer stays it is refitted once more, with the twins of all rounds that stood there: the ripple of one
+    round's twins moves it as much as that of the recording itself.  Where it never stays, the best round's is taken.
+    """
     evaluations, least, best, kept = 0, np.inf, x, found
+    rounds: list[Twins] = []
     for number in range(_ROUNDS):
         tell(f"model bias and refit, round {number + 1} of at most {_ROUNDS}", number / _ROUNDS)
         found = twins(problem, x, seed + number, found)
-        _reweight(problem, given, found)
         if found is None:
+            _reweight(problem, given, found)
             x, _, more = _descend(problem, x)
             return x, None, evaluations + more
+        here = found.with_those_near(rounds)
+        rounds.append(found)
+        _reweight(problem, given, here)
         known = problem.jacobians(x[None, :], in_whole_blocks=True)
         evaluations += problem.points_in_whole_blocks(1)
         cost = float(known[0][0] @ known[0][0])
         moved = float(np.max(np.abs(x - best)[:FAULTS]))
-        if cost < least:
-            least, best, kept = cost, x, found
-            if (number and moved < _SETTLED) or number == _ROUNDS - 1:
+        settled = number > 0 and moved < _SETTLED
+        if cost < least or settled:
+            least, best, kept = cost, x, here
+            if number == _ROUNDS - 1:
                 break
             x, _, more = _descend(problem, x, known)
             evaluations += more
-        elif moved < _SETTLED:
-            break
+            if settled:
+                return x, here, evaluations
         else:
             x = 0.5 * (x + best)
     assert kept is not None and found is not None
@@ -268,50 +274,3 @@ def _descend(problem: Problem, x: Array, known: tuple[Array, Array] | None = Non
         if descent.done:
             break
     return descent.x[0], float(descent.cost[0]), descent.evaluations
-
-
-def _spreads(problem: Problem, x: Array) -> Array:
-    """How far each base parameter is from its file's value, in its tolerances, as the data say: (base parameters,).
-
-    x: the best fit with the file's values.  The likelihood of the data with k and the base parameters integrated
-    out, each of these with a prior of its own `spread` σ, at its maximum (automatic relevance determination: MacKay,
-    Neural Computation 4, 1992; Tipping, JMLR 1, 2001).  A rig that is as its file says gets its k with hardly any
-    cost of tolerances that it does not use, and one parameter that is off does not set the others free.
-    """
-    residuals, all_slopes = problem.jacobians(x[None, :])
-    residual, slopes, base = residuals[0], all_slopes[0], problem.base
-    free = ~base
-    free[:FAULTS] &= (x > problem.low + 1e-9)[:FAULTS] & (x < problem.high - 1e-9)[:FAULTS]
-    q, _ = np.linalg.qr(slopes[:, free])
-    columns = slopes[:, base].copy()
-    columns[problem.values :] = 0.0  # their prior is what is asked for
-    columns -= q @ (q.T @ columns)
-    return most_likely_spreads(columns.T @ columns, columns.T @ residual)
-
-
-def most_likely_spreads(inner: Array, shown: Array) -> Array:
-    """The prior σ of each of n numbers, 0 to 1, at which data are likeliest: (n,), found one after another.
-
-    0 where that hardly makes them likelier: of many numbers one gains a little by chance.
-
-    inner (n, n): of their derivatives, over the noise; shown (n,): of these with what is left without them.
-    Of one number alone the best is known: √(q² − s) / s (Tipping and Faul, AISTATS 2003, eq. 20).
-    """
-    spreads = np.zeros(len(shown))
-    for _ in range(_SWEEPS):
-        before = spreads.copy()
-        for one in range(len(spreads)):
-            spreads[one] = 0.0
-            on = np.flatnonzero(spreads)
-            scaled = np.eye(len(on)) + spreads[on, None] * inner[np.ix_(on, on)] * spreads[on]
-            both = np.linalg.solve(scaled, spreads[on, None] * np.column_stack([inner[on, one], shown[on]]))
-            across = inner[on, one] * spreads[on]
-            s, q = np.array([inner[one, one], shown[one]]) - across @ both
-            if q * q > s > _SEEN:
-                spread = min(1.0, np.sqrt(q * q - s) / s)
-                more = spread * spread * s
-                if 0.5 * (q * q / s * more / (1.0 + more) - np.log1p(more)) > _WORTH:
-                    spreads[one] = spread
-        if np.max(np.abs(spreads - before)) < _SWEPT:
-            break
-    return spreads

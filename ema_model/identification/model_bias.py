@@ -38,7 +38,21 @@ class Twins:
 
     added: list[dict[str, Array]]  # by signal, (blocks,)
     spread: list[dict[str, Array]]  # by signal, (blocks,): 1 σ
-    deviations: list[dict[str, Array]]  # by signal, (twins, blocks): of each twin from their mean
+    deviations: list[dict[str, Array]]  # by signal, (twins, blocks): of each twin from the mean of its round
+    at: Array  # (unknowns,), where they stand
+    count: int = TWINS  # whose mean is what is added
+
+    def with_those_near(self, others: Sequence[Twins]) -> Twins:
+        """The same with the mean of these and of other rounds' that stand as close as these do to each other."""
+        rounds = [one for one in others if np.max(np.abs(one.at - self.at)) < _HAIR]
+        if not rounds:
+            return self
+        rounds.append(self)
+        added = [
+            {name: np.mean([one.added[i][name] for one in rounds], axis=0) for name in window}
+            for i, window in enumerate(self.added)
+        ]
+        return replace(self, added=added, count=TWINS * len(rounds))
 
     def floors(self, before: Sequence[Floor]) -> list[Floor]:
         """The floors of a fit with this added."""
@@ -53,11 +67,11 @@ def twins(
     about: a root of the covariance of x (unknowns, unknowns) that the twins are drawn from, in place of a hair of each
     fault: what is known of the difference is then what holds wherever x may be.
     """
-    return of_errors(problem, errors_near(problem, x[None, :], seed, about)[0], before)
+    return of_errors(problem, x, errors_near(problem, x[None, :], seed, about)[0], before)
 
 
-def of_errors(problem: Problem, errors: Errors | None, before: Twins | None = None) -> Twins | None:
-    """What `twins` makes of the twins' errors, or of none."""
+def of_errors(problem: Problem, x: Array, errors: Errors | None, before: Twins | None = None) -> Twins | None:
+    """What `twins` makes of the errors of twins at x, or of none."""
     if errors is None:
         return None
     added, spread, deviations = [], [], []
@@ -69,7 +83,7 @@ def of_errors(problem: Problem, errors: Errors | None, before: Twins | None = No
         added.append(means)
         deviations.append(own)
         spread.append({name: _spread(one, means[name], name, window.block_s) for name, one in own.items()})
-    return Twins(added, spread, deviations)
+    return Twins(added, spread, deviations, x)
 
 
 def errors_near(problem: Problem, points: Array, seed: int, about: Array | None = None) -> list[Errors | None]:

@@ -143,7 +143,7 @@ def _covariance(found: Fitted) -> Array:
     if found.twins is not None:
         scores = _twin_scores(found) @ inverse
         freedom = len(scores) // TWINS * (TWINS - 1)
-        of_twins = (1.0 + 1.0 / TWINS) * scores.T @ scores / freedom
+        of_twins = (1.0 + 1.0 / found.twins.count) * scores.T @ scores / freedom
         covariance += of_twins
         share = np.diag(of_twins) / np.diag(covariance)
         wider = stdtrit(freedom / np.maximum(share, 1e-6) ** 2, 0.95) / HALF_90  # Welch and Satterthwaite's freedom

@@ -1,7 +1,7 @@
 """The Monitor Model's outer kernels: the errors, or the signals, of a whole population in lanes.
 
-A single run is a population of one in the same kernel (a block of 32 lanes takes no longer than a plain
-loop over one), so that it is bit-identical to any lane.
+A single run is a population of one in the same kernel (a block of lanes takes no longer than a plain loop
+over one), so that it is bit-identical to any lane.
 """
 
 from __future__ import annotations

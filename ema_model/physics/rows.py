@@ -6,7 +6,7 @@ Parameters of effects follow the base rows, in the order of the stack.
 
 from __future__ import annotations
 
-LANES = 32
+LANES = 16  # 8 do not vectorise; of 32 a lane takes as long, and a small population has too few blocks for two cores
 
 PARAMETER_ROWS = (
     # controller

@@ -12,12 +12,12 @@ from ema_model.commands import command
 from ema_model.estimation import calibrate, floor
 from ema_model.estimation.calibrate import calibrated, problem_of
 from ema_model.estimation.descent import Descent
+from ema_model.estimation.problem import TOGETHER
 from ema_model.estimation.unknowns import K_SIGMA, to_vector, unknowns_of
 from ema_model.faults import HEALTHY, NAMES, vector
 from ema_model.identification.fit import setting
 from ema_model.identification.objective import Objective
 from ema_model.models import model_for
-from ema_model.physics.rows import LANES
 from ema_model.simulation.plant import simulated
 from ema_model.simulation.run import Run, simulate_reference
 from ema_model.simulation.sensors import Sensors
@@ -115,7 +115,7 @@ def test_a_step_on_the_way_takes_no_block_of_lanes_more_than_one_side_needs(reco
     lanes, simulate = [], problem.simulate
     monkeypatch.setattr(problem, "simulate", lambda x, window: lanes.append(len(x)) or simulate(x, window))
     residual, [thrifty] = problem.jacobians(x, in_whole_blocks=True)
-    assert 1 + problem.count <= lanes[0] <= LANES < 1 + 2 * problem.count
+    assert 1 + problem.count <= lanes[0] <= TOGETHER < 1 + 2 * problem.count
     np.testing.assert_array_equal(residual, problem.residuals(x))
     both = lanes[0] - 1 - problem.count  # unknowns that are moved to both sides all the same
     same = [np.array_equal(one, other) for one, other in zip(exact.T, thrifty.T)]

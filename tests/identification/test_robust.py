@@ -15,8 +15,9 @@ from ema_model.errors import InputError
 from ema_model.estimation.descent import Descent
 from ema_model.estimation.feldman_cousins import above_zero, length_of_vector
 from ema_model.estimation.unknowns import to_k, to_vector
-from ema_model.identification.fit import most_likely_spreads, refine, setting
-from ema_model.identification.model_bias import TWINS, _spread
+from ema_model.identification.base_spreads import most_likely_spreads
+from ema_model.identification.fit import refine, setting
+from ema_model.identification.model_bias import TWINS, _spread, twins
 from ema_model.identification.objective import Objective
 from ema_model.identification.run import identify
 from ema_model.simulation.plant import simulated
@@ -177,6 +178,25 @@ def test_twin_takes_the_low_fidelity_bias_out(monkeypatch):
     with_twin = faults.error_percent(refine(given, truth).k, truth)
     monkeypatch.setattr("ema_model.identification.fit.twins", lambda *_: None)
     assert with_twin < 0.5 * faults.error_percent(refine(given, truth).k, truth)
+
+
+def test_twins_of_rounds_that_stand_close_are_counted_together():
+    """Their mean is then closer to what many twins say; those of a round far off are left out."""
+    truth = faults.vector({"k3": 0.75})
+    problem = setting(Objective([simulated(Run(), ACTUATOR, truth)], ACTUATOR), parameters_known=True).problem(
+        with_base=False
+    )
+    x = problem.at(truth)
+    far = x + 0.1 * (np.arange(problem.count) == 0)
+    rounds = [twins(problem, x, seed) for seed in range(9)]
+    first, *others = (one for one in rounds if one is not None)
+    alone = first.with_those_near([one for one in [twins(problem, far, 9)] if one is not None])
+    assert len(others) == 8 and alone.count == TWINS and alone.added[0] is first.added[0]
+    two = first.with_those_near(others[:1])
+    many = np.mean([one.added[0]["current_A"] for one in others[1:]], axis=0)
+    assert two.count == 2 * TWINS
+    off = [np.sqrt(np.mean((one.added[0]["current_A"] - many) ** 2)) for one in (first, others[0], two)]
+    assert off[2] < 0.9 * min(off[:2])
 
 
 def test_a_spread_beside_a_far_larger_one_is_a_number():

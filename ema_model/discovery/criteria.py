@@ -62,6 +62,10 @@ PLAUSIBLE = {
     ("torque_ripple", "ratio"): (0.0, 0.5),
 }
 
+# Of the torque, that saturation may take at the highest current recorded: iron loses up to a quarter at twice the rated
+# current, and what takes more is no iron's (of a servo with plastic gears 31 % would: its friction grows with load).
+MOST_SATURATED = 0.25
+
 # Of a gain, that a drive's must differ by from the file's; drives' own scaling and a torque constant that is known to a
 # few percent stay below.
 GAIN_APART = 0.1

@@ -22,6 +22,7 @@ Ranges = Mapping[str, tuple[float, float]]  # by variable
 _FAR = 30.0  # times what there is to explain
 _ATTEMPTS = 3
 _LONGEST_STEP_S = 2e-5  # at which no score differs in its first three digits from that at 1e-5
+_BACKWARD = 0.05  # of the top speed, that both directions must reach for motion to count as both ways
 _DIVERGED = 1e100  # floors, from which on a change has no meaning: its square would overflow
 
 
@@ -60,10 +61,12 @@ def variants(
         return [[{first: middle, "phase_rad": phase} for phase in (0.0, 0.5 * np.pi)]]
     if effect.placed:
         low, high = (ranges or {}).get(effect.against, (0.0, 0.0))
+        own = {one.name: one for one in effect.parameters}
         places = [
             {name: low + s * (high - low) for name, s in zip(effect.placed, at)} for at in zip(*effect.placed.values())
         ]
-        return [[{first: middle, **place}] for place in places] if high > low else []
+        within = [at for at in places if all(own[name].low <= value <= own[name].high for name, value in at.items())]
+        return [[{first: middle, **place}] for place in within] if high > low else []
     low, high = effect.parameters[0].low, effect.parameters[0].high
     speeds = [share * top_rad_s for share in effect.at_speeds]
     return [[{first: one}] for one in (*effect.severities, *(speed for speed in speeds if low <= speed <= high))]
@@ -72,6 +75,8 @@ def variants(
 def fingerprints(data: Data, found: Fit, names: Iterable[str], orders: Sequence[float]) -> list[Fingerprint]:
     """Those of all effects that are not yet in the model, at the model's calibrated parameters."""
     effects = [find(name, found.actuator.axes) for name in names if name not in found.effects]
+    if not _moves_both_ways(found):
+        effects = [one for one in effects if not one.by_direction]
     top, ranges = _top_speed(found), _ranges(found)
     tried = [(effect, settings) for effect in effects for settings in variants(effect, orders, top, ranges)]
     lanes = [(effect, one) for effect, settings in tried for one in settings]
@@ -109,11 +114,25 @@ def of_the_file(found: Fit, names: Iterable[str]) -> list[Fingerprint]:
     return prints
 
 
-def _top_speed(found: Fit) -> float:
-    """The motor's top speed in the recordings, rad/s; 0 where it is not known."""
+def _moves_both_ways(found: Fit) -> bool:
+    """Whether the motor goes forward and backward in the recordings; also where its speed is not known."""
+    speeds = _speeds(found)
+    if not speeds:
+        return True
+    fastest = _top_speed(found)
+    return all(max(float(np.max(side * one)) for one in speeds) > _BACKWARD * fastest for side in (1.0, -1.0))
+
+
+def _speeds(found: Fit) -> list[Array]:
+    """The motor's speed in each window where it is known, (blocks,)."""
     windows = zip(found.plant.windows, found.calibration.signals)
     shown = [window.context.get("motor_speed_rad_s", signals.get("motor_speed_rad_s")) for window, signals in windows]
-    return float(max((np.max(np.abs(one)) for one in shown if one is not None), default=0.0))
+    return [one for one in shown if one is not None]
+
+
+def _top_speed(found: Fit) -> float:
+    """The motor's top speed in the recordings, rad/s; 0 where it is not known."""
+    return float(max((np.max(np.abs(one)) for one in _speeds(found)), default=0.0))
 
 
 def _ranges(found: Fit) -> Ranges:

@@ -11,7 +11,17 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ema_model.actuator.naming import on_axes
-from ema_model.discovery.criteria import ANOTHER, AS_MUCH, DRIVEN, FAR, LEAST_FALL, LEAST_SHARE, PLAUSIBLE, TIE
+from ema_model.discovery.criteria import (
+    ANOTHER,
+    AS_MUCH,
+    DRIVEN,
+    FAR,
+    LEAST_FALL,
+    LEAST_SHARE,
+    MOST_SATURATED,
+    PLAUSIBLE,
+    TIE,
+)
 from ema_model.discovery.evidence import colour_of, evidence, signals_of
 from ema_model.discovery.model_fit import ANGLES, Data, Fit, floor_ratio
 from ema_model.discovery.remaining import at_floor, left_by, used_left
@@ -148,9 +158,18 @@ def _implausible(after: Fit, key: str) -> str:
         low, high = PLAUSIBLE.get((name, parameter), (-np.inf, np.inf))
         if not low <= value <= high:
             return f"its {_title(after, f'effects.{key}.{parameter}')} of {number(value)} is not plausible"
+        lost = 1.0 - 1.0 / (1.0 + value * _top_current(after)) if name == "torque_saturation" else 0.0
+        if lost > MOST_SATURATED:
+            return f"a loss of {100.0 * lost:.0f} % of the torque at the highest current is not plausible"
         if parameter == "period_rad" and value > _travel(after):
             return "its period is longer than the travel"
     return ""
+
+
+def _top_current(found: Fit) -> float:
+    """The highest current in the recordings, A; 0 where it is not known."""
+    shown = [signals["current_A"] for signals in found.calibration.signals if "current_A" in signals]
+    return float(max((np.max(np.abs(one)) for one in shown), default=0.0))
 
 
 def _travel(found: Fit) -> float:

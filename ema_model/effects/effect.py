@@ -147,6 +147,7 @@ class Effect:
     is_load: bool = False  # pulls at the user from outside, so that its torque counts as the load
     at_speeds: tuple[float, ...] = ()  # of a first parameter that is a speed: shares of the top speed to look for it at
     placed: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    by_direction: bool = False  # told from what does not turn over with the direction: needs motion both ways
     turns: Side | None = None  # of a part that turns on that side: there is none on a linear axis
     against: str = "time"  # of `quantities.variables`: what its residual follows; time where it follows nothing else
     nothing: float = 0.0  # the first parameter, the others at their defaults, with which kernels go on as without it

@@ -38,4 +38,5 @@ EFFECT = Effect(
     against="user_position",
     mistaken_for="hinge moment, load-dependent friction",
     family="mechanics",
+    by_direction=True,
 )

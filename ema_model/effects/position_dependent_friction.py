@@ -44,4 +44,5 @@ EFFECT = Effect(
     against="motor_angle",
     mistaken_for="cogging torque, torque ripple",
     family="mechanics",
+    by_direction=True,
 )

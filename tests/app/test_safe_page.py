@@ -77,6 +77,7 @@ def test_the_page_works_under_its_policy_and_reaches_no_other_port(browser, app,
     page.close()
 
 
+@pytest.mark.page_errors  # of what is refused without the token
 def test_a_page_comes_in_by_its_token_and_stays_by_its_cookie(browser):
     door = Door("127.0.0.1", ["localhost"])
     server = open_server("127.0.0.1", 0, door)

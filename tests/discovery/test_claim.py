@@ -126,6 +126,7 @@ def test_far_above_the_floor_what_tells_as_much_cannot_be_told_apart(monkeypatch
     """share: of what the best effect tells, that another tells; near the floor the evidence alone decides."""
     monkeypatch.setattr(claim, "ratio", lambda data, found: ratio)
     monkeypatch.setattr(claim, "evidence", lambda data, small, large: 15.0)
+    monkeypatch.setattr(claim, "price", lambda data, current, trial: 8.0)
     trials = [
         Trial(Candidate(name, {}, drop), {name: {}}, SimpleNamespace(), drop)
         for name, drop in (("asymmetric_friction", 1000.0), ("current_sensor_bias", 1000.0 * share))
@@ -137,9 +138,23 @@ def test_far_above_the_floor_what_tells_as_much_cannot_be_told_apart(monkeypatch
 def test_of_what_cannot_be_told_apart_the_one_that_keeps_parameters_nearer_the_file_is_named_first(monkeypatch):
     monkeypatch.setattr(claim, "ratio", lambda data, found: 1.0)
     monkeypatch.setattr(claim, "evidence", lambda data, small, large: -260.0)
+    monkeypatch.setattr(claim, "price", lambda data, current, trial: 8.0)
     trials = [
         Trial(Candidate(name, {}, drop), {name: {}}, SimpleNamespace(), drop)
         for name, drop in (("current_sensor_gain", 950.0), ("computation_delay", 630.0))
+    ]
+    best, others = claim._chosen(SimpleNamespace(data=None, held=None, current=None), trials)
+    assert best is trials[1] and others == [trials[0]]
+
+
+def test_of_what_tells_as_much_the_one_with_fewer_parameters_is_named_first(monkeypatch):
+    """Over a short travel an eccentric sensor, of two parameters, tells as much as a gain does, and a little more."""
+    monkeypatch.setattr(claim, "ratio", lambda data, found: 1.0)
+    monkeypatch.setattr(claim, "evidence", lambda data, small, large: 3.0)
+    monkeypatch.setattr(claim, "price", lambda data, current, trial: 8.0 * (1 + ("eccentric" in trial.candidate.name)))
+    trials = [
+        Trial(Candidate(name, {}, drop), {name: {}}, SimpleNamespace(), drop)
+        for name, drop in (("position_sensor_eccentricity", 953.0), ("position_sensor_gain", 950.0))
     ]
     best, others = claim._chosen(SimpleNamespace(data=None, held=None, current=None), trials)
     assert best is trials[1] and others == [trials[0]]

@@ -16,7 +16,7 @@ from ema_model.comparison.residuals import Residuals
 from ema_model.discovery.model_fit import Data, Fit, fit, gather, holdout_error
 from ema_model.discovery.torque_curve import curve_of, is_torque, with_curve
 from ema_model.effects import find
-from ema_model.effects.user import user_torque
+from ema_model.effects.user import torque_curve, user_torque
 from ema_model.errors import InputError
 from ema_model.estimation.floor import twin_error
 from ema_model.recordings import prepared
@@ -106,6 +106,7 @@ def explanation(signal: str, variable: str, modulator: str = "1") -> Explanation
 def torque(effect, **at: float) -> float:
     """Of a curve with its own knots, N·m."""
     arguments = {"torque": 0.0, "theta": 0.0, "omega": 0.0, "current": 0.0, "user": 0.0, "gear": 0.0, "load": 0.0}
+    arguments |= {"time": 0.0}
     return effect.places[0](*(arguments | at).values(), *(parameter.default for parameter in effect.parameters))
 
 
@@ -202,5 +203,11 @@ def test_knots_are_free_and_the_rest_of_the_actuator_stays():
     }
     assert all(one.free and one.sigma > 0.0 for path, one in actuator.tolerances.items() if path.startswith("effects."))
     assert replace(actuator, effects={}, tolerances=ACTUATOR.tolerances) == ACTUATOR
-    with pytest.raises(InputError, match="over time cannot be made a torque curve; variables are motor_angle"):
-        with_curve(data, base, explanation("current_A", "time"))
+    with pytest.raises(InputError, match="over temperature cannot be made a torque curve; variables are motor_angle"):
+        with_curve(data, base, explanation("current_A", "temperature"))
+
+
+def test_a_torque_over_time_becomes_a_curve_over_it():
+    assert is_torque(explanation("current_A", "time"), ACTUATOR)
+    curve = torque_curve([0.0, 0.2, 0.1], 0.0, 1.0, "t")
+    assert [torque(curve, time=t) for t in (0.0, 0.25, 0.5, 1.0, 2.0)] == pytest.approx([0.0, 0.1, 0.2, 0.1, 0.1])

@@ -205,7 +205,7 @@ def test_no_value_makes_a_compiled_expression_raise():
         effect = user_torque(text)
         for _ in range(20):
             theta, omega, current, user, *own = (rng.choice(extremes) for _ in range(4 + len(effect.parameters)))
-            torque = effect.places[0](0.0, theta, omega, current, user, 0.01, 0.0, *own)
+            torque = effect.places[0](0.0, theta, omega, current, user, 0.01, 0.0, 0.0, *own)
             without_value += not math.isfinite(torque)
     assert without_value > 100
 

@@ -136,15 +136,13 @@ def _top_speed(found: Fit) -> float:
 
 
 def _ranges(found: Fit) -> Ranges:
-    """What the user's position and the time go through in the recordings."""
+    """What the user's position goes through in the recordings, where it is known."""
     user, tau = [], found.actuator.transmission.gear_ratio
     for window, signals in zip(found.plant.windows, found.calibration.signals):
         motor = signals.get("motor_position_rad", window.context.get("motor_position_rad"))
         shown = signals.get("user_position_rad", None if motor is None else tau * motor)
         user += [] if shown is None else [np.min(shown), np.max(shown)]
-    longest = max(float(window.time_s[-1]) for window in found.plant.windows)
-    ranges = {"time": (0.0, longest)}
-    return ranges | ({"user_position": (float(min(user)), float(max(user)))} if user else {})
+    return {"user_position": (float(min(user)), float(max(user)))} if user else {}
 
 
 def _changes(data: Data, found: Fit, lanes: list[Lane]) -> Array:

@@ -29,22 +29,26 @@ def with_intervals(data: Data, found: Fit) -> Calibration:
     """
     calibration = found.calibration
     jacobian = calibration.weighted_jacobian / np.sqrt(colour_of(data, found))[:, None]
-    # Orthogonal to the last digit: beside a fine floor JᵀJ itself rounds the prior away.
-    root = np.linalg.inv(np.linalg.qr(np.concatenate([jacobian, np.eye(jacobian.shape[1])]), mode="r"))
+    covariance = _covariance(jacobian)
     problem = problem_of(found.plant, data.floors, free=calibration.free, signals=data.signals)
-    covariance = root @ root.T
     wider = np.sqrt(np.maximum(1.0, _by_pieces(data, found) / np.diag(covariance)))
     told = calibrated(problem, calibration.x, covariance * np.outer(wider, wider))
     parameters = {n: replace(one, interval90=told[n].interval90) for n, one in calibration.parameters.items()}
     return replace(calibration, parameters=parameters)
 
 
+def _covariance(jacobian: Array) -> Array:
+    """(JᵀJ + 1)⁻¹, of unknowns in σ of their tolerances."""
+    # Orthogonal to the last digit: beside a fine floor JᵀJ itself rounds the prior away.
+    root = np.linalg.inv(np.linalg.qr(np.concatenate([jacobian, np.eye(jacobian.shape[1])]), mode="r"))
+    return root @ root.T
+
+
 def _by_pieces(data: Data, found: Fit) -> Array:
     """Variance of each unknown, in σ² of its tolerance, from how pieces of the windows pull at it: (unknowns,)."""
     calibration = found.calibration
     jacobian, residual = calibration.weighted_jacobian, calibration.residual
-    root = np.linalg.inv(np.linalg.qr(np.concatenate([jacobian, np.eye(jacobian.shape[1])]), mode="r"))
-    inverse = root @ root.T
+    inverse = _covariance(jacobian)
     variances = []
     for count in _PIECES:
         pieces = _pieces(data, found, count)

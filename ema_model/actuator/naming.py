@@ -16,6 +16,7 @@ _OF_WINDOWS: dict[str, tuple[str, Side | None]] = {
     "turned": ("rad", MOTOR),
     "play": ("rad", MOTOR),
     "load": ("N·m", USER),
+    "lag": ("s", None),
 }
 
 

@@ -161,7 +161,8 @@ class Problem:
 
     def _places(self, window: int) -> dict[str, int]:
         """Of the kinds that are not all windows' alike: where a window's own stands."""
-        return {"turned": window, "play": window, "load": self.model.windows[window].recording}
+        recording = self.model.windows[window].recording
+        return {"turned": window, "play": window, "load": recording, "lag": recording}
 
     def parts(self) -> list[tuple[int, str, slice]]:
         """Where the residuals of each window's signals stand: window, signal, rows."""
@@ -188,7 +189,26 @@ class Problem:
 
     def simulate(self, x: Array, window: int, *, even: bool = False) -> Signals:
         """Signals of a window, by its place, for x (n, unknowns): (n, blocks) each; even: as of `Model.signals`."""
-        return self.model.signals(window, *self.rig(x, window), even=even)
+        return self.logged(self.model.signals(window, *self.rig(x, window), even=even), x, window)
+
+    def logged(self, shown: Signals, x: Array, window: int) -> Signals:
+        """A window's signals (n, blocks) as its logger has them, at x (n, unknowns): the current comes after them."""
+        lag = self._own(x, window).get("lag")
+        if lag is None or "current_A" not in shown or not np.any(lag):
+            return shown
+        current = shown["current_A"]
+        with np.errstate(invalid="ignore", over="ignore"):  # of one that diverges
+            slope = np.gradient(current, self.model.windows[window].block_s, axis=1)
+            return {**shown, "current_A": current - lag[:, None] * slope}
+
+    def _own(self, x: Array, window: int) -> dict[str, Any]:
+        """Of the kinds that are not all windows' alike: a window's own values at x (…, unknowns), by kind."""
+        places = self._places(window)
+        return {
+            u.kind: self._nominal[i] + self._sigma[i] * x[..., i]
+            for i, u in enumerate(self.unknowns)
+            if places.get(u.kind) == u.place
+        }
 
     def vector(self, x: Array) -> Array:
         """The faults at x (…, unknowns), the eccentricity as a vector: (…, 8)."""
@@ -217,9 +237,7 @@ class Problem:
 
     def rig(self, x: Array, window: int) -> Rig:
         """What a window is simulated with at x (unknowns,), or for a population (n, unknowns)."""
-        values = (self._nominal + self._sigma * x).T
-        places = self._places(window)
-        own: dict[str, Any] = {u.kind: one for u, one in zip(self.unknowns, values) if places.get(u.kind) == u.place}
+        own = self._own(x, window)
         effects: Effects = self.model.effects
         if "load" in own:
             effects = {**effects, LOAD: {"torque_Nm": own["load"]}}

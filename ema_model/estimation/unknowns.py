@@ -37,6 +37,7 @@ _STEP_OF_K = 0.01  # of a k's, which spans far more
 _TURNED_RAD = 2e-3  # how well a rig's encoder tells where the motor starts
 _WIDEST_PLAY = 50.0  # half plays, of a worn actuator
 _LEAST_START_RAD = 1e-6
+_POSITIONS = ("motor_position_rad", "user_position_rad")
 _UNRECORDED_LOAD = 0.05  # 1 σ of a load that was not recorded, of the motor's greatest torque
 
 
@@ -44,13 +45,13 @@ _UNRECORDED_LOAD = 0.05  # 1 σ of a load that was not recorded, of the motor's 
 class Unknown:
     """One number that a fit moves: nominal + σ·x, low ≤ x ≤ high; σ is its prior."""
 
-    name: str  # "section.parameter", "effects.name.parameter", k1…k8, "turned 0", "play 0", "load 0"
+    name: str  # "section.parameter", "effects.name.parameter", k1…k8, "turned 0", "play 0", "load 0", "lag 0"
     nominal: float
     sigma: float
     low: float = -BOUND
     high: float = BOUND
-    kind: Literal["parameter", "fault", "turned", "play", "load"] = "parameter"
-    place: int = 0  # of a fault: which; of a start: its window; of a load: its recording
+    kind: Literal["parameter", "fault", "turned", "play", "load", "lag"] = "parameter"
+    place: int = 0  # of a fault: which; of a start: its window; of a load and of a lag: its recording
     step: float = _STEP  # of the difference that a derivative is taken by
 
     @property
@@ -154,4 +155,16 @@ def loads_of(model: Model) -> list[Unknown]:
         Unknown(f"load {i}", usual, sigma, -most, most, "load", i)
         for i, measurement in enumerate(model.measurements)
         if "load_torque_Nm" not in measurement
+    ]
+
+
+def lags_of(model: Model) -> list[Unknown]:
+    """By how long the current of each recording comes after its positions: a logger may well take it a sample apart.
+
+    Without it, what the current leads or trails by is taken for friction and inertia that are off.
+    """
+    return [
+        Unknown(f"lag {i}", 0.0, measurement.sample_period_s, kind="lag", place=i)
+        for i, measurement in enumerate(model.measurements)
+        if "current_A" in measurement and any(position in measurement for position in _POSITIONS)
     ]

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from ema_model.estimation.descent import Descent
 from ema_model.estimation.floor import Floor, floor
 from ema_model.estimation.problem import Problem
-from ema_model.estimation.unknowns import K_SIGMA, Unknown, loads_of, starts_of, unknowns_of
+from ema_model.estimation.unknowns import K_SIGMA, Unknown, lags_of, loads_of, starts_of, unknowns_of
 from ema_model.faults import HEALTHY, NAMES
 from ema_model.identification.base_spreads import spreads_of
 from ema_model.identification.model_bias import Twins, errors_near, of_errors, twins
@@ -113,7 +113,8 @@ def setting(objective: ClosedLoop, *, parameters_known: bool) -> Setting:
     actuator = plant.actuator
     paths = [path for path in actuator.tolerances if path.startswith("effects.") or not parameters_known]
     starts = starts_of(plant, floors, worn=True, exact=parameters_known)
-    others = [*unknowns_of(actuator, paths), *loads_of(plant), *starts]
+    lags = [] if parameters_known else lags_of(plant)
+    others = [*unknowns_of(actuator, paths), *loads_of(plant), *lags, *starts]
     return Setting(plant, floors, unknowns_of(actuator, NAMES), others)
 
 
@@ -152,9 +153,10 @@ def refine(given: Setting, k: ArrayLike, seed: int = 0, tell: Tell = _silent) ->
     spreads = np.zeros(0)
     if any(one.is_base for one in given.others):
         full = given.problem(with_base=True)
-        start = np.zeros(full.count)
-        start[~full.base] = x
-        found = twins(full, start, seed + _ROUNDS)
+        start = _at_file_values(full, x)
+        known = [] if found is None else [replace(found, at=_at_file_values(full, found.at))]
+        found = twins(full, start, seed + _ROUNDS, found)
+        found = found and found.with_those_near(known)  # their ripple alone shall set no parameter free
         _reweight(full, given, found)
         problem, x = full, start
         spreads = spreads_of(problem, x)
@@ -182,6 +184,13 @@ def refine(given: Setting, k: ArrayLike, seed: int = 0, tell: Tell = _silent) ->
     return Fitted(
         problem, x, float(residual @ residual), residual, slopes[0], found, problem.k(x), spreads, evaluations + more
     )
+
+
+def _at_file_values(full: Problem, x: Array) -> Array:
+    """x of a problem without base parameters, in one with them."""
+    whole = np.zeros(full.count)
+    whole[~full.base] = x
+    return whole
 
 
 def _with_twins(

@@ -43,16 +43,14 @@ class Twins:
     count: int = TWINS  # whose mean is what is added
 
     def with_those_near(self, others: Sequence[Twins]) -> Twins:
-        """The same with the mean of these and of other rounds' that stand as close as these do to each other."""
-        rounds = [one for one in others if np.max(np.abs(one.at - self.at)) < _HAIR]
-        if not rounds:
-            return self
-        rounds.append(self)
+        """The same with the mean of these and of others that stand as close as these do to each other."""
+        near = [self, *(one for one in others if np.max(np.abs(one.at - self.at)) < _HAIR)]
+        total = sum(one.count for one in near)
         added = [
-            {name: np.mean([one.added[i][name] for one in rounds], axis=0) for name in window}
+            {name: sum(one.count / total * one.added[i][name] for one in near) for name in window}
             for i, window in enumerate(self.added)
         ]
-        return replace(self, added=added, count=TWINS * len(rounds))
+        return replace(self, added=added, count=total)
 
     def floors(self, before: Sequence[Floor]) -> list[Floor]:
         """The floors of a fit with this added."""
@@ -124,5 +122,5 @@ def _spread(deviations: Array, mean: Array, name: str, block_s: float) -> Array:
 def _errors(problem: Problem, x: Array, place: int) -> dict[str, Array]:
     """Reference less Monitor Model for x (n, unknowns), both under a constant load and an even supply: (n, blocks)."""
     monitor = problem.simulate(x, place, even=True)
-    twin = problem.model.twins(place, *problem.rig(x, place))
+    twin = problem.logged(problem.model.twins(place, *problem.rig(x, place)), x, place)
     return {name: twin[name] - monitor[name] for name in problem.weights[place]}

@@ -8,6 +8,7 @@ from support.second_plant import SecondPlant
 
 from ema_model import faults
 from ema_model.actuator import load_actuator
+from ema_model.identification.fit import refine, setting
 from ema_model.identification.objective import Objective
 from ema_model.identification.run import ROBUST, identify
 from ema_model.recordings import Measurement
@@ -45,6 +46,16 @@ def test_the_two_programs_agree_on_a_faulty_actuator():
     current = mine["current_A"][:count]
     assert np.sqrt(np.mean((current - other["current_A"]) ** 2)) < 0.1 * np.sqrt(np.mean(current**2))
     assert np.max(np.abs(mine["user_position_rad"][:count] - other["user_position_rad"])) < 2e-5
+
+
+def test_a_current_that_is_logged_a_sample_before_the_positions_is_not_taken_for_friction():
+    """The second plant's columns are so; the model's own have the current at the end of its sample."""
+    k = VECTORS[0]
+    problem = setting(Objective([recording(k)], load_actuator()), parameters_known=False)
+    found = refine(problem, k)
+    lag = next(i for i, one in enumerate(found.problem.unknowns) if one.kind == "lag")
+    assert found.problem.unknowns[lag].sigma * found.x[lag] == pytest.approx(-1e-4, rel=0.3)
+    assert faults.error_percent(found.k, np.array(k), wrap=True) < 0.5
 
 
 @pytest.mark.study

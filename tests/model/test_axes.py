@@ -103,6 +103,7 @@ OF_BOTH = {  # on a rotary, a linear, a screw's and a rack's axes
     "effects.resistance_drift.rate_1_s": ("1/s", "1/s", "1/s", "1/s"),
     "effects.speed_loop_integral.rate_1_s": ("1/s", "1/s", "1/s", "1/s"),
     "effects.torque_saturation.saturation_1_A": ("1/A", "1/A", "1/A", "1/A"),
+    "lag 0": ("s", "s", "s", "s"),
     "transmission.gear_ratio": ("", "", "m/rad", "rad/m"),
     "effects.cogging_torque.order": ("", "rad/m", "", "rad/m"),
     "effects.torque_ripple.order": ("", "rad/m", "", "rad/m"),
@@ -125,7 +126,7 @@ def expected(path: str, axes: Axes) -> str:
 
 
 @pytest.mark.parametrize("axes", [ROTARY, LINEAR, SCREW, RACK], ids=["rotary", "linear", "screw", "rack"])
-@pytest.mark.parametrize("path", [*PATHS, "turned 0", "play 0", "load 0"])
+@pytest.mark.parametrize("path", [*PATHS, "turned 0", "play 0", "load 0", "lag 0"])
 def test_a_parameter_has_the_unit_of_the_side_it_acts_at(path, axes):
     assert on_axes(path, axes).unit == expected(path, axes)
 

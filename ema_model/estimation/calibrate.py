@@ -177,13 +177,23 @@ class _Search:
             fun = self.problem.residuals(np.zeros((1, 0)))[0]
             return _Found(np.zeros(0), fun, np.zeros((len(fun), 0)), float(fun @ fun) / self.problem.values, 0.0, True)
         if start is not None:
-            starts = [np.array([start.get(u.name, 0.0) for u in self.problem.unknowns])]
-        else:
-            starts = [np.zeros(count), *_promising(self.problem)]
+            x = np.array([start.get(u.name, 0.0) for u in self.problem.unknowns])
+            return self._from_near(x)
+        starts = [np.zeros(count), *_promising(self.problem)]
         found = self._from(starts)
-        if found.chi2 > _MISFIT:
-            found = self._from([found.x, *starts], soft=float(np.sqrt(found.chi2)) / 3.0)
-        return found
+        return self._from([found.x, *starts], _soft(found.chi2)) if found.chi2 > _MISFIT else found
+
+    def _from_near(self, x: Array) -> _Found:
+        """From an earlier fit's answer: at once with large errors counted less, where it misses by far there."""
+        before = self.problem.residuals(self.problem.clip(x)[None, :])[0][: self.problem.values]
+        chi2 = float(before @ before) / self.problem.values
+        if chi2 > _MISFIT:
+            found = self._from([x], _soft(chi2))
+            if found.chi2 > _MISFIT:
+                return found
+            x = found.x
+        found = self._from([x])
+        return self._from([found.x], _soft(found.chi2)) if found.chi2 > _MISFIT else found
 
     def _from(self, starts: Sequence[Array], soft: float | None = None) -> _Found:
         fits, agree = [], len(starts) == 1
@@ -200,6 +210,11 @@ class _Search:
         fun, jacobian = residuals[0], jacobians[0]
         chi2 = float(fun @ fun - x @ x) / self.problem.values
         return _Found(x, fun[: self.problem.values], jacobian, chi2, best.cost, best.ended and agree)
+
+
+def _soft(chi2: float) -> float:
+    """From how many σ on an error counts less, where the model leaves χ² per value."""
+    return float(np.sqrt(chi2)) / 3.0
 
 
 def _promising(problem: Problem) -> Array:

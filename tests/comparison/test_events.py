@@ -54,11 +54,12 @@ def test_a_sensor_that_jumps_is_dated(signal, by):
     assert event.change == pytest.approx(by, rel=0.2)
 
 
-def test_a_zero_that_moves_slowly_is_not_dated():
+def test_a_zero_that_swings_is_not_dated():
+    """A step explains 80 % of one period, and far more than a drift does."""
     [shown] = recorded(4, commands=[CHIRP])
-    moved = shown["motor_position_rad"] + 0.05 * np.clip((shown.time_s - WHEN_S) / 0.2 + 0.5, 0.0, 1.0)
-    slow = replace(shown, signals={**shown.signals, "motor_position_rad": moved}, name="chirp")
-    assert not compare([slow], ACTUATOR).events
+    moved = shown["motor_position_rad"] + 0.05 * np.sin(4.0 * np.pi * (shown.time_s - WHEN_S))
+    swinging = replace(shown, signals={**shown.signals, "motor_position_rad": moved}, name="chirp")
+    assert not compare([swinging], ACTUATOR).events
 
 
 @pytest.mark.parametrize(

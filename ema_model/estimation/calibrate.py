@@ -181,7 +181,15 @@ class _Search:
             return self._from_near(x)
         starts = [np.zeros(count), *_promising(self.problem)]
         found = self._from(starts)
-        return self._from([found.x, *starts], _soft(found.chi2)) if found.chi2 > _MISFIT else found
+        return self._softened(found, [found.x, *starts]) if found.chi2 > _MISFIT else found
+
+    def _softened(self, found: _Found, starts: Sequence[Array]) -> _Found:
+        """With large errors counted less than one that misses by far does; whole again where it does not any more."""
+        softened = self._from(starts, _soft(found.chi2))
+        if softened.chi2 > _MISFIT:
+            return softened
+        whole = self._from([softened.x])
+        return replace(whole, converged=whole.converged and softened.converged)
 
     def _from_near(self, x: Array) -> _Found:
         """From an earlier fit's answer: at once with large errors counted less, where it misses by far there."""
@@ -193,7 +201,7 @@ class _Search:
                 return found
             x = found.x
         found = self._from([x])
-        return self._from([found.x], _soft(found.chi2)) if found.chi2 > _MISFIT else found
+        return self._softened(found, [found.x]) if found.chi2 > _MISFIT else found
 
     def _from(self, starts: Sequence[Array], soft: float | None = None) -> _Found:
         fits, agree = [], len(starts) == 1
@@ -204,6 +212,8 @@ class _Search:
             if fits[0].cost < 2.0 or (len(fits) > 1 and fits[1].cost < 1.01 * fits[0].cost + 2.0):
                 agree = True
                 break
+            if soft is None and len(fits) > 1 and 2.0 * fits[0].cost > _MISFIT * self.problem.values:
+                break  # it misses by far: what counts large errors less goes through all of the starts
         best = fits[0]
         x = self.problem.clip(best.x)
         residuals, jacobians = self.problem.jacobians(x[None, :])  # the fit's own are weighted by its loss

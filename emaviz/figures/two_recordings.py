@@ -47,10 +47,10 @@ def figure(first: Recording, second: Recording, signal: str, *, dark: bool = Fal
             _add_search(drawn, trace, plain(f"{name} {algorithm}"), colour, _DASHES[place % len(_DASHES)])
     title, unit = SIGNALS[signal].title, SIGNALS[signal].unit or "-"
     drawn.update_yaxes(title_text=f"{title}<br>[{unit}]", row=1, col=1)
-    drawn.update_yaxes(title_text=f"residual<br>[{unit}]", row=2, col=1)
-    drawn.update_yaxes(title_text="rmse of the best<br>[A]", type="log", row=3, col=1)
-    drawn.update_xaxes(title_text="time [s]", matches="x", row=2, col=1)
-    drawn.update_xaxes(title_text="iteration", row=3, col=1)
+    drawn.update_yaxes(title_text=f"Residual<br>[{unit}]", row=2, col=1)
+    drawn.update_yaxes(title_text="RMSE of the best<br>[A]", type="log", row=3, col=1)
+    drawn.update_xaxes(title_text="Time [s]", matches="x", row=2, col=1)
+    drawn.update_xaxes(title_text="Iteration", row=3, col=1)
     drawn.update_layout(
         template=theme.template(),
         margin={"l": 66, "r": 12, "t": 8, "b": 40},

@@ -10,7 +10,8 @@ from plotly.subplots import make_subplots
 from ema_model.faults import FAULTS
 from ema_model.identification.run import ALGORITHMS
 from ema_model.recordings import SIGNALS
-from emaviz.colours import LIMIT, RUNS
+from ema_model.text import COLOURS
+from emaviz.colours import RUNS
 from emaviz.figures.lines import line
 from emaviz.figures.theme import DARK, LIGHT, plain
 from emaviz.recording.entry import Entry, setting
@@ -90,7 +91,7 @@ def table(first: Entry, second: Entry) -> Html:
         apart = len(known) == 2 and abs(known[0] - known[1]) > 0.02
         if fault.name == _PHASE:
             apart &= all(answer is not None and _ECCENTRICITY in answer["alarms"] for answer in answers)
-        mark = html(' style="color:{};font-weight:600"', LIMIT) if apart else ""
+        mark = html(' style="color:{};font-weight:600"', COLOURS["warning"]) if apart else ""
         rows.append(_row(fault.label, *(html("<span{}>{}</span>", mark, cell) for cell in cells)))
     return html(
         '<div style="padding:4px 10px;font-size:12.5px;font-variant-numeric:tabular-nums">'

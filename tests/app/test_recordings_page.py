@@ -13,7 +13,7 @@ from support.on_page import field, wait_until
 
 from ema_model.actuator import load_actuator
 from ema_model.errors import InputError
-from emaviz.colours import LIMIT
+from ema_model.text import COLOURS
 from emaviz.figures import two_recordings
 from emaviz.recording import RecordingWriter, read
 from emaviz.recording.entry import setting
@@ -147,7 +147,9 @@ def test_two_recordings_share_their_axes(recorded, races):
     text = two_recordings.table(*(recorded.entry(name) for name in names))
     assert "0.2 0 0" in text and "0.6 0 0" in text and "population" not in text, "only what differs"
     k1, k7 = (text[text.index(f"<td>{name}") :].split("</tr>")[0] for name in ("k1 friction", "k7"))
-    assert LIMIT in k1 and LIMIT not in k7, "a direction of an eccentricity that is not there does not differ"
+    assert COLOURS["warning"] in k1 and COLOURS["warning"] not in k7, (
+        "a direction of an eccentricity that is not there does not differ"
+    )
 
 
 def test_an_identification_is_arranged_once(races):

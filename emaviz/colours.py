@@ -9,6 +9,7 @@ FITTED, HELD_OUT = "#1098ad", "#9c36b5"  # what was fitted, and what was not
 LIMIT = "#c2255c"  # what calls for attention: a threshold, a unit that differs
 TRUTH = "#2b8a3e"
 GHOST = "#9c6ade"  # a frozen run
+RUNS = ("#74920b", "#8463f0")  # two runs beside each other
 PHASES = ("#c9a200", "#0fa58a", "#c2459e")  # A, B, C, in the charts and in the windings: none is a model's or a fault's
 ALGORITHMS = {"robust": MONITOR, "ssa": "#9c36b5", "hba": "#846358", "do": "#1098ad"}
 

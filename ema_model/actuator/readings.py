@@ -74,6 +74,6 @@ def sentences(k: ArrayLike, actuator: Actuator) -> tuple[str, ...]:
         f"phase B: {r['turns_b']:.0%} of turns",
         f"phase C: {r['turns_c']:.0%} of turns",
         f"eccentricity ζ = {r['eccentricity']:.2f}",
-        f"thinnest gap at {round(np.degrees(r['eccentricity_phase_rad'])):+d}°",
+        f"thinnest gap at {round(np.degrees(r['eccentricity_phase_rad'])):+d}°".replace("-", "−"),
         f"gain × {physical(k).gain_factor:.2f}",
     )

@@ -63,10 +63,10 @@ def hindsight(then: FaultTrack, came: Came) -> str:
         return f"what came: not so far, {since} later{told}"
     when = f"{came.crossed} flights later" if came.crossed != 1 else "1 flight later"
     if left is None:
-        return f"what came: {reached} {when}"
+        return f"what came: {reached}, {when}"
     inside = left.p05 - 0.5 <= came.crossed <= left.p95 + 0.5  # whole flights are counted
     side = "within" if inside else ("before" if came.crossed < left.p05 else "after")
-    return f"what came: {reached} {when}, {side} the 90 % interval"
+    return f"what came: {reached}, {when}, {side} the 90 % interval"
 
 
 def _sentence(one: FaultTrack) -> str:
@@ -75,6 +75,8 @@ def _sentence(one: FaultTrack) -> str:
     if one.remaining is None:
         return f"{told}: {one.reason}"
     left = one.remaining
+    if left.p95 < 0.5:
+        return f"{told} and has reached {one.threshold:g}"
     return (
         f"{told} and reaches {one.threshold:g} in about {_flights(left.p50)} flights "
         f"(90 %: {_flights(left.p05)} … {_flights(left.p95)})"

@@ -75,7 +75,7 @@ def figure(comparison: Comparison, *, highlight: Region | None = None, dark: boo
         return theme.missing(title, "nothing was calibrated", dark=dark)
     chart = theme.new(title, "Distance from the actuator's file [σ]", "", dark=dark)
     names = [theme.plain(score.title) for score in reversed(found)]
-    for at_bound, name, colour in ((False, "90 % interval", theme.MEASURED), (True, "at its bound", theme.RESIDUAL)):
+    for at_bound, name, colour in ((False, "90 % interval", theme.MODEL), (True, "at its bound", theme.MARK)):
         some = [score for score in reversed(found) if score.at_bound == at_bound]
         if not some:
             continue
@@ -93,7 +93,7 @@ def figure(comparison: Comparison, *, highlight: Region | None = None, dark: boo
             )
         )
     for edge in (-_BOUND, _BOUND):
-        drawn = {"color": theme.RESIDUAL, "width": 1.2, "dash": "dash"}
+        drawn = {"color": theme.MARK, "width": 1.2, "dash": "dash"}
         chart.add_shape(type="line", x0=edge, x1=edge, yref="y domain", y0=0, y1=1, line=drawn)
     chart.update_xaxes(range=[-4, 4], dtick=1, zeroline=True)
     chart.update_yaxes(categoryorder="array", categoryarray=names, range=[-0.7, len(names) - 0.3], nticks=0)

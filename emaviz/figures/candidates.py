@@ -6,9 +6,10 @@ import plotly.graph_objects as go
 
 from ema_model.discovery import Discovery
 from ema_model.discovery.labels import effect_title
+from emaviz.colours import FITTED
 from emaviz.figures import theme
 
-PREDICTED, REFITTED = theme.MEASURED, theme.MODEL
+PREDICTED, REFITTED = theme.EDGE, FITTED
 
 
 def height(found: Discovery) -> int:

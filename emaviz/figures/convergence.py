@@ -20,7 +20,7 @@ class LiveConvergence:
     """RMSE against iteration, logarithmic; an optimiser that has ended keeps its level."""
 
     def __init__(self, gui: viser.GuiApi, height: int = 200) -> None:
-        axes: Any = ({**AXIS, "label": "iteration", "size": 30}, {**AXIS, "label": "rmse of the best [A]", "size": 56})
+        axes: Any = ({**AXIS, "label": "Iteration", "size": 30}, {**AXIS, "label": "RMSE of the best [A]", "size": 56})
         self._algorithms: tuple[str, ...] = ()
         self._iterations = 150
         self._legend: Any = add_html(gui)

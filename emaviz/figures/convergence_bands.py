@@ -20,7 +20,7 @@ def figure(
     histories: Mapping[str, Sequence[Sequence[float]]],
     *,
     title: str = "Best error of each iteration",
-    y: str = "rmse [A]",
+    y: str = "RMSE [A]",
     names: Mapping[str, str] | None = None,
     dark: bool = False,
 ) -> go.Figure:

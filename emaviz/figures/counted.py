@@ -12,7 +12,7 @@ from emaviz.figures.error_distribution import colour
 
 def figure(title: str, counts: Mapping[str, Mapping[str, int]], *, dark: bool = False) -> go.Figure:
     """counts: by case, of each answer."""
-    chart = theme.new(title, "tasks", "", dark=dark)
+    chart = theme.new(title, "Tasks", "", dark=dark)
     cases = list(counts)
     answers = list(dict.fromkeys(answer for one in counts.values() for answer in one))
     for i, answer in enumerate(answers):

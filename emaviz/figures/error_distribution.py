@@ -15,7 +15,7 @@ _MOST_POINTS = 400
 
 def figure(title: str, x: str, values: Mapping[str, Sequence[float]], *, dark: bool = False) -> go.Figure:
     """values: by case."""
-    chart = theme.new(title, x, "share below [%]", dark=dark)
+    chart = theme.new(title, x, "Share below [%]", dark=dark)
     for i, (name, given) in enumerate(values.items()):
         ordered = np.sort(np.asarray(given, dtype=float))
         share = 100.0 * np.arange(1, len(ordered) + 1) / len(ordered)

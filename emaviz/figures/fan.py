@@ -52,7 +52,7 @@ class LiveFan:
 
     def show(self, labels: Sequence[str], runs: Sequence[Measurement]) -> None:
         """labels: what each run is; both from the mildest to the worst, five."""
-        self._legend.content = legend(*zip(SHADES, labels))
+        self._legend.content = legend(*zip(SHADES, labels), (COMMAND, "command"))
         for chart, handle in self._charts:
             lines = [chart.scale * one[chart.signal] for one in runs]
             if chart.with_command:

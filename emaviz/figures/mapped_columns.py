@@ -50,7 +50,7 @@ def figure(columns: dict[str, np.ndarray], mapping: ColumnMapping) -> tuple[go.F
         )
     chart.update_yaxes(nticks=4, gridcolor="#86868640", zeroline=False, tickfont={"size": 10})
     chart.update_xaxes(gridcolor="#86868640", zeroline=False, tickfont={"size": 10})
-    chart.update_xaxes(title={"text": "time [s]" if time is not None else "sample", "font": {"size": 11}}, row=rows)
+    chart.update_xaxes(title={"text": "Time [s]" if time is not None else "Sample", "font": {"size": 11}}, row=rows)
     chart.update_layout(
         annotations=titles,
         showlegend=False,

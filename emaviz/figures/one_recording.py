@@ -42,7 +42,7 @@ def figure(recording: Recording, *, dark: bool = False) -> go.Figure | None:
         x, y = line(left.time_s, left.values, _POINTS)
         look = {"color": DIFFERENCE, "width": 1.3}
         drawn.add_trace(go.Scatter(x=x, y=y, name="residual", mode="lines", line=look), row=2, col=1)
-        drawn.update_yaxes(title_text=f"residual<br>[{unit}]", row=2, col=1)
+        drawn.update_yaxes(title_text=f"Residual<br>[{unit}]", row=2, col=1)
     drawn.update_xaxes(title_text="Time [s]", row=rows, col=1)
     drawn.update_layout(
         template=(DARK if dark else LIGHT).template(),

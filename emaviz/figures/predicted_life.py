@@ -19,7 +19,7 @@ def figure(history: History, name: str, number: int, *, dark: bool = False) -> g
     runs = _runs([(n, one) for n, one in left.items() if one is not None])
     if not runs:
         return theme.missing(title, "no remaining life was said after any flight", dark=dark)
-    chart = theme.new(title, "Flight", "flights left", dark=dark)
+    chart = theme.new(title, "Flight", "Flights left", dark=dark)
     for place, run in enumerate(runs):
         at = [n for n, _ in run]
         first = {"showlegend": place == 0}
@@ -37,8 +37,9 @@ def figure(history: History, name: str, number: int, *, dark: bool = False) -> g
         x, line = [min(start, crossed), crossed], {"color": REFERENCE, "width": 2, "dash": "dash"}
         chart.add_trace(go.Scatter(x=x, y=[crossed - x[0], 0], mode="lines", line=line, name="what came"))
     theme.moment(chart, number)
-    tops = sorted(one.p95 for run in runs for _, one in run)
-    chart.update_yaxes(range=[0.0, 1.5 * max(tops[len(tops) // 2], 1.0)])  # the first ones say little
+    tops = sorted(one.p95 for run in runs for _, one in run if one.p95 > 0.0) or [0.0]
+    came = 0 if crossed is None else crossed - runs[0][0][0]
+    chart.update_yaxes(range=[0.0, max(1.5 * tops[len(tops) // 2], 1.1 * came, 1.0)])  # the first ones say little
     return chart
 
 

@@ -48,7 +48,7 @@ def figure(
                 row=row, col=1,
             )  # fmt: skip
         drawn.update_yaxes(title_text=f"{chart.title}<br>[{chart.unit}]", row=row, col=1)
-    drawn.update_xaxes(title_text="time [s]", row=len(every), col=1)
+    drawn.update_xaxes(title_text="Time [s]", row=len(every), col=1)
     if window_s is not None:
         drawn.update_xaxes(range=list(window_s))
     drawn.update_layout(

@@ -180,7 +180,7 @@ CURSOR: Any = {"sync": {"key": "time"}, "drag": {"x": False, "y": False}}
 def time_axis(last: bool) -> Any:
     """The axis below a chart: the last of a column has the values and the label, those above it the lines alone."""
     if last:
-        return {**AXIS, "label": "time [s]", "size": 30}
+        return {**AXIS, "label": "Time [s]", "size": 30}
     return {**AXIS, "label": "", "stroke": "#00000000", "size": 30 - _VALUES_PX, "labelSize": 0}
 
 

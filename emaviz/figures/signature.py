@@ -76,7 +76,7 @@ def _over_time(look: Look, one: Candidate, title: str, signal: str, change: Arra
     shown = of_residual(signal, look.found.actuator.axes).scaled(values)
     chart = theme.new(title, "Time [s], where it would show most", shown.label, dark=dark)
     for name, line, style in (
-        ("measured − model", values, {"color": theme.MEASURED, "width": 1}),
+        ("measured − model", values, {"color": theme.RESIDUAL, "width": 1}),
         (_legend(one), change[part], {"color": SIGNATURE, "width": 2.5}),
     ):
         chart.add_trace(
@@ -145,7 +145,7 @@ def _add_left(chart: go.Figure, left: Binned, axis: Quantity, shown: Quantity) -
             error_y={"array": shown.factor * left.error, "thickness": 1, "width": 0, "color": theme.FLOOR},
             mode="markers",
             name="measured − model",
-            marker={"size": 5, "color": theme.MEASURED},
+            marker={"size": 5, "color": theme.RESIDUAL},
             hovertemplate="%{y:.3g}",
         )
     )

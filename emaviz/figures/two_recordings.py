@@ -8,16 +8,21 @@ from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
 from ema_model.faults import FAULTS
+from ema_model.identification.run import ALGORITHMS
 from ema_model.recordings import SIGNALS
-from emaviz.colours import DIFFERENCE, MONITOR, REFERENCE
+from ema_model.text import COLOURS
+from emaviz.colours import RUNS
 from emaviz.figures.lines import line
 from emaviz.figures.theme import DARK, LIGHT, plain
 from emaviz.recording.entry import Entry, setting
 from emaviz.recording.read import IdentificationTrace, Recording
 from emaviz.text.html import Html, html, joined
 
-FIRST, SECOND = REFERENCE, MONITOR
+FIRST, SECOND = RUNS
 _POINTS = 2000
+_ECCENTRICITY, _PHASE = "k6", "k7"  # of which the second means something where the first is seen
+_STEPS = [step * 10.0**decade for decade in range(-6, 4) for step in (1, 2, 5)]
+_LOG = {"tickvals": _STEPS, "ticktext": [f"{value:g}" for value in _STEPS]}  # in full: Plotly's own have a digit each
 _DASHES = ("solid", "dash", "dot", "dashdot")
 
 
@@ -42,19 +47,20 @@ def figure(first: Recording, second: Recording, signal: str, *, dark: bool = Fal
                 _add(drawn, 1, series.time_s, series.values, f"{name} {said}", colour, dash, width)
         residual = recording.signals.get("residual", {}).get(signal)
         if residual is not None:
-            _add(drawn, 2, residual.time_s, residual.values, f"{name} residual", colour, "solid", 1.2)
+            _add(drawn, 2, residual.time_s, residual.values, f"{name} residual", colour, "solid", 1.2, listed=False)
         for place, (algorithm, trace) in enumerate(recording.identification.items()):
-            _add_search(drawn, trace, plain(f"{name} {algorithm}"), colour, _DASHES[place % len(_DASHES)])
+            said = plain(f"{name} {ALGORITHMS.get(algorithm, algorithm)}")
+            _add_search(drawn, trace, said, colour, _DASHES[place % len(_DASHES)])
     title, unit = SIGNALS[signal].title, SIGNALS[signal].unit or "-"
     drawn.update_yaxes(title_text=f"{title}<br>[{unit}]", row=1, col=1)
-    drawn.update_yaxes(title_text=f"residual<br>[{unit}]", row=2, col=1)
-    drawn.update_yaxes(title_text="rmse of the best<br>[A]", type="log", row=3, col=1)
-    drawn.update_xaxes(title_text="time [s]", matches="x", row=2, col=1)
-    drawn.update_xaxes(title_text="iteration", row=3, col=1)
+    drawn.update_yaxes(title_text=f"Residual<br>[{unit}]", row=2, col=1)
+    drawn.update_yaxes(title_text="RMSE of the best<br>[A]", type="log", row=3, col=1, **_LOG)
+    drawn.update_xaxes(title_text="Time [s]", matches="x", row=2, col=1)
+    drawn.update_xaxes(title_text="Iteration", row=3, col=1)
     drawn.update_layout(
         template=theme.template(),
-        margin={"l": 66, "r": 12, "t": 8, "b": 40},
-        legend={"orientation": "h", "x": 0.0, "y": -0.12, "yanchor": "top"},
+        margin={"l": 66, "r": 12, "t": 8, "b": 0},
+        legend={"orientation": "h", "x": 0.02, "xref": "container", "y": 0.0, "yref": "container", "yanchor": "bottom"},
     )
     return drawn
 
@@ -70,7 +76,7 @@ def table(first: Entry, second: Entry) -> Html:
     if not any(first.settings.get(n) != second.settings.get(n) for n in names) and names:
         rows.append(_row("settings", "the same", "the same"))
     answers = (first.answer, second.answer)
-    rows.append(_row("algorithm", *(one.best or "–" for one in (first, second))))
+    rows.append(_row("best algorithm", *(ALGORITHMS.get(one.best or "", one.best or "–") for one in (first, second))))
     for title, key, form in (
         ("Err [%]", "error_percent", ".2f"),
         ("rmse [A]", "rmse_A", ".4f"),
@@ -83,7 +89,9 @@ def table(first: Entry, second: Entry) -> Html:
         cells = ["–" if value is None else f"{value:.3f}" for value in values]
         known = [value for value in values if value is not None]
         apart = len(known) == 2 and abs(known[0] - known[1]) > 0.02
-        mark = html(' style="color:{};font-weight:600"', DIFFERENCE) if apart else ""
+        if fault.name == _PHASE:
+            apart &= all(answer is not None and _ECCENTRICITY in answer["alarms"] for answer in answers)
+        mark = html(' style="color:{};font-weight:600"', COLOURS["warning"]) if apart else ""
         rows.append(_row(fault.label, *(html("<span{}>{}</span>", mark, cell) for cell in cells)))
     return html(
         '<div style="padding:4px 10px;font-size:12.5px;font-variant-numeric:tabular-nums">'
@@ -92,10 +100,13 @@ def table(first: Entry, second: Entry) -> Html:
     )
 
 
-def _add(drawn: go.Figure, row: int, x, y, name: str, colour: str, dash: str, width: float) -> None:
+def _add(
+    drawn: go.Figure, row: int, x, y, name: str, colour: str, dash: str, width: float, *, listed: bool = True
+) -> None:
     x, y = line(x, y, _POINTS)
+    style = {"color": colour, "width": width, "dash": dash}
     drawn.add_trace(
-        go.Scatter(x=x, y=y, name=name, mode="lines", line={"color": colour, "width": width, "dash": dash}),
+        go.Scatter(x=x, y=y, name=name, mode="lines", line=style, showlegend=listed),
         row=row,
         col=1,
     )

@@ -12,7 +12,7 @@ from emaviz.figures.error_distribution import colour
 
 def figure(memory: Mapping[str, tuple[Sequence[float], Sequence[float]]], *, dark: bool = False) -> go.Figure:
     """memory: by worker, minutes since the first row, and MB."""
-    chart = theme.new("Memory of the workers", "time [min]", "resident [MB]", dark=dark)
+    chart = theme.new("Memory of the workers", "Time [min]", "Resident [MB]", dark=dark)
     for i, (name, (minutes, megabytes)) in enumerate(memory.items()):
         line = {"color": colour(i), "width": 1.5}
         chart.add_trace(go.Scatter(x=minutes, y=megabytes, mode="lines", name=theme.plain(name), line=line))

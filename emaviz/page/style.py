@@ -44,7 +44,7 @@ def page() -> Html:
         "[data-dock-region] [data-dock-griphandle]{display:none!important}"
         # what stands last in a panel ends above its edge
         "[data-dock-region=right] .mantine-ScrollArea-viewport{padding-bottom:14px}"
-        f"div:has(> div > .emaviz-long) {_LABEL}{{width:10.4em!important}}"
+        f"div:has(> div > .emaviz-long) {_LABEL}{{width:11.6em!important}}"
         "</style>"
     )
     return rules + _strip() + inset.style() + chart_heights.style()

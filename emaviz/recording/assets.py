@@ -20,6 +20,8 @@ _TYPES = {
     "favicon.ico": "image/x-icon",
 }
 _ADDRESS = re.compile(r"Hosting a web-viewer at (http://127\.0\.0\.1:\d+)")
+# Links to its makers' fonts: refused as a style sheet, which is an error in the console, but not as a connection.
+_ABROAD = re.compile(rb"\s*<link\b[^>]*https?://[^>]*>")
 _TIMEOUT_S = 20.0
 
 
@@ -84,4 +86,5 @@ def _copy(address: str):
     opener = urllib.request.build_opener(urllib.request.ProxyHandler({}))
     for name, kind in _TYPES.items():
         with opener.open(f"{address}/{name}", timeout=_TIMEOUT_S) as answer:
-            yield name, kind, answer.read()
+            body = answer.read()
+            yield name, kind, _ABROAD.sub(b"", body) if name == "index.html" else body

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from typing import Any
 
+from ema_model.identification.run import ALGORITHMS
 from ema_model.quantities.numbers import amount, number
 from ema_model.quantities.titles import in_sentence, parameter_title, unit_of
 
@@ -32,7 +33,10 @@ class Entry:
 
 def setting(name: str, value: Any) -> tuple[str, str]:
     """A setting as a person reads it: ('amplitude', '5.00 mrad') of ('amplitude_rad', '0.005')."""
-    return in_sentence(parameter_title(name)), _told(value, unit_of(name))
+    told = _told(value, unit_of(name))
+    if name == "algorithms":
+        told = ", ".join(ALGORITHMS.get(one, one) for one in told.split(", "))
+    return in_sentence(parameter_title(name)), told
 
 
 def _told(value: Any, unit: str) -> str:

@@ -18,7 +18,9 @@ Column = tuple[str, list[rr.TimeColumn], Any]
 class IterationBuffer:
     """Rows of one algorithm that are not yet sent.  Not thread safe."""
 
-    def __init__(self, algorithm: str) -> None:
+    def __init__(self, algorithm: str, widest: int = 0) -> None:
+        """widest: of the populations that were sent before."""
+        self.widest = widest
         self._path = algorithm_path(algorithm)
         self._index: list[int] = []
         self._rmse: list[float] = []
@@ -47,6 +49,7 @@ class IterationBuffer:
             if individuals.ndim != 2 or individuals.shape[1] != 8:
                 raise ValueError(f"the population must have the shape (N, 8), not {individuals.shape}")
             self._population.append((row, individuals))
+            self.widest = max(self.widest, len(individuals))
         if population_rmse is not None:
             self._population_rmse.append((row, np.array(population_rmse, dtype=float).reshape(-1)))
         self._index.append(row)
@@ -70,13 +73,19 @@ class IterationBuffer:
                 yield f"{self._path}/truth/{k}", time, rr.Scalars.columns(scalars=np.full(len(index), truth[j]))
         if self._population:
             for j, k in enumerate(K_NAMES):
-                yield f"{self._path}/population/{k}", *_ragged([(i, rows[:, j]) for i, rows in self._population])
+                rows = [(i, _padded(individuals[:, j], self.widest)) for i, individuals in self._population]
+                yield f"{self._path}/population/{k}", *_ragged(rows)
         if self._population_rmse:
             yield f"{self._path}/population/rmse", *_ragged(self._population_rmse)
 
 
 def _time(index: list[int]) -> list[rr.TimeColumn]:
     return [rr.TimeColumn(ITERATION, sequence=np.array(index, dtype=np.int64))]
+
+
+def _padded(values: Array, count: int) -> Array:
+    """With no numbers behind: the viewer complains of a plot whose rows become shorter."""
+    return np.pad(values, (0, count - len(values)), constant_values=np.nan)
 
 
 def _ragged(rows: list[tuple[int, Array]]) -> tuple[list[rr.TimeColumn], Any]:

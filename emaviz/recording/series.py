@@ -24,7 +24,7 @@ def monitor_style(index: int) -> Style:
 def iteration_style(path: str) -> Style:
     """The style of an entity over iterations, by its place under /identification/<algorithm>/."""
     _, _, algorithm, kind, *rest = path.split("/")
-    colour = style.algorithm_colour(algorithm)
+    colour, title = style.algorithm_colour(algorithm), TITLES.get(algorithm, algorithm)
     name = rest[0] if rest else ""
     if kind == "population":
         return rr.SeriesPoints(
@@ -33,16 +33,11 @@ def iteration_style(path: str) -> Style:
     if kind == "interval":
         return rr.SeriesPoints(names=f"90 % interval {name}", colors=[colour], markers="diamond", marker_sizes=[5.0])
     if kind == "best":
-        return line(f"{algorithm} best {name} [-]", colour, 2.5)
+        return line(f"{title} best {name} [-]", colour, 2.5)
     if kind == "truth":
         return line(f"true {name} [-]", style.TRUTH_COLOUR, 2.0)
-    # Series of one name share an entry of the legend.
-    title = TITLES.get(algorithm, algorithm)
-    return line(
-        f"{title}, log10 of the RMSE of the best [A]" if kind == "log10_rmse" else f"{title}, RMSE of the best [A]",
-        colour,
-        2.0,
-    )
+    # Series of one name share an entry of the legend; the logarithm's plot says in its title what they are.
+    return line(title if kind == "log10_rmse" else f"{title}, RMSE of the best [A]", colour, 2.0)
 
 
 def line(name: str, colour: Colour, width: float) -> Style:

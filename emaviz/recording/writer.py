@@ -14,6 +14,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import ArrayLike, NDArray
 
+from ema_model.identification.run import ALGORITHMS
 from emaviz.recording import dashboard, series, style
 from emaviz.recording.blueprint import Algorithm, Contents, build, send
 from emaviz.recording.dashboard import Chart
@@ -57,6 +58,7 @@ class RecordingWriter:
         # Iterations come fast: they only go through this gate, and a thread of their own sends them.
         self._gate = threading.Lock()
         self._buffers: dict[str, IterationBuffer] = {}
+        self._widest: dict[str, int] = {}  # populations by algorithm
         self._last_algorithm: str | None = None
         self._wake = threading.Event()
         self._ending = False
@@ -134,9 +136,9 @@ class RecordingWriter:
         if not self._file.writing:
             return
         with self._gate:
-            buffer = self._buffers.get(algorithm) or IterationBuffer(algorithm)
+            buffer = self._buffers.get(algorithm) or IterationBuffer(algorithm, self._widest.get(algorithm, 0))
             buffer.add(index, rmse, best_k, population_k, population_rmse)
-            self._buffers[algorithm] = buffer
+            self._buffers[algorithm], self._widest[algorithm] = buffer, buffer.widest
             self._last_algorithm = algorithm
             if len(buffer) >= _ROWS_PER_CHUNK:
                 self._wake.set()
@@ -202,7 +204,10 @@ class RecordingWriter:
             if algorithm is None:
                 raise ValueError("a result needs its algorithm's name when no iteration came before it")
             self._algorithm(algorithm).result = True
-            self._text(f"{style.algorithm_path(algorithm)}/result", table(f"Result of {algorithm}", values))
+            self._text(
+                f"{style.algorithm_path(algorithm)}/result",
+                table(f"Result of {ALGORITHMS.get(algorithm, algorithm)}", values),
+            )
 
     def expect(self, signals: Mapping[str, Sequence[str]], algorithms: Sequence[str]) -> None:
         """Arranges the file now for what will come, so that a viewer that follows it is arranged from the start.

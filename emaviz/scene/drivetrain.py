@@ -9,7 +9,7 @@ import numpy as np
 import viser
 
 from emaviz.scene.mesh import add_mesh
-from emaviz.scene.palette import DARK, FAULT, IRON, LIGHT, SATIN, STEEL, Colour, between
+from emaviz.scene.palette import DARK, FAULT, IRON, LIGHT, RESIDUAL, SATIN, STEEL, Colour, between
 from emaviz.scene.solids import Solid, about_x, about_y, ball, block, extruded, gear_wheel, joined, thread, tube
 
 ARM = 0.2  # of the horn: what the nut's travel is to the surface's turn
@@ -85,11 +85,11 @@ class Drivetrain:
             one.color = FAULT if "k2" in faults else SATIN
 
     def heat(self, share: float) -> None:
-        """Colour of the screw, from cold 0 to glowing 1."""
+        """Colour of the screw, from cold 0 to glowing 1, the residual's."""
         share = round(min(max(share, 0.0), 1.0), 2)
         if share != self._heat:
             self._heat = share
-            self._rod_of_screw.color = between(STEEL, FAULT, share)
+            self._rod_of_screw.color = between(STEEL, RESIDUAL, share)
 
 
 def _rod_of(surface_rad: float) -> tuple[np.ndarray, np.ndarray]:

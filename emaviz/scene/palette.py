@@ -1,4 +1,4 @@
-"""Colours of the actuator: a machine of greys, phases in subdued tones, and one colour for what is broken."""
+"""Colours of the actuator: greys, phases in subdued tones, one colour for what is broken, another for an error."""
 
 from __future__ import annotations
 
@@ -21,5 +21,6 @@ IRON: Colour = (104, 109, 119)
 DARK: Colour = (76, 81, 91)
 WHITE: Colour = (255, 255, 255)
 FAULT = colours.rgb(colours.FAULT)
+RESIDUAL = colours.rgb(colours.DIFFERENCE)
 PHASES = tuple(colours.rgb(one) for one in colours.PHASES)
 AT_REST = tuple(between(between(one, IRON, 0.5), DARK, 0.35) for one in PHASES)  # a phase without current

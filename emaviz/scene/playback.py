@@ -8,6 +8,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import takewhile
 
 import numpy as np
 
@@ -21,7 +22,7 @@ _POSES_PER_S = 30.0
 # them; each pose lets the browser draw pictures for a quarter of a second.  It sends a slider's value every 50 ms when
 # it has the time: then there is time for poses, too.
 _POSES_WHILE_CHANGING_PER_S = 15.0
-_POSES_WHILE_BEHIND_PER_S = 0.5
+_POSES_WHILE_BEHIND_PER_S = 0.2
 _IN_TIME_S = 0.057  # between two runs of a browser that is not behind
 _CHANGING_S = 0.6  # a run that comes so soon after another one is one of many
 _TOLD_PER_S = 8.0  # play-heads are redrawn at this pace
@@ -151,7 +152,7 @@ class Playback:
             if shown is not None and moves and (stale or now - told >= 1.0 / _TOLD_PER_S):
                 told = now
                 self._moved(reel.clock_s, shown.duration_s)
-            if self.playing or self._changing:
+            if self.playing or self._pace < _POSES_PER_S:
                 while not self._closing and (left := 1.0 / self._pace - (time.monotonic() - now)) > 0.0:
                     time.sleep(min(left, 1.0 / _POSES_PER_S))  # the pace may change meanwhile
             elif not self._stale:
@@ -160,17 +161,13 @@ class Playback:
             self._wake.clear()
 
     @property
-    def _changing(self) -> bool:
-        """Whether one run follows the other, as while a slider is dragged."""
-        before, last = self._came_s[-2], self._came_s[-1]
-        return last - before < _CHANGING_S and time.monotonic() - last < _CHANGING_S
-
-    @property
     def _pace(self) -> float:
-        """Poses per second."""
-        if not self._changing:
+        """Poses per second: fewer while one run follows the other, as while a slider is dragged."""
+        came = tuple(self._came_s)
+        gaps = tuple(takewhile(lambda gap: gap < _CHANGING_S, np.diff(came)[::-1]))
+        if not gaps or time.monotonic() - came[-1] >= _CHANGING_S:
             return _POSES_PER_S
-        in_time = np.median(np.diff(self._came_s)) <= _IN_TIME_S
+        in_time = np.median(gaps) <= _IN_TIME_S  # of this change alone: a quick one before says nothing of it
         return _POSES_WHILE_CHANGING_PER_S if in_time else _POSES_WHILE_BEHIND_PER_S
 
     def _show_damage(self, shown: Motion) -> None:

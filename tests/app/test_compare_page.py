@@ -149,6 +149,8 @@ def test_from_a_file_to_the_region_where_the_model_fails(compare, app, rig_file)
         wait_until(lambda title=title: any(title in drawn for drawn, _ in figures(page)))
 
     page.get_by_role("tab", name="Time", exact=True).click()
+    saves, plot = (page.get_by_role("button", name="Save report"), page.locator(".js-plotly-plot:visible").first)
+    assert saves.locator("visible=true").bounding_box()["x"] < plot.bounding_box()["x"], "below the answer"
     page.set_viewport_size({"width": 1100, "height": 700})
     chart, verdict = page.locator(".js-plotly-plot:visible").first, page.get_by_text(comparison.sentences[0]).first
     try:  # the first chart stands below the verdict, seen without scrolling

@@ -117,7 +117,7 @@ def test_the_large_plot_has_units_and_every_line(runs):
     figure = run_signals.figure(*runs, runs[0], (0.1, 0.2))
     assert len(figure.data) == 4 * 3 + 1
     titles = [figure.layout[f"yaxis{i}"].title.text for i in ("", "2", "3", "4")]
-    assert all("[" in title for title in titles) and figure.layout.xaxis4.title.text == "time [s]"
+    assert all("[" in title for title in titles) and figure.layout.xaxis4.title.text == "Time [s]"
     assert figure.layout.xaxis.range == (0.1, 0.2)
 
 

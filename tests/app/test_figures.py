@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from ema_model.actuator import load_actuator
+from emaviz import figures
 from emaviz.figures.decimate import envelope
 from emaviz.figures.fault_bars import fault_bars
 
@@ -29,3 +33,13 @@ def test_bars_hold_all_faults_and_stay_inside():
     for i in range(1, 9):
         assert f"<b>k{i}</b>" in page
     assert "script" not in page and "-100" not in page and "200.00%" not in page
+
+
+def test_titles_of_axes_begin_with_a_capital():
+    axis = re.compile(r'(?:AXIS, "label": |title_text=f?|theme\.new\([^()]*?, )"([a-z]{3}[^"]*)"')
+    found = {
+        (path.name, text)
+        for path in Path(figures.__file__).parent.glob("*.py")
+        for text in axis.findall(path.read_text())
+    }
+    assert not found

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from support.on_page import wait_until
@@ -55,6 +57,8 @@ def test_a_slider_breaks_the_actuator_and_reset_heals_it(page, app):
     wait_until(lambda: app.session.settings.k[0] == 0.8)
     wait_until(lambda: not np.array_equal(chart(page, "Equivalent current"), before))
     row(page, "k1 friction × 2.60").wait_for()
+    labels = page.locator("label:visible").filter(has_text=re.compile(r"^k[1-8] "))
+    assert labels.count() == 8 and all(one.bounding_box()["height"] < 30.0 for one in labels.all()), "a line each"
     page.wait_for_timeout(300)
     broken = chart(page, "Equivalent current")
     assert np.abs(broken[3]).mean() > 1.2 * np.abs(before[3]).mean()

@@ -13,6 +13,7 @@ from support.on_page import field, wait_until
 
 from ema_model.actuator import load_actuator
 from ema_model.errors import InputError
+from ema_model.text import COLOURS
 from emaviz.figures import two_recordings
 from emaviz.recording import RecordingWriter, read
 from emaviz.recording.entry import setting
@@ -60,7 +61,7 @@ def races(tmp_path_factory):
         ("amplitude_rad", 0.005, ("amplitude", "5.00 mrad")),
         ("noise_A", "0.1", ("noise", "0.100 A")),
         ("iterations", "150", ("iterations", "150")),
-        ("algorithms", ["do", "hba"], ("algorithms", "do, hba")),
+        ("algorithms", ["do", "hba"], ("algorithms", "Dandelion, Honey Badger")),
         ("command", "chirp", ("command", "chirp")),
         ("seed", "–", ("seed", "–")),
     ],
@@ -140,11 +141,15 @@ def test_two_recordings_share_their_axes(recorded, races):
     figure = two_recordings.figure(first, second, "current_A")
     drawn = {trace.name: trace for trace in figure.data}
     assert {"A fitted", "B fitted", "A recorded", "B recorded", "A residual", "B residual"} <= set(drawn)
-    assert {"A do", "A hba", "B do"} <= set(drawn)
-    assert np.allclose(drawn["B do"].y, second.identification["do"].rmse)
+    assert {"A Dandelion", "A Honey Badger", "B Dandelion"} <= set(drawn)
+    assert np.allclose(drawn["B Dandelion"].y, second.identification["do"].rmse)
     assert drawn["A fitted"].yaxis == drawn["B fitted"].yaxis
     text = two_recordings.table(*(recorded.entry(name) for name in names))
     assert "0.2 0 0" in text and "0.6 0 0" in text and "population" not in text, "only what differs"
+    k1, k7 = (text[text.index(f"<td>{name}") :].split("</tr>")[0] for name in ("k1 friction", "k7"))
+    assert COLOURS["warning"] in k1 and COLOURS["warning"] not in k7, (
+        "a direction of an eccentricity that is not there does not differ"
+    )
 
 
 def test_an_identification_is_arranged_once(races):

@@ -60,13 +60,17 @@ def test_a_life_is_followed(page, app, monkeypatch):
     page.get_by_role("button", name="Track", exact=True).click()
     page.get_by_text("k1 friction drifts by 0.02").first.wait_for()
     page.get_by_text(f"after flight_39: {COUNT} flights, {COUNT} of them usable").wait_for()
-    assert page.locator(".js-plotly-plot:visible").count() == 3
+    plots = [plot.bounding_box() for plot in page.locator(".js-plotly-plot:visible").all()]
+    assert len(plots) == 3 and plots[1]["x"] == plots[2]["x"] > plots[0]["x"]
+    ends = page.get_by_role("button", name="Compare this flight").bounding_box()
+    columns = ends["y"] + ends["height"], plots[2]["y"] + plots[2]["height"]
+    assert abs(columns[0] - columns[1]) < 90.0, "both columns are filled"
 
     fill(page, "Today, after flight", 15)
     page.get_by_text("What came: k1 friction reached 0.5").wait_for()
     page.get_by_text("after flight_14: 15 flights, 15 of them usable").wait_for()
     crossed = tab.following.history.crossed("k1")
-    page.get_by_text(f"reached 0.5 {crossed - 15} flights later").wait_for()
+    page.get_by_text(f"reached 0.5, {crossed - 15} flights later").wait_for()
     drawn = [plot.figure.layout.title.text for plot in tab.result._plots]
     assert [text.startswith(f"<b>{begins}") for text, begins in zip(drawn, ("k1", "Probability", "Remaining life"))]
 

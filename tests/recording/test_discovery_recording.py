@@ -26,12 +26,12 @@ def written(found, tmp_path_factory):
     return path
 
 
-def _columns(path, entity, component):
-    """Values of one component of an entity, a list for each row."""
+def _columns(path, entity, component, **store):
+    """Values of one component of an entity, or of all, a list for each row."""
     rows = []
-    for chunk in RrdReader(path).stream():
+    for chunk in RrdReader(path).stream(**store):
         batch = chunk.to_record_batch()
-        if str(chunk.entity_path) == entity and component in batch.schema.names:
+        if entity in (None, str(chunk.entity_path)) and component in batch.schema.names:
             rows += [value for value in batch.column(component).to_pylist() if value is not None]
     return rows
 
@@ -92,6 +92,10 @@ def test_it_opens_arranged(written):
     (layout,) = reader.blueprints()
     texts = " ".join(str(chunk.to_record_batch().columns) for chunk in reader.stream(store=layout))
     for title in ("Signals", "Ladder", "Candidates", "Residuals", "Configuration", "step 1: + Cogging torque"):
+        assert title in texts, title
+    legends = _columns(written, None, "PlotLegend:visible", store=layout)
+    assert legends.count([False]) == 2, "bars are named by their view: a legend would have their paths"
+    for title in ("left: fitted; purple, right: held out", "left: predicted; teal, right: refitted"):
         assert title in texts, title
 
 

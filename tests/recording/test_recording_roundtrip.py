@@ -87,10 +87,15 @@ def test_parts_of_a_recording_are_enough(tmp_path, signals):
 def test_populations_may_change_size(tmp_path):
     with RecordingWriter(tmp_path / "a.rrd") as writer:
         writer.iteration("do", 0, 1.0, np.zeros(8), np.ones((3, 8)))
+        writer.flush()
         writer.iteration("do", 1, 1.0, np.zeros(8), np.ones((2, 8)))
     population = read(tmp_path / "a.rrd").identification["do"].population
     assert population is not None and population.shape == (2, 3, 8)
     assert np.isnan(population[1, 2]).all() and np.isfinite(population[1, :2]).all()
+    path, name = "/identification/do/population/k1", "Scalars:scalars"
+    drawn = [c.to_record_batch() for c in RrdReader(tmp_path / "a.rrd").stream() if str(c.entity_path) == path]
+    rows = [row for batch in drawn if name in batch.schema.names for row in batch.column(name).to_pylist()]
+    assert [len(row) for row in rows] == [3, 3], "the viewer complains of rows of different lengths"
 
 
 def test_mistakes_of_the_caller_are_raised(tmp_path):

@@ -54,6 +54,7 @@ def test_what_came_stands_beside_what_was_said(history):
     assert "longer than the 90 % interval" in hindsight(then, Came(None, 100))
     assert hindsight(then, Came(None, 0)) == "" and hindsight(history.looks[60].faults["k2"], Came(None, 9)) == ""
     assert headline(history.looks[60]).startswith("k1 friction drifts")
+    assert headline(history.last).endswith(f"and has reached {AT:g}"), "no flights are left"
     assert headline(history.looks[8]).startswith("No trend")
 
 

@@ -48,7 +48,7 @@ class ResultPanel:
     """Everything here is built and changed on the screen's thread.
 
     strip: its clock, for Compare's recording on the 3D actuator; lines(): adds a text's first lines, above the preview;
-    leads(): adds what may follow, below the answer; keep(): adds what saves a comparison, below the plots.
+    leads(): adds what may follow, below the answer; keep(): adds what saves a comparison, below it.
     """
 
     def __init__(
@@ -82,14 +82,14 @@ class ResultPanel:
         self._next = gui.add_folder("Next", visible=False)
         with self._next:
             leads()
+        self._save = gui.add_folder("Keep it", visible=False)
+        with self._save:
+            self._kept = keep()
         self._plots_folder = gui.add_folder("Plots", visible=False)
         with self._plots_folder:
             add_html(gui, NEXT_COLUMN)
             self._recording = gui.add_dropdown("Measurement", ["–"], visible=False)
             self._plots = ComparePlots(page)
-        self._save = gui.add_folder("Keep it", visible=False)
-        with self._save:
-            self._kept = keep()
         strip.moves.connect(self._moved)
         self._recording.on_update(lambda event: event.client and self._chosen())
 

@@ -186,9 +186,10 @@ class IdentifyResult:
 
 
 def _seen(track: Track) -> np.ndarray:
-    """k (8,) as the actuator shows it: an eccentricity that was not seen has no direction."""
+    """k (8,) as the actuator shows it: of an answer the faults that are seen, and the direction of an eccentricity."""
     assert track.k is not None, "it has searched"
-    k = track.k.copy()
-    if track.answer is not None and NAMES[5] not in track.answer.uncertainty.alarms:
-        k[6] = HEALTHY[6]
-    return k
+    if track.answer is None:
+        return track.k
+    alarms = track.answer.uncertainty.alarms
+    seen = [name in alarms or (name == NAMES[6] and NAMES[5] in alarms) for name in NAMES]
+    return np.where(seen, track.k, HEALTHY)

@@ -14,6 +14,7 @@ from emaviz.page.inset import COLUMNS, NEXT_COLUMN
 from emaviz.page.library import WORKSPACE
 from emaviz.page.page import Page
 from emaviz.page.playback import PlaybackStrip
+from emaviz.page.style import LONG_LABELS
 from emaviz.scene.motion import motion
 from emaviz.session.library import Library
 from emaviz.text.html import add_html, html
@@ -37,6 +38,8 @@ class EffectPage:
         self._text = add_html(gui)
         self._run = gui.add_dropdown("Run", tuple(RUNS), visible=False)
         self._place = gui.add_folder("Parameters", visible=False)
+        with self._place:
+            add_html(gui, LONG_LABELS)
         self._status = add_html(gui)
         add_html(gui, NEXT_COLUMN)  # a signal and its difference stay together
         self._charts = EffectCharts(gui, page.session.actuator.axes)

@@ -7,6 +7,7 @@ from typing import Any
 import plotly.graph_objects as go
 import viser
 
+from ema_model.recordings import SIGNALS
 from emaviz.figures import one_recording, two_recordings
 from emaviz.page.inset import COLUMNS
 from emaviz.page.page import Page
@@ -37,7 +38,8 @@ class RunsResult:
         with panel.add_tab("Two runs", viser.Icon.ARROWS_DIFF):
             add_html(gui, COLUMNS)
             self._names = add_html(gui, _hint("Choose two on the left."))
-            self._signal: Any = gui.add_dropdown("Signal", ("current_A",), visible=False)
+            self._signals: dict[str, str] = {}
+            self._signal: Any = gui.add_dropdown("Signal", ("–",), visible=False)
             self._place = gui.add_folder("Signals and search", visible=False)
             self._table = add_html(gui)
         self._close.on_click(lambda _: page.screen.post("viewer", self.close_viewer))
@@ -74,8 +76,10 @@ class RunsResult:
         """Two recordings, each as an entry and what was read of it."""
         self._pair = first, second
         names = two_recordings.signals(first[1], second[1]) or ["current_A"]
-        self._signal.options = names
-        self._signal.value = "current_A" if "current_A" in names else names[0]
+        self._signals = {SIGNALS[name].title: name for name in names}
+        titles = {name: title for title, name in self._signals.items()}
+        self._signal.options = tuple(self._signals)
+        self._signal.value = titles.get("current_A") or next(iter(self._signals))
         self._signal.visible = self._place.visible = True
         self._names.content = _hint(
             html(
@@ -93,10 +97,10 @@ class RunsResult:
         if self._pair is None:
             return
         (_, first), (_, second) = self._pair
-        figure = two_recordings.figure(first, second, str(self._signal.value))
+        figure = two_recordings.figure(first, second, self._signals.get(str(self._signal.value), "current_A"))
         if self._plot is None:
             with self._place:
-                self._plot = self._page.server.gui.add_plotly(figure, config=_CONFIG, aspect=0.85)
+                self._plot = self._page.server.gui.add_plotly(figure, config=_CONFIG, aspect=1.1)
         else:
             self._plot.figure = figure
 

@@ -13,6 +13,7 @@ from emaviz.page.folder_choice import FolderChoice
 from emaviz.page.job_line import JobLine
 from emaviz.page.page import Page
 from emaviz.page.practice import PracticeButtons
+from emaviz.page.style import LONG_LABELS
 from emaviz.page.track import WORKSPACE
 from emaviz.page.track.result import TrackResult
 from emaviz.session.track.following import Following
@@ -38,6 +39,7 @@ class TrackPanel:
         self._folder = FolderChoice(page, "Flights", hint, self._listed, lambda: following.chosen, self._take_folder)
         self._practice = PracticeButtons(page, following.practice, self.choose)
         with gui.add_folder("End of life"):
+            add_html(gui, LONG_LABELS)
             self._faults = {BY_NAME[name].label: name for name in TRACKED}
             self._fault: Any = gui.add_dropdown("Fault", tuple(self._faults))
             self._ends = gui.add_checkbox("With a threshold", False)

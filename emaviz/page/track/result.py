@@ -16,10 +16,11 @@ from ema_model.tracking.result import Tracked
 from ema_model.tracking.track import TRACKED
 from ema_model.tracking.words import headline, hindsight
 from emaviz.figures import k_over_flights, predicted_life, remaining_life
-from emaviz.page.inset import COLUMNS
+from emaviz.page.inset import COLUMNS, NEXT_COLUMN
 from emaviz.page.kept import Cleared
 from emaviz.page.page import Page
 from emaviz.page.practice import Seal
+from emaviz.page.style import LONG_LABELS
 from emaviz.page.track.click import FlightClicks
 from emaviz.page.track.leads import FlightLead
 from emaviz.session.worker import Worker
@@ -34,7 +35,7 @@ _STEPS = (
     Html("Press <b>Track</b>: the faults of each flight are identified."),
     "You see which fault drifts and how many flights remain, as a distribution; drag the day back along the life.",
 )
-_ASPECTS = (0.6, 0.42, 0.48)  # of the figures, height over width
+_ASPECTS = (0.66, 0.42, 0.48)  # of the figures, height over width: the first stands beside the others
 
 
 class TrackResult:
@@ -55,18 +56,18 @@ class TrackResult:
         self._told = add_html(gui, begin("No flights are tracked yet", _STEPS))
         self._life = gui.add_folder("The unit's life", visible=False)
         with self._life:
-            add_html(gui, COLUMNS)
+            add_html(gui, COLUMNS + LONG_LABELS)
             self._faults = {BY_NAME[name].label: name for name in TRACKED}
             self._fault: Any = gui.add_dropdown("Shown", tuple(self._faults))
             self._today = gui.add_slider(
                 "Today, after flight", min=1, max=2, step=1, initial_value=2, hint="Drag it back: what was said then"
             )
-            self._plots = [gui.add_plotly(go.Figure(), config=_CONFIG, aspect=aspect) for aspect in _ASPECTS]
-        self._place = gui.add_folder("One flight", visible=False)
-        with self._place:
+            flights = gui.add_plotly(go.Figure(), config=_CONFIG, aspect=_ASPECTS[0])
             self._flight: Any = gui.add_dropdown("Flight", (_NONE,))
             self._lead = lead(self._chosen)
             FlightClicks(page, self._clicked)
+            add_html(gui, NEXT_COLUMN)
+            self._plots = [flights, *(gui.add_plotly(go.Figure(), config=_CONFIG, aspect=one) for one in _ASPECTS[1:])]
         self._seal = seal()
         self._words = gui.add_folder("All results in words", visible=False, expand_by_default=False)
         with self._words:
@@ -83,7 +84,7 @@ class TrackResult:
         begun = before is None or history is None or before.flights[:1] != history.flights[:1]
         asked = before is None or history is None or begun or before.thresholds != history.thresholds
         last = history.last if history is not None else None
-        for folder in (self._life, self._place, self._words, self._save):
+        for folder in (self._life, self._words, self._save):
             folder.visible = last is not None
         if begun:
             self._seal.show()

@@ -12,6 +12,7 @@ from emaviz.recording.style import series_title
 
 LADDER, CANDIDATES, VERDICT = "/discovery/ladder", "/discovery/candidates", "/discovery/verdict"
 _AIR = 1.05
+_NO_LEGEND = rrb.PlotLegend(visible=False)  # a bar's entry there would be its path: the view's title names the bars
 
 
 @dataclass(frozen=True)
@@ -41,8 +42,8 @@ def _ladder() -> rrb.Container:
     bars = rrb.BarChartView(
         origin="/",
         contents=[f"{LADDER}/fitted", f"{LADDER}/held_out", f"{LADDER}/floor"],
-        name="Error over floor after each step (teal: fitted, purple: held out, grey: the floor, 1)",
-        plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop),
+        name="Error over floor after each step (teal, left: fitted; purple, right: held out; grey: the floor, 1)",
+        plot_legend=_NO_LEGEND,
     )
     words = rrb.TextDocumentView(origin=VERDICT, name="What was found")
     return rrb.Horizontal(words, bars, column_shares=[1, 1], name="Ladder")
@@ -52,8 +53,8 @@ def _candidates() -> rrb.Container:
     bars = rrb.BarChartView(
         origin="/",
         contents=[f"{CANDIDATES}/predicted", f"{CANDIDATES}/refitted"],
-        name="Fall of χ² by rank (blue: predicted, orange: refitted)",
-        plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop),
+        name="Fall of χ² by rank (grey, left: predicted; teal, right: refitted)",
+        plot_legend=_NO_LEGEND,
     )
     table = rrb.TextDocumentView(origin=CANDIDATES, name="Ranking")
     return rrb.Horizontal(table, bars, column_shares=[1, 1], name="Candidates")

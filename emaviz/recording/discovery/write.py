@@ -169,8 +169,8 @@ class DiscoveryWriter(RecordingWriter):
                 predicted = [one.predicted_drop for one in chosen]
                 refitted = [max(one.refitted_drop or 0.0, 0.0) for one in chosen]
                 for name, values, side, colour in (
-                    ("predicted", predicted, -1.0, GROUP_COLOURS["reference"]),
-                    ("refitted", refitted, 0.0, GROUP_COLOURS["monitor"]),
+                    ("predicted", predicted, -1.0, (*colours.rgb(colours.COMMAND), 255)),
+                    ("refitted", refitted, 0.0, _LINES["fitted"]),
                 ):
                     bars = rr.BarChart(
                         values, abscissa=at + side * _WIDTH, color=colour, widths=[0.9 * _WIDTH] * len(chosen)

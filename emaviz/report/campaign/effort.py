@@ -34,7 +34,7 @@ class Effort(Section[Rows]):
                 megabytes.append(row["memory_MB"])
         shown = dict(sorted(memory.items(), key=lambda one: -len(one[1][0]))[:_MOST_WORKERS])
         thin = {name: tuple(np.asarray(one)[:: max(1, len(one) // 300)] for one in its) for name, its in shown.items()}
-        drawn = [figures.place(error_distribution.figure("Time of a task", "time [s]", seconds), 320)]
+        drawn = [figures.place(error_distribution.figure("Time of a task", "Time [s]", seconds), 320)]
         if thin:
             drawn.append(figures.place(worker_memory.figure(thin), 320))  # pyright: ignore[reportArgumentType]
         return pair(*drawn)

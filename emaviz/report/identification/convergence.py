@@ -22,7 +22,7 @@ class Convergence(Section[Identified]):
     def body(self, subject: Identified, figures: Figures) -> str:
         """Always there."""
         answer = subject.answer
-        chart = theme.new("Best error of each iteration", "Iteration", "rmse [A]")
+        chart = theme.new("Best error of each iteration", "Iteration", "RMSE [A]")
         drawn = {"color": colour(answer.algorithm), "width": 2}
         chart.add_trace(go.Scatter(y=answer.rmse_history, mode="lines", line=drawn, showlegend=False))
         chart.update_yaxes(type="log")

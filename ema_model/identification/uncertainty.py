@@ -19,6 +19,7 @@ from ema_model.estimation.feldman_cousins import above_zero, length_of_vector
 from ema_model.estimation.unknowns import ECCENTRICITY, K_SIGMA, polar, to_vector
 from ema_model.identification.adequacy import Adequacy, adequacy
 from ema_model.identification.fit import FAULTS, Fitted
+from ema_model.identification.logged_apart import logged_apart
 from ema_model.identification.model_bias import TWINS
 from ema_model.identification.next_experiment import Suggestion, separating
 from ema_model.quantities.interval import HALF_90
@@ -83,7 +84,7 @@ def uncertainty(found: Fitted, k: Array) -> Uncertainty:
         ambiguous=groups,
         hardly_known=hardly,
         adequate=best.fit.adequate,
-        warnings=_warnings(best.fit),
+        warnings=(*_warnings(best.fit), *logged_apart(found)),
         separated_by=separating(found, best.covariance, unclear) if unclear else None,
         covariance=best.covariance,
         detectable=_detectable(best),

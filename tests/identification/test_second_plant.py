@@ -11,6 +11,7 @@ from ema_model.actuator import load_actuator
 from ema_model.identification.fit import refine, setting
 from ema_model.identification.objective import Objective
 from ema_model.identification.run import ROBUST, identify
+from ema_model.identification.uncertainty import uncertainty
 from ema_model.recordings import Measurement
 from ema_model.simulation.run import Run, simulate_reference
 
@@ -56,6 +57,8 @@ def test_a_current_that_is_logged_a_sample_before_the_positions_is_not_taken_for
     lag = next(i for i, one in enumerate(found.problem.unknowns) if one.kind == "lag")
     assert found.problem.unknowns[lag].sigma * found.x[lag] == pytest.approx(-1e-4, rel=0.3)
     assert faults.error_percent(found.k, np.array(k), wrap=True) < 0.5
+    [said] = uncertainty(found, found.k).warnings
+    assert said.startswith("The current of second plant is logged ") and " before its positions" in said
 
 
 @pytest.mark.study

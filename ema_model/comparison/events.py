@@ -24,8 +24,9 @@ Array = NDArray[np.float64]
 
 _LEAST_BLOCKS = 100
 _EDGE = 0.05  # of a recording, nearer to whose ends nothing is dated
-_AT_ONCE_S, _LEAST_AT_ONCE = 0.05, 3  # about the moment, and blocks on either side, within which ...
-_AT_ONCE = 0.5  # ... so much of the change must come: what a residual that swings does in its own time is no event
+# About the moment so much of the change must come within a few blocks, of what drives within the time that a loop takes
+# to answer: what a residual that swings, or a motor that stalls, does in its own time is no event.
+_AT_ONCE, _LEAST_AT_ONCE, _LOOP_S = 0.5, 3, 0.05
 _STRETCHES = 24  # of a recording, over which what is left is taken to be independent
 
 
@@ -121,16 +122,16 @@ def _step(residuals: Residuals, recording: int, signal: str, modulator: str) -> 
     left = values - scale * np.where(np.arange(len(time)) > place, after[at], before[at])
     if abs(change) < EVENT_T * _uncertainty(left, scale, place):
         return None
-    if _at_once(time, values, scale, place) / change < _AT_ONCE:
+    if _at_once(time, values, scale, place, _LOOP_S if _drives(signal) else 0.0) / change < _AT_ONCE:
         return None
     return _Step(signal, modulator, float(0.5 * (time[place] + time[place + 1])), change, min(share, 1.0), gain)
 
 
-def _at_once(time: Array, values: Array, scale: Array, place: int) -> float:
+def _at_once(time: Array, values: Array, scale: Array, place: int, within_s: float) -> float:
     """The step as it is seen close to its moment, between the blocks `place` and the one after it."""
     moment = 0.5 * (time[place] + time[place + 1])
     sides = [np.arange(place + 1)[-_LEAST_AT_ONCE:], np.arange(place + 1, len(time))[:_LEAST_AT_ONCE]]
-    near = np.flatnonzero(np.abs(time - moment) < _AT_ONCE_S)
+    near = np.flatnonzero(np.abs(time - moment) < within_s)
     before, after = (
         np.union1d(side, near[(near <= place) == is_before]) for side, is_before in zip(sides, (True, False))
     )

@@ -16,3 +16,8 @@ BAND = 1.25
 # what a parabola over time explains, how many times as much it must explain; and of its standard deviation, how many
 # times it must be (some hundred moments are tried).  Studied in tests/comparison/test_events.py.
 EVENT_SHARE, EVENT_BEYOND_DRIFT, EVENT_T = 0.4, 1.2, 6.0
+
+# Of a step, that must come within so many blocks on either side of its moment, and of a current's or a torque's within
+# the time that a loop takes to answer: what a residual that swings, or a motor that stalls, does in its own time is no
+# event (XL330's did both: tests/real_data/test_discovery.py).
+EVENT_AT_ONCE, EVENT_BLOCKS, EVENT_LOOP_S = 0.5, 3, 0.05

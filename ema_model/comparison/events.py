@@ -14,7 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
-from ema_model.comparison.criteria import BAND, EVENT_BEYOND_DRIFT, EVENT_SHARE, EVENT_T
+from ema_model.comparison.criteria import (
+    BAND,
+    EVENT_AT_ONCE,
+    EVENT_BEYOND_DRIFT,
+    EVENT_BLOCKS,
+    EVENT_LOOP_S,
+    EVENT_SHARE,
+    EVENT_T,
+)
 from ema_model.comparison.explain import modulator_of, without_spikes
 from ema_model.comparison.residuals import Residuals
 from ema_model.comparison.sentences import event_sentence
@@ -24,9 +32,6 @@ Array = NDArray[np.float64]
 
 _LEAST_BLOCKS = 100
 _EDGE = 0.05  # of a recording, nearer to whose ends nothing is dated
-# About the moment so much of the change must come within a few blocks, of what drives within the time that a loop takes
-# to answer: what a residual that swings, or a motor that stalls, does in its own time is no event.
-_AT_ONCE, _LEAST_AT_ONCE, _LOOP_S = 0.5, 3, 0.05
 _STRETCHES = 24  # of a recording, over which what is left is taken to be independent
 
 
@@ -122,21 +127,22 @@ def _step(residuals: Residuals, recording: int, signal: str, modulator: str) -> 
     left = values - scale * np.where(np.arange(len(time)) > place, after[at], before[at])
     if abs(change) < EVENT_T * _uncertainty(left, scale, place):
         return None
-    if _at_once(time, values, scale, place, _LOOP_S if _drives(signal) else 0.0) / change < _AT_ONCE:
+    if _at_once(time, values, scale, place, _drives(signal)) / change < EVENT_AT_ONCE:
         return None
     return _Step(signal, modulator, float(0.5 * (time[place] + time[place + 1])), change, min(share, 1.0), gain)
 
 
-def _at_once(time: Array, values: Array, scale: Array, place: int, within_s: float) -> float:
+def _at_once(time: Array, values: Array, scale: Array, place: int, drives: bool) -> float:
     """The step as it is seen close to its moment, between the blocks `place` and the one after it."""
-    moment = 0.5 * (time[place] + time[place + 1])
-    sides = [np.arange(place + 1)[-_LEAST_AT_ONCE:], np.arange(place + 1, len(time))[:_LEAST_AT_ONCE]]
-    near = np.flatnonzero(np.abs(time - moment) < within_s)
-    before, after = (
-        np.union1d(side, near[(near <= place) == is_before]) for side, is_before in zip(sides, (True, False))
+    after = np.arange(len(time)) - place  # 1 is the first block after the moment, 0 the last before it
+    near = (after > -EVENT_BLOCKS) & (after <= EVENT_BLOCKS)
+    if drives:
+        near |= np.abs(time - 0.5 * (time[place] + time[place + 1])) < EVENT_LOOP_S
+    before, behind = (
+        float(scale[side] @ values[side]) / float(scale[side] @ scale[side])
+        for side in (near & (after <= 0), near & (after > 0))
     )
-    levels = [float(scale[at] @ values[at]) / float(scale[at] @ scale[at]) for at in (before, after)]
-    return levels[1] - levels[0]
+    return behind - before
 
 
 def _drift(time: Array, values: Array, scale: Array) -> float:

@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 BAND_SIGMAS = 2.0  # σ on either side: 95 of 100 blocks of a perfect model lie within
 CORRELATED_S = 0.025  # how long the model's error, and a sensor's inaccuracy, stay alike
 _STILL = 8.0  # of a position's noise, within which it stands
-_POSITIONS = ("motor_position_rad", "user_position_rad")
+POSITIONS = ("motor_position_rad", "user_position_rad")
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +97,7 @@ def twin_error(model: Model, place: int, actuator: Actuator | None = None, k: Ar
 def repeats_of(window: Window, noise: Mapping[str, float]) -> Array:
     """Blocks over which the model's error stays alike: 25 ms, or as long as the motor stands, (blocks,)."""
     repeats = np.full(window.blocks, max(1.0, CORRELATED_S / window.block_s))
-    name = next((name for name in _POSITIONS if name in window.measured), None)
+    name = next((name for name in POSITIONS if name in window.measured), None)
     width = round(CORRELATED_S / window.block_s)
     if name is None or width < 2:
         return repeats

@@ -14,6 +14,7 @@ from ema_model.estimation.floor import Floor
 from ema_model.estimation.unknowns import ECCENTRICITY, Unknown, to_k, to_vector
 from ema_model.models import Model
 from ema_model.models.closed_loop import LOAD
+from ema_model.models.later import later
 from ema_model.models.model import Effects, Signals
 from ema_model.physics.rows import LANES
 
@@ -63,6 +64,7 @@ class Problem:
         self._k = np.asarray(model.actuator.k if k is None else k, dtype=float)
         self._nominal, self._sigma = (np.array([getattr(u, one) for u in unknowns]) for one in ("nominal", "sigma"))
         self._faults = [(i, u.place) for i, u in enumerate(unknowns) if u.kind == "fault"]
+        self._lags = {u.place: i for i, u in enumerate(unknowns) if u.kind == "lag"}  # by recording
         self._eccentricity = [i for i, place in self._faults if place in ECCENTRICITY]  # both parts, or none
         bent_most = sorted(range(self.count), key=lambda i: (unknowns[i].kind == "turned", unknowns[i].is_base))
         self._acting = [
@@ -193,22 +195,12 @@ class Problem:
 
     def logged(self, shown: Signals, x: Array, window: int) -> Signals:
         """A window's signals (n, blocks) as its logger has them, at x (n, unknowns): the current comes after them."""
-        lag = self._own(x, window).get("lag")
-        if lag is None or "current_A" not in shown or not np.any(lag):
+        at = self.model.windows[window]
+        if at.recording not in self._lags:
             return shown
-        current = shown["current_A"]
-        with np.errstate(invalid="ignore", over="ignore"):  # of one that diverges
-            slope = np.gradient(current, self.model.windows[window].block_s, axis=1)
-            return {**shown, "current_A": current - lag[:, None] * slope}
-
-    def _own(self, x: Array, window: int) -> dict[str, Any]:
-        """Of the kinds that are not all windows' alike: a window's own values at x (…, unknowns), by kind."""
-        places = self._places(window)
-        return {
-            u.kind: self._nominal[i] + self._sigma[i] * x[..., i]
-            for i, u in enumerate(self.unknowns)
-            if places.get(u.kind) == u.place
-        }
+        column = self._lags[at.recording]
+        late_s = self._nominal[column] + self._sigma[column] * x[:, [column]]
+        return {**shown, "current_A": later(shown["current_A"], late_s, at.block_s)}
 
     def vector(self, x: Array) -> Array:
         """The faults at x (…, unknowns), the eccentricity as a vector: (…, 8)."""
@@ -237,7 +229,9 @@ class Problem:
 
     def rig(self, x: Array, window: int) -> Rig:
         """What a window is simulated with at x (unknowns,), or for a population (n, unknowns)."""
-        own = self._own(x, window)
+        values = (self._nominal + self._sigma * x).T
+        places = self._places(window)
+        own: dict[str, Any] = {u.kind: one for u, one in zip(self.unknowns, values) if places.get(u.kind) == u.place}
         effects: Effects = self.model.effects
         if "load" in own:
             effects = {**effects, LOAD: {"torque_Nm": own["load"]}}

@@ -20,7 +20,7 @@ from ema_model.actuator.naming import on_axes
 from ema_model.actuator.parameters import low_limit
 from ema_model.effects import find
 from ema_model.errors import InputError
-from ema_model.estimation.floor import Floor
+from ema_model.estimation.floor import POSITIONS, Floor
 from ema_model.faults import NAMES
 from ema_model.models import Model
 from ema_model.models.closed_loop import LOAD
@@ -37,7 +37,6 @@ _STEP_OF_K = 0.01  # of a k's, which spans far more
 _TURNED_RAD = 2e-3  # how well a rig's encoder tells where the motor starts
 _WIDEST_PLAY = 50.0  # half plays, of a worn actuator
 _LEAST_START_RAD = 1e-6
-_POSITIONS = ("motor_position_rad", "user_position_rad")
 _UNRECORDED_LOAD = 0.05  # 1 σ of a load that was not recorded, of the motor's greatest torque
 
 
@@ -166,5 +165,5 @@ def lags_of(model: Model) -> list[Unknown]:
     return [
         Unknown(f"lag {i}", 0.0, measurement.sample_period_s, kind="lag", place=i)
         for i, measurement in enumerate(model.measurements)
-        if "current_A" in measurement and any(position in measurement for position in _POSITIONS)
+        if "current_A" in measurement and any(position in measurement for position in POSITIONS)
     ]

@@ -18,6 +18,7 @@ from ema_model.commands import Recorded
 from ema_model.commands.recorded import jumps
 from ema_model.effects import find
 from ema_model.errors import InputError
+from ema_model.models.later import later
 from ema_model.models.loop_window import BLOCK_S, COMPARED, LoopWindow, cut
 from ema_model.models.model import Effects, Signals
 from ema_model.models.sampling import check_steps, on_even_grid
@@ -249,10 +250,7 @@ class ClosedLoop:
         if np.any(gain != 1.0) or np.any(bias != 0.0):
             shown = {**true, "current_A": gain * true["current_A"] + bias}
         late = _each(sensors.delay_s) - self.actuator.sensors.delay_s  # beyond what the window's command has
-        if not np.any(late):
-            return shown
-        with np.errstate(invalid="ignore", over="ignore"):  # of one that diverges
-            return {name: y - late * np.gradient(y, block_s, axis=1) for name, y in shown.items()}
+        return {name: later(values, late, block_s) for name, values in shown.items()}
 
 
 def _command(window: LoopWindow) -> Recorded:

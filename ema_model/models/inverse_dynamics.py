@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from ema_model.actuator import Actuator
 from ema_model.effects import find
 from ema_model.errors import InputError
+from ema_model.models.later import later
 from ema_model.models.measured_motion import Stretch, stretches_of
 from ema_model.models.model import Effects, Signals
 from ema_model.models.sampling import on_even_grid
@@ -86,7 +87,7 @@ class InverseDynamics:
         static = self._currents(rows, len(k), window, np.zeros_like(window.position))
         moving = self._currents(rows, len(k), window, window.motion.acceleration)
         needed = window.motion.filtered(static) + moving - static
-        needed = _later(needed, _each(actuator.sensors.delay_s), window.period_s)
+        needed = later(needed, _each(actuator.sensors.delay_s), window.period_s, smooth=True)
         size = window.samples_per_block
         whole = needed.shape[1] // size
         current = needed[:, : whole * size].reshape(len(k), whole, size).mean(axis=2)[:, window.moving]
@@ -140,14 +141,6 @@ class InverseDynamics:
             )
             currents[:, part] = result.transpose(0, 2, 1).reshape(len(rows) * LANES, -1)[:n]
         return currents
-
-
-def _later(values: Array, late_s: Array, period_s: float) -> Array:
-    """Smooth signals (n, samples) so much later, (n, 1): to the second order of what the filter lets pass."""
-    if not np.any(late_s):
-        return values
-    slope = np.gradient(values, period_s, axis=1)
-    return values - late_s * slope + 0.5 * late_s**2 * np.gradient(slope, period_s, axis=1)
 
 
 def _each(value: ArrayLike) -> Array:

@@ -84,7 +84,7 @@ def uncertainty(found: Fitted, k: Array) -> Uncertainty:
         ambiguous=groups,
         hardly_known=hardly,
         adequate=best.fit.adequate,
-        warnings=(*_warnings(best.fit), *logged_apart(found)),
+        warnings=(*_warnings(best.fit), *logged_apart(found, best.of_x)),
         separated_by=separating(found, best.covariance, unclear) if unclear else None,
         covariance=best.covariance,
         detectable=_detectable(best),
@@ -98,6 +98,7 @@ def uncertainty(found: Fitted, k: Array) -> Uncertainty:
 class _Basin:
     """What one best fit alone says."""
 
+    of_x: Array  # covariance of all unknowns, in σ of their priors
     covariance: Array  # of the faults, the eccentricity as a vector
     free: Array  # (8,), without bounds
     common: Array  # (8, base parameters), the part of the covariance that all recordings of a unit share
@@ -109,7 +110,8 @@ class _Basin:
 
 
 def _basin(found: Fitted, k: Array) -> _Basin:
-    covariance = K_SIGMA**2 * _covariance(found)[:FAULTS, :FAULTS]
+    of_x = _covariance(found)
+    covariance = K_SIGMA**2 * of_x[:FAULTS, :FAULTS]
     fit = adequacy(found)
     if not fit.adequate:  # a misfit says how wrong the model is, and the intervals with it
         covariance = covariance * max(1.0, fit.ratio) ** 2
@@ -117,6 +119,7 @@ def _basin(found: Fitted, k: Array) -> _Basin:
     healthy = _from_healthy(free, covariance) < float(chdtri(FAULTS, 0.01))
     common = K_SIGMA * _of_base(found)[:FAULTS]
     return _Basin(
+        of_x,
         covariance,
         free,
         common,

@@ -33,6 +33,11 @@ _LONG = 20  # iterations, from which on this is worth looking at
 _NEARLY = 0.02  # of the fitness, by which these may change it
 
 
+def algorithm_title(name: str) -> str:
+    """How people call it; what is none of `ALGORITHMS`, as of a recording of another version, stays as it is."""
+    return ALGORITHMS.get(name, name)
+
+
 @dataclass(frozen=True)
 class Progress:
     """Where an identification stands after an iteration; iteration 0 is the first random population."""

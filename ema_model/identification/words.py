@@ -9,7 +9,7 @@ import numpy as np
 from ema_model import faults
 from ema_model.actuator.readings import between, sentences
 from ema_model.identification.landscape import Landscape, Way
-from ema_model.identification.run import ALGORITHMS, Identification
+from ema_model.identification.run import Identification, algorithm_title
 from ema_model.quantities.numbers import amount
 from ema_model.quantities.titles import in_sentence
 from ema_model.simulation.words import run_in_words
@@ -120,7 +120,7 @@ def way_sentences(found: Mapping[str, Way]) -> Sequence[str]:
     """What became of each search that is not the answer, in words."""
     said = []
     for name, way in found.items():
-        title = ALGORITHMS.get(name, name)
+        title = algorithm_title(name)
         end, answer, highest = (amount(rmse, "A") for rmse in (way.rmse_A, way.answer_A, way.highest_A))
         if way.is_trap:
             said.append(

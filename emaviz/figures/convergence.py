@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import viser
 
-from ema_model.identification.run import ALGORITHMS as TITLES
+from ema_model.identification.run import algorithm_title
 from emaviz.colours import ALGORITHMS, MONITOR
 from emaviz.figures.signals import AXIS, PADDING, legend
 from emaviz.text.html import add_html
@@ -41,7 +41,7 @@ class LiveConvergence:
             self._algorithms = tuple(algorithms)
             self.handle.data = (np.array([0.0, 1.0]), *(np.array([1.0, 1.0]) for _ in algorithms))
             self.handle.series = ({"label": "iteration"}, *(_line(name) for name in algorithms))
-            self._legend.content = legend(*((colour(name), TITLES.get(name, name)) for name in algorithms))
+            self._legend.content = legend(*((colour(name), algorithm_title(name)) for name in algorithms))
         if iterations != self._iterations:
             self._iterations = iterations
             self.handle.scales = _scales(iterations)

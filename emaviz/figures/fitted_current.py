@@ -9,7 +9,7 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from ema_model.identification.run import ALGORITHMS as TITLES
+from ema_model.identification.run import algorithm_title
 from emaviz.colours import DIFFERENCE, REFERENCE
 from emaviz.figures.convergence import colour
 from emaviz.figures.decimate import envelope
@@ -75,7 +75,7 @@ class LiveFit:
             left = names if len(names) > 1 else [(names[0][0], DIFFERENCE)]
             self._left.series = ({"label": "t [s]"}, *(_line(name, drawn) for name, drawn in left))
             self._legend.content = legend(
-                (REFERENCE, "measured"), *((drawn, TITLES.get(name, name)) for name, drawn in names)
+                (REFERENCE, "measured"), *((drawn, algorithm_title(name)) for name, drawn in names)
             )
         fitted = list(fitted_A.values())
         self._currents.data = envelope(time_s, [measured_A, *fitted], POINTS)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ema_model.identification.run import ALGORITHMS as TITLES
+from ema_model.identification.run import algorithm_title
 from emaviz.figures.convergence import colour
 from emaviz.text.html import Html, html, joined
 
@@ -65,7 +65,7 @@ def table(rows: Sequence[Row]) -> Html:
 
 
 def _row(row: Row) -> Html:
-    name = html('<b style="color:{}">{}</b>', colour(row.algorithm), TITLES.get(row.algorithm, row.algorithm))
+    name = html('<b style="color:{}">{}</b>', colour(row.algorithm), algorithm_title(row.algorithm))
     cells = (
         _MISSING if row.error_percent is None else f"{row.error_percent:.2f}",
         f"{row.rmse_A:.4f}",

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ema_model.faults import FAULTS
 from ema_model.identification.landscape import Landscape
-from ema_model.identification.run import ALGORITHMS as TITLES
+from ema_model.identification.run import algorithm_title
 from emaviz.colours import TRUTH
 from emaviz.figures import theme
 from emaviz.figures.convergence import colour
@@ -56,7 +56,7 @@ def figure(landscape: Landscape, marks: Marks, *, dark: bool = False) -> go.Figu
     if marks.interval90 is not None:
         _box(drawn, marks.interval90[x], marks.interval90[y])
     for name, k in (marks.ends or {}).items():
-        _point(drawn, k[x], k[y], f"{TITLES.get(name, name)} ended", "circle", colour(name), 11, "#ffffff")
+        _point(drawn, k[x], k[y], f"{algorithm_title(name)} ended", "circle", colour(name), 11, "#ffffff")
     if marks.truth is not None:
         _point(drawn, marks.truth[x], marks.truth[y], "truth", "cross", TRUTH, 12, "#ffffff")
     _point(drawn, marks.answer[x], marks.answer[y], "answer, 90 %", "circle-open", _ANSWER, 15, _ANSWER, 2.5)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
 from ema_model.faults import FAULTS
-from ema_model.identification.run import ALGORITHMS
+from ema_model.identification.run import algorithm_title
 from ema_model.recordings import SIGNALS
 from ema_model.text import COLOURS
 from emaviz.colours import RUNS
@@ -49,7 +49,7 @@ def figure(first: Recording, second: Recording, signal: str, *, dark: bool = Fal
         if residual is not None:
             _add(drawn, 2, residual.time_s, residual.values, f"{name} residual", colour, "solid", 1.2, listed=False)
         for place, (algorithm, trace) in enumerate(recording.identification.items()):
-            said = plain(f"{name} {ALGORITHMS.get(algorithm, algorithm)}")
+            said = plain(f"{name} {algorithm_title(algorithm)}")
             _add_search(drawn, trace, said, colour, _DASHES[place % len(_DASHES)])
     title, unit = SIGNALS[signal].title, SIGNALS[signal].unit or "-"
     drawn.update_yaxes(title_text=f"{title}<br>[{unit}]", row=1, col=1)
@@ -76,7 +76,7 @@ def table(first: Entry, second: Entry) -> Html:
     if not any(first.settings.get(n) != second.settings.get(n) for n in names) and names:
         rows.append(_row("settings", "the same", "the same"))
     answers = (first.answer, second.answer)
-    rows.append(_row("best algorithm", *(ALGORITHMS.get(one.best or "", one.best or "–") for one in (first, second))))
+    rows.append(_row("best algorithm", *(algorithm_title(one.best or "–") for one in (first, second))))
     for title, key, form in (
         ("Err [%]", "error_percent", ".2f"),
         ("rmse [A]", "rmse_A", ".4f"),

@@ -9,7 +9,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 import rerun_bindings
 
-from ema_model.identification.run import ALGORITHMS
+from ema_model.identification.run import algorithm_title
 from emaviz.recording import dashboard
 from emaviz.recording.dashboard import Chart
 from emaviz.recording.style import (
@@ -100,7 +100,7 @@ def _identification(contents: Contents) -> rrb.Blueprint:
         ]
         tabs.append(rrb.Grid(*views, grid_columns=2, name="Signals"))
     results = [
-        rrb.TextDocumentView(origin=f"{algorithm_path(name)}/result", name=ALGORITHMS.get(name, name))
+        rrb.TextDocumentView(origin=f"{algorithm_path(name)}/result", name=algorithm_title(name))
         for name, one in contents.algorithms.items()
         if one.result
     ]

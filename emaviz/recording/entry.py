@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from typing import Any
 
-from ema_model.identification.run import ALGORITHMS
+from ema_model.identification.run import algorithm_title
 from ema_model.quantities.numbers import amount, number
 from ema_model.quantities.titles import in_sentence, parameter_title, unit_of
 
@@ -35,7 +35,7 @@ def setting(name: str, value: Any) -> tuple[str, str]:
     """A setting as a person reads it: ('amplitude', '5.00 mrad') of ('amplitude_rad', '0.005')."""
     told = _told(value, unit_of(name))
     if name == "algorithms":
-        told = ", ".join(ALGORITHMS.get(one, one) for one in told.split(", "))
+        told = ", ".join(algorithm_title(one) for one in told.split(", "))
     return in_sentence(parameter_title(name)), told
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import rerun as rr
 
-from ema_model.identification.run import ALGORITHMS as TITLES
+from ema_model.identification.run import algorithm_title
 from emaviz.recording import style
 from emaviz.recording.style import Colour
 
@@ -24,7 +24,7 @@ def monitor_style(index: int) -> Style:
 def iteration_style(path: str) -> Style:
     """The style of an entity over iterations, by its place under /identification/<algorithm>/."""
     _, _, algorithm, kind, *rest = path.split("/")
-    colour, title = style.algorithm_colour(algorithm), TITLES.get(algorithm, algorithm)
+    colour, title = style.algorithm_colour(algorithm), algorithm_title(algorithm)
     name = rest[0] if rest else ""
     if kind == "population":
         return rr.SeriesPoints(

@@ -13,7 +13,7 @@ from ema_model import faults
 from ema_model.actuator.readings import between, sentences
 from ema_model.commands import Recorded
 from ema_model.identification.objective import Objective
-from ema_model.identification.run import ALGORITHMS, Identification, Progress
+from ema_model.identification.run import Identification, Progress, algorithm_title
 from ema_model.identification.words import facts, in_one_line, verdict, why_best
 from ema_model.quantities.numbers import amount
 from ema_model.recordings import Measurement
@@ -168,7 +168,7 @@ def _in_words(best: Identification, others: Sequence[Identification]) -> str:
         f"| {'**' + name + '**' if name in best.uncertainty.alarms else name} | {phrase if told else '–'} |"
         for name, phrase in zip(faults.NAMES, phrases)
     ]
-    more = [f"\n★ {ALGORITHMS.get(best.algorithm, best.algorithm)}: {why_best(best, others)}"] if others else []
+    more = [f"\n★ {algorithm_title(best.algorithm)}: {why_best(best, others)}"] if others else []
     facts_line = " · ".join(facts(best))
     return "\n".join([f"# {in_one_line(best)}", "", facts_line, *more, "", "| k | 90 % |", "|---|---|", *rows])
 

@@ -14,7 +14,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import ArrayLike, NDArray
 
-from ema_model.identification.run import ALGORITHMS
+from ema_model.identification.run import algorithm_title
 from emaviz.recording import dashboard, series, style
 from emaviz.recording.blueprint import Algorithm, Contents, build, send
 from emaviz.recording.dashboard import Chart
@@ -206,7 +206,7 @@ class RecordingWriter:
             self._algorithm(algorithm).result = True
             self._text(
                 f"{style.algorithm_path(algorithm)}/result",
-                table(f"Result of {ALGORITHMS.get(algorithm, algorithm)}", values),
+                table(f"Result of {algorithm_title(algorithm)}", values),
             )
 
     def expect(self, signals: Mapping[str, Sequence[str]], algorithms: Sequence[str]) -> None:

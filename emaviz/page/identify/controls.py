@@ -9,7 +9,7 @@ from typing import Any
 
 import viser
 
-from ema_model.identification.run import ALGORITHMS
+from ema_model.identification.run import ALGORITHMS, algorithm_title
 from ema_model.identification.words import facts, verdict, why_best
 from ema_model.simulation.plant import FITNESSES
 from emaviz.figures.convergence import colour
@@ -213,7 +213,7 @@ def recording_link(viewer: ViewerHost | None, path: Path, text: str = "") -> Htm
 
 
 def _title(name: str) -> Html:
-    return html('<b style="color:{}">{}</b>', colour(name), ALGORITHMS.get(name, name))
+    return html('<b style="color:{}">{}</b>', colour(name), algorithm_title(name))
 
 
 def _line(inner: str) -> Html:

@@ -10,7 +10,7 @@ import viser
 
 from ema_model.faults import FAULTS
 from ema_model.identification.landscape import POINTS, Landscape, Way
-from ema_model.identification.run import ALGORITHMS
+from ema_model.identification.run import algorithm_title
 from ema_model.identification.words import way_sentences
 from emaviz.figures import landscape as drawn
 from emaviz.page.identify.swarm import telling
@@ -68,7 +68,7 @@ class LandscapeView:
         self._draw.disabled = best is None or best.k is None
         if best is None or best.k is None:
             return
-        others = [ALGORITHMS.get(name, name) for name in race.tracks if race.tracks[name] is not best]
+        others = [algorithm_title(name) for name in race.tracks if race.tracks[name] is not best]
         self._through.options = (_BEST, *(f"where {title} ended" for title in others))
         self._through.value = _BEST
         if not self._by_hand:
@@ -95,7 +95,7 @@ class LandscapeView:
         best = race.best
         assert best is not None and best.k is not None
         for name, k in ends(race).items():
-            if self._through.value == f"where {ALGORITHMS.get(name, name)} ended":
+            if self._through.value == f"where {algorithm_title(name)} ended":
                 return k
         return best.k
 

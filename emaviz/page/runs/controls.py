@@ -11,7 +11,7 @@ from typing import Any
 import viser
 
 from ema_model.errors import InputError
-from ema_model.identification.run import ALGORITHMS
+from ema_model.identification.run import algorithm_title
 from emaviz.figures.convergence import colour
 from emaviz.page.identify.controls import recording_link
 from emaviz.page.page import Page
@@ -206,7 +206,7 @@ def _card(entry: Entry) -> Html:
         html(
             '<div><b style="color:{}">{}</b> {}{}</div>',
             colour(name),
-            ALGORITHMS.get(name, name),
+            algorithm_title(name),
             _result(answer),
             " ★" if name == entry.best and len(entry.found) > 1 else "",
         )

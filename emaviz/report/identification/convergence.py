@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import plotly.graph_objects as go
 
-from ema_model.identification.run import ALGORITHMS
+from ema_model.identification.run import algorithm_title
 from emaviz.figures import theme
 from emaviz.figures.convergence import colour
 from emaviz.report.identification.subject import Identified
@@ -27,5 +27,5 @@ class Convergence(Section[Identified]):
         chart.add_trace(go.Scatter(y=answer.rmse_history, mode="lines", line=drawn, showlegend=False))
         chart.update_yaxes(type="log")
         ended = ", stopped by the user" if answer.stopped else ", then a least-squares fit" if answer.polished else ""
-        told = f"{ALGORITHMS.get(answer.algorithm, answer.algorithm)}{ended}: {answer.evaluations} simulations"
+        told = f"{algorithm_title(answer.algorithm)}{ended}: {answer.evaluations} simulations"
         return paragraph(f"{told} in {answer.elapsed_s:.2f} s.") + figures.place(chart, 300)

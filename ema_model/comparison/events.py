@@ -133,16 +133,19 @@ def _step(residuals: Residuals, recording: int, signal: str, modulator: str) -> 
 
 
 def _at_once(time: Array, values: Array, scale: Array, place: int, drives: bool) -> float:
-    """The step as it is seen close to its moment, between the blocks `place` and the one after it."""
-    after = np.arange(len(time)) - place  # 1 is the first block after the moment, 0 the last before it
-    near = (after > -EVENT_BLOCKS) & (after <= EVENT_BLOCKS)
-    if drives:
-        near |= np.abs(time - 0.5 * (time[place] + time[place + 1])) < EVENT_LOOP_S
-    before, behind = (
+    """The step as it is seen close to its moment, between the blocks `place` and the one after it.
+
+    0 where these are too far apart, as about a standstill whose friction is not known: nothing was seen at once there.
+    """
+    within_s = max(EVENT_BLOCKS * float(np.median(np.diff(time))), EVENT_LOOP_S if drives else 0.0)
+    if time[place + 1] - time[place] > within_s:
+        return 0.0
+    late_s = time - 0.5 * (time[place] + time[place + 1])
+    before, after = (
         float(scale[side] @ values[side]) / float(scale[side] @ scale[side])
-        for side in (near & (after <= 0), near & (after > 0))
+        for side in ((-within_s < late_s) & (late_s < 0.0), (late_s > 0.0) & (late_s < within_s))
     )
-    return behind - before
+    return after - before
 
 
 def _drift(time: Array, values: Array, scale: Array) -> float:

@@ -10,6 +10,7 @@ from support.hidden_effects import ACTUATOR, plant, recorded
 
 from ema_model.commands import command
 from ema_model.comparison import compare
+from ema_model.comparison.events import _at_once
 from ema_model.comparison.summary import as_dict
 from ema_model.discovery import discover
 from ema_model.recordings import Measurement
@@ -52,6 +53,13 @@ def test_a_sensor_that_jumps_is_dated(signal, by):
     [event] = compare([jumped(4, signal, by)], ACTUATOR).events
     assert event.time_s == pytest.approx(WHEN_S, abs=5e-3) and event.signal == signal
     assert event.change == pytest.approx(by, rel=0.2)
+
+
+@pytest.mark.parametrize(("gap_s", "seen"), [(0.0, 1.0), (0.095, 0.0)])
+def test_what_changed_while_nothing_was_known_was_not_seen_at_once(gap_s, seen):
+    """As about a standstill, where an inverse model says nothing: no moment can be named."""
+    time = 5e-4 * np.arange(400) + gap_s * (np.arange(400) >= 200)
+    assert _at_once(time, 1.0 * (np.arange(400) >= 200), np.ones(400), 199, drives=True) == pytest.approx(seen)
 
 
 def test_a_zero_that_swings_is_not_dated():

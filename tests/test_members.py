@@ -260,5 +260,6 @@ def test_an_optimiser(copied):
     assert copied("-c", LISTS) == "lottery True\n"
 
 
+@pytest.mark.long
 def test_a_tab(copied):
     assert copied("-c", PAGE).count("'Runs', 'Notes']") == 1

@@ -87,6 +87,7 @@ def test_what_lasts_is_no_event(effects):
         assert not compare(recorded(83, commands=commands, effects=effects), ACTUATOR).events
 
 
+@pytest.mark.long
 def test_a_load_that_comes_on_is_given_no_effects_name():
     found = discover([loaded(6, 40.0)], ACTUATOR)
     [event] = found.events

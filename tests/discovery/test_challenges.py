@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from support.representative import first_of
 
 import ema_model
 from ema_model.actuator import load_actuator
@@ -105,6 +104,7 @@ def test_making_twice_gives_the_same_bytes(tmp_path):
     assert made[0] == made[1]
 
 
+@pytest.mark.long
 def test_script_makes_what_is_shipped(tmp_path, monkeypatch):
     name = "first_bench_run"
     (tmp_path / "truth").mkdir()
@@ -160,7 +160,8 @@ def test_the_easy_one_is_solved():
     assert found.ladder[-1].rmse < 1.1 and found.ladder[-1].holdout_rmse < 1.1
 
 
-@pytest.mark.parametrize("name", first_of(["quiet_complaint", "after_the_overhaul", "two_suspects", "prototype"]))
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["quiet_complaint", "after_the_overhaul", "two_suspects", "prototype"])
 def test_the_whole_library_solves_it(name):
     """As somebody meets it who presses "Find all"."""
     found, truth = solved(name, None), read_truth(folder() / "truth" / f"{name}.toml")

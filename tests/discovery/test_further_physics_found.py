@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pytest
 from support.hidden_effects import ACTUATOR, recorded
-from support.representative import first_of
 
 from ema_model.discovery import discover
 from ema_model.discovery.fingerprints import variants
@@ -26,7 +25,8 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("name", first_of(list(CASES)))
+@pytest.mark.long
+@pytest.mark.parametrize("name", CASES)
 def test_it_is_named_at_its_values(name):
     values, *rivals = CASES[name]
     found = discover(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pytest
-from support.representative import first_of
 
 from ema_model.actuator import load_actuator
 from ema_model.discovery import discover
@@ -14,7 +13,8 @@ def read(folder, pattern, actuator):
     return [read_recording(file, actuator) for file in sorted(folder.glob(pattern))]
 
 
-@pytest.mark.parametrize("moves", first_of([["sin_sin", "up_and_down"], ["*"]]), ids=" and ".join)
+@pytest.mark.long
+@pytest.mark.parametrize("moves", [["sin_sin", "up_and_down"], ["*"]], ids=" and ".join)
 def test_servo_on_a_pendulum_lacks_load_dependent_friction(data_folder, actuators, moves):
     """Fitted at the gains 100 and 800, held out at 400."""
     actuator = load_actuator(actuators / "xl330.toml")
@@ -31,6 +31,7 @@ def test_servo_on_a_pendulum_lacks_load_dependent_friction(data_folder, actuator
     assert not found.events  # what swings or stalls in its own time did not jump
 
 
+@pytest.mark.long
 def test_spin_ups_lack_cogging(data_folder, actuators):
     """One set of spin-ups fitted, the other held out."""
     actuator = load_actuator(actuators / "odrive.toml")

@@ -7,7 +7,6 @@ import threading
 import numpy as np
 import pytest
 from support.on_page import wait_until
-from support.representative import first_of
 
 from ema_model.actuator import load_actuator
 from ema_model.errors import InputError
@@ -115,7 +114,7 @@ def replace_first(k, value):
     return changed
 
 
-@pytest.mark.parametrize(("name", "kernel"), first_of([(None, "run"), (SERVO, "traces")]))
+@pytest.mark.parametrize(("name", "kernel"), [(None, "run"), pytest.param(SERVO, "traces", marks=pytest.mark.long)])
 def test_a_start_compiles_the_plants_own_kernels_and_behind_them_the_librarys(tmp_path, monkeypatch, name, kernel):
     asked = []
     monkeypatch.setattr(ahead, "compile_ahead", lambda kernels, urgent=True: asked.append((list(kernels), urgent)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -216,21 +217,32 @@ def _shared_rows(actuator: Actuator, fault: faults.PhysicalFaults) -> dict[str, 
 
 def _blocks(values: Mapping[str, ArrayLike], stack: Stack, effects: EffectSettings, individuals: int) -> Array:
     blocks = -(-individuals // LANES)
-    rows = np.zeros((blocks, len(stack.parameter_rows), LANES))
-    given = dict(values)
-    library = (name for name in stack.effects if catalogue_name(name) in CATALOGUE)
-    resting = {name: CATALOGUE[catalogue_name(name)].neutral for name in library}
-    for effect, parameters in {**resting, **effects}.items():
-        given |= {f"{effect}.{name}": value for name, value in parameters.items()}
-    index = {name: row for row, name in enumerate(stack.parameter_rows)}
-    for name, value in given.items():
+    index, resting = _at_rest(stack.parameter_rows, stack.effects)
+    rows = np.empty((blocks, len(resting), LANES))
+    rows[:] = resting[:, None]
+    for name, value in values.items():
         rows[:, index[name], :] = _lanes(value, blocks)
+    for effect, parameters in effects.items():
+        for name, value in parameters.items():
+            rows[:, index[f"{effect}.{name}"], :] = _lanes(value, blocks)
     return rows.reshape(blocks, -1)
 
 
-def _lanes(value: ArrayLike, blocks: int) -> Array:
-    """One number, or one for each individual, as (blocks, LANES)."""
+@lru_cache(maxsize=64)
+def _at_rest(parameter_rows: tuple[str, ...], effects: tuple[str, ...]) -> tuple[dict[str, int], Array]:
+    """Of a stack: where each parameter stands, and its rows where no effect of the library does anything, (rows,)."""
+    index = {name: row for row, name in enumerate(parameter_rows)}
+    resting = np.zeros(len(parameter_rows))
+    for effect in effects:
+        if catalogue_name(effect) in CATALOGUE:
+            for name, value in CATALOGUE[catalogue_name(effect)].neutral.items():
+                resting[index[f"{effect}.{name}"]] = value
+    return index, resting
+
+
+def _lanes(value: ArrayLike, blocks: int) -> Array | float:
+    """One number, or one for each individual, as what fills (blocks, LANES)."""
     value = np.asarray(value, dtype=float)
-    if value.ndim == 0 or value.size == 1:
-        return np.broadcast_to(value.reshape(-1)[0], (blocks, LANES))
+    if value.size == 1:
+        return float(value.reshape(-1)[0])
     return np.concatenate([value, np.full(blocks * LANES - len(value), value[-1])]).reshape(blocks, LANES)

@@ -14,7 +14,8 @@ from ema_model.recordings import Measurement
 from emaviz.figures.signal_charts import charts
 from emaviz.text.html import Html, html, joined
 
-_MISSING = "–"
+_RISE = "rise time 10–90 %"
+_DIVERGED, _TOO_FAR = "diverged", "not reached"
 
 
 @dataclass(frozen=True)
@@ -32,23 +33,23 @@ METRICS = (
     Metric("rms current", "A"),
     Metric("largest following error", "rad", USER, "m"),
     Metric("rms following error", "rad", USER, "m"),
-    Metric("rise time 10–90 %", "s", prefix="m"),
+    Metric(_RISE, "s", prefix="m"),
     Metric("peak speed", "rad/s", MOTOR),
 )
 
 
 def metrics(run: Measurement, command: str) -> dict[str, float]:
-    """The metrics of a run by name; NaN where one makes no sense, as a rise time without a step."""
+    """The metrics of a run by name; only a step has a rise time, which is NaN where the user does not get that far."""
     current, user = run["current_A"], run["user_position_rad"]
     error = 1e3 * (run["command_rad"] - user)
-    return {
+    found = {
         "peak current": float(np.max(np.abs(current))),
         "rms current": _rms(current),
         "largest following error": float(np.max(np.abs(error))),
         "rms following error": _rms(error),
-        "rise time 10–90 %": 1e3 * rise_time_s(run) if command == "step" else math.nan,
         "peak speed": float(np.max(np.abs(run["motor_speed_rad_s"]))),
     }
+    return {**found, _RISE: 1e3 * rise_time_s(run)} if command == "step" else found
 
 
 def rise_time_s(run: Measurement) -> float:
@@ -89,15 +90,16 @@ def table(
     heads = joined(html('<th style="{};color:{}">{}</th>', right, colour, name) for name, colour in zip(runs, colours))
     rows = joined(
         html("<tr><td>{} [{}{}]</td>", metric.name, metric.prefix, axes.unit(metric.unit, metric.side))
-        + joined(html('<td style="text-align:right">{}</td>', _shown(run[metric.name])) for run in runs.values())
+        + joined(html('<td style="text-align:right">{}</td>', _shown(run, metric.name)) for run in runs.values())
         + html("</tr>")
         for metric in METRICS
+        if any(metric.name in run for run in runs.values())
     )
     heads_below = joined(html('<th style="{}">{}</th>', right, name) for name in errors)
     first = next(iter(errors.values()))
     rows_below = joined(
         html("<tr><td>{} [{}]</td>", title, unit)
-        + joined(html('<td style="text-align:right">{}</td>', _shown(error[title][0])) for error in errors.values())
+        + joined(html('<td style="text-align:right">{}</td>', _number(error[title][0])) for error in errors.values())
         + html("</tr>")
         for title, (_, unit) in first.items()
     )
@@ -122,5 +124,12 @@ def _rms(values: np.ndarray) -> float:
     return largest * float(np.sqrt(np.mean(np.square(values / largest))))  # a diverged run's own squares overflow
 
 
-def _shown(value: float) -> str:
-    return f"{value:.4g}" if math.isfinite(value) else _MISSING
+def _shown(run: Mapping[str, float], name: str) -> str:
+    """A metric in a cell, or why there is no number."""
+    if name == _RISE and not math.isfinite(run.get(name, math.nan)):
+        return _TOO_FAR if name in run else "no step"
+    return _number(run[name])
+
+
+def _number(value: float) -> str:
+    return f"{value:.4g}" if math.isfinite(value) else _DIVERGED

@@ -220,11 +220,9 @@ def _blocks(values: Mapping[str, ArrayLike], stack: Stack, effects: EffectSettin
     index, resting = _at_rest(stack.parameter_rows, stack.effects)
     rows = np.empty((blocks, len(resting), LANES))
     rows[:] = resting[:, None]
-    for name, value in values.items():
+    of_effects = {f"{effect}.{name}": value for effect, given in effects.items() for name, value in given.items()}
+    for name, value in {**values, **of_effects}.items():
         rows[:, index[name], :] = _lanes(value, blocks)
-    for effect, parameters in effects.items():
-        for name, value in parameters.items():
-            rows[:, index[f"{effect}.{name}"], :] = _lanes(value, blocks)
     return rows.reshape(blocks, -1)
 
 
@@ -244,5 +242,5 @@ def _lanes(value: ArrayLike, blocks: int) -> Array | float:
     """One number, or one for each individual, as what fills (blocks, LANES)."""
     value = np.asarray(value, dtype=float)
     if value.size == 1:
-        return float(value.reshape(-1)[0])
+        return value.item()
     return np.concatenate([value, np.full(blocks * LANES - len(value), value[-1])]).reshape(blocks, LANES)

@@ -15,17 +15,17 @@ from emaviz.figures.signal_charts import charts
 from emaviz.text.html import Html, html, joined
 
 _RISE = "rise time 10–90 %"
-_DIVERGED, _TOO_FAR = "diverged", "not reached"
 
 
 @dataclass(frozen=True)
 class Metric:
-    """A row of the table; `side`: whose axis it is of."""
+    """A row of the table; `side`: whose axis it is of; `missing`: what stands in place of a number that there is not."""
 
     name: str
     unit: str
     side: Side | None = None
     prefix: str = ""
+    missing: str = "diverged"
 
 
 METRICS = (
@@ -33,7 +33,7 @@ METRICS = (
     Metric("rms current", "A"),
     Metric("largest following error", "rad", USER, "m"),
     Metric("rms following error", "rad", USER, "m"),
-    Metric(_RISE, "s", prefix="m"),
+    Metric(_RISE, "s", prefix="m", missing="not reached"),
     Metric("peak speed", "rad/s", MOTOR),
 )
 
@@ -90,7 +90,7 @@ def table(
     heads = joined(html('<th style="{};color:{}">{}</th>', right, colour, name) for name, colour in zip(runs, colours))
     rows = joined(
         html("<tr><td>{} [{}{}]</td>", metric.name, metric.prefix, axes.unit(metric.unit, metric.side))
-        + joined(html('<td style="text-align:right">{}</td>', _shown(run, metric.name)) for run in runs.values())
+        + joined(html('<td style="text-align:right">{}</td>', _shown(run, metric)) for run in runs.values())
         + html("</tr>")
         for metric in METRICS
         if any(metric.name in run for run in runs.values())
@@ -99,7 +99,10 @@ def table(
     first = next(iter(errors.values()))
     rows_below = joined(
         html("<tr><td>{} [{}]</td>", title, unit)
-        + joined(html('<td style="text-align:right">{}</td>', _number(error[title][0])) for error in errors.values())
+        + joined(
+            html('<td style="text-align:right">{}</td>', _number(error[title][0], "diverged"))
+            for error in errors.values()
+        )
         + html("</tr>")
         for title, (_, unit) in first.items()
     )
@@ -124,12 +127,10 @@ def _rms(values: np.ndarray) -> float:
     return largest * float(np.sqrt(np.mean(np.square(values / largest))))  # a diverged run's own squares overflow
 
 
-def _shown(run: Mapping[str, float], name: str) -> str:
-    """A metric in a cell, or why there is no number."""
-    if name == _RISE and not math.isfinite(run.get(name, math.nan)):
-        return _TOO_FAR if name in run else "no step"
-    return _number(run[name])
+def _shown(run: Mapping[str, float], metric: Metric) -> str:
+    """A metric in a cell, or why there is no number; a run that lacks one stands beside a step that has it."""
+    return _number(run[metric.name], metric.missing) if metric.name in run else "no step"
 
 
-def _number(value: float) -> str:
-    return f"{value:.4g}" if math.isfinite(value) else _DIVERGED
+def _number(value: float, missing: str) -> str:
+    return f"{value:.4g}" if math.isfinite(value) else missing

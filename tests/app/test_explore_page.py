@@ -18,7 +18,7 @@ from ema_model.recordings import Measurement
 from ema_model.recordings.file import read_measurement
 from ema_model.simulation.run import Run, simulate_monitor, simulate_reference
 from emaviz.figures import run_signals
-from emaviz.figures.run_metrics import differences, metrics, rise_time_s
+from emaviz.figures.run_metrics import differences, metrics, rise_time_s, table
 from emaviz.figures.signals import _within, at, beneath
 from emaviz.page.explore.presets import CUSTOM, PRESETS, name_of
 from emaviz.page.explore.tab import ExploreTab
@@ -84,6 +84,16 @@ def test_metrics_are_those_of_the_signals(runs):
         1e6 * np.sqrt(np.mean((monitor["user_position_rad"] - reference["user_position_rad"]) ** 2))
     )
     assert all(value == 0.0 for value, _ in differences(reference, reference).values())
+
+
+def test_a_number_that_is_missing_has_its_reason(runs):
+    """Of a step that is not reached, a frozen chirp beside it, and a run that diverged; a chirp's table has no such row."""
+    reference, _ = runs
+    stuck = Measurement({**reference.signals, "user_position_rad": 0.0 * reference.time_s}, name="stuck")
+    errors = {"frozen run's": {"Current": (math.nan, "A")}}
+    found = table({"plant": metrics(stuck, "step"), "frozen": metrics(reference, "chirp")}, errors, ["red", "blue"])
+    assert [found.count(f">{why}<") for why in ("not reached", "no step", "diverged")] == [1, 1, 1]
+    assert "rise time" not in table({"plant": metrics(reference, "chirp")}, errors, ["red"])
 
 
 def test_a_run_that_diverged_has_its_numbers(runs):

@@ -44,10 +44,10 @@ def test_results_have_the_width_beside_an_inset_that_grows_at_a_click(page):
     for width, height in ((1400, 900), (1920, 1080), (1100, 700)):
         page.set_viewport_size({"width": width, "height": height})
         wait_until(lambda width=width: abs(box(page, RIGHT)[2] - width) < 2.0, 10.0)
-        wait_until(lambda: box(page, PICTURE)[2] < box(page, RIGHT)[0] < 400, 10.0)  # all that the controls leave
+        wait_until(lambda: box(page, PICTURE)[2] < box(page, RIGHT)[0] < 400.0, 10.0)
         left, top, right, bottom = box(page, PICTURE)
         results = box(page, RIGHT)
-        assert results[2] == pytest.approx(width, abs=2)
+        assert results[0] < 400 and results[2] == pytest.approx(width, abs=2), "all that the controls leave"
         assert left >= 0.0 and bottom <= height - 68.0, "above the playback"
         assert top >= page.evaluate("document.querySelector('[data-dock-region=left]').getBoundingClientRect().bottom")
         assert columns(page) == ("2" if width >= 1240 else "auto")

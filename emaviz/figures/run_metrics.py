@@ -19,7 +19,7 @@ _RISE = "rise time 10–90 %"
 
 @dataclass(frozen=True)
 class Metric:
-    """A row of the table; `side`: whose axis it is of; `missing`: what stands in place of a number that there is not."""
+    """A row of the table; `side`: whose axis it is of; `missing`: what is said where there is no number."""
 
     name: str
     unit: str

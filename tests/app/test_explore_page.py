@@ -87,7 +87,7 @@ def test_metrics_are_those_of_the_signals(runs):
 
 
 def test_a_number_that_is_missing_has_its_reason(runs):
-    """Of a step that is not reached, a frozen chirp beside it, and a run that diverged; a chirp's table has no such row."""
+    """Of a step that is not reached, of a chirp beside it and of a run that diverged; a chirp alone has no such row."""
     reference, _ = runs
     stuck = Measurement({**reference.signals, "user_position_rad": 0.0 * reference.time_s}, name="stuck")
     errors = {"frozen run's": {"Current": (math.nan, "A")}}

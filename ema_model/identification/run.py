@@ -19,6 +19,7 @@ from ema_model.identification.objective import Objective
 from ema_model.identification.optimisers import OPTIMISERS, Optimiser, create
 from ema_model.identification.search import search
 from ema_model.identification.uncertainty import Uncertainty, uncertainty
+from ema_model.physics.rows import LANES
 from ema_model.simulation.one_stack import stack_at_hand
 from ema_model.simulation.precompile import compile_ahead, compile_here, wait_for
 from ema_model.stacks import Stack
@@ -178,7 +179,7 @@ def _optimise(objective: Objective, optimiser: Optimiser) -> Generator[Progress,
     while not optimiser.done:
         started = time.perf_counter()
         if iteration < 0 and optimiser.iterations >= _LONG:
-            fitness, beside = _roughly(objective, optimiser.ask())
+            fitness, beside = _roughly(objective, optimiser.ask()[:LANES])
         elif fitness is not exact and iteration >= _ROUGH * optimiser.iterations:
             fitness = exact
             optimiser.rescore(exact)

@@ -15,7 +15,7 @@ from ema_model.comparison.result import Compared, Comparison, SignalError
 from ema_model.comparison.verdict import judge
 from ema_model.effects import find
 from ema_model.errors import InputError, quoted
-from ema_model.estimation import Calibration, Floor, floor
+from ema_model.estimation import Calibration, Floor, after_fit, floor
 from ema_model.estimation import calibrate as fit
 from ema_model.estimation.floor import twin_error
 from ema_model.estimation.problem import SIGNALS
@@ -83,11 +83,10 @@ def compare(
         on_progress=lambda evaluations: tell(f"calibrating: {evaluations} simulations"),
     )
     tell("looking where it fails")
+    twins = [twin_error(fitted, i, calibration.actuator, calibration.k) for i in range(len(fitted.windows))]
+    floors = after_fit(floors, calibration, twins)
     plant, floors, before, after = _everywhere(recordings, fitted, floors, calibration, actuator)
-    known = [
-        twin_error(plant, i, calibration.actuator, calibration.k) if plant is fitted else {}
-        for i in range(len(plant.windows))
-    ]
+    known = twins if plant is fitted else [{} for _ in plant.windows]
     residuals = residuals_of(
         plant, floors, after, known, calibration.actuator, calibration if plant is fitted else None
     )
@@ -185,11 +184,16 @@ def _everywhere(
 def _typical_floor(floors: list[Floor], blocks: int) -> Floor:
     """One for the whole recording, from those of its parts."""
     names = floors[0].noise
+
+    def level(parts: Sequence[Mapping[str, Array]]) -> dict[str, Array]:
+        return {
+            name: np.full(blocks, np.sqrt(np.mean([np.mean(one[name] ** 2) for one in parts]))) for name in parts[0]
+        }
+
     return Floor(
         noise={name: float(np.median([one.noise[name] for one in floors])) for name in names},
-        model={
-            name: np.full(blocks, np.sqrt(np.mean([np.mean(one.model[name] ** 2) for one in floors]))) for name in names
-        },
+        model=level([one.model for one in floors]),
+        left=level([one.left for one in floors]),
         repeats=np.full(blocks, np.median([np.median(one.repeats) for one in floors])),
         block_s=floors[0].block_s,
     )

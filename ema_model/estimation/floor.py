@@ -5,12 +5,14 @@ floor, how far the Monitor Model is from its three-phase twin under the same com
 differs most in transients, so its floor is local: the rms within 12.5 ms on either side.  Where the motor stands,
 friction holds it at any place in a band, and the model's error there is one error, however long it stands.
 When a command jumped is known to within a sample, which moves the transient that follows.
+
+A fit takes part of the twin's difference up in its parameters: `after_fit` tells what a true model then leaves.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,11 +21,13 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter1d
 from ema_model.actuator import Actuator
 from ema_model.models import Model, Window
 from ema_model.models.model import Signals
+from ema_model.recordings.noise import white_noise
 
 Array = NDArray[np.float64]
 
 BAND_SIGMAS = 2.0  # σ on either side: 95 of 100 blocks of a perfect model lie within
 CORRELATED_S = 0.025  # how long the model's error, and a sensor's inaccuracy, stay alike
+_LEAST_OF_NOISE = 0.5  # that is always taken for the sensors'
 _STILL = 8.0  # of a position's noise, within which it stands
 POSITIONS = ("motor_position_rad", "user_position_rad")
 
@@ -37,10 +41,12 @@ class Floor:
     repeats: Array  # (blocks,), over how many blocks the model's error stays alike
     block_s: float
     white: frozenset[str] = frozenset()  # signals whose model error does not last while the motor moves
+    twin: Signals = field(default_factory=dict)  # the twin's signals less the model's own, (blocks,) each
+    left: Mapping[str, Array] = field(default_factory=dict)  # of `model`, that a fit does not take up, (blocks,) each
 
     def sigma(self, signal: str) -> Array:
-        """Both together, (blocks,)."""
-        return np.hypot(self.noise[signal], self.model[signal])
+        """Both together, (blocks,); once fitted, what a true model leaves: `left` in place of `model`."""
+        return np.hypot(self.noise[signal], self.left.get(signal, self.model[signal]))
 
     def fit_sigma(self, signal: str) -> Array:
         """What to weight a fit by: the correlated part counts as often as it repeats, (blocks,)."""
@@ -55,12 +61,9 @@ class Floor:
         return np.min(self.repeats) / self.repeats
 
     def beside(self, other: Floor) -> Floor:
-        """The greater model floor of two, block by block."""
-        return replace(self, model={name: np.maximum(self.model[name], other.model[name]) for name in self.model})
-
-    def rms(self, signal: str) -> float:
-        """Both together over the whole window."""
-        return float(np.sqrt(np.mean(self.sigma(signal) ** 2)))
+        """The greater model floor of two, block by block; of the twins, the other's."""
+        greater = {name: np.maximum(self.model[name], other.model[name]) for name in self.model}
+        return replace(self, model=greater, twin=other.twin)
 
 
 def floor(
@@ -75,16 +78,28 @@ def floor(
     "noise" (white, rms per sample) in place of the estimate, "accuracy" (slow, rms) besides it.
     """
     window, given = model.windows[place], stated or {}
-    noise = model.noise(place, {name: one["noise"] for name, one in given.items() if "noise" in one})
+    told = {name: one["noise"] for name, one in given.items() if "noise" in one}
     twins, late = twin_error(model, place, None, k), model.a_sample_late(place, k)
-    width = max(3, round(CORRELATED_S / window.block_s) | 1)
+    noise = model.noise(place, told)
+    noise |= {name: _of_sensors(noise[name], twins[name]) for name in twins if name not in told}
     slow = {}
     for name in noise:
-        lasting = uniform_filter1d(twins[name] ** 2, width, mode="nearest") if twins else np.zeros(window.blocks)
+        lasting = local_rms(twins[name], window.block_s) if twins else np.zeros(window.blocks)
         jump = late[name] / np.sqrt(12.0) if late else 0.0  # anywhere within the sample
-        own = np.hypot(np.hypot(np.sqrt(np.maximum(lasting, 0.0)), jump), window.lasting.get(name, 0.0))
+        own = np.hypot(np.hypot(lasting, jump), window.lasting.get(name, 0.0))
         slow[name] = np.hypot(own, given.get(name, {}).get("accuracy", 0.0))
-    return Floor(noise, slow, repeats_of(window, noise), window.block_s)
+    return Floor(noise, slow, repeats_of(window, noise), window.block_s, twin=twins)
+
+
+def local_rms(values: Array, block_s: float) -> Array:
+    """Over 12.5 ms on either side, (blocks,)."""
+    width = max(3, round(CORRELATED_S / block_s) | 1)
+    return np.sqrt(np.maximum(uniform_filter1d(values**2, width, mode="nearest"), 0.0))
+
+
+def _of_sensors(noise: float, twin: Array) -> float:
+    """What of a recording's noise is not the inverter's ripple, which the twin's difference has as well."""
+    return float(np.sqrt(max(noise**2 - white_noise(twin) ** 2, (_LEAST_OF_NOISE * noise) ** 2)))
 
 
 def twin_error(model: Model, place: int, actuator: Actuator | None = None, k: ArrayLike | None = None) -> Signals:

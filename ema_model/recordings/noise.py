@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+from math import comb
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,23 +16,42 @@ Array = NDArray[np.float64]
 # own, because it was calculated or does not change.
 _FINEST = {"position": 1e-9, "speed": 1e-6, "current": 1e-6, "torque": 1e-8}
 
+_ORDERS = range(3, 9)  # of the differences: a smooth motion has no third ones, but where it is sampled slowly
+_LEVEL = 0.98  # of an order's noise, that the next order's must reach: noise is white, and motion is not
+_NEAR, _WITHIN = 3.0, 0.9866  # standard deviations, and the rms of a normal distribution's values within them
+
 
 def sample_noise(values: Array, signal: str) -> float:
     """White noise and quantisation of a signal (samples,), rms.
 
-    From its third differences, which a smooth motion lacks: the median of their size is blind to steps and
-    reversals.  A signal that hardly ever changes gives the step of its quantisation, s/√12.  Never 0: a floor is
-    what errors are counted in.
+    From its third differences, which a smooth motion lacks, or from higher ones where these are smaller until they
+    are so no more: the median of their size is blind to steps and reversals.  A signal that hardly ever changes gives
+    the step of its quantisation, s/√12.  Never 0: a floor is what errors are counted in.
     """
-    third = np.diff(values, 3)
-    robust = 1.4826 * float(np.median(np.abs(third))) / np.sqrt(20.0)  # 1 + 9 + 9 + 1
     steps = np.abs(np.diff(values))
     steps = steps[steps > 1e-12 * (1.0 + np.max(np.abs(values)))]
+    step = float(np.min(steps)) if len(steps) else 0.0
     repeated = len(steps) < 0.9 * (len(values) - 1)  # held values are the mark of quantisation
-    quantum = float(np.min(steps)) / np.sqrt(12.0) if repeated and len(steps) else 0.0
-    return max(robust, quantum, least_noise(signal))
+    quantum = step / np.sqrt(12.0) if repeated else 0.0
+    return max(white_noise(values), quantum, least_noise(signal))
 
 
 def least_noise(signal: str) -> float:
     """The least that a signal's noise can be, in its unit; above 0."""
     return _FINEST[SIGNALS[signal].kind]
+
+
+def white_noise(values: Array) -> float:
+    """rms, by the lowest order of differences from which on the next tells the same; by the first where none does."""
+    found = [_typical(np.diff(values, order)) / np.sqrt(comb(2 * order, order)) for order in _ORDERS]
+    return next((one for one, after in pairwise(found) if after > _LEVEL * one), found[0])
+
+
+def _typical(differences: Array) -> float:
+    """Standard deviation of what is normal about 0: the rms of all that is not far, by the median, which knows no far.
+
+    The median alone scatters by twice as much, and on a grid it is one of few numbers, up to a seventh off.
+    """
+    size = np.abs(differences)
+    near = size <= _NEAR * 1.4826 * float(np.median(size))
+    return float(np.sqrt(np.mean(size[near] ** 2))) / _WITHIN

@@ -12,12 +12,13 @@ from ema_model.actuator import Actuator, load_actuator
 from ema_model.actuator.naming import path_inside
 from ema_model.comparison.assemble import residuals_of
 from ema_model.comparison.result import Compared, Comparison, SignalError
-from ema_model.comparison.verdict import judge
+from ema_model.comparison.verdict import judge, judged, over_floor
 from ema_model.effects import find
 from ema_model.errors import InputError, quoted
 from ema_model.estimation import Calibration, Floor, after_fit, floor
 from ema_model.estimation import calibrate as fit
 from ema_model.estimation.floor import twin_error
+from ema_model.estimation.floor_band import band, spread
 from ema_model.estimation.problem import SIGNALS
 from ema_model.faults import named
 from ema_model.models import Model, model_for
@@ -94,14 +95,17 @@ def compare(
         _compared(i, recordings[i], cards[i], plant, floors, before, after, actuator) for i in range(len(recordings))
     ]
     errors = _together(compared)
-    judgement = judge(residuals, errors, calibration if calibrate else None, actuator, [one.name for one in recordings])
+    fitted_to = calibration if calibrate else None
+    pooled = [judged(window.measured.keys() & one.keys()) for window, one in zip(plant.windows, after)]
+    names = [one.name for one in recordings]
+    judgement = judge(residuals, errors, fitted_to, actuator, names, spread(floors, pooled))
     held: Sequence[Compared] = ()
     if unseen:
         tell("holding it against what was not fitted")
         held = compare(unseen, calibration.actuator, k=calibration.k, calibrate=False, signals=signals).recordings
     return Comparison(
         actuator=actuator,
-        calibration=calibration if calibrate else None,
+        calibration=fitted_to,
         recordings=compared,
         residuals=judgement.residuals,
         signals=errors,
@@ -111,6 +115,8 @@ def compare(
         worst_regions=judgement.worst_regions,
         events=judgement.events,
         adequate=judgement.adequate,
+        over_floor=over_floor(residuals, judged(residuals.values)),
+        floor_band=band(floors, pooled),
         sentences=judgement.sentences,
         warnings=judgement.warnings,
         holdout=held,

@@ -84,6 +84,8 @@ class Comparison(InWords):
     orders: Sequence[Order]  # of the primary signal, strongest first; significant ones only
     worst_regions: Sequence[Region]  # worst first
     adequate: bool
+    over_floor: float  # error in floors, pooled over signals
+    floor_band: tuple[float, float]  # between which nine of ten true models' lie
     sentences: Sequence[str]  # the answer in plain words, the first one first
     warnings: Sequence[str] = field(default_factory=tuple)
     events: Sequence[Event] = field(default_factory=tuple)  # what happened at one moment of a recording

@@ -18,6 +18,8 @@ def as_dict(comparison: Comparison) -> dict[str, Any]:
     return plain(
         {
             "adequate": comparison.adequate,
+            "over_floor": comparison.over_floor,
+            "floor_band": list(comparison.floor_band),
             "sentences": list(comparison.sentences),
             "warnings": list(comparison.warnings),
             "signals": {name: _error(error) for name, error in comparison.signals.items()},

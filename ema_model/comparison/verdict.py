@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.actuator.naming import on_axes
-from ema_model.comparison.criteria import BAND, SLOW
+from ema_model.comparison.criteria import BAND, BAND_SIGMAS, SLOW
 from ema_model.comparison.events import Event, events
 from ema_model.comparison.explain import Explanation, explain, used_blocks
 from ema_model.comparison.orders import Order, residual_orders
@@ -51,18 +51,19 @@ def judge(
     calibration: Calibration | None,
     actuator: Actuator,
     recordings: Sequence[str] = (),
+    spread: float = 0.0,
 ) -> Judgement:
     """Explains the residual of the first signal of interest: the current, where it is measured.
 
-    recordings: their names, for what happened at one moment of one.
+    recordings: their names, for what happened at one moment of one; spread: as of `most_of_floor`.
     """
     primary = next(name for name in ORDER_OF_PRIMARY if name in residuals.values)
     explained = explain(residuals, primary, actuator.axes)
     orders = residual_orders(residuals, primary)
     regions = worst_regions(residuals, primary, explained, actuator.axes)
     significant = [one for one in explained if one.significant]
-    names = [name for name in residuals.values if name != "motor_speed_rad_s"]
-    within = over_floor(residuals, names) <= BAND and not lasting(residuals, names)
+    names = judged(residuals.values)
+    within = over_floor(residuals, names) <= most_of_floor(spread) and not lasting(residuals, names)
     adequate = not significant and within and (calibration is None or calibration.converged)
     shown = actuator.axes.signal(primary)
     happened = [] if adequate else events(residuals, names, recordings, actuator)
@@ -84,6 +85,16 @@ def judge(
         sentences=sentences,
         warnings=_warnings(residuals, primary, calibration, actuator),
     )
+
+
+def judged(signals: Iterable[str]) -> list[str]:
+    """Those whose error is pooled: a speed is mostly a position's difference."""
+    return [name for name in signals if name != "motor_speed_rad_s"]
+
+
+def most_of_floor(spread: float) -> float:
+    """The error in floors up to which a model is adequate; spread: as of `estimation.floor_band`."""
+    return max(BAND, 1.0 + BAND_SIGMAS * spread)
 
 
 def _order(order: Order, primary: str, residuals: Residuals, actuator: Actuator) -> str:

@@ -36,7 +36,7 @@ def after_fit(floors: Sequence[Floor], calibration: Calibration, twins: Sequence
     for place, name, part, own in parts:
         one = floors[place]
         before, after = (local_rms(t * one.fit_sigma(name), one.block_s) for t in (own, own - part @ taken))
-        besides = np.maximum(one.model[name], before) ** 2 - before**2  # also by how much two twins differ
+        besides = 0.5 * (np.maximum(one.model[name], before) ** 2 - before**2)  # also by how much two twins differ
         left[place][name] = np.sqrt(besides + np.minimum(before, after) ** 2)
     return [replace(one, left=its) for one, its in zip(floors, left)]
 
@@ -46,11 +46,11 @@ def of_unseen(floors: Sequence[Floor], fitted: Sequence[Floor]) -> list[Floor]:
     shares: dict[str, float] = {}
     for name in {name for one in fitted for name in one.left}:
         known = [one for one in fitted if name in one.left]
-        whole, left = (
-            sum(float(np.sum(one**2)) for one in parts)
-            for parts in ([one.model[name] for one in known], [one.left[name] for one in known])
+        left, whole, counts = (
+            np.concatenate([part(one) for one in known])
+            for part in (lambda one: one.left[name], lambda one: one.model[name], lambda one: one.counts)  # noqa: B023
         )
-        shares[name] = float(np.sqrt(left / whole)) if whole else 1.0
+        shares[name] = float(np.sqrt(np.average((left / np.maximum(whole, 1e-300)) ** 2, weights=counts)))
     return [
         replace(one, left={name: share * one.model[name] for name, share in shares.items() if name in one.model})
         for one in floors

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from ema_model.actuator import load_actuator
+from ema_model.campaign.draws import base_parameters
 from ema_model.commands import command
-from ema_model.estimation.floor import floor
+from ema_model.estimation import Floor, after_fit, calibrate, floor, of_unseen
+from ema_model.estimation.floor import twin_error
+from ema_model.estimation.floor_band import spread
 from ema_model.models import ClosedLoop
 from ema_model.simulation.run import Run, simulate_reference
+from ema_model.simulation.sensors import Sensors
 
 ACTUATOR = load_actuator()
 
@@ -39,3 +45,45 @@ def test_a_standstill_counts_once():
     stands = np.ptp(window.measured["motor_position_rad"][-100:]) == 0.0
     assert stands and found.repeats[-1] >= 100
     assert found.counts[-1] < 0.5 * np.max(found.counts)
+
+
+def test_a_true_model_is_at_its_floor_once_fitted():
+    """Of ten plants drawn from the tolerances: 1 on average, and within the band that says how well it is known."""
+    errors, spreads = [], []
+    for seed in range(10):
+        plant = ACTUATOR.with_values(base_parameters(ACTUATOR, "free", 1.0, seed))
+        run = Run(command("chirp"), duration_s=0.5, sample_rate_Hz=5_000.0)
+        seen = Sensors(0.2, 14).record(simulate_reference(run, plant), seed)
+        model = ClosedLoop([seen], ACTUATOR)
+        before = [floor(model, 0)]
+        found = calibrate(model, before)
+        after = after_fit(before, found, [twin_error(model, 0, found.actuator, found.k)])
+        names = list(found.weighted_sensitivities[0])
+        assert all(np.mean(after[0].sigma(name)) < np.mean(before[0].sigma(name)) for name in names)
+        squared = [
+            (found.signals[0][name] - model.windows[0].measured[name]) ** 2 / after[0].sigma(name) ** 2
+            for name in names
+        ]
+        errors.append(float(np.sqrt(np.average(np.mean(squared, axis=0), weights=after[0].counts))))
+        spreads.append(spread(after, [names]))
+    assert np.mean(errors) == pytest.approx(1.0, abs=0.05)
+    within = np.abs(np.array(errors) - 1.0) < 2.33 * np.array(spreads)
+    assert np.count_nonzero(within) >= 9 and max(spreads) < 0.08
+
+
+def test_an_unseen_recording_has_as_much_of_its_floor_left():
+    window, one = floor_of("sine", {"amplitude_rad": 0.03, "frequency_Hz": 3.0}, 5_000.0)
+    [other] = of_unseen([one], [replace(one, left={name: 0.5 * values for name, values in one.model.items()})])
+    for name, values in one.model.items():
+        np.testing.assert_allclose(other.left[name], 0.5 * values, rtol=1e-12)
+    assert other.fit_sigma("current_A") == pytest.approx(one.fit_sigma("current_A")) and window.blocks
+
+
+def test_the_spread_of_white_noise_is_that_of_its_mean_square():
+    """No model error: the mean square of n values scatters by √(2/n), the noise that is estimated by twice as much."""
+    blocks = 1000
+    own = Floor({"current_A": 0.1}, {"current_A": np.zeros(blocks)}, np.ones(blocks), 1e-3)
+    expected = 0.5 * np.sqrt(2.0 / blocks + 4.0 * 1.3 / blocks)
+    assert spread([own], [["current_A"]]) == pytest.approx(np.hypot(expected, 0.02))
+    certain = replace(own, model={"current_A": np.full(blocks, 10.0)})
+    assert spread([certain], [["current_A"]]) == pytest.approx(0.5 * np.sqrt(2.0 / 40.0), rel=0.05)

@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ema_model.commands import COMMANDS, Command, Recorded, command
+from ema_model.commands.recorded import between
 from ema_model.errors import InputError
 
 T = np.linspace(0.0, 1.0, 100_001)
@@ -152,3 +153,17 @@ def test_settings_must_be_finite(name, value):
     for setting, default in command(name).settings().items():
         with pytest.raises(InputError):
             command(name, {setting: (value,) if isinstance(default, tuple) else value})
+
+
+def test_a_sampled_command_goes_smoothly_between_its_samples_and_keeps_its_corners():
+    time, fine = np.arange(501) / 500.0, np.arange(0.0, 1.0, 1e-4)
+
+    def sine(at):
+        return 0.03 * np.sin(2.0 * np.pi * 3.0 * at)
+
+    chord = np.max(np.abs(np.interp(fine, time, sine(time)) - sine(fine)))
+    assert np.max(np.abs(between(fine, time, sine(time)) - sine(fine))) < 0.05 * chord
+    ramp = np.clip(time - 0.2, 0.0, 0.1)
+    np.testing.assert_allclose(between(fine, time, ramp), np.clip(fine - 0.2, 0.0, 0.1), atol=1e-12)
+    step = between(fine, time, np.where(time > 0.1, 0.005, 0.0))
+    assert set(np.unique(step)) == {0.0, 0.005}

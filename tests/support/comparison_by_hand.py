@@ -43,6 +43,8 @@ def comparison(
     errors = {name: _over_all(recordings, name) for name in SIGNALS}
     angle, current = residuals.variables["motor_angle"], residuals.values["current_A"]
     return Comparison(
+        over_floor=1.0,
+        floor_band=(0.95, 1.05),
         actuator=before,
         calibration=_calibration(before, actuator, recordings) if calibrated else None,
         recordings=recordings,

@@ -29,6 +29,8 @@ def _run(given: Given, settings: Settings, seed: int) -> dict[str, Any]:
         "adequate": found["adequate"],
         "sentence": found["sentences"][0],
         "signal": found["primary"],
+        "over_floor": found["over_floor"],
+        "floor_band": found["floor_band"],
         "rmse": error["rmse"],
         "noise_floor": error["noise_floor"],
         "variable": first.get("variable"),
@@ -46,7 +48,8 @@ def _told(rows: list[dict[str, Any]]) -> dict[str, Any]:
         "adequate": sum(row["adequate"] for row in rows),
         "explained first by": ", ".join(f"{name} {count}" for name, count in first.most_common(4)),
         "strongest order": ", ".join(f"{order}: {count}" for order, count in orders.most_common(3)) or "–",
-        "rmse over floor, median": f"{np.median([row['rmse'] / row['noise_floor'] for row in rows]):.2f}",
+        "error over floor, median": f"{np.median([row['over_floor'] for row in rows]):.2f}",
+        "in its 90 % band": sum(low <= row["over_floor"] <= high for row in rows for low, high in [row["floor_band"]]),
     }
 
 
@@ -58,6 +61,8 @@ KIND = Kind(
             ("adequate", FLAG),
             ("sentence", TEXT),
             ("signal", TEXT),  # whose residual is explained
+            ("over_floor", NUMBER),  # pooled over signals
+            ("floor_band", NUMBERS),
             ("rmse", NUMBER),
             ("noise_floor", NUMBER),
             ("variable", TEXT),  # of the first significant explanation; null where there is none

@@ -1,0 +1,42 @@
+"""How well a floor is known: between which multiples of it the error of a true model lies."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ema_model.estimation.floor import CORRELATED_S, Floor
+from ema_model.quantities.interval import HALF_90
+
+Array = NDArray[np.float64]
+
+_OF_NOISE = 1.3  # times 1/n: relative variance of a noise's standard deviation that n samples tell (third differences)
+_KNOWN_TO = 0.02  # of a floor: a few in a hundred of the noise and of what a fit takes up remain a guess
+
+
+def spread(floors: Sequence[Floor], signals: Sequence[Collection[str]]) -> float:
+    """Standard deviation of a true model's error in floors, pooled over windows and over each window's signals.
+
+    The squared error is a mean: of white noise, block by block, whose size is itself estimated; and of the model's own
+    error, which is one value in 25 ms, for all signals.  A square of a normal value scatters by √2 of its mean.
+    """
+    variance = total = 0.0
+    for one, names in zip(floors, signals):
+        size = max(1, round(CORRELATED_S / one.block_s))
+        lasting = np.zeros(len(one.counts))
+        for name in names:
+            of_noise = one.counts * (one.noise[name] / one.sigma(name)) ** 2
+            lasting += one.counts - of_noise
+            variance += 2.0 * float(of_noise @ of_noise) + 4.0 * _OF_NOISE / len(of_noise) * float(of_noise.sum()) ** 2
+            total += float(one.counts.sum())
+        together = np.add.reduceat(lasting, np.arange(0, len(lasting), size))
+        variance += 2.0 * float(together @ together)
+    return float(np.hypot(0.5 * np.sqrt(variance) / total, _KNOWN_TO)) if total else _KNOWN_TO
+
+
+def band(floors: Sequence[Floor], signals: Sequence[Collection[str]]) -> tuple[float, float]:
+    """Between which multiples of the floor nine of ten true models' errors lie."""
+    half = HALF_90 * spread(floors, signals)
+    return max(0.0, 1.0 - half), 1.0 + half

@@ -72,9 +72,13 @@ def discovered(task, i):
 
 
 def compared(task, i):
-    return {"adequate": i == 0, "signal": "current_A", "rmse": 2.0, "noise_floor": 1.0, "orders": [12.0]} | (
-        {"variable": "motor_speed", "modulator": "1"} if i else {}
-    )
+    return {
+        "adequate": i == 0,
+        "signal": "current_A",
+        "over_floor": 1.2,
+        "floor_band": [0.9, 1.1],
+        "orders": [12.0],
+    } | ({"variable": "motor_speed", "modulator": "1"} if i else {})
 
 
 ANSWER = {"identify": identified, "discover": discovered, "compare": compared}
@@ -110,6 +114,7 @@ def test_tables_count_what_was_right(store):
     )
     cells = [dict(zip(compare.heads, line)) for line in compare.lines]
     assert (cells[0]["tasks"], cells[0]["errors"], cells[0]["strongest order"]) == ("2", "1", "12: 1")
+    assert (cells[0]["error over floor, median"], cells[0]["in its 90 % band"]) == ("1.20", "0")
 
 
 def test_a_name_counts_with_what_cannot_be_told_from_it():

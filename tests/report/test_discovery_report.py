@@ -14,6 +14,7 @@ from support.discovered import with_cogging, with_unknown
 from ema_model.discovery import Discovery
 from ema_model.discovery.result import Experiment
 from ema_model.errors import InputError
+from ema_model.quantities.numbers import number
 from emaviz.figures import error_ladder
 from emaviz.report import write_discovery_report
 from emaviz.text.mathml import mathml
@@ -60,7 +61,7 @@ def test_verdict_stands_first_in_plain_words(report, found):
         and "effects found" in text
     )
     first, last = found.ladder[0], found.ladder[-1]
-    assert f"from {first.rmse:.2f} to {last.rmse:.3f} times the floor" in text
+    assert f"from {number(first.rmse)} to {number(last.rmse)} times the floor" in text
     assert "cannot tell cogging torque from torque ripple" in text and "Motor inertia" in text
 
 
@@ -74,7 +75,7 @@ def test_each_effect_has_equation_cause_parameters_and_rivals(report, found):
 
 def test_no_number_of_the_ladder_lies_on_the_floor(found):
     rungs = [replace(found.ladder[0], rmse=rmse, holdout_rmse=held) for rmse, held in ((3.0, 2.0), (0.9, 0.3))]
-    fitted, held_out, _ = error_ladder.figure(replace(found, ladder=rungs)).data
+    fitted, held_out, *_ = error_ladder.figure(replace(found, ladder=rungs)).data
     assert fitted.textposition == ("top center", "middle right"), "0.9 with a number above it would reach over 1"
     assert held_out.textposition == ("bottom center", "bottom center")
 

@@ -18,6 +18,7 @@ _FINEST = {"position": 1e-9, "speed": 1e-6, "current": 1e-6, "torque": 1e-8}
 
 _ORDERS = range(3, 9)  # of the differences: a smooth motion has no third ones, but where it is sampled slowly
 _LEVEL = 0.98  # of an order's noise, that the next order's must reach: noise is white, and motion is not
+_PIECE, _SLOW = 64, 0.25  # samples, and the share of such pieces in which a signal moves slowly
 _NEAR, _WITHIN = 3.0, 0.9866  # standard deviations, and the rms of a normal distribution's values within them
 
 
@@ -25,15 +26,19 @@ def sample_noise(values: Array, signal: str) -> float:
     """White noise and quantisation of a signal (samples,), rms.
 
     From its third differences, which a smooth motion lacks, or from higher ones where these are smaller until they
-    are so no more: the median of their size is blind to steps and reversals.  A signal that hardly ever changes gives
-    the step of its quantisation, s/√12.  Never 0: a floor is what errors are counted in.
+    are so no more: the median of their size is blind to steps and reversals.  A signal on a grid whose values are held
+    shows where it moves slowly whether it has more noise than the grid's, s/√12.  Never 0: a floor is what errors are
+    counted in.
     """
     steps = np.abs(np.diff(values))
     steps = steps[steps > 1e-12 * (1.0 + np.max(np.abs(values)))]
     step = float(np.min(steps)) if len(steps) else 0.0
     repeated = len(steps) < 0.9 * (len(values) - 1)  # held values are the mark of quantisation
-    quantum = step / np.sqrt(12.0) if repeated else 0.0
-    return max(white_noise(values), quantum, least_noise(signal))
+    if not repeated:
+        return max(white_noise(values), least_noise(signal))
+    pieces = np.array_split(values, max(1, len(values) // _PIECE))
+    slow = float(np.quantile([white_noise(one) for one in pieces], _SLOW))
+    return max(slow, step / np.sqrt(12.0), least_noise(signal))
 
 
 def least_noise(signal: str) -> float:

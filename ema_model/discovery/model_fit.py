@@ -41,6 +41,11 @@ class Data:
         """Standard deviation of a true model's error in floors."""
         return spread(self.floors, [one.noise.keys() & self.signals.keys() for one in self.floors])
 
+    @cached_property
+    def before_fit(self) -> Data:
+        """The same with floors from which nothing is taken off that a fit takes up."""
+        return replace(self, floors=[replace(one, left={}) for one in self.floors])
+
     def plant(self, actuator: Actuator) -> Model:
         """The recordings beside this actuator's model."""
         return model_for(self.measurements, actuator, stretches=self.stretches, guarded=self.guarded)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 from ema_model.actuator import Actuator
 from ema_model.comparison.compare import weights_of
@@ -12,7 +11,6 @@ from ema_model.discovery.path import Step, Story, rung_of
 from ema_model.discovery.repeatability import by_inverse_dynamics, is_lost, with_divergence
 from ema_model.discovery.result import Change
 from ema_model.discovery.sentences import NOT_REPEATABLE
-from ema_model.estimation import after_fit, of_unseen
 from ema_model.models.delay_of_drive import with_delay_of_drive
 from ema_model.models.stretches import fit_stretches
 from ema_model.recordings import Measurement
@@ -66,8 +64,6 @@ def calibrated_story(
     held = None if held is None else held.beside(base)
     if not data.weighs_as(bare):
         base = fit(data, actuator, base.starts, tell)
-    data = replace(data, floors=after_fit(data.floors, base.calibration))
-    held = None if held is None else replace(held, floors=of_unseen(held.floors, data.floors))
     return Story(data, held, [Step(base, rung_of(Change(), base, data, held), ())], not is_lost(lost))
 
 

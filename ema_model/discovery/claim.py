@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from ema_model.discovery.criteria import ALIKE, HALF, LARGEST_GROUP, SECOND, TIE
+from ema_model.discovery.criteria import ALIKE, FAR, HALF, LARGEST_GROUP, SECOND, TIE
 from ema_model.discovery.evidence import evidence
 from ema_model.discovery.harmonics import Further, further_orders
 from ema_model.discovery.model_fit import holdout_error
-from ema_model.discovery.objections import against, is_far, ratio
+from ema_model.discovery.objections import against, ratio
 from ema_model.discovery.path import Story
 from ema_model.discovery.refit import Trial, price, stands_for
 from ema_model.effects import find
@@ -63,12 +63,14 @@ def _chosen(story: Story, accepted: Sequence[Trial]) -> tuple[Trial, list[Trial]
     them apart.
     """
     first = accepted[0]
-    far = is_far(story.data, first.fit)
+    is_far = ratio(story.data, first.fit) > FAR
     tied = [
-        trial for trial in accepted if _short_of(story, trial, first) < TIE or (far and trial.drop > ALIKE * first.drop)
+        trial
+        for trial in accepted
+        if _short_of(story, trial, first) < TIE or (is_far and trial.drop > ALIKE * first.drop)
     ]
     effects = [trial for trial in tied if not stands_for(story.current, trial.candidate.name)] or tied[:1]
-    if not far or story.held is None:
+    if not is_far or story.held is None:
         best = min(effects, key=lambda trial: _short_of(story, trial, first) + price(story.data, story.current, trial))
         return best, [trial for trial in tied if trial is not best]
     unseen = {trial.candidate.name: holdout_error(story.held, trial.fit) for trial in tied}
@@ -85,7 +87,7 @@ def _short_of(story: Story, trial: Trial, first: Trial) -> float:
 def _halves(story: Story, best: Trial, more: Trial) -> bool:
     """Whether further orders take half of what one alone leaves far above the floor, also where nothing was fitted."""
     alone = ratio(story.data, best.fit)
-    if story.held is None or not is_far(story.data, best.fit) or ratio(story.data, more.fit) > HALF * alone:
+    if story.held is None or alone <= FAR or ratio(story.data, more.fit) > HALF * alone:
         return False
     return holdout_error(story.held, more.fit) < HALF * holdout_error(story.held, best.fit)
 

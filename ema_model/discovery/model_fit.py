@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from ema_model.actuator import Actuator, Tolerance
 from ema_model.effects import find
 from ema_model.estimation import Calibration, Floor, calibrate, default_free, floor
-from ema_model.estimation.floor_band import spread
 from ema_model.models import Model, model_for
 from ema_model.recordings import Measurement
 
@@ -35,16 +34,6 @@ class Data:
     floors: Sequence[Floor]
     signals: Mapping[str, float]
     guarded: bool = False  # inverse dynamics as a second opinion: held to what differentiation can tell
-
-    @cached_property
-    def floor_spread(self) -> float:
-        """Standard deviation of a true model's error in floors."""
-        return spread(self.floors, [one.noise.keys() & self.signals.keys() for one in self.floors])
-
-    @cached_property
-    def before_fit(self) -> Data:
-        """The same with floors from which nothing is taken off that a fit takes up."""
-        return replace(self, floors=[replace(one, left={}) for one in self.floors])
 
     def plant(self, actuator: Actuator) -> Model:
         """The recordings beside this actuator's model."""

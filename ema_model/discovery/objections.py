@@ -65,7 +65,7 @@ def _against_settled(data: Data, before: Fit, after: Fit, keys: Sequence[str], s
         return reason
     first = settled(before)
     # Near the floor a settled model, too, may lack a second cause that shares the error.
-    return _idle(data, first, calm) or (_little(data, first, calm) if is_far(data, after) else "")
+    return _idle(data, first, calm) or ("" if ratio(data, after) < FAR else _little(data, first, calm))
 
 
 def still_against(data: Data, base: Fit, found: Fit, key: str) -> str:
@@ -107,11 +107,6 @@ def _dated(data: Data, before: Fit, after: Fit) -> str:
 def ratio(data: Data, found: Fit) -> float:
     """The error of a fit in floors, as the ladder has it."""
     return floor_ratio(data, found.plant, found.calibration.signals)
-
-
-def is_far(data: Data, found: Fit) -> bool:
-    """Whether a fit leaves so much that its cause must be told, in floors that no fit has taken from."""
-    return ratio(data.before_fit, found) > FAR
 
 
 def _unmeasured(data: Data, key: str) -> str:
@@ -196,7 +191,7 @@ def _idle(data: Data, before: Fit, after: Fit) -> str:
 
 def _little(data: Data, before: Fit, after: Fit) -> str:
     """Whether far more is left than the effects explain."""
-    if not is_far(data, after):
+    if ratio(data, after) < FAR:
         return ""
     first, second = (float(one.residual @ one.residual) for one in (before, after))
     share = (first - second) / max(first - len(before.residual), len(before.residual))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.comparison.assemble import residuals_of
+from ema_model.comparison.criteria import BAND
 from ema_model.comparison.curves import orders_in
 from ema_model.comparison.events import Event, events
 from ema_model.comparison.explain import Explanation, advance_of, explain, used_blocks, without_spikes
@@ -17,7 +18,7 @@ from ema_model.comparison.orders import Order
 from ema_model.comparison.orders import orders as orders_of
 from ema_model.comparison.pitches import pitches
 from ema_model.comparison.residuals import Residuals
-from ema_model.comparison.verdict import ORDER_OF_PRIMARY, lasting, most_of_floor
+from ema_model.comparison.verdict import ORDER_OF_PRIMARY, lasting
 from ema_model.discovery.model_fit import Data, Fit, floor_ratio
 from ema_model.estimation.floor import twin_error
 
@@ -40,7 +41,7 @@ class Left:
 
 def at_floor(data: Data, found: Fit) -> bool:
     """Whether a fit leaves no more than the floor's band."""
-    return floor_ratio(data, found.plant, found.calibration.signals) <= most_of_floor(data.floor_spread)
+    return floor_ratio(data, found.plant, found.calibration.signals) <= BAND
 
 
 @lru_cache(maxsize=16)

@@ -17,7 +17,6 @@ from ema_model.discovery.repeated import Repeated
 from ema_model.discovery.transmission_seen import TransmissionSeen
 from ema_model.estimation import Calibrated, Calibration, Floor
 from ema_model.models import Model
-from ema_model.quantities.interval import HALF_90
 from ema_model.text import InWords
 
 Array = NDArray[np.float64]
@@ -148,12 +147,6 @@ class Discovery(InWords):
     disagreements: Sequence[Contradiction] = field(default_factory=tuple)  # held-out recordings at odds with the fitted
     repeated: Repeated | None = None  # where a command was recorded twice
     events: Sequence[Event] = field(default_factory=tuple)  # what happened at one moment of a recording
-
-    @property
-    def floor_band(self) -> tuple[float, float]:
-        """Multiples of the floor, between which nine of ten true models' errors lie."""
-        half = HALF_90 * self.data.floor_spread
-        return 1.0 - half, 1.0 + half
 
     @property
     def floor_believable(self) -> bool:

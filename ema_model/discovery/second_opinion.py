@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 from ema_model.actuator import Actuator, Tolerance
 from ema_model.actuator.unread import INVERSE_PLACES, unread
-from ema_model.comparison.verdict import most_of_floor
+from ema_model.comparison.criteria import BAND
 from ema_model.discovery.begin import calibrated_story
 from ema_model.discovery.controller_seen import ControllerSeen, controller_seen
 from ema_model.discovery.criteria import APART, GONE, HEARD, LOOP_TOLD, MUCH_BETTER
@@ -54,19 +54,18 @@ class Opinion:
         """
         first, last = closed.ladder[0].rmse, closed.ladder[-1].rmse
         of_drive = any(find(one.name).family == "drive" for one in closed.added if one.name in CATALOGUE)
-        told = of_drive and last <= LOOP_TOLD * first
-        if at_floor(closed.data, closed.current) or told:  # what was added to the drive's loop explains it
+        if last <= BAND or (of_drive and last <= LOOP_TOLD * first):  # what was added to the drive's loop explains it
             return False
-        left, most = self.story.ladder[-1].rmse, most_of_floor(self.story.data.floor_spread)
+        left = self.story.ladder[-1].rmse
         sure = self.seen is not None and self.seen.holds and any(gain.differs for gain in self.seen.gains)
-        return left <= most or left <= (1.0 if sure else MUCH_BETTER) * closed.ladder[-1].rmse
+        return left <= BAND or left <= (1.0 if sure else MUCH_BETTER) * closed.ladder[-1].rmse
 
     def settles(self, closed: Story) -> bool:
         """Whether the loop need not be walked on: this explains what flowed to its floor.
 
         A drive's own effect beside another one is left to the loop, which alone can tell the two.
         """
-        return at_floor(self.story.data, self.story.current) and self.explains_better(closed)
+        return self.story.ladder[-1].rmse <= BAND and self.explains_better(closed)
 
 
 def second_opinion(story: Story, tell: Callable[[str], None], before: Opinion | None = None) -> Opinion | None:

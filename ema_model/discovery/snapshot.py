@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.comparison.assemble import residuals_of
+from ema_model.comparison.criteria import BAND
 from ema_model.comparison.explain import Explanation
 from ema_model.comparison.residuals import Residuals
 from ema_model.discovery import Candidate, Discovery, Story
@@ -24,6 +25,7 @@ from ema_model.quantities.interval import HALF_90
 
 Array = NDArray[np.float64]
 
+AT_FLOOR = BAND  # times the floor, up to which there is little left to find
 _RIVAL = 25.0  # of χ², below which an effect is too faint to be taken for another
 
 

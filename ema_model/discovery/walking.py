@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from ema_model.comparison.explain import Explanation
 from ema_model.discovery.claim import claimed
 from ema_model.discovery.contradiction import contradictions
-from ema_model.discovery.criteria import HALF, LOOP_TOLD, TOLD_WELL
+from ema_model.discovery.criteria import FAR, HALF, LOOP_TOLD, TOLD_WELL
 from ema_model.discovery.dropped import drop_doubtful, drop_idle
 from ema_model.discovery.model_fit import Fit
-from ema_model.discovery.objections import is_far
+from ema_model.discovery.objections import ratio
 from ema_model.discovery.path import Story, with_drops
 from ema_model.discovery.refit import Trial, pays
 from ema_model.discovery.remaining import Left, at_floor
@@ -50,14 +50,14 @@ def walk(
         walked = beside.taken_over()
     else:
         own.go()
-        untold = is_far(story.data, story.current) and story.ladder[-1].rmse > LOOP_TOLD * story.ladder[0].rmse
-        if untold and beside.blames_controller() and beside.settles():
+        left = max(FAR, LOOP_TOLD * story.ladder[0].rmse)
+        if story.ladder[-1].rmse > left and beside.blames_controller() and beside.settles():
             walked = beside.taken_over()
         else:
             walked = own.ended()
             opinion = beside.asked()
             if opinion is not None:
-                wanted = opinion.blames_controller or not named_in(story) or is_far(story.data, story.current)
+                wanted = opinion.blames_controller or not named_in(story) or story.ladder[-1].rmse > FAR
                 if wanted and beside.explains_better():
                     walked = beside.taken_over()
                 else:
@@ -82,7 +82,7 @@ class _Walk:
     def suspects_drive(self) -> bool:
         """Whether the loop is far off, and what would tell most of it is of the drive, and does not tell it well."""
         story = self.story
-        if not is_far(story.data, story.current) or not story.current.plant.simulates_commands:
+        if ratio(story.data, story.current) <= FAR or not story.current.plant.simulates_commands:
             return False
         best = next(iter(self._scored()[1]), None)
         if best is None:
@@ -127,7 +127,7 @@ class _Walk:
             return True
         self._first = self._first or with_drops(ranked, trials)
         accepted = [trial for trial in trials if pays(story.current, trial, story.data, story.held)]
-        if not accepted and is_far(story.data, story.current):
+        if not accepted and ratio(story.data, story.current) > FAR:
             trials = story.tried_whole([one for one in ranked if one not in [t.candidate for t in trials]], tell)
             accepted = [trial for trial in trials if pays(story.current, trial, story.data, story.held)]
         claim = claimed(story, accepted, tell)

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import Akima1DInterpolator
 
 from ema_model.commands.command import Array, Command
 
@@ -34,6 +33,8 @@ def between(at_s: Array, time_s: Array, command: Array) -> Array:
         bent = np.append(False, jumps(np.diff(command) / step_s))
         beside = np.convolve(~near | change | bent, np.ones(2 * _OF_A_CURVE + 1), mode="same")[: len(change)] > 0
         inside = np.append(~beside, False)[last] & (at_s >= time_s[0])
+        from scipy.interpolate import Akima1DInterpolator  # takes a third of a second to import
+
         values[inside] = Akima1DInterpolator(time_s, command)(at_s[inside])
     held = np.append(change & near, False)
     return np.where(held[last], command[last], values)

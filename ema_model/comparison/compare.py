@@ -12,7 +12,7 @@ from ema_model.actuator import Actuator, load_actuator
 from ema_model.actuator.naming import path_inside
 from ema_model.comparison.assemble import residuals_of
 from ema_model.comparison.result import Compared, Comparison, SignalError
-from ema_model.comparison.verdict import judge, judged, over_floor
+from ema_model.comparison.verdict import judge, judged
 from ema_model.effects import find
 from ema_model.errors import InputError, quoted
 from ema_model.estimation import Calibration, Floor, after_fit, floor
@@ -97,8 +97,8 @@ def compare(
     errors = _together(compared)
     fitted_to = calibration if calibrate else None
     pooled = [judged(window.measured.keys() & one.keys()) for window, one in zip(plant.windows, after)]
-    names = [one.name for one in recordings]
-    judgement = judge(residuals, errors, fitted_to, actuator, names, spread(floors, pooled))
+    known_to = spread(floors, pooled)
+    judgement = judge(residuals, errors, fitted_to, actuator, [one.name for one in recordings], known_to)
     held: Sequence[Compared] = ()
     if unseen:
         tell("holding it against what was not fitted")
@@ -115,8 +115,8 @@ def compare(
         worst_regions=judgement.worst_regions,
         events=judgement.events,
         adequate=judgement.adequate,
-        over_floor=over_floor(residuals, judged(residuals.values)),
-        floor_band=band(floors, pooled),
+        over_floor=judgement.over_floor,
+        floor_band=band(known_to),
         sentences=judgement.sentences,
         warnings=judgement.warnings,
         holdout=held,

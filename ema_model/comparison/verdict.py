@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.actuator.naming import on_axes
-from ema_model.comparison.criteria import BAND, BAND_SIGMAS, SLOW
+from ema_model.comparison.criteria import BAND, BEYOND, SLOW
 from ema_model.comparison.events import Event, events
 from ema_model.comparison.explain import Explanation, explain, used_blocks
 from ema_model.comparison.orders import Order, residual_orders
@@ -41,6 +41,7 @@ class Judgement:
     worst_regions: Sequence[Region]
     events: Sequence[Event]
     adequate: bool
+    over_floor: float
     sentences: Sequence[str]
     warnings: Sequence[str]
 
@@ -63,7 +64,8 @@ def judge(
     regions = worst_regions(residuals, primary, explained, actuator.axes)
     significant = [one for one in explained if one.significant]
     names = judged(residuals.values)
-    within = over_floor(residuals, names) <= most_of_floor(spread) and not lasting(residuals, names)
+    error = over_floor(residuals, names)
+    within = error <= most_of_floor(spread) and not lasting(residuals, names)
     adequate = not significant and within and (calibration is None or calibration.converged)
     shown = actuator.axes.signal(primary)
     happened = [] if adequate else events(residuals, names, recordings, actuator)
@@ -82,6 +84,7 @@ def judge(
         worst_regions=() if adequate else regions,
         events=happened,
         adequate=adequate,
+        over_floor=error,
         sentences=sentences,
         warnings=_warnings(residuals, primary, calibration, actuator),
     )
@@ -94,7 +97,7 @@ def judged(signals: Iterable[str]) -> list[str]:
 
 def most_of_floor(spread: float) -> float:
     """The error in floors up to which a model is adequate; spread: as of `estimation.floor_band`."""
-    return max(BAND, 1.0 + BAND_SIGMAS * spread)
+    return max(BAND, 1.0 + BEYOND * spread)
 
 
 def _order(order: Order, primary: str, residuals: Residuals, actuator: Actuator) -> str:

@@ -15,13 +15,12 @@ from ema_model.models.model import Signals
 Array = NDArray[np.float64]
 
 
-def after_fit(floors: Sequence[Floor], calibration: Calibration, twins: Sequence[Signals] | None = None) -> list[Floor]:
+def after_fit(floors: Sequence[Floor], calibration: Calibration, twins: Sequence[Signals]) -> list[Floor]:
     """The floors of a calibration's windows with `left`: what no parameter takes up of the twin's difference t.
 
     t − J(JᵀJ + I)⁻¹Jᵀt, weighted as the fit was: J are its sensitivities, and I is the prior.  twins: as of
-    `twin_error`, with the calibrated parameters; without it, the floors' own.  Floors without a twin stay as they are.
+    `twin_error`, by window, with the calibrated parameters.  Floors without a twin stay as they are.
     """
-    twins = [one.twin for one in floors] if twins is None else twins
     parts = [
         (place, name, part[name], twins[place][name] / floors[place].fit_sigma(name))
         for place, part in enumerate(calibration.weighted_sensitivities)
@@ -39,19 +38,3 @@ def after_fit(floors: Sequence[Floor], calibration: Calibration, twins: Sequence
         besides = 0.5 * (np.maximum(one.model[name], before) ** 2 - before**2)  # also by how much two twins differ
         left[place][name] = np.sqrt(besides + np.minimum(before, after) ** 2)
     return [replace(one, left=its) for one, its in zip(floors, left)]
-
-
-def of_unseen(floors: Sequence[Floor], fitted: Sequence[Floor]) -> list[Floor]:
-    """Floors of recordings that were not fitted, of which as much is left, by signal, as of those that were."""
-    shares: dict[str, float] = {}
-    for name in {name for one in fitted for name in one.left}:
-        known = [one for one in fitted if name in one.left]
-        left, whole, counts = (
-            np.concatenate([part(one) for one in known])
-            for part in (lambda one: one.left[name], lambda one: one.model[name], lambda one: one.counts)  # noqa: B023
-        )
-        shares[name] = float(np.sqrt(np.average((left / np.maximum(whole, 1e-300)) ** 2, weights=counts)))
-    return [
-        replace(one, left={name: share * one.model[name] for name, share in shares.items() if name in one.model})
-        for one in floors
-    ]

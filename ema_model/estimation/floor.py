@@ -41,7 +41,6 @@ class Floor:
     repeats: Array  # (blocks,), over how many blocks the model's error stays alike
     block_s: float
     white: frozenset[str] = frozenset()  # signals whose model error does not last while the motor moves
-    twin: Signals = field(default_factory=dict)  # the twin's signals less the model's own, (blocks,) each
     left: Mapping[str, Array] = field(default_factory=dict)  # of `model`, that a fit does not take up, (blocks,) each
 
     def sigma(self, signal: str) -> Array:
@@ -61,9 +60,8 @@ class Floor:
         return np.min(self.repeats) / self.repeats
 
     def beside(self, other: Floor) -> Floor:
-        """The greater model floor of two, block by block; of the twins, the other's."""
-        greater = {name: np.maximum(self.model[name], other.model[name]) for name in self.model}
-        return replace(self, model=greater, twin=other.twin)
+        """The greater model floor of two, block by block."""
+        return replace(self, model={name: np.maximum(self.model[name], other.model[name]) for name in self.model})
 
 
 def floor(
@@ -88,7 +86,7 @@ def floor(
         jump = late[name] / np.sqrt(12.0) if late else 0.0  # anywhere within the sample
         own = np.hypot(np.hypot(lasting, jump), window.lasting.get(name, 0.0))
         slow[name] = np.hypot(own, given.get(name, {}).get("accuracy", 0.0))
-    return Floor(noise, slow, repeats_of(window, noise), window.block_s, twin=twins)
+    return Floor(noise, slow, repeats_of(window, noise), window.block_s)
 
 
 def local_rms(values: Array, block_s: float) -> Array:

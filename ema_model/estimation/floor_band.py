@@ -36,7 +36,7 @@ def spread(floors: Sequence[Floor], signals: Sequence[Collection[str]]) -> float
     return float(np.hypot(0.5 * np.sqrt(variance) / total, _KNOWN_TO)) if total else _KNOWN_TO
 
 
-def band(floors: Sequence[Floor], signals: Sequence[Collection[str]]) -> tuple[float, float]:
+def band(spread: float) -> tuple[float, float]:
     """Between which multiples of the floor nine of ten true models' errors lie."""
-    half = HALF_90 * spread(floors, signals)
+    half = HALF_90 * spread
     return max(0.0, 1.0 - half), 1.0 + half

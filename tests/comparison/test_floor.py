@@ -10,7 +10,7 @@ import pytest
 from ema_model.actuator import load_actuator
 from ema_model.campaign.draws import base_parameters
 from ema_model.commands import command
-from ema_model.estimation import Floor, after_fit, calibrate, floor, of_unseen
+from ema_model.estimation import Floor, after_fit, calibrate, floor
 from ema_model.estimation.floor import twin_error
 from ema_model.estimation.floor_band import spread
 from ema_model.models import ClosedLoop
@@ -70,14 +70,6 @@ def test_a_true_model_is_at_its_floor_once_fitted():
     assert np.mean(errors) == pytest.approx(1.0, abs=0.05)
     within = np.abs(np.array(errors) - 1.0) < 2.33 * np.array(spreads)
     assert np.count_nonzero(within) >= 9 and max(spreads) < 0.08
-
-
-def test_an_unseen_recording_has_as_much_of_its_floor_left():
-    window, one = floor_of("sine", {"amplitude_rad": 0.03, "frequency_Hz": 3.0}, 5_000.0)
-    [other] = of_unseen([one], [replace(one, left={name: 0.5 * values for name, values in one.model.items()})])
-    for name, values in one.model.items():
-        np.testing.assert_allclose(other.left[name], 0.5 * values, rtol=1e-12)
-    assert other.fit_sigma("current_A") == pytest.approx(one.fit_sigma("current_A")) and window.blocks
 
 
 def test_the_spread_of_white_noise_is_that_of_its_mean_square():

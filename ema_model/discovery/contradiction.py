@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ema_model.actuator.naming import on_axes
 from ema_model.discovery.criteria import ANOTHER, MISSED, PUT_RIGHT, WIDER
 from ema_model.discovery.model_fit import Data, Fit, fit, floor_ratio, gather, resimulated
+from ema_model.discovery.objections import ratio
 from ema_model.discovery.result import Contradiction
 from ema_model.errors import InputError
 from ema_model.estimation import calibrate
@@ -50,7 +51,7 @@ def contradictions(story: Story, tell: Callable[[str], None]) -> list[Contradict
     """One for each held-out recording that the last model misses by far more than the fitted ones."""
     if story.held is None:
         return []
-    found, limit = [], MISSED * max(1.0, story.ladder[-1].rmse)
+    found, limit = [], MISSED * max(1.0, ratio(story.data, story.current))
     for place, measurement in enumerate(story.held.measurements):
         alone = _alone(story.held, story.current, place)
         if alone is None:
@@ -172,4 +173,6 @@ def _alone(held: Data, found: Fit, place: int) -> Data | None:
     floors = [one for window, one in zip(windows, held.floors) if window.recording == place]
     stretches = None if held.stretches is None else [held.stretches[place]]
     measurements = [held.measurements[place]]
-    return replace(held, measurements=measurements, stretches=stretches, floors=floors) if floors else None
+    return (
+        replace(held, measurements=measurements, stretches=stretches, floors=floors, after_fit=()) if floors else None
+    )

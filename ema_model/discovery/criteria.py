@@ -50,22 +50,6 @@ DRIVEN = 0.5
 # Of what the residual's own curve tells, that an effect must tell: a curve has more freedom.
 AS_MUCH = 0.9
 
-# What an effect's parameters are where it is physics: beyond, something else is bent into its place.  A sensor or a
-# magnet that is off by a third is found by hand; a spring pulls back.
-PLAUSIBLE = {
-    ("current_sensor_gain", "ratio"): (-0.3, 0.3),
-    ("demagnetisation", "ratio"): (0.0, 0.4),
-    ("hinge_moment", "stiffness_Nm_rad"): (0.0, float("inf")),
-    ("asymmetric_friction", "ratio"): (-0.6, 0.6),
-    ("load_dependent_friction", "ratio"): (0.0, 0.6),
-    ("gear_load_friction", "ratio"): (0.0, 0.8),
-    ("torque_ripple", "ratio"): (0.0, 0.5),
-}
-
-# Of the torque, that saturation may take at the highest current recorded: iron loses up to a quarter at twice the rated
-# current, and what takes more is no iron's (of a servo with plastic gears 31 % would: its friction grows with load).
-MOST_SATURATED = 0.25
-
 # Of a gain, that a drive's must differ by from the file's; drives' own scaling and a torque constant that is known to a
 # few percent stay below.
 GAIN_APART = 0.1

@@ -14,7 +14,7 @@ from ema_model.comparison.explain import Explanation
 from ema_model.discovery.begin import begun
 from ema_model.discovery.next_experiment import next_experiment
 from ema_model.discovery.path import Story, refreshed
-from ema_model.discovery.remaining import at_floor, left_by
+from ema_model.discovery.remaining import left_by, within_band
 from ema_model.discovery.repeated import repeated
 from ema_model.discovery.result import Candidate, Discovery, Experiment
 from ema_model.discovery.second_opinion import support_of
@@ -84,9 +84,9 @@ def result_of(
         parameters_outside_tolerance=list(dict.fromkeys([*stand_ins, *outside])),
         actuator=calibration.actuator,
         plant=story.current.plant,
-        floors=story.data.floors,
+        floors=story.data.told_in,
         data=story.data,
-        at_floor=at_floor(story.data, story.current),
+        at_floor=within_band(story.data, story.current),
         held=story.held,
         unknown=unknown,
         curve=next((one for one in added if one.name not in CATALOGUE), None),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,10 @@ from numpy.typing import NDArray
 from ema_model.actuator import Actuator, Tolerance
 from ema_model.effects import find
 from ema_model.estimation import Calibration, Floor, calibrate, default_free, floor
+from ema_model.estimation.floor import twin_error
+from ema_model.estimation.floor_band import spread
 from ema_model.models import Model, model_for
+from ema_model.models.model import Signals
 from ema_model.recordings import Measurement
 
 Array = NDArray[np.float64]
@@ -34,6 +37,22 @@ class Data:
     floors: Sequence[Floor]
     signals: Mapping[str, float]
     guarded: bool = False  # inverse dynamics as a second opinion: held to what differentiation can tell
+    after_fit: Sequence[Floor] = ()  # what a true model leaves once it is fitted; () before the first fit
+
+    @property
+    def told_in(self) -> Sequence[Floor]:
+        """The floors in which errors are told; fits, and what is decided of them, are weighed by `floors`."""
+        return self.after_fit or self.floors
+
+    @cached_property
+    def before_fit(self) -> Data:
+        """The same with all errors in the floors that fits are weighed by."""
+        return replace(self, after_fit=())
+
+    @cached_property
+    def floor_spread(self) -> float:
+        """Standard deviation of a true model's error in floors."""
+        return spread(self.told_in, [one.noise.keys() & self.signals.keys() for one in self.told_in])
 
     def plant(self, actuator: Actuator) -> Model:
         """The recordings beside this actuator's model."""
@@ -106,6 +125,13 @@ def gather(
     plant = model_for(measurements, actuator, stretches=stretches, guarded=guarded)
     floors = [floor(plant, place) for place in range(len(plant.windows))]
     return Data(measurements, stretches, floors, signals, guarded)
+
+
+@lru_cache(maxsize=4)
+def twins_of(found: Fit) -> Sequence[Signals]:
+    """As of `twin_error`, by window, of a fit."""
+    fitted, k = found.calibration.actuator, found.calibration.k
+    return [twin_error(found.plant, place, fitted, k) for place in range(len(found.plant.windows))]
 
 
 def with_effect(actuator: Actuator, name: str, settings: Mapping[str, float]) -> Actuator:
@@ -206,13 +232,13 @@ def ratio_by_recording(data: Data, plant: Model, shown: Sequence[Mapping[str, Ar
 
 
 def floor_ratio(data: Data, plant: Model, shown: Sequence[Mapping[str, Array]], recording: int | None = None) -> float:
-    """rms of measurement − model in units of the floor, pooled over windows and signals: 1 is the floor.
+    """rms of measurement − model in units of the floor after the fit, pooled over windows and signals: 1 is the floor.
 
     A standstill counts as 25 ms of motion do.  recording: the one, from 0, whose windows count; all without it.
     """
     each = [
         (((signals[name] - window.measured[name]) / one.sigma(name)) ** 2, one.counts)
-        for window, one, signals in zip(plant.windows, data.floors, shown)
+        for window, one, signals in zip(plant.windows, data.told_in, shown)
         for name in data.signals
         if name in window.measured and recording in (None, window.recording)
     ]

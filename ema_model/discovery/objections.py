@@ -18,8 +18,6 @@ from ema_model.discovery.criteria import (
     FAR,
     LEAST_FALL,
     LEAST_SHARE,
-    MOST_SATURATED,
-    PLAUSIBLE,
     TIE,
 )
 from ema_model.discovery.evidence import colour_of, evidence, signals_of
@@ -29,6 +27,7 @@ from ema_model.discovery.stability import disagreement
 from ema_model.effects import catalogue_name, find
 from ema_model.quantities.numbers import number
 from ema_model.quantities.titles import in_sentence
+from ema_model.recordings import SIGNALS
 
 _READINGS = {
     "current_reading": "current_A",
@@ -105,8 +104,8 @@ def _dated(data: Data, before: Fit, after: Fit) -> str:
 
 
 def ratio(data: Data, found: Fit) -> float:
-    """The error of a fit in floors, as the ladder has it."""
-    return floor_ratio(data, found.plant, found.calibration.signals)
+    """The error of a fit in the floors that it was weighed by."""
+    return floor_ratio(data.before_fit, found.plant, found.calibration.signals)
 
 
 def _unmeasured(data: Data, key: str) -> str:
@@ -153,22 +152,21 @@ def _bent(before: Fit, after: Fit, key: str) -> str:
 
 def _implausible(after: Fit, key: str) -> str:
     """A value that no such part has."""
-    name = catalogue_name(key)
-    for parameter, value in after.calibration.actuator.effects[key].items():
-        low, high = PLAUSIBLE.get((name, parameter), (-np.inf, np.inf))
-        if not low <= value <= high:
-            return f"its {_title(after, f'effects.{key}.{parameter}')} of {number(value)} is not plausible"
-        lost = 1.0 - 1.0 / (1.0 + value * _top_current(after)) if name == "torque_saturation" else 0.0
-        if lost > MOST_SATURATED:
-            return f"a loss of {100.0 * lost:.0f} % of the torque at the highest current is not plausible"
-        if parameter == "period_rad" and value > _travel(after):
+    values = after.calibration.actuator.effects[key]
+    for parameter in find(catalogue_name(key)).parameters:
+        value, low, high = values[parameter.name], *parameter.plausible
+        size = _greatest(after, parameter.plausible_at) if parameter.plausible_at else 1.0
+        if not low <= value * size <= high:
+            at = f" at {number(size)} {SIGNALS[parameter.plausible_at].unit}" if parameter.plausible_at else ""
+            return f"its {_title(after, f'effects.{key}.{parameter.name}')} of {number(value)} is not plausible{at}"
+        if parameter.name == "period_rad" and value > _travel(after):
             return "its period is longer than the travel"
     return ""
 
 
-def _top_current(found: Fit) -> float:
-    """The highest current in the recordings, A; 0 where it is not known."""
-    shown = [signals["current_A"] for signals in found.calibration.signals if "current_A" in signals]
+def _greatest(found: Fit, signal: str) -> float:
+    """The greatest size of a signal in the recordings; 0 where it is not known."""
+    shown = [signals[signal] for signals in found.calibration.signals if signal in signals]
     return float(max((np.max(np.abs(one)) for one in shown), default=0.0))
 
 

@@ -18,9 +18,8 @@ from ema_model.comparison.orders import Order
 from ema_model.comparison.orders import orders as orders_of
 from ema_model.comparison.pitches import pitches
 from ema_model.comparison.residuals import Residuals
-from ema_model.comparison.verdict import ORDER_OF_PRIMARY, lasting
-from ema_model.discovery.model_fit import Data, Fit, floor_ratio
-from ema_model.estimation.floor import twin_error
+from ema_model.comparison.verdict import ORDER_OF_PRIMARY, lasting, most_of_floor
+from ema_model.discovery.model_fit import Data, Fit, floor_ratio, twins_of
 
 Array = NDArray[np.float64]
 
@@ -40,8 +39,13 @@ class Left:
 
 
 def at_floor(data: Data, found: Fit) -> bool:
-    """Whether a fit leaves no more than the floor's band."""
-    return floor_ratio(data, found.plant, found.calibration.signals) <= BAND
+    """Whether a fit leaves so little that the walk takes it for the floor, before a fit takes from that."""
+    return floor_ratio(data.before_fit, found.plant, found.calibration.signals) <= BAND
+
+
+def within_band(data: Data, found: Fit) -> bool:
+    """Whether a fit leaves no more than a true model does, as `compare` has it."""
+    return floor_ratio(data, found.plant, found.calibration.signals) <= most_of_floor(data.floor_spread)
 
 
 @lru_cache(maxsize=16)
@@ -49,7 +53,7 @@ def lasts(data: Data, found: Fit) -> bool:
     """Whether what is left of a signal lasts longer than noise does, as `compare` has it."""
     fitted = found.calibration.signals
     known: list[dict[str, Array]] = [{} for _ in fitted]
-    residuals = residuals_of(found.plant, data.floors, fitted, known, found.calibration.actuator)
+    residuals = residuals_of(found.plant, data.told_in, fitted, known, found.calibration.actuator)
     return bool(lasting(residuals, [name for name in data.signals if name in residuals.values]))
 
 
@@ -81,11 +85,8 @@ def used_left(data: Data, before: Fit, after: Fit) -> tuple[str, Array, Array]:
 @lru_cache(maxsize=4)  # of a fit and of the one before it
 def residuals_left(data: Data, found: Fit) -> Residuals:
     """The residuals of a fit beside the variables that may explain them."""
-    fitted, k = found.calibration.actuator, found.calibration.k
-    known = [twin_error(found.plant, place, fitted, k) for place in range(len(found.plant.windows))]
-    return residuals_of(
-        found.plant, data.floors, found.calibration.signals, known, found.calibration.actuator, found.calibration
-    )
+    fitted = found.calibration
+    return residuals_of(found.plant, data.floors, fitted.signals, twins_of(found), fitted.actuator, fitted)
 
 
 def _orders(residuals: Residuals, primary: str, actuator: Actuator) -> list[Order]:

@@ -16,6 +16,7 @@ from ema_model.discovery.model_fit import Data
 from ema_model.discovery.repeated import Repeated
 from ema_model.discovery.transmission_seen import TransmissionSeen
 from ema_model.estimation import Calibrated, Calibration, Floor
+from ema_model.estimation.floor_band import band
 from ema_model.models import Model
 from ema_model.text import InWords
 
@@ -147,6 +148,11 @@ class Discovery(InWords):
     disagreements: Sequence[Contradiction] = field(default_factory=tuple)  # held-out recordings at odds with the fitted
     repeated: Repeated | None = None  # where a command was recorded twice
     events: Sequence[Event] = field(default_factory=tuple)  # what happened at one moment of a recording
+
+    @property
+    def floor_band(self) -> tuple[float, float]:
+        """Multiples of the floor, between which nine of ten true models' errors lie."""
+        return band(self.data.floor_spread)
 
     @property
     def floor_believable(self) -> bool:

@@ -15,6 +15,7 @@ from ema_model.comparison.criteria import BAND
 from ema_model.discovery.begin import calibrated_story
 from ema_model.discovery.controller_seen import ControllerSeen, controller_seen
 from ema_model.discovery.criteria import APART, GONE, HEARD, LOOP_TOLD, MUCH_BETTER
+from ema_model.discovery.objections import ratio
 from ema_model.discovery.path import Story
 from ema_model.discovery.refit import pays
 from ema_model.discovery.remaining import at_floor
@@ -52,20 +53,20 @@ class Opinion:
 
         A gain that is another than the file's is seen without any plant: better is then enough.
         """
-        first, last = closed.ladder[0].rmse, closed.ladder[-1].rmse
+        first, last = ratio(closed.data, closed.base), ratio(closed.data, closed.current)
         of_drive = any(find(one.name).family == "drive" for one in closed.added if one.name in CATALOGUE)
         if last <= BAND or (of_drive and last <= LOOP_TOLD * first):  # what was added to the drive's loop explains it
             return False
-        left = self.story.ladder[-1].rmse
+        left = ratio(self.story.data, self.story.current)
         sure = self.seen is not None and self.seen.holds and any(gain.differs for gain in self.seen.gains)
-        return left <= BAND or left <= (1.0 if sure else MUCH_BETTER) * closed.ladder[-1].rmse
+        return left <= BAND or left <= (1.0 if sure else MUCH_BETTER) * last
 
     def settles(self, closed: Story) -> bool:
         """Whether the loop need not be walked on: this explains what flowed to its floor.
 
         A drive's own effect beside another one is left to the loop, which alone can tell the two.
         """
-        return self.story.ladder[-1].rmse <= BAND and self.explains_better(closed)
+        return at_floor(self.story.data, self.story.current) and self.explains_better(closed)
 
 
 def second_opinion(story: Story, tell: Callable[[str], None], before: Opinion | None = None) -> Opinion | None:
@@ -117,7 +118,7 @@ def taken_over(story: Story, opinion: Opinion) -> None:
 
 def compared(story: Story, opinion: Opinion, tell: Callable[[str], None]) -> None:
     """Asks inverse dynamics for each effect of the closed loop; one that it plainly contradicts is taken out."""
-    heard = opinion.story.ladder[0].rmse <= HEARD
+    heard = ratio(opinion.story.data, opinion.story.base) <= HEARD
     for one in [one for one in story.added if one.name in CATALOGUE]:
         story.support[one.name] = (CLOSED_LOOP,)
         if not _acts(one.name):

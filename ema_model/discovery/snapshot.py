@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.comparison.assemble import residuals_of
-from ema_model.comparison.criteria import BAND
 from ema_model.comparison.explain import Explanation
 from ema_model.comparison.residuals import Residuals
 from ema_model.discovery import Candidate, Discovery, Story
@@ -25,7 +24,6 @@ from ema_model.quantities.interval import HALF_90
 
 Array = NDArray[np.float64]
 
-AT_FLOOR = BAND  # times the floor, up to which there is little left to find
 _RIVAL = 25.0  # of χ², below which an effect is too faint to be taken for another
 
 
@@ -158,7 +156,7 @@ def look_at(story: Story, found: Discovery, assessment: Assessment | None, first
         added=story.added,
         steps=len(story.steps),
         counts=np.concatenate([one.counts for one in data.floors]),
-        residuals=residuals_of(fit.plant, data.floors, fit.calibration.signals, known, fit.calibration.actuator),
+        residuals=residuals_of(fit.plant, data.told_in, fit.calibration.signals, known, fit.calibration.actuator),
         weights=weights,
         sigmas=sigmas,
         assessment=assessment,

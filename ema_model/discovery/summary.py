@@ -53,6 +53,7 @@ def as_dict(found: Discovery) -> dict[str, Any]:
                 "added": None if found.curve is None else _added(found.curve, axes),
             },
             "floor_believable": is_believable,
+            "floor_band": list(found.floor_band),
             "repeatability": None
             if twice is None
             else {

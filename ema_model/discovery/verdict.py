@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from ema_model.comparison.explain import Explanation
 from ema_model.discovery.path import Story
-from ema_model.discovery.remaining import at_floor, lasts
+from ema_model.discovery.remaining import lasts, within_band
 from ema_model.discovery.result import Added
 
 
@@ -14,7 +14,7 @@ def verdict_of(story: Story, named: Sequence[Added], unknown: Explanation | None
     """One of `VERDICTS`; named: the library's effects in the last model; unknown: what the last model leaves."""
     if not story.repeatable:
         return "not_repeatable"
-    done = at_floor(story.data, story.current) and story.transmission_seen is None
+    done = within_band(story.data, story.current) and story.transmission_seen is None
     if named:
         return "effects_found" if done else "partly_explained"
     if not story.base.calibration.converged and not story.added:

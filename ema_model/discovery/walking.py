@@ -50,14 +50,14 @@ def walk(
         walked = beside.taken_over()
     else:
         own.go()
-        left = max(FAR, LOOP_TOLD * story.ladder[0].rmse)
-        if story.ladder[-1].rmse > left and beside.blames_controller() and beside.settles():
+        left = max(FAR, LOOP_TOLD * ratio(story.data, story.base))
+        if ratio(story.data, story.current) > left and beside.blames_controller() and beside.settles():
             walked = beside.taken_over()
         else:
             walked = own.ended()
             opinion = beside.asked()
             if opinion is not None:
-                wanted = opinion.blames_controller or not named_in(story) or story.ladder[-1].rmse > FAR
+                wanted = opinion.blames_controller or not named_in(story) or ratio(story.data, story.current) > FAR
                 if wanted and beside.explains_better():
                     walked = beside.taken_over()
                 else:

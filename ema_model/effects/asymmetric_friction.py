@@ -23,7 +23,11 @@ EFFECT = Effect(
         "constant torque as long as the motor moves, and goes away when it stands, which tells it from an offset "
         "of the current's sensor."
     ),
-    parameters=(Parameter("ratio", "share a more in positive motion, and less in negative", 0.12, -0.9, 0.9),),
+    parameters=(
+        Parameter(
+            "ratio", "share a more in positive motion, and less in negative", 0.12, -0.9, 0.9, plausible=(-0.6, 0.6)
+        ),
+    ),
     severities=(0.06, 0.12, 0.25),
     places=(moving_friction,),
     shows="as an offset of the current in motion, in either direction alike",

@@ -22,7 +22,7 @@ EFFECT = Effect(
         "current is too large by the same share. From the current alone this cannot be told from a motor with less "
         "torque per ampere; a measured voltage, or the top speed, tells them apart."
     ),
-    parameters=(Parameter("ratio", "share g that is read too much", 0.06, -0.9, 5.0),),
+    parameters=(Parameter("ratio", "share g that is read too much", 0.06, -0.9, 5.0, plausible=(-0.3, 0.3)),),
     severities=(0.03, 0.06, 0.12),
     places=(current_reading,),
     shows="in the recorded current, in proportion to it, not in the motion",

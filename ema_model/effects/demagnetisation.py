@@ -27,7 +27,7 @@ EFFECT = Effect(
         "more current for the same torque, and its voltage at the same speed is lower, which lets it run faster "
         "at the voltage limit. A current sensor that reads too much looks the same but leaves the top speed alone."
     ),
-    parameters=(Parameter("ratio", "share d of the flux that is lost", 0.08, 0.0, 0.9),),
+    parameters=(Parameter("ratio", "share d of the flux that is lost", 0.08, 0.0, 0.9, plausible=(0.0, 0.4)),),
     severities=(0.04, 0.08, 0.15),
     places=(electric_torque, back_emf),
     shows="in the current, in proportion to the current; top speed",

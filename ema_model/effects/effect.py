@@ -67,6 +67,8 @@ class Parameter:
     """One number of an effect; the unit ends its name (a ratio or an order has none).
 
     What a linear axis measures in other units says where it sits; ValueError where that is left open.
+    A fitted value outside of `plausible` is no such part's: something else is bent into its place.  Where the value
+    counts by how far a signal goes, it is the product of the two that must be plausible.
     """
 
     name: str
@@ -80,6 +82,8 @@ class Parameter:
     linear: tuple[float, float, float] | None = None  # default, low and high where the side's axis is linear
     unit: str = ""  # as shown; the name tells it where it ends in one
     shown: str = ""  # the name in files; `on` fills it in
+    plausible: tuple[float, float] = (-math.inf, math.inf)
+    plausible_at: str = ""  # the signal by whose greatest size the value counts
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "unit", self.unit or unit_of(self.name))

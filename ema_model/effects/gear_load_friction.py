@@ -22,7 +22,7 @@ EFFECT = Effect(
         "without a load has none of it. Only recordings under a load can show it, and two loads tell it from "
         "plain dry friction."
     ),
-    parameters=(Parameter("ratio", "friction μ per load, both at the motor", 0.2, 0.0, 0.95),),
+    parameters=(Parameter("ratio", "friction μ per load, both at the motor", 0.2, 0.0, 0.95, plausible=(0.0, 0.8)),),
     severities=(0.1, 0.2, 0.4),
     places=(moving_friction,),
     shows="in the current under a load from outside, with the direction of motion",

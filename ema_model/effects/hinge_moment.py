@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from ema_model.effects.effect import USER, Effect, Parameter
 from ema_model.physics.jit import scalar
 
@@ -22,7 +24,16 @@ EFFECT = Effect(
         "the current shows it at rest as well as in motion."
     ),
     parameters=(
-        Parameter("stiffness_Nm_rad", "stiffness H", 1000.0, -1e6, 1e6, side=USER, linear=(1e4, -1e9, 1e9)),
+        Parameter(
+            "stiffness_Nm_rad",
+            "stiffness H",
+            1000.0,
+            -1e6,
+            1e6,
+            side=USER,
+            linear=(1e4, -1e9, 1e9),
+            plausible=(0.0, math.inf),  # a spring pulls back
+        ),
         Parameter(
             "offset_Nm", "moment H_0 at the neutral position", 0.0, -1e5, 1e5, side=USER, linear=(0.0, -1e6, 1e6)
         ),

@@ -21,7 +21,7 @@ EFFECT = Effect(
         "friction is the same under any load; with this effect it grows with the motor's torque. The motor must "
         "then push more than the load alone asks for, and holds it with less when it is let down."
     ),
-    parameters=(Parameter("ratio", "friction μ per motor torque", 0.15, 0.0, 0.95),),
+    parameters=(Parameter("ratio", "friction μ per motor torque", 0.15, 0.0, 0.95, plausible=(0.0, 0.6)),),
     severities=(0.08, 0.15, 0.25),
     places=(moving_friction,),
     shows="in the current under load, with the direction of motion",

@@ -27,7 +27,7 @@ EFFECT = Effect(
         "each turn like cogging, but it is in proportion to the current: without current there is none."
     ),
     parameters=(
-        Parameter("ratio", "amplitude a, per mean torque", 0.06, 0.0, 0.9),
+        Parameter("ratio", "amplitude a, per mean torque", 0.06, 0.0, 0.9, plausible=(0.0, 0.5)),
         Parameter(
             "order",
             "periods h in each turn of the motor",

@@ -38,3 +38,19 @@ def after_fit(floors: Sequence[Floor], calibration: Calibration, twins: Sequence
         besides = 0.5 * (np.maximum(one.model[name], before) ** 2 - before**2)  # also by how much two twins differ
         left[place][name] = np.sqrt(besides + np.minimum(before, after) ** 2)
     return [replace(one, left=its) for one, its in zip(floors, left)]
+
+
+def of_unseen(floors: Sequence[Floor], fitted: Sequence[Floor]) -> list[Floor]:
+    """Floors of recordings that were not fitted, of which as much is left, by signal, as of those that were."""
+    shares = {name: _share_left(fitted, name) for name in {name for one in fitted for name in one.left}}
+    return [
+        replace(one, left={name: share * one.model[name] for name, share in shares.items() if name in one.model})
+        for one in floors
+    ]
+
+
+def _share_left(fitted: Sequence[Floor], name: str) -> float:
+    known = [one for one in fitted if name in one.left]
+    left = sum(float(one.counts @ one.left[name] ** 2) for one in known)
+    whole = sum(float(one.counts @ one.model[name] ** 2) for one in known)
+    return float(np.sqrt(left / whole)) if whole else 1.0

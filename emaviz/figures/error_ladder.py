@@ -18,7 +18,7 @@ _LABEL = 0.14  # height of a number and its distance from its point, of the char
 
 
 def figure(found: Discovery, *, dark: bool = False) -> go.Figure:
-    """A line for what was fitted, one for what was held out, and the floor at 1."""
+    """A line for what was fitted, one for what was held out, and the floor at 1 with how well it is known."""
     chart = theme.new("Error after each step", "", "Rms error / floor [-]", dark=dark)
     # Numbered within: two steps may have the same title.
     places = list(range(len(found.ladder)))
@@ -50,9 +50,23 @@ def figure(found: Discovery, *, dark: bool = False) -> go.Figure:
                 cliponaxis=False,
             )
         )
+    low, high = found.floor_band
+    ends = [-0.5, len(places) - 0.5]
     chart.add_trace(
         go.Scatter(
-            x=[-0.5, len(places) - 0.5],
+            x=[*ends, *ends[::-1]],
+            y=[low, low, high, high],
+            fill="toself",
+            fillcolor=theme.FLOOR,
+            line={"width": 0},
+            mode="lines",
+            name="a true model, 90 %",
+            hoverinfo="skip",
+        )
+    )
+    chart.add_trace(
+        go.Scatter(
+            x=ends,
             y=[1.0, 1.0],
             mode="lines",
             name="floor",

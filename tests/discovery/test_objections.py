@@ -10,6 +10,7 @@ import pytest
 from ema_model.actuator import Tolerance
 from ema_model.discovery import objections
 from ema_model.discovery.stability import disagreement
+from ema_model.effects import find
 from ema_model.estimation import Calibrated
 from ema_model.quantities.axes import ROTARY
 
@@ -39,9 +40,9 @@ def fitted(amplitudes, noise=1.0, settings=None, at_bound=False, path=PATH):
         x=np.ones(1),
         residual=residual,
         weighted_jacobian=np.tile(0.5 * shape, count)[:, None],
-        actuator=SimpleNamespace(effects={key: settings or {"stiffness_Nm_rad": 1000.0}}),
+        actuator=SimpleNamespace(effects={key: find(key).settings(settings or {})}),
         converged=True,
-        signals=[{"motor_position_rad": np.linspace(0.0, 3.0, N)}],
+        signals=[{"motor_position_rad": np.linspace(0.0, 3.0, N), "current_A": np.linspace(0.0, -15.0, N)}],
     )
     actuator = SimpleNamespace(tolerances={path: Tolerance(500.0, True)}, axes=ROTARY)
     return Fit(plant=SimpleNamespace(windows=windows), residual=residual, calibration=calibration, actuator=actuator)
@@ -83,6 +84,8 @@ def test_a_single_recording_is_judged_by_its_halves():
         ("hinge_moment", {"stiffness_Nm_rad": -110.0}, "not plausible"),
         ("current_sensor_gain", {"ratio": -0.51}, "not plausible"),
         ("screw_lead_error", {"amplitude_rad": 1e-3, "period_rad": 40.0}, "longer than the travel"),
+        ("torque_saturation", {"saturation_1_A": 0.06}, "not plausible at 15.0 A"),
+        ("torque_saturation", {"saturation_1_A": 0.02}, ""),
         ("hinge_moment", {"stiffness_Nm_rad": 500.0}, ""),
         ("current_sensor_gain", {"ratio": -0.06}, ""),
     ],

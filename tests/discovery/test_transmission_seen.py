@@ -69,7 +69,7 @@ def test_it_needs_both_positions(healthy):
 
 
 def test_nothing_is_adequate_beside_it(monkeypatch):
-    monkeypatch.setattr("ema_model.discovery.verdict.at_floor", lambda data, found: True)
+    monkeypatch.setattr("ema_model.discovery.verdict.within_band", lambda data, found: True)
     monkeypatch.setattr("ema_model.discovery.verdict.lasts", lambda data, found: False)
     found = SimpleNamespace(calibration=SimpleNamespace(converged=True))
     named: Any = object()

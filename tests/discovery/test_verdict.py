@@ -15,7 +15,7 @@ from ema_model.comparison.residuals import Residuals
 from ema_model.comparison.result import SignalError
 from ema_model.comparison.verdict import judge
 from ema_model.discovery import as_dict, begun, result_of
-from ema_model.discovery.objections import ratio
+from ema_model.discovery.model_fit import floor_ratio
 from ema_model.discovery.path import Step, rung_of
 from ema_model.discovery.result import VERDICTS
 from ema_model.discovery.snapshot import known_of
@@ -28,18 +28,18 @@ SURE = ("adequate", "effects_found")
 
 def sharper(story, times: float):
     """The same steps beside sensors so many times finer: as much more is left, in floors."""
-    floors = [
-        replace(
-            one,
-            noise={name: value / times for name, value in one.noise.items()},
-            model={name: values / times for name, values in one.model.items()},
-        )
-        for one in story.data.floors
-    ]
-    data = replace(story.data, floors=floors)
+    floors, after = ([_finer(one, times) for one in some] for some in (story.data.floors, story.data.after_fit))
+    data = replace(story.data, floors=floors, after_fit=after)
     fits = [replace(one.fit, calibration=_counted(one.fit.calibration, times)) for one in story.steps]
     steps = [Step(fit, rung_of(one.rung.change, fit, data, None), one.added) for fit, one in zip(fits, story.steps)]
     return replace(story, data=data, held=None, steps=steps, _calm={})
+
+
+def _finer(floor, times: float):
+    noise, model, left = (
+        {name: part[name] / times for name in part} for part in (floor.noise, floor.model, floor.left)
+    )
+    return replace(floor, noise=noise, model=model, left=left)
 
 
 def _counted(calibration, times: float):
@@ -64,6 +64,10 @@ def lacking():
     bare = replace(story, steps=list(story.steps))
     story.add(story.trial(next(one for one in story.ranked(tuple(CLEAR)))))
     return bare, story
+
+
+def error(data, found):
+    return floor_ratio(data, found.plant, found.calibration.signals)
 
 
 def answers(healthy, lacking):
@@ -116,7 +120,7 @@ def test_the_rungs_of_a_ladder_are_of_one_kind(lacking):
     story = sharper(lacking[1], 4.0)
     story.settle()
     assert story.added and all(story.settled(step.fit) is step.fit for step in story.steps)
-    assert all(step.rung.rmse == pytest.approx(ratio(story.data, step.fit)) for step in story.steps)
+    assert all(step.rung.rmse == pytest.approx(error(story.data, step.fit)) for step in story.steps)
 
 
 def test_a_stop_while_the_rungs_settle_leaves_the_ladder_as_it_was(lacking):

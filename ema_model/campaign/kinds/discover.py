@@ -12,11 +12,11 @@ import pyarrow as pa
 from ema_model.campaign.given import Given
 from ema_model.campaign.kinds.kind import FLAG, NUMBER, NUMBERS, TEXT, TEXTS, Kind
 from ema_model.campaign.showable import showable
+from ema_model.comparison.criteria import BAND
 from ema_model.discovery import as_dict, discover
 from ema_model.errors import InputError, quoted
 
 _LARGEST_GROUP = 3  # of effects that cannot be told apart, with which a name is still an answer
-_AT_FLOOR = 1.1
 _SIGNALS = {"all": None, "current": ["current_A"]}
 
 
@@ -81,7 +81,7 @@ def tally(row: dict[str, Any]) -> Counter[str]:
         "exact": exact,
         "wrong": bool(named) and not right and len(named[0]) == 1,
         "abstained": not named,
-        "floor": exact and max(ends, default=0.0) <= _AT_FLOOR,
+        "floor": exact and max(ends, default=0.0) <= BAND,
     }
     return Counter({name: int(one) for name, one in counts.items()})
 

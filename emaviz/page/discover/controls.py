@@ -9,7 +9,7 @@ import viser
 
 from ema_model.discovery import Candidate
 from ema_model.discovery.labels import effect_title, rung_title
-from ema_model.discovery.snapshot import AT_FLOOR, Look
+from ema_model.discovery.snapshot import Look
 from ema_model.effects import CATALOGUE
 from ema_model.quantities.numbers import number
 from emaviz.page.discover import cards
@@ -207,7 +207,7 @@ class DiscoverPanel:
             return "Analysing the residual and scoring the library's effects …"
         if look.promising:
             return "The bar is the share of the error that it would remove. Click a card to see why, and to add it."
-        if look.assessment.left.explanation is not None and look.rmse > AT_FLOOR:
+        if look.assessment.left.explanation is not None and not look.found.at_floor:
             return "No effect in the library explains the residual: try its curve, or an expression of your own, below."
         return "No effect in the library would reduce the error significantly."
 

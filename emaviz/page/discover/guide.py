@@ -7,7 +7,7 @@ from collections.abc import Callable
 import viser
 
 from ema_model.discovery.labels import effect_title
-from ema_model.discovery.snapshot import AT_FLOOR, Look
+from ema_model.discovery.snapshot import Look
 from ema_model.quantities.numbers import number
 from emaviz.page.page import Page
 from emaviz.session.discover.discovering import Discovering
@@ -45,7 +45,7 @@ def step(look: Look | None, running: bool, opened: str | None, revealed: bool) -
             "Where the two lie together, this is it. Press <b>Add it to the model</b>.",
             name.lower(),
         )
-    if look.rmse > AT_FLOOR:
+    if not look.found.at_floor:
         return 5, Html(
             "The ladder fell, but not to the floor. Take the step back with <b>Undo</b>, or add the next card."
         )

@@ -8,7 +8,7 @@ from typing import Any
 import plotly.graph_objects as go
 import viser
 
-from ema_model.discovery.snapshot import AT_FLOOR, Look
+from ema_model.discovery.snapshot import Look
 from ema_model.discovery.tables import per_recording
 from ema_model.discovery.tracks import Track, tracks
 from ema_model.discovery.words import FLOOR_NOTE, headline, sentences
@@ -173,7 +173,7 @@ class DiscoveryPanel:
 def answer(look: Look) -> Html:
     """The verdict in words, its warnings, and what 1 means."""
     found = look.found
-    done = look.rmse <= AT_FLOOR
+    done = found.at_floor
     if look.assessment is None:
         first, others = sentences(found)[0], ["Analysing the residual …"]
     elif not look.added and look.promising:  # before anything was added, of which a verdict could speak

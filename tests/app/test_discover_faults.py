@@ -50,7 +50,7 @@ def test_start_takes_the_fault_into_the_model(worn):
     assert [rung.change for rung in look.found.ladder] == [Change(), Change("fault", ("k2",))]
     assert look.rmse < 1.1 < look.found.ladder[0].rmse
     assert headline(look.found) == "No physics is missing: the actuator has the fault k2 backlash."
-    assert "k2 backlash" in faults(look.found)["k2"] and "mrad" in faults(look.found)["k2"]
+    assert "k2 backlash" in faults(look.found)["k2"] and "µrad" in faults(look.found)["k2"]
     assert any("k2 backlash" in text for text in sentences(look.found))
     assert COLOURS["good"] in answer(look), "at the floor"
 

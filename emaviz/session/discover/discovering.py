@@ -100,10 +100,14 @@ class Discovering:
             told = self._shown.begin(self.source.recipe(), tell)
             self._stories.forget()
             self._shown.assess(told, tell)
-            while told.take_faults(tell):
-                self._shown.assess(told, tell)
+            self._take_faults(told, tell)
 
         return self.job.begin("Calibrating the model", job)
+
+    def _take_faults(self, told: Telling, tell: Tell) -> None:
+        """After each step, as `emaviz discover` does: a worn actuator is not passed by."""
+        while told.take_faults(tell):
+            self._shown.assess(told, tell)
 
     def add(self, name: str) -> bool:
         """The best of that effect into the model, refitted; then looks again."""
@@ -129,6 +133,7 @@ class Discovering:
             if candidate.name not in CATALOGUE:
                 trial = told.trials.followed(told.story, trial, tell)
             self._shown.take(told, trial, alike, tell)
+            self._take_faults(told, tell)
 
         return self.job.begin(f"Adding {in_sentence(find(candidate.name).title)}", job)
 

@@ -35,13 +35,14 @@ _MEASURED, _MODEL_WIDTH = (2.6, 1.3), 1.3  # ui points: light and broad beneath,
 
 @dataclass(frozen=True)
 class Chart:
-    """A signal's axes: from and to in s and in its unit."""
+    """Axes: across from first to last, and up from low to high, each in its unit."""
 
-    signal: str
-    from_s: float
-    to_s: float
+    unit: str
+    first: float
+    last: float
     low: float
     high: float
+    across: str = "s"
 
     @staticmethod
     def of(signal: str, time_s: ArrayLike, values: ArrayLike) -> Chart:
@@ -49,33 +50,31 @@ class Chart:
         time, y = np.asarray(time_s, dtype=float), np.asarray(values, dtype=float)
         low, high = float(np.min(y)), float(np.max(y))
         air = _AIR * ((high - low) or abs(high) or 1.0)
-        return Chart(signal, float(time[0]), float(time[-1]), low - air, high + air)
+        unit = signal_title(signal).rpartition("[")[2].rstrip("]")
+        return Chart(unit, float(time[0]), float(time[-1]), low - air, high + air)
 
-    def strip(self, time_s: ArrayLike, values: ArrayLike) -> Array:
+    def strip(self, across: ArrayLike, values: ArrayLike) -> Array:
         """A curve's points in the view, (m, 2); what lies beyond the axes is drawn at their edge."""
-        time, y = (np.asarray(one, dtype=float) for one in (time_s, values))
+        x, y = (np.asarray(one, dtype=float) for one in (across, values))
         kept = _peaks(y)
-        x = (time[kept] - self.from_s) / ((self.to_s - self.from_s) or 1.0) * _WIDTH
-        up = (np.clip(y[kept], self.low, self.high) - self.low) / (self.high - self.low)
-        return np.stack([x, (0.5 - up) * _HEIGHT], axis=1)
+        return self._line(x[kept], np.clip(y[kept], self.low, self.high))
 
     def log_axes(self, stream: rr.RecordingStream, root: str) -> None:
         """The grid and its numbers, static."""
-        at, up = round_numbers(self.from_s, self.to_s, _TICKS), round_numbers(self.low, self.high, _TICKS)
+        at, up = round_numbers(self.first, self.last, _TICKS), round_numbers(self.low, self.high, _TICKS)
         lines = [self._line([x, x], [self.low, self.high]) for x in at]
-        lines += [self._line([self.from_s, self.to_s], [y, y]) for y in up]
+        lines += [self._line([self.first, self.last], [y, y]) for y in up]
         grid = rr.LineStrips2D(lines, colors=[_GRID], radii=rr.Radius.ui_points(0.5), draw_order=-1.0)
         stream.log(f"{root}/grid", grid, static=True)
-        unit = signal_title(self.signal).rpartition("[")[2].rstrip("]")
         spots = [(float(line[0][0]), 0.5 * _HEIGHT + 0.08) for line in lines[: len(at)]]
         spots += [(-0.15, float(line[0][1])) for line in lines[len(at) :]]
-        names = [f"{x:.3g} s" for x in at] + [f"{y:.3g} {unit}" for y in up]
+        names = [f"{x:.3g} {self.across}".rstrip() for x in at] + [f"{y:.3g} {self.unit}".rstrip() for y in up]
         ticks = rr.Points2D(spots, labels=names, show_labels=True, colors=[_INK], radii=rr.Radius.ui_points(0.0))
         stream.log(f"{root}/ticks", ticks, static=True)
 
-    def _line(self, x: Sequence[float], y: Sequence[float]) -> Array:
-        across = (np.array(x) - self.from_s) / ((self.to_s - self.from_s) or 1.0) * _WIDTH
-        up = (np.array(y) - self.low) / (self.high - self.low)
+    def _line(self, x: ArrayLike, y: ArrayLike) -> Array:
+        across = (np.asarray(x) - self.first) / ((self.last - self.first) or 1.0) * _WIDTH
+        up = (np.asarray(y) - self.low) / (self.high - self.low)
         return np.stack([across, (0.5 - up) * _HEIGHT], axis=1)
 
 
@@ -85,9 +84,14 @@ def measured(points: Array) -> rr.LineStrips2D:
     return rr.LineStrips2D([points], colors=[colour], radii=rr.Radius.ui_points(_MEASURED[0]), draw_order=0.0)
 
 
-def model(points: Array, colour: Colour) -> rr.LineStrips2D:
-    """A model's curve."""
-    return rr.LineStrips2D([points], colors=[colour], radii=rr.Radius.ui_points(_MODEL_WIDTH), draw_order=1.0)
+def model(points: Array, colour: Colour, width: float = _MODEL_WIDTH) -> rr.LineStrips2D:
+    """A model's curve; width in ui points."""
+    return rr.LineStrips2D([points], colors=[colour], radii=rr.Radius.ui_points(width), draw_order=1.0)
+
+
+def name_at(point: Array, name: str, colour: Colour) -> rr.Points2D:
+    """The name of a curve, beside one of its points (2,)."""
+    return rr.Points2D([point], labels=[name], show_labels=True, colors=[colour], radii=rr.Radius.ui_points(2.0))
 
 
 def model_columns(points: Array, colour: Colour) -> Any:

@@ -1,4 +1,4 @@
-"""The thesis's evaluation as a recording: tables, convergence on `iteration`, responses on `sim_time`."""
+"""The thesis's evaluation as a recording: tables, convergence as static curves, responses on `sim_time`."""
 
 from __future__ import annotations
 
@@ -16,8 +16,9 @@ from ema_model.campaign.thesis.cases import ALGORITHMS, CASES, MULTIPLE, case_of
 from ema_model.campaign.thesis.responses import FAMILIES, SIGNALS, Drawn
 from ema_model.campaign.thesis.result import AS_THE_THESIS
 from ema_model.errors import InputError
-from emaviz.recording import series, style
+from emaviz.recording import dashboard, series, style
 from emaviz.recording.blueprint import plot
+from emaviz.recording.dashboard import Array, Chart
 from emaviz.recording.errors import RecordingError
 from emaviz.recording.markdown import escaped
 from emaviz.recording.style import algorithm_colour, signal_title
@@ -25,7 +26,8 @@ from emaviz.recording.writer import RecordingWriter
 from emaviz.text.reproduce import NAMES, answer, coefficient_table, row_table
 
 ROOT = "/reproduce"
-_PERCENTILES = (("p05", 5.0, 1.0), ("median", 50.0, 2.5), ("p95", 95.0, 1.0))  # with their lines' widths
+_PERCENTILES = (("p05", 5.0, 0.5), ("median", 50.0, 1.5), ("p95", 95.0, 0.5))  # with their lines' widths
+_AIR = 0.1  # of the curves' range, above and below
 _SIGNALS = ("current_A", "user_position_rad", "motor_position_rad", "motor_speed_rad_s")
 _COLOURS = ((16, 152, 173, 255), (47, 111, 222, 255), (156, 54, 181, 255), (214, 51, 108, 255), (240, 140, 0, 255))
 
@@ -62,27 +64,32 @@ class ReproductionWriter(RecordingWriter):
             self._text(f"{ROOT}/tables", "\n\n".join(parts))
 
     def convergence(self, of: Evaluation, case: str) -> None:
-        """Median and band of the best RMSE over the iterations, A, by algorithm."""
-        for name in ALGORITHMS:
-            own = [
-                row["rmse_history_A"]
-                for row in of.of(AS_THE_THESIS)
-                if row["algorithm"] == name and (known := case_of(row["k_true"])) is not None and known.name == case
-            ]
-            if not own:
-                continue
-            length = max(map(len, own))
-            whole = np.array([[*one, *[one[-1]] * (length - len(one))] for one in own])
-            steps = np.arange(length)
-            for what, percentile, width in _PERCENTILES:
-                title = f"{NAMES[name]} {what} [A]"
-                drawn = series.line(title, algorithm_colour(name), width)
-                time = [rr.TimeColumn(style.ITERATION, sequence=steps)]
-                self._plotted(
-                    f"convergence/{case}/{name}/{what}", drawn, time, np.percentile(whole, percentile, axis=0)
-                )
-            if case not in self._searched:
-                self._searched.append(case)
+        """Median and band of the best RMSE over the iterations, log10 of A, by algorithm.
+
+        Static: of the timelines, the one that the file opens on is the responses'.
+        """
+        curves = {name: curve for name in ALGORITHMS if (curve := _percentiles(of, case, name)) is not None}
+        if not curves:
+            return
+        every = np.concatenate([curve.ravel() for curve in curves.values()])
+        last = max(curve.shape[1] for curve in curves.values()) - 1
+        air = _AIR * (float(np.ptp(every)) or 1.0)
+        chart = Chart("", 0.0, last, float(every.min()) - air, float(every.max()) + air, across="")
+        root = f"{ROOT}/convergence/{case}"
+        with self._file.lock:
+            self._searched.append(case)
+            self._file.do(lambda stream: chart.log_axes(stream, f"{root}/axes"))
+            for place, (name, curve) in enumerate(curves.items(), 1):
+                colour = algorithm_colour(name)
+                named = place * last // (len(curves) + 1)  # each at another place: the curves come to lie together
+                there = dashboard.name_at(chart.strip([named], [curve[1, named]])[0], NAMES[name], colour)
+                self._file.do(lambda stream, at=f"{root}/{name}/name", there=there: stream.log(at, there, static=True))
+                for (what, _, width), values in zip(_PERCENTILES, curve):
+                    strip = chart.strip(np.arange(len(values)), values)
+                    drawn = dashboard.model(strip, colour, width)
+                    self._file.do(
+                        lambda stream, at=f"{root}/{name}/{what}", one=drawn: stream.log(at, one, static=True)
+                    )
 
     def responses(self, drawn: Drawn) -> None:
         """Both models, healthy and faulty; the actuator at five severities of each fault."""
@@ -108,7 +115,10 @@ class ReproductionWriter(RecordingWriter):
         if self._searched:
             first = sorted(self._searched, key=lambda case: case != MULTIPLE)
             tabs.append(
-                rrb.Grid(*[plot(_title(case), [f"{ROOT}/convergence/{case}/**"]) for case in first], name="Convergence")
+                rrb.Grid(
+                    *[dashboard.view(_title(case), [f"{ROOT}/convergence/{case}/**"]) for case in first],
+                    name="Convergence (log10 RMSE [A], iterations)",
+                )
             )
         for pair in ("healthy", "faulty"):
             tabs.append(_grid(f"RM and MM, {pair}", f"{ROOT}/models/{pair}", _SIGNALS))
@@ -127,6 +137,20 @@ class ReproductionWriter(RecordingWriter):
             auto_views=False,
             auto_layout=False,
         )
+
+
+def _percentiles(of: Evaluation, case: str, algorithm: str) -> Array | None:
+    """log10 of the best RMSE, A, (percentiles, iterations); None where nothing was searched."""
+    own = [
+        row["rmse_history_A"]
+        for row in of.of(AS_THE_THESIS)
+        if row["algorithm"] == algorithm and (known := case_of(row["k_true"])) is not None and known.name == case
+    ]
+    if not own:
+        return None
+    length = max(map(len, own))
+    whole = np.array([[*one, *[one[-1]] * (length - len(one))] for one in own])
+    return np.log10(np.percentile(whole, [percentile for _, percentile, _ in _PERCENTILES], axis=0))
 
 
 def _grid(title: str, root: str, names: Sequence[str]) -> rrb.Grid:

@@ -60,9 +60,7 @@ def test_it_opens_on_one_dashboard_at_the_last_iteration(written):
 def test_what_was_not_recorded_has_no_view():
     tabs = [
         one.name
-        for one in build(
-            Contents(charts={"current_A": Chart("current_A", 0.0, 1.0, -1.0, 1.0)})
-        ).root_container.contents
+        for one in build(Contents(charts={"current_A": Chart("A", 0.0, 1.0, -1.0, 1.0)})).root_container.contents
     ]
     assert tabs == ["Identification"]
 

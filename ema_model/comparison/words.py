@@ -35,10 +35,19 @@ def verdict(result: Comparison) -> str:
     return "adequate" if result.adequate else "not adequate"
 
 
+def of_floor(result: Comparison) -> str:
+    """'All signals together, the error is 1.02 times the floor; nine of ten true models would leave 0.97 to 1.03.'"""
+    low, high = result.floor_band
+    error = f"All signals together, the error is {number(result.over_floor)} times the floor"
+    return f"{error}; nine of ten true models would leave {low:.2f} to {high:.2f}."
+
+
 def document_of(result: Comparison) -> Document:
     """All that is shown of it in words."""
     notes = [Note(warning) for warning in result.warnings]
-    return Document([Lines(result.sentences), *notes, errors(result), *_recordings(result), *_why(result)])
+    return Document(
+        [Lines([*result.sentences, of_floor(result)]), *notes, errors(result), *_recordings(result), *_why(result)]
+    )
 
 
 def errors(result: Comparison) -> Table:

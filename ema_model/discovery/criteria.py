@@ -12,6 +12,10 @@ TIE = 10.0
 # left (FAR): that rest, whose cause nobody knows, falls a little with the one or the other by chance.
 ALIKE = 0.95
 
+# Of the fall of χ² of an effect, that another must have told to be weighed against it again once more is in the model:
+# of two that are alike, what both leave may fall a little more with the wrong one (the study's pair 9000: 0.998).
+NEAR_AS_MUCH = 0.9
+
 # So many rivals may stand beside an effect; more say that the recordings do not tell which it is (MODEL §6).
 LARGEST_GROUP = 3
 

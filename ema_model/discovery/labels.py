@@ -31,6 +31,9 @@ def rung_title(one: Change, axes: Axes) -> str:
         return f"{_SIGNS[one.kind]} {all_of([effect_title(name) for name in one.names])}{_of_orders(one, axes)}"
     if one.kind == "parameter":
         return f"{on_axes(one.names[0], axes).title} freed"
+    if one.kind == "replaced":
+        before, after = (effect_title(name) for name in one.names)
+        return f"{after} in place of {in_sentence(before)}"
     label = rung_label(one, axes)
     return label[:1].upper() + label[1:]
 
@@ -41,6 +44,8 @@ def rung_label(one: Change, axes: Axes) -> str:
         return f"fault {all_of([BY_NAME[name].label for name in one.names])}"
     if one.kind == "parameter":
         return f"{on_axes(one.names[0], axes).path} outside its tolerance"
+    if one.kind == "replaced":
+        return f"{one.names[1]} in place of {one.names[0]}"
     if one.kind == "without_controller":
         return "calibrated, without the controller"
     if one.kind == "calibrated":

@@ -204,6 +204,36 @@ class Story:
         rung = self._rung(Change("removed", (name,)), smaller)
         self._append(smaller, rung, tuple(one for one in self.added if one.key != key))
 
+    def swap(self, key: str, trial: Trial) -> None:
+        """Takes a trial in the place of an effect, as a step of its own."""
+        place = next(i for i, one in enumerate(self.added) if one.key == key)
+        old, name = self.added[place], trial.candidate.name
+        rung = self._rung(Change("replaced", (old.name, name)), trial.fit)
+        new = Added(
+            name,
+            {},
+            old.rmse_before,
+            rung.rmse,
+            old.holdout_before,
+            rung.holdout_rmse,
+            (),
+            name,
+            of_the_file=name in self.of_the_file,
+        )
+        self._append(trial.fit, rung, (*self.added[:place], new, *self.added[place + 1 :]))
+        compile_behind(trial.fit.actuator)
+
+    def tie(self, key: str, name: str, equal: bool) -> None:
+        """Names another effect beside one of the last model's, as not to be told from it, or no more."""
+        last = self.steps[-1]
+        added = [
+            replace(one, same_as=(*(known for known in one.same_as if known != name), *((name,) if equal else ())))
+            if one.key == key
+            else one
+            for one in last.added
+        ]
+        self.steps[-1] = replace(last, added=tuple(added))
+
     def without(self, key: str, tell: Progress = lambda text: None) -> Fit:
         """The last model without one of its effects, refitted."""
         actuator = without_effect(self.current.actuator, key)

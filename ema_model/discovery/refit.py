@@ -69,7 +69,7 @@ def again(data: Data, current: Fit, trial: Trial, tell: Progress) -> Trial:
 
     Its own way began where the smaller model ended, which may be held there by the start of a recording.
     """
-    best = _better(trial.fit, _refitted(data, current, _settings(trial.fit, trial.effects), _AS_IN_THE_FILE, tell))
+    best = _better(trial.fit, _refitted(data, current, settings_in(trial.fit, trial.effects), _AS_IN_THE_FILE, tell))
     return replace(trial, fit=best, drop=current.chi2 - best.chi2)
 
 
@@ -78,7 +78,7 @@ def _recentred(data: Data, current: Fit, best: Fit, effects: Mapping[str, Mappin
     for _ in range(_RECENTRED):
         if best.chi2 > current.chi2 - LEAST_BIC or not _held_back(best, effects):
             break
-        other = _refitted(data, current, _settings(best, effects), current.starts, tell)
+        other = _refitted(data, current, settings_in(best, effects), current.starts, tell)
         if other.chi2 > best.chi2:
             break
         best = other
@@ -105,7 +105,7 @@ def _sized(
     held = tuple(default_free(current.actuator))
     for _ in range(_RECENTRED):
         found = _refitted(data, current, effects, _AS_IN_THE_FILE, tell, held)
-        effects = _settings(found, effects)
+        effects = settings_in(found, effects)
         if not _held_back(found, effects):
             break
     return effects
@@ -115,7 +115,7 @@ def _better(one: Fit, other: Fit) -> Fit:
     return min(one, other, key=lambda found: found.chi2)
 
 
-def _settings(found: Fit, effects: Iterable[str]) -> dict[str, Mapping[str, float]]:
+def settings_in(found: Fit, effects: Iterable[str]) -> dict[str, Mapping[str, float]]:
     """Of these effects, as a fit found them: a value at its bound may lie beyond by the last bit."""
     settings = {}
     for name in effects:

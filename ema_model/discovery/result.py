@@ -46,7 +46,8 @@ class Change:
     """What a rung's model has beyond the one before.
 
     kind: "calibrated", "without_controller", "fault" (k1 … k8), "effect", "parameter" (its path: freed beyond its
-    tolerance), or "removed"; orders: of a periodic effect that was there already, at others.
+    tolerance), "removed", or "replaced" (an effect, and what came in its place); orders: of a periodic effect that was
+    there already, at others.
     """
 
     kind: str = "calibrated"

@@ -19,6 +19,7 @@ from ema_model.discovery.result import Candidate
 from ema_model.discovery.second_opinion import Opinion, compared, second_opinion, taken_over
 from ema_model.discovery.transmission_seen import transmission_seen
 from ema_model.discovery.unknown import curve_instead, is_a_shape
+from ema_model.discovery.weighed_again import near, weigh_again
 from ema_model.effects import CATALOGUE, find
 
 Progress = Callable[[str], None]
@@ -75,6 +76,7 @@ class _Walk:
         self.story, self._tell, self._names, self._most = story, tell, candidates, most_effects
         self._first: list[Candidate] = []
         self._rivals: list[Trial] = []
+        self._near: dict[str, list[Trial]] = {}  # that told nearly as much as an effect when it was added, by its key
         self._curve: Trial | None = None
         self._going = True
         self._ranked: tuple[Fit, Left, list[Candidate]] | None = None
@@ -99,6 +101,7 @@ class _Walk:
         while self._going:
             self.go()
         story, tell = self.story, self._tell
+        weigh_again(story, self._near, tell)
         drop_idle(story, tell)
         drop_doubtful(story, tell)
         unknown = story.left().explanation
@@ -141,6 +144,7 @@ class _Walk:
         if others and not self._rivals:
             self._rivals = [best, *others]
         story.add(best, ties=[trial.candidate.name for trial in others])
+        self._near[best.candidate.name] = near(best, trials)
         if more:
             story.add(more)
         return True

@@ -118,8 +118,9 @@ def sentences(found: Discovery) -> list[str]:
         bare = found.ladder[-2] if found.curve is not None else last  # a curve is no part of the calibrated model
         held = "" if bare.holdout_rmse is None else f" ({number(bare.holdout_rmse)} times on what was not fitted)"
         told.append(f"The calibrated model's error is {number(bare.rmse)} times the floor{held}.")
-    low, high = found.floor_band
-    told.append(f"Nine of ten true models would leave {low:.2f} to {high:.2f} times the floor.")
+    if found.floor_believable:
+        low, high = found.floor_band
+        told.append(f"Nine of ten true models would leave {low:.2f} to {high:.2f} times the floor.")
     if found.faults:
         told.append(f"{'; '.join(faults(found).values())}. Effects and faults are estimated together.")
     for one in found.effects:

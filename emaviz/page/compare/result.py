@@ -10,7 +10,7 @@ import viser
 
 from ema_model.comparison.regions import worst_moment
 from ema_model.comparison.result import Comparison, Region
-from ema_model.comparison.words import details, errors, errors_by_recording
+from ema_model.comparison.words import details, errors, errors_by_recording, of_floor
 from ema_model.errors import InputError
 from emaviz.figures import mapped_columns
 from emaviz.page.compare import WORKSPACE
@@ -222,7 +222,7 @@ def headline(comparison: Comparison) -> Html:
         "<div {}>{}{}{}</div>",
         _BOX,
         large(first, severity),
-        joined(html("<div>{}</div>", text) for text in others if text not in regions),
+        joined(html("<div>{}</div>", text) for text in [*others, of_floor(comparison)] if text not in regions),
         warned(comparison.warnings),
     )
 

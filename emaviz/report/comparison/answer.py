@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ema_model.comparison.result import Comparison
-from ema_model.comparison.words import verdict
+from ema_model.comparison.words import of_floor, verdict
 from emaviz.report.markup import bullets, escape, paragraph
 from emaviz.report.section import Figures, Section
 
@@ -22,6 +22,6 @@ class Answer(Section[Comparison]):
         return (
             f'<p><span class="verdict {kind}">{escape(told)}</span></p>'
             + paragraph(first, "answer")
-            + "".join(paragraph(sentence) for sentence in others)
+            + "".join(paragraph(sentence) for sentence in [*others, of_floor(subject)])
             + bullets(subject.warnings, "warning")
         )

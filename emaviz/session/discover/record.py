@@ -64,6 +64,8 @@ def _take(story: Story, saved: SavedStep, tell: Tell) -> None:
         story.add(Trial(Candidate(more[0], 0.0, {}), {}, found, story.current.chi2 - found.chi2, more))
     elif len(gone) == 1 and not new:
         story.remove(gone[0], found)
+    elif len(gone) == len(new) == 1:
+        story.swap(gone[0], Trial(Candidate(new[0], 0.0, {}), {new[0]: {}}, found, story.current.chi2 - found.chi2))
     elif new and not gone:
         effects = {key: dict(model.effects[key]) for key in new}
         name = catalogue_name(new[0])

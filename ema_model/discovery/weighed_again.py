@@ -1,0 +1,54 @@
+"""Effects weighed again in the last model, against those that told nearly as much when they were added.
+
+Where two causes share the error, the first is chosen beside all that the second leaves, which falls a little with the
+one or the other of two effects that are alike.  Once both causes are in the model, the data tell them apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+from ema_model.discovery.criteria import NEAR_AS_MUCH, TIE
+from ema_model.discovery.evidence import evidence
+from ema_model.discovery.objections import against
+from ema_model.discovery.path import Story
+from ema_model.discovery.refit import Trial, price, settings_in, tried
+from ema_model.effects import catalogue_name
+
+Progress = Callable[[str], None]
+
+_MOST = 2  # rivals of an effect
+
+
+def near(best: Trial, trials: Sequence[Trial]) -> list[Trial]:
+    """Those of one step that told nearly as much as the one that was added."""
+    others = [one for one in trials if one.candidate.name != best.candidate.name and not one.faults]
+    return [one for one in others if one.drop > NEAR_AS_MUCH * best.drop][:_MOST]
+
+
+def weigh_again(story: Story, rivals: Mapping[str, Sequence[Trial]], tell: Progress) -> None:
+    """Puts a rival in the place of an effect that it outdoes now; names it beside one that it equals, and no other.
+
+    rivals: by the effect's key, as of `near`.  The last effect was weighed against its own in this very model.
+    """
+    for one in story.added[:-1]:
+        orders = [other for other in story.added if catalogue_name(other.key) == catalogue_name(one.key)]
+        present = story.current.actuator.effects
+        new = [rival for rival in rivals.get(one.key, ()) if rival.candidate.name not in present]
+        if not new or len(orders) > 1:
+            continue
+        smaller = story.without(one.key, tell)
+        for rival in new:
+            name = rival.candidate.name
+            tell(f"weighing {name} against {one.name} again")
+            trial = tried(story.data, smaller, rival.candidate, settings_in(rival.fit, rival.effects), tell)
+            own = price(story.data, smaller, replace(trial, effects={one.name: {}}))
+            more = price(story.data, smaller, trial) - own
+            if evidence(story.data, story.current, trial.fit) - more > TIE:
+                if not against(story.data, smaller, trial.fit, [name], lambda fit: story.settled(fit, tell)):
+                    story.swap(one.key, trial)
+                    break
+            else:
+                equal = evidence(story.data, trial.fit, story.current) + more < TIE
+                story.tie(one.key, name, equal)

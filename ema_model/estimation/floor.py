@@ -42,10 +42,13 @@ class Floor:
     block_s: float
     white: frozenset[str] = frozenset()  # signals whose model error does not last while the motor moves
     left: Mapping[str, Array] = field(default_factory=dict)  # of `model`, that a fit does not take up, (blocks,) each
+    beating: Mapping[str, Array] = field(default_factory=dict)  # of quantisation, (blocks,); told once it was fitted
 
     def sigma(self, signal: str) -> Array:
         """Both together, (blocks,); once fitted, what a true model leaves: `left` in place of `model`."""
-        return np.hypot(self.noise[signal], self.left.get(signal, self.model[signal]))
+        if signal not in self.left:
+            return np.hypot(self.noise[signal], self.model[signal])
+        return np.hypot(np.hypot(self.noise[signal], self.beating.get(signal, 0.0)), self.left[signal])
 
     def fit_sigma(self, signal: str) -> Array:
         """What to weight a fit by: the correlated part counts as often as it repeats, (blocks,)."""
@@ -86,7 +89,7 @@ def floor(
         jump = late[name] / np.sqrt(12.0) if late else 0.0  # anywhere within the sample
         own = np.hypot(np.hypot(lasting, jump), window.lasting.get(name, 0.0))
         slow[name] = np.hypot(own, given.get(name, {}).get("accuracy", 0.0))
-    return Floor(noise, slow, repeats_of(window, noise), window.block_s)
+    return Floor(noise, slow, repeats_of(window, noise), window.block_s, beating=window.beating)
 
 
 def local_rms(values: Array, block_s: float) -> Array:

@@ -11,7 +11,8 @@ from ema_model.actuator import Actuator
 from ema_model.commands.recorded import between
 from ema_model.errors import InputError, quoted
 from ema_model.models.model import Window
-from ema_model.recordings import Measurement
+from ema_model.recordings import SIGNALS, Measurement
+from ema_model.recordings.noise import beating
 from ema_model.simulation.pack import integral_at_start
 from ema_model.simulation.run import steps_per_sample
 
@@ -125,6 +126,11 @@ def cut(
                 current_A=current,
                 begins_s=float(measurement.time_s[run.start] - measurement.time_s[0]),
                 values=values,
+                beating={
+                    name: beating(measurement[name][compared], samples)
+                    for name in known
+                    if name in measurement and SIGNALS[name].kind == "position"
+                },
             )
         )
     if not windows:

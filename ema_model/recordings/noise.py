@@ -7,6 +7,7 @@ from math import comb
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import binary_opening
 
 from ema_model.quantities.signals import SIGNALS
 
@@ -19,6 +20,10 @@ _FINEST = {"position": 1e-9, "speed": 1e-6, "current": 1e-6, "torque": 1e-8}
 _ORDERS = range(3, 9)  # of the differences: a smooth motion has no third ones, but where it is sampled slowly
 _LEVEL = 0.98  # of an order's noise, that the next order's must reach: noise is white, and motion is not
 _PIECE, _SLOW = 64, 0.25  # samples, and the share of such pieces in which a signal moves slowly
+_ROUNDING, _ON_GRID = 1e-12, 0.01  # of a value, and of a grid's step
+_BEAT = 0.25  # of a beat, that a mean spans
+_LASTS = 50  # means, over which a pace stays whole
+_AROUND = 2  # means on either side, over which a pace is told
 _NEAR, _WITHIN = 3.0, 0.9866  # standard deviations, and the rms of a normal distribution's values within them
 
 
@@ -31,7 +36,7 @@ def sample_noise(values: Array, signal: str) -> float:
     counted in.
     """
     steps = np.abs(np.diff(values))
-    steps = steps[steps > 1e-12 * (1.0 + np.max(np.abs(values)))]
+    steps = steps[steps > _ROUNDING * (1.0 + np.max(np.abs(values)))]
     step = float(np.min(steps)) if len(steps) else 0.0
     repeated = len(steps) < 0.9 * (len(values) - 1)  # held values are the mark of quantisation
     if not repeated:
@@ -39,6 +44,34 @@ def sample_noise(values: Array, signal: str) -> float:
     pieces = np.array_split(values, max(1, len(values) // _PIECE))
     slow = float(np.quantile([white_noise(one) for one in pieces], _SLOW))
     return max(slow, step / np.sqrt(12.0), least_noise(signal))
+
+
+def beating(values: Array, size: int) -> Array:
+    """What quantisation leaves in means over size samples beyond s/√(12 size), rms, (means,).
+
+    A signal that goes on by a whole number of steps a sample is off by the same in each, which no mean takes away: at
+    a pace of p steps it beats every 1/|p − round(p)| samples.  0 where the pace changes, and without a grid.
+    """
+    means = values[: len(values) // size * size].reshape(-1, size).mean(axis=1)
+    step = _step(values)
+    if step == 0.0 or len(means) <= 2 * _AROUND:
+        return np.zeros(len(means))
+    around = 2 * _AROUND + 1
+    smooth = np.convolve(np.pad(means, _AROUND, mode="edge"), np.full(around, 1.0 / around), "valid")
+    pace = np.abs(np.gradient(smooth)) / (size * step)
+    whole = (np.round(pace) >= 1.0) & (size * np.abs(pace - np.round(pace)) < _BEAT)
+    lasts = binary_opening(whole, np.ones(_LASTS, dtype=bool))
+    return np.where(lasts, step * np.sqrt((1.0 - 1.0 / size) / 12.0), 0.0)
+
+
+def _step(values: Array) -> float:
+    """The step of a grid on which values lie, that all their differences are multiples of; 0 where there is none."""
+    steps = np.diff(values)
+    changes = np.abs(np.diff(steps))
+    changes = changes[changes > _ROUNDING * (1.0 + np.max(np.abs(values)))]
+    step = float(np.min(changes, initial=np.inf))
+    multiples = steps / step
+    return step if np.all(np.abs(multiples - np.round(multiples)) < _ON_GRID) and np.isfinite(step) else 0.0
 
 
 def least_noise(signal: str) -> float:

@@ -17,6 +17,7 @@ from emaviz.page.identify import WORKSPACE
 from emaviz.page.identify.result import IdentifyResult
 from emaviz.page.job_line import JobLine
 from emaviz.page.page import Page
+from emaviz.page.style import IN_PAIRS
 from emaviz.recording.viewer import ViewerHost
 from emaviz.session.compare.comparing import Comparing
 from emaviz.session.described import limits
@@ -49,13 +50,14 @@ class IdentifyPanel:
             "Identify", (PLANT,), hint="The sliders' plant, whose faults are known, or a measurement of the data folder"
         )
         with gui.add_folder("Algorithms, one or several at once"):
+            add_html(gui, IN_PAIRS)
             self._ticks = {
                 name: gui.add_checkbox(title, name in settings.algorithms) for name, title in ALGORITHMS.items()
             }
-        self._population = gui.add_number("Population", settings.population, **of("population"), step=1)
-        self._iterations = gui.add_number("Iterations", settings.iterations, **of("iterations"), step=1)
-        self._fitness: Any = gui.add_dropdown("Fitness", FITNESSES, initial_value=settings.fitness)
-        self._seed = gui.add_number("Seed", settings.seed, min=0, step=1)  # a maximum would be put in silently
+            self._population = gui.add_number("Population", settings.population, **of("population"), step=1)
+            self._iterations = gui.add_number("Iterations", settings.iterations, **of("iterations"), step=1)
+            self._fitness: Any = gui.add_dropdown("Fitness", FITNESSES, initial_value=settings.fitness)
+            self._seed = gui.add_number("Seed", settings.seed, min=0, step=1)  # a maximum would be put in silently
         for entry, name in (
             (self._population, "population"),
             (self._iterations, "iterations"),

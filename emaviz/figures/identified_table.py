@@ -56,8 +56,8 @@ def table(rows: Sequence[Row]) -> Html:
     return html(
         '<div style="padding:4px 10px;font-size:12.5px;font-variant-numeric:tabular-nums">'
         '<table style="width:100%;border-collapse:collapse"><tr>{}</tr>{}</table>'
-        '<div style="font-size:11px;opacity:.7;padding-top:8px">Err: T 5.2, where the truth is known. Time: of the '
-        "optimiser alone. PC: the performance coefficient of the thesis (T 5.4), 100 (1 − Err·t / Σ Err·t) over the "
+        '<div style="font-size:11px;opacity:.7;padding-top:8px">Err: the thesis’s equation 5.2, if the truth is known. '
+        "Time: of the optimiser alone. PC: its performance coefficient, 5.4, 100 (1 − Err·t / Σ Err·t) over the "
         "optimisers of one race; higher is better.</div></div>",
         head,
         joined(body),

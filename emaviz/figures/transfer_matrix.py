@@ -50,6 +50,6 @@ def figure(result: UnitsCompared, *, dark: bool = False) -> go.Figure:
             colorbar={"thickness": 10, "title": {"text": "× own model's error", "side": "right", "font": {"size": 11}}},
         )
     )
-    chart.update_yaxes(autorange="reversed", nticks=0, title={"standoff": 12})
-    chart.update_xaxes(nticks=0)
+    chart.update_yaxes(autorange="reversed", nticks=0, showgrid=False, title={"standoff": 12})
+    chart.update_xaxes(nticks=0, showgrid=False)
     return chart

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ema_model.identification.run import algorithm_title
-from emaviz.figures.convergence import colour
+from emaviz.figures.convergence import named
 from emaviz.text.html import Html, html, joined
 
 _MISSING = "–"
@@ -65,7 +64,6 @@ def table(rows: Sequence[Row]) -> Html:
 
 
 def _row(row: Row) -> Html:
-    name = html('<b style="color:{}">{}</b>', colour(row.algorithm), algorithm_title(row.algorithm))
     cells = (
         _MISSING if row.error_percent is None else f"{row.error_percent:.2f}",
         f"{row.rmse_A:.4f}",
@@ -75,5 +73,8 @@ def _row(row: Row) -> Html:
     )
     stopped = " (stopped)" if row.stopped else ""
     return html(
-        "<tr><td>{}{}</td>{}</tr>", name, stopped, joined(html("<td {}>{}</td>", _NUMBER, cell) for cell in cells)
+        "<tr><td>{}{}</td>{}</tr>",
+        named(row.algorithm),
+        stopped,
+        joined(html("<td {}>{}</td>", _NUMBER, cell) for cell in cells),
     )

@@ -117,11 +117,11 @@ def figures(dark: bool) -> Html:
     """Text, grids and hover labels of figures that were drawn for a light page, legible on a dark one."""
     if not dark:
         return Html()
-    of = ".js-plotly-plot"
+    of, seen = ".js-plotly-plot", "stroke-opacity:1!important"
     return unescaped(
         f"<style>{of} .main-svg text{{fill:{DARK.ink}!important}}.u-title{{color:{DARK.ink}}}"
-        f"{of} .gridlayer path,{of} .angular-grid path,{of} .radial-grid path{{stroke:{DARK.grid}!important}}"
-        f"{of} .zerolinelayer path,{of} path.ticks{{stroke:{DARK.zero}!important}}"
+        f"{of} :is(.gridlayer,.angular-grid,.radial-grid) path{{stroke:{DARK.grid}!important;{seen}}}"
+        f"{of} :is(.zerolinelayer path,path.ticks){{stroke:{DARK.zero}!important;{seen}}}"
         f"{of} .hoverlayer .hovertext path{{fill:{DARK.paper}!important}}"
         ".mantine-Paper-root>.mantine-ActionIcon-root{background:rgba(0,0,0,.4)!important}</style>"
     )

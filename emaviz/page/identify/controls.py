@@ -9,10 +9,10 @@ from typing import Any
 
 import viser
 
-from ema_model.identification.run import ALGORITHMS, algorithm_title
+from ema_model.identification.run import ALGORITHMS
 from ema_model.identification.words import facts, verdict, why_best
 from ema_model.simulation.plant import FITNESSES
-from emaviz.figures.convergence import colour
+from emaviz.figures.convergence import named
 from emaviz.page.identify import WORKSPACE
 from emaviz.page.identify.result import IdentifyResult
 from emaviz.page.job_line import JobLine
@@ -26,6 +26,7 @@ from emaviz.session.settings import SLIDERS, Settings
 from emaviz.text.html import Html, add_html, html, joined
 
 PLANT = "The plant of Explore's sliders"
+_WHY = '<details style="opacity:.75"><summary style="cursor:pointer">★ why it is the best</summary>{}</details>'
 
 
 class IdentifyPanel:
@@ -177,7 +178,7 @@ class IdentifyPanel:
                 at = "done"
             elif track.fitting is not None:
                 at = f"searched; {track.fitting[0]}"
-            lines.append(_line(html("{} · {} · rmse {:.4f} A", _title(name), at, track.rmse[-1])))
+            lines.append(_line(html("{} · {} · rmse {:.4f} A", named(name), at, track.rmse[-1])))
         if race.growing is not None and race is not self._race:
             self._link.content = recording_link(self._viewer, race.growing, "Watch it live ↗")
             self._watch.visible = self._viewer is not None
@@ -190,10 +191,10 @@ class IdentifyPanel:
         for answer in race.answers:
             star = "★ " if best is not None and len(race.tracks) > 1 and answer is best.answer else ""
             told = [*facts(answer), *([verdict(answer)] if len(race.tracks) > 1 else [])]
-            lines.append(_line(html("{}{} · {}", star, _title(answer.algorithm), " · ".join(told))))
+            lines.append(_line(html("{}{} · {}", star, named(answer.algorithm), " · ".join(told))))
         if best is not None and best.answer is not None and len(race.answers) > 1:
             others = [answer for answer in race.answers if answer is not best.answer]
-            lines.append(_line(html('<span style="opacity:.75">★ {}</span>', why_best(best.answer, others))))
+            lines.append(_line(html(_WHY, why_best(best.answer, others))))
         self._text.content = joined(lines)
         self._race = race
         self._missing.visible = best is not None and best.answer is not None and not best.answer.uncertainty.adequate
@@ -212,10 +213,6 @@ def recording_link(viewer: ViewerHost | None, path: Path, text: str = "") -> Htm
         viewer.url_of(path.name),
         text or f"Open {path.name} in Rerun ↗",
     )
-
-
-def _title(name: str) -> Html:
-    return html('<b style="color:{}">{}</b>', colour(name), algorithm_title(name))
 
 
 def _line(inner: str) -> Html:

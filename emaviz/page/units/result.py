@@ -45,7 +45,7 @@ class UnitsResult:
             add_html(gui, NEXT_COLUMN)
             self._transfer: Any = gui.add_plotly(go.Figure(), config=_CONFIG, aspect=0.6)
         self._seal = Seal(page, comparing.practice, lambda: comparing.chosen, lambda: comparing.found)
-        self._words = gui.add_folder("All results in numbers", visible=False)
+        self._words = gui.add_folder("All results in numbers", visible=False, expand_by_default=False)
         with self._words:
             self._document = add_html(gui)
         self._save = gui.add_folder("Keep it", visible=False)

@@ -227,7 +227,7 @@ def test_recordings_are_opened_compared_renamed_and_deleted(watched, app):
 
     page.get_by_role("button", name="Overlay both runs").click()
     page.get_by_role("tab", name="Two runs").click()
-    page.locator(".js-plotly-plot").first.wait_for(timeout=60_000)
+    page.locator(".js-plotly-plot:visible").first.wait_for(timeout=60_000)
     page.get_by_text("k2 backlash").last.wait_for()
 
     page.get_by_role("tab", name="Rerun").click()

@@ -200,7 +200,7 @@ class IdentifyPanel:
         self._missing.visible = best is not None and best.answer is not None and not best.answer.uncertainty.adequate
         self._result.finished(race)
         if race.path is not None:
-            self._link.content = recording_link(self._viewer, race.path)
+            self._link.content = recording_link(self._viewer, race.path, "Open this run in Rerun ↗")
 
 
 def recording_link(viewer: ViewerHost | None, path: Path, text: str = "") -> Html:

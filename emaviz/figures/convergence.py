@@ -11,7 +11,7 @@ import viser
 from ema_model.identification.run import algorithm_title
 from emaviz.colours import ALGORITHMS, MONITOR
 from emaviz.figures.signals import AXIS, PADDING, legend
-from emaviz.text.html import add_html
+from emaviz.text.html import Html, add_html, html
 
 _LEAST_A = 1e-9  # a logarithmic axis has no zero
 
@@ -58,6 +58,11 @@ class LiveConvergence:
 def colour(algorithm: str) -> str:
     """The algorithm's own colour; the monitor's for one without."""
     return ALGORITHMS.get(algorithm, MONITOR)
+
+
+def named(algorithm: str) -> Html:
+    """The algorithm's name behind a mark of its colour, in which text would be hard to read on dark or on light."""
+    return html('<span style="color:{}">●</span> <b>{}</b>', colour(algorithm), algorithm_title(algorithm))
 
 
 def _to_length(rmse: Sequence[float], count: int) -> np.ndarray:

@@ -41,7 +41,8 @@ def figure(
                 name=MODULATORS[modulator].title,
                 legendrank=list(MODULATORS).index(modulator),
                 marker={
-                    "color": theme.MODULATORS[modulator],
+                    "color": theme.RESIDUAL,
+                    "pattern": {"shape": theme.HATCHES[modulator], "size": 5},
                     "opacity": [1.0 if e.significant else _PALE for e in shown],
                 },
                 customdata=[theme.plain(e.sentence) for e in shown],

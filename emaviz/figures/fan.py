@@ -11,12 +11,12 @@ import viser
 from ema_model.quantities.axes import Axes
 from ema_model.recordings import Measurement
 from emaviz.colours import COMMAND
+from emaviz.colours import MONITOR_SHADES as SHADES
 from emaviz.figures.decimate import envelope
 from emaviz.figures.signal_charts import charts
 from emaviz.figures.signals import CURSOR, LAST_MORE_PX, PADDING, POINTS, legend, time_axis, value_axis
 from emaviz.text.html import add_html
 
-SHADES = ("#fcc487", "#f59f4a", "#ea7317", "#c94f0a", "#a13a06")  # the model's colour, ever darker
 _SHOWN = ("current_A", "user_position_rad", "motor_speed_rad_s")
 
 

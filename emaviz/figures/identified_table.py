@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ema_model.identification.run import algorithm_title
-from emaviz.figures.convergence import colour
+from emaviz.figures.convergence import named
 from emaviz.text.html import Html, html, joined
 
 _MISSING = "–"
@@ -56,8 +55,8 @@ def table(rows: Sequence[Row]) -> Html:
     return html(
         '<div style="padding:4px 10px;font-size:12.5px;font-variant-numeric:tabular-nums">'
         '<table style="width:100%;border-collapse:collapse"><tr>{}</tr>{}</table>'
-        '<div style="font-size:11px;opacity:.7;padding-top:8px">Err: T 5.2, where the truth is known. Time: of the '
-        "optimiser alone. PC: the performance coefficient of the thesis (T 5.4), 100 (1 − Err·t / Σ Err·t) over the "
+        '<div style="font-size:11px;opacity:.7;padding-top:8px">Err: the thesis’s equation 5.2, if the truth is known. '
+        "Time: of the optimiser alone. PC: its performance coefficient, 5.4, 100 (1 − Err·t / Σ Err·t) over the "
         "optimisers of one race; higher is better.</div></div>",
         head,
         joined(body),
@@ -65,7 +64,6 @@ def table(rows: Sequence[Row]) -> Html:
 
 
 def _row(row: Row) -> Html:
-    name = html('<b style="color:{}">{}</b>', colour(row.algorithm), algorithm_title(row.algorithm))
     cells = (
         _MISSING if row.error_percent is None else f"{row.error_percent:.2f}",
         f"{row.rmse_A:.4f}",
@@ -75,5 +73,8 @@ def _row(row: Row) -> Html:
     )
     stopped = " (stopped)" if row.stopped else ""
     return html(
-        "<tr><td>{}{}</td>{}</tr>", name, stopped, joined(html("<td {}>{}</td>", _NUMBER, cell) for cell in cells)
+        "<tr><td>{}{}</td>{}</tr>",
+        named(row.algorithm),
+        stopped,
+        joined(html("<td {}>{}</td>", _NUMBER, cell) for cell in cells),
     )

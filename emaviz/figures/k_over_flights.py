@@ -31,7 +31,7 @@ def figure(
     it was known then, and the ends of its 90 % interval.
     """
     one = result.faults[name]
-    chart = theme.new(BY_NAME[name].label, "Flight", name, dark=dark)
+    chart = theme.new(BY_NAME[name].label, "Flight", f"{name} [-]", dark=dark)
     chart.update_layout(meta=CLICKED)
     at = [i for i, flight in enumerate(result.flights, 1) if not flight.excluded]
     if levels:

@@ -14,7 +14,7 @@ _BAND = "rgba(240,140,0,0.22)"
 
 def figure(history: History, name: str, number: int, *, dark: bool = False) -> go.Figure:
     """Of one k, by flight; number: of the flight of today, which is marked."""
-    title = f"Remaining life of {BY_NAME[name].label}, as predicted"
+    title = f"Predicted flights left, {BY_NAME[name].label}"
     left = {n: look.faults[name].remaining for n, look in history.looks.items()}
     runs = _runs([(n, one) for n, one in left.items() if one is not None])
     if not runs:

@@ -11,12 +11,12 @@ from emaviz.figures import theme
 
 _POINTS = 400
 _ROOM = 0.15  # of the axis, that a label left of its point needs
-_TITLE = "Probability of crossing within the next flights"
+_TITLE = "Probability that the threshold is reached"
 
 
 def figure(left: Remaining, *, came: int | None = None, dark: bool = False) -> go.Figure:
     """Its cumulative distribution, with 5, 50 and 95 %; came: after how many flights it was crossed, where known."""
-    chart = theme.new(_TITLE, "Flights from now", "Probability", dark=dark)
+    chart = theme.new(_TITLE, "Flights from now", "Probability [-]", dark=dark)
     x = np.linspace(0.0, max(1.0, 1.6 * left.p95, 1.1 * (came or 0.0)), _POINTS)
     y = [left.within(one) for one in x]
     chart.add_trace(go.Scatter(x=x, y=y, mode="lines", line={"color": MONITOR, "width": 2}, showlegend=False))

@@ -8,6 +8,7 @@ import plotly.graph_objects as go
 from ema_model.comparison.result import Comparison, Region
 from ema_model.estimation.floor import BAND_SIGMAS
 from ema_model.quantities.numbers import Quantity
+from emaviz.colours import BACKWARD, FORWARD
 from emaviz.figures import floor_band, quantity, theme
 from emaviz.figures.binned import Binned, binned, edges_for
 from emaviz.figures.lines import scattered
@@ -59,7 +60,7 @@ def figure(
     if by_direction is None:
         by_direction = _best_modulator(comparison, variable, signal) == "sign_speed"
     if by_direction:
-        for sign, name, colour in ((1, "mean, forward", theme.FORWARD), (-1, "mean, backward", theme.BACKWARD)):
+        for sign, name, colour in ((1, "mean, forward", FORWARD), (-1, "mean, backward", BACKWARD)):
             moving = known & (residuals.direction == sign)
             if np.count_nonzero(moving) >= _FEWEST:
                 _mean(

@@ -1,4 +1,4 @@
-"""One signal of several runs over time, the runs from light to dark in their order."""
+"""One signal of several runs of the reference model over time, from light to dark in their order."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import plotly.graph_objects as go
 from ema_model.quantities.axes import ROTARY, Axes
 from ema_model.quantities.shown import of_signal
 from ema_model.recordings import Measurement
+from emaviz.colours import REFERENCE_SHADES
 from emaviz.figures import theme
 from emaviz.figures.lines import line
 
 _POINTS = 700
-_COLOURS = ("#1098ad", "#2f6fde", "#9c36b5", "#d6336c", "#f08c00")  # apart on light and on dark
 
 
 def figure(
@@ -39,7 +39,7 @@ def figure(
     for i, (name, one) in enumerate(runs.items()):
         time, values = _inside(one, signal, window_s)
         x, y = line(time, shown.factor * values, _POINTS)
-        drawn = {"color": _COLOURS[i % len(_COLOURS)], "width": 1.2}
+        drawn = {"color": REFERENCE_SHADES[i % len(REFERENCE_SHADES)], "width": 1.2}
         chart.add_trace(
             go.Scatter(x=x, y=y, mode="lines", name=theme.plain(name), line=drawn, hovertemplate="%{y:.4g}")
         )

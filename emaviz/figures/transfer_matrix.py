@@ -47,9 +47,9 @@ def figure(result: UnitsCompared, *, dark: bool = False) -> go.Figure:
             textfont={"color": (theme.DARK if dark else theme.LIGHT).ink},
             xgap=1,
             ygap=1,
-            colorbar={"thickness": 10, "title": {"text": "× own", "font": {"size": 11}}},
+            colorbar={"thickness": 10, "title": {"text": "× own model's error", "side": "right", "font": {"size": 11}}},
         )
     )
-    chart.update_yaxes(autorange="reversed", nticks=0, title={"standoff": 12})
-    chart.update_xaxes(nticks=0)
+    chart.update_yaxes(autorange="reversed", nticks=0, showgrid=False, title={"standoff": 12})
+    chart.update_xaxes(nticks=0, showgrid=False)
     return chart

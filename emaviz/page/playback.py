@@ -37,13 +37,14 @@ class Looks(msgspec.Struct, frozen=True):
 class PlaybackStrip:
     """One strip for all workspaces: it shows the clock of the one that was used last.
 
-    theme(dark) sets the page's.  moves: called with the reel's name, the moment and from–to, s of the recording's own
-    time, on the screen's thread.
+    theme(dark) sets the page's, of which `themed` tells.  moves: called with the reel's name, the moment and from–to, s
+    of the recording's own time, on the screen's thread.
     """
 
     def __init__(self, page: Page, scene: ActuatorScene, actuator: Actuator, theme: Callable[[bool], None]) -> None:
         self._page, self._scene, self._theme = page, scene, theme
         self._span_s = (0.0, 0.5)
+        self.themed: Signal[[bool]] = Signal()
         self.moves: Signal[[str, float, tuple[float, float]]] = Signal()
         self.playback = Playback(scene, actuator, self._moved)
         gui, usual = page.server.gui, Looks()
@@ -169,3 +170,4 @@ class PlaybackStrip:
         dark = bool(self._dark.value)
         self._theme(dark)
         self._figures.content = figures(dark)
+        self.themed(dark)

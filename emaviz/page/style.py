@@ -15,6 +15,7 @@ from emaviz.text.html import Html, html, unescaped
 STRIP = Html('<div class="emaviz-strip"></div>')  # stands in the panel that becomes the strip
 TIME_CHARTS = Html('<div class="emaviz-time"></div>')  # stands beside charts over time
 LONG_LABELS = Html('<div class="emaviz-long"></div>')  # stands beside controls with long labels
+IN_PAIRS = Html('<div class="emaviz-pairs"></div>')  # stands before short controls, two of which share a line
 # stands before the upload button that takes dropped files, which is not to be seen
 WIDE_MODAL = Html("<style>.mantine-Modal-root{--modal-size:min(960px,92vw)!important}</style>")
 STRIP_HEIGHT_PX = 68
@@ -45,6 +46,11 @@ def page() -> Html:
         # what stands last in a panel ends above its edge
         "[data-dock-region=right] .mantine-ScrollArea-viewport{padding-bottom:14px}"
         f"div:has(> div > .emaviz-long) {_LABEL}{{width:11.6em!important}}"
+        "div:has(> div > .emaviz-pairs){display:grid;grid-template-columns:1fr 1fr}"
+        "div:has(> .emaviz-pairs){display:none!important}"
+        f"div:has(> div > .emaviz-pairs) {_LABEL}{{width:5.6em!important}}"
+        f"div:has(> div > .emaviz-pairs) > div:has(input[type=checkbox]) > .mantine-Flex-root > div:first-child"
+        "{width:8.4em!important}"
         "</style>"
     )
     return rules + _strip() + inset.style() + chart_heights.style()
@@ -108,10 +114,14 @@ def play_head(share: float | None) -> Html:
 
 
 def figures(dark: bool) -> Html:
-    """Text of figures that were drawn for a light page, legible on a dark one."""
+    """Text, grids and hover labels of figures that were drawn for a light page, legible on a dark one."""
     if not dark:
         return Html()
+    of, seen = ".js-plotly-plot", "stroke-opacity:1!important"
     return unescaped(
-        f"<style>.js-plotly-plot .main-svg text{{fill:{DARK.ink}!important}}.u-title{{color:{DARK.ink}}}"
+        f"<style>{of} .main-svg text{{fill:{DARK.ink}!important}}.u-title{{color:{DARK.ink}}}"
+        f"{of} :is(.gridlayer,.angular-grid,.radial-grid) path{{stroke:{DARK.grid}!important;{seen}}}"
+        f"{of} :is(.zerolinelayer path,path.ticks){{stroke:{DARK.zero}!important;{seen}}}"
+        f"{of} .hoverlayer .hovertext path{{fill:{DARK.paper}!important}}"
         ".mantine-Paper-root>.mantine-ActionIcon-root{background:rgba(0,0,0,.4)!important}</style>"
     )

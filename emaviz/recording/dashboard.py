@@ -28,8 +28,7 @@ POINTS = 600  # of a curve, about
 _WIDTH, _HEIGHT = 2.3, 1.0  # as wide as a dashboard's views
 _TICKS = 5.0  # of an axis, about
 _AIR = 0.08  # of the range, above and below
-_GRID, _INK = [215, 215, 215], [90, 90, 90]
-_BACKGROUND = [255, 255, 255]
+_GRID, _INK = [134, 142, 150, 90], [134, 142, 150]  # legible on the viewer's own background, light or dark
 _MEASURED, _MODEL_WIDTH = (2.6, 1.3), 1.3  # ui points: light and broad beneath, as in the app
 
 
@@ -112,7 +111,7 @@ def axes_path(signal: str) -> str:
 def view(title: str, paths: Sequence[str]) -> rrb.Spatial2DView:
     """Entities of one signal in one picture."""
     bounds = rrb.VisualBounds2D(x_range=(-0.3, _WIDTH + 0.08), y_range=(-0.58, 0.7))
-    return rrb.Spatial2DView(origin="/", contents=list(paths), name=title, background=_BACKGROUND, visual_bounds=bounds)
+    return rrb.Spatial2DView(origin="/", contents=list(paths), name=title, visual_bounds=bounds)
 
 
 def _peaks(values: Array) -> NDArray[np.intp]:

@@ -39,7 +39,7 @@ GROUP_COLOURS: dict[str, Colour] = {
     "monitor": _rgba(colours.MONITOR),
     "measurement": _rgba(colours.REFERENCE, 150),
     "residual": _rgba(colours.DIFFERENCE),
-    "initial": _rgba(colours.TRUTH, 160),
+    "initial": _rgba(colours.COMMAND, 160),
     "floor_high": _rgba(colours.COMMAND),
     "floor_low": _rgba(colours.COMMAND),
 }
@@ -85,7 +85,7 @@ def signal_colour(group: str, name: str) -> Colour:
 def iteration_colour(index: int) -> Colour:
     """From grey to the monitor's colour as the iterations go by (150 is usual)."""
     share = min(index / 150.0, 1.0) ** 0.5
-    start, end = np.array(GROUP_COLOURS["measurement"]), np.array(GROUP_COLOURS["monitor"])
+    start, end = np.array(POPULATION_COLOUR), np.array(GROUP_COLOURS["monitor"])
     red, green, blue, alpha = (start + share * (end - start)).astype(int).tolist()
     return red, green, blue, alpha
 

@@ -260,3 +260,21 @@ def test_the_answer_is_said_once_and_comes_forward(shared_page, app):
         "an eccentricity that is not seen has no direction"
     )
     settings.restore(Settings().saved())
+
+
+@pytest.mark.browser
+def test_the_answers_of_a_race_are_seen_above_the_actuator(shared_page, app):
+    page, settings = shared_page, app.session.settings
+    settings.restore({**Settings().saved(), "algorithms": list(ALGORITHMS), "population": 20, "iterations": 5})
+    page.get_by_role("tab", name="Identify", exact=True).click()
+    page.get_by_role("button", name="Identify", exact=True).click()
+    page.get_by_text("why it is the best").wait_for(timeout=120_000)
+    page.get_by_role("link", name="in Rerun").wait_for()
+    left = page.locator("[data-dock-region=left]")
+    ends = left.bounding_box()["y"] + left.bounding_box()["height"]  # where the actuator begins
+    for title in ALGORITHMS.values():
+        one = left.locator("b", has_text=title).bounding_box()
+        assert one["y"] + one["height"] < ends, title
+    link = left.get_by_role("link", name="in Rerun").bounding_box()
+    assert link["y"] + link["height"] < ends, "nothing of the answer is to be scrolled to"
+    settings.restore(Settings().saved())

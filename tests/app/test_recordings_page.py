@@ -227,13 +227,16 @@ def test_recordings_are_opened_compared_renamed_and_deleted(watched, app):
 
     page.get_by_role("button", name="Overlay both runs").click()
     page.get_by_role("tab", name="Two runs").click()
-    page.locator(".js-plotly-plot").first.wait_for(timeout=60_000)
+    page.locator(".js-plotly-plot:visible").first.wait_for(timeout=60_000)
     page.get_by_text("k2 backlash").last.wait_for()
 
     page.get_by_role("tab", name="Rerun").click()
     page.get_by_role("button", name="Open in Rerun, here").click()
     frame = page.frame_locator("iframe.emaviz-rerun")
     frame.locator("#the_canvas_id").wait_for(timeout=60_000, state="attached")
+    for looks in ("dark", "light"):
+        page.get_by_label("Dark", exact=True).set_checked(looks == "dark")
+        page.locator(f"iframe.emaviz-rerun[src$='&theme={looks}']").wait_for(timeout=20_000)
     page.get_by_role("button", name="Close the viewer").click()
     page.locator("iframe.emaviz-rerun").wait_for(state="detached")
 

@@ -8,7 +8,7 @@ from rerun.chunk import RrdReader
 
 from emaviz.recording import RecordingWriter
 from emaviz.recording.blueprint import Contents, build
-from emaviz.recording.dashboard import POINTS, Chart, axes_path, fit_path
+from emaviz.recording.dashboard import POINTS, Chart, axes_path, fit_path, view
 
 TIME = np.linspace(0.0, 0.5, 5001)
 CURRENT = 4.0 * np.sin(40.0 * TIME)
@@ -55,6 +55,11 @@ def test_it_opens_on_one_dashboard_at_the_last_iteration(written):
     assert "The answer" in texts and "iteration" in texts
     assert "Identification robust" not in texts and "Identification do" not in texts, "a race is one overlay"
     assert "Signals" in texts and "/identification/do/fit/current_A" in texts
+
+
+def test_a_dashboard_is_as_light_or_dark_as_the_viewer():
+    shown = view("current", ["/curves/current_A/**"])
+    assert "Background" not in shown.properties and "VisualBounds2D" in shown.properties
 
 
 def test_what_was_not_recorded_has_no_view():

@@ -10,7 +10,7 @@ from ema_model.text import COLOURS
 from emaviz.session.opened import Opened
 from emaviz.text.html import Html, html, joined
 
-_MARKS = {"good": ("✓", COLOURS["good"]), "note": ("●", "#1c7ed6"), "warning": ("▲", COLOURS["warning"])}
+_MARKS = {"good": ("✓", COLOURS["good"]), "note": ("●", COLOURS["note"]), "warning": ("▲", COLOURS["warning"])}
 _BOX = Html('style="padding:0 10px 6px;font-size:12.5px;line-height:1.4"')
 _DIM = Html('style="opacity:.65"')
 

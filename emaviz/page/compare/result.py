@@ -82,14 +82,14 @@ class ResultPanel:
         self._next = gui.add_folder("Next", visible=False)
         with self._next:
             leads()
-        self._save = gui.add_folder("Keep it", visible=False)
-        with self._save:
-            self._kept = keep()
         self._plots_folder = gui.add_folder("Plots", visible=False)
         with self._plots_folder:
             add_html(gui, NEXT_COLUMN)
             self._recording = gui.add_dropdown("Measurement", ["–"], visible=False)
             self._plots = ComparePlots(page)
+        self._save = gui.add_folder("Keep it", visible=False)
+        with self._save:
+            self._kept = keep()
         strip.moves.connect(self._moved)
         self._recording.on_update(lambda event: event.client and self._chosen())
 

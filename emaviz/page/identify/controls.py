@@ -9,14 +9,15 @@ from typing import Any
 
 import viser
 
-from ema_model.identification.run import ALGORITHMS, algorithm_title
+from ema_model.identification.run import ALGORITHMS
 from ema_model.identification.words import facts, verdict, why_best
 from ema_model.simulation.plant import FITNESSES
-from emaviz.figures.convergence import colour
+from emaviz.figures.convergence import named
 from emaviz.page.identify import WORKSPACE
 from emaviz.page.identify.result import IdentifyResult
 from emaviz.page.job_line import JobLine
 from emaviz.page.page import Page
+from emaviz.page.style import IN_PAIRS
 from emaviz.recording.viewer import ViewerHost
 from emaviz.session.compare.comparing import Comparing
 from emaviz.session.described import limits
@@ -25,6 +26,7 @@ from emaviz.session.settings import SLIDERS, Settings
 from emaviz.text.html import Html, add_html, html, joined
 
 PLANT = "The plant of Explore's sliders"
+_WHY = '<details style="opacity:.75"><summary style="cursor:pointer">★ why it is the best</summary>{}</details>'
 
 
 class IdentifyPanel:
@@ -49,13 +51,14 @@ class IdentifyPanel:
             "Identify", (PLANT,), hint="The sliders' plant, whose faults are known, or a measurement of the data folder"
         )
         with gui.add_folder("Algorithms, one or several at once"):
+            add_html(gui, IN_PAIRS)
             self._ticks = {
                 name: gui.add_checkbox(title, name in settings.algorithms) for name, title in ALGORITHMS.items()
             }
-        self._population = gui.add_number("Population", settings.population, **of("population"), step=1)
-        self._iterations = gui.add_number("Iterations", settings.iterations, **of("iterations"), step=1)
-        self._fitness: Any = gui.add_dropdown("Fitness", FITNESSES, initial_value=settings.fitness)
-        self._seed = gui.add_number("Seed", settings.seed, min=0, step=1)  # a maximum would be put in silently
+            self._population = gui.add_number("Population", settings.population, **of("population"), step=1)
+            self._iterations = gui.add_number("Iterations", settings.iterations, **of("iterations"), step=1)
+            self._fitness: Any = gui.add_dropdown("Fitness", FITNESSES, initial_value=settings.fitness)
+            self._seed = gui.add_number("Seed", settings.seed, min=0, step=1)  # a maximum would be put in silently
         for entry, name in (
             (self._population, "population"),
             (self._iterations, "iterations"),
@@ -175,7 +178,7 @@ class IdentifyPanel:
                 at = "done"
             elif track.fitting is not None:
                 at = f"searched; {track.fitting[0]}"
-            lines.append(_line(html("{} · {} · rmse {:.4f} A", _title(name), at, track.rmse[-1])))
+            lines.append(_line(html("{} · {} · rmse {:.4f} A", named(name), at, track.rmse[-1])))
         if race.growing is not None and race is not self._race:
             self._link.content = recording_link(self._viewer, race.growing, "Watch it live ↗")
             self._watch.visible = self._viewer is not None
@@ -188,16 +191,16 @@ class IdentifyPanel:
         for answer in race.answers:
             star = "★ " if best is not None and len(race.tracks) > 1 and answer is best.answer else ""
             told = [*facts(answer), *([verdict(answer)] if len(race.tracks) > 1 else [])]
-            lines.append(_line(html("{}{} · {}", star, _title(answer.algorithm), " · ".join(told))))
+            lines.append(_line(html("{}{} · {}", star, named(answer.algorithm), " · ".join(told))))
         if best is not None and best.answer is not None and len(race.answers) > 1:
             others = [answer for answer in race.answers if answer is not best.answer]
-            lines.append(_line(html('<span style="opacity:.75">★ {}</span>', why_best(best.answer, others))))
+            lines.append(_line(html(_WHY, why_best(best.answer, others))))
         self._text.content = joined(lines)
         self._race = race
         self._missing.visible = best is not None and best.answer is not None and not best.answer.uncertainty.adequate
         self._result.finished(race)
         if race.path is not None:
-            self._link.content = recording_link(self._viewer, race.path)
+            self._link.content = recording_link(self._viewer, race.path, "Open this run in Rerun ↗")
 
 
 def recording_link(viewer: ViewerHost | None, path: Path, text: str = "") -> Html:
@@ -210,10 +213,6 @@ def recording_link(viewer: ViewerHost | None, path: Path, text: str = "") -> Htm
         viewer.url_of(path.name),
         text or f"Open {path.name} in Rerun ↗",
     )
-
-
-def _title(name: str) -> Html:
-    return html('<b style="color:{}">{}</b>', colour(name), algorithm_title(name))
 
 
 def _line(inner: str) -> Html:

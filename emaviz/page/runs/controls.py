@@ -11,8 +11,7 @@ from typing import Any
 import viser
 
 from ema_model.errors import InputError
-from ema_model.identification.run import algorithm_title
-from emaviz.figures.convergence import colour
+from emaviz.figures.convergence import named
 from emaviz.page.identify.controls import recording_link
 from emaviz.page.page import Page
 from emaviz.page.runs import WORKSPACE
@@ -141,7 +140,7 @@ class RunsPanel:
         if (entry.name, entry.at) == self._seen or not self._page.workspaces.anyone(WORKSPACE.name):
             return
         self._seen = entry.name, entry.at
-        told = html('<div style="padding:8px 2px 2px;font-size:14px"><b>{}</b></div>{}', entry.name, _card(entry))
+        told = html('<div style="padding:8px 10px 2px;font-size:14px"><b>{}</b></div>{}', entry.name, _card(entry))
         try:
             self._result.show(told, self._recorded.read(entry.name))
         except InputError:  # it is not whole
@@ -204,9 +203,8 @@ def _card(entry: Entry) -> Html:
         return html("<div {}>{}<br><b>{}</b> {}</div>", _BOX, size, entry.kind.capitalize(), said)
     results = joined(
         html(
-            '<div><b style="color:{}">{}</b> {}{}</div>',
-            colour(name),
-            algorithm_title(name),
+            "<div>{} {}{}</div>",
+            named(name),
             _result(answer),
             " ★" if name == entry.best and len(entry.found) > 1 else "",
         )

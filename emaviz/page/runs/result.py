@@ -29,6 +29,7 @@ class RunsResult:
         self._pair: tuple[tuple[Entry, Any], tuple[Entry, Any]] | None = None
         self._plot: Any = None
         self._told, self._drawn = _hint(_NOTHING), False  # of the chosen run
+        self._opened, self._dark = ("", ""), False  # the viewer's address and recording; whether the page is dark
         self._tab = panel.add_tab("Rerun", viser.Icon.PLAYER_PLAY)
         gui = page.server.gui
         with self._tab:
@@ -45,8 +46,16 @@ class RunsResult:
         self._close.on_click(lambda _: page.screen.post("viewer", self.close_viewer))
         self._signal.on_update(lambda event: event.client and page.screen.post("two", self._draw))
 
+    def set_dark(self, dark: bool) -> None:
+        """The page is dark from now on, or light; a viewer that is open is loaded anew."""
+        self._dark = dark
+        if self._close.visible:
+            self.open(*self._opened)
+
     def open(self, url: str, name: str) -> None:
-        """The viewer with a recording, in the page."""
+        """The viewer with a recording, in the page, as light or dark as that is."""
+        self._opened = url, name
+        url += f"&theme={'dark' if self._dark else 'light'}"
         self._frame.content = html(
             '<div style="padding:0 10px 4px;font-size:12px;overflow-wrap:anywhere"><b>{}</b> · '
             '<a href="{}" target="_blank" rel="noopener">in a tab of its own ↗</a></div>'

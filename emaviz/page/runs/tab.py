@@ -28,6 +28,7 @@ class RunsTab(Tab):
     def __init__(self, shared: Shared, right: viser.PanelHandle) -> None:
         super().__init__(shared, right)
         self.result = RunsResult(self.page, right)
+        shared.strip.themed.connect(lambda dark: self.page.screen.post("viewer", lambda: self.result.set_dark(dark)))
 
     def build(self) -> None:
         """The recordings, sessions and campaigns."""

@@ -66,6 +66,8 @@ class UnitsPanel:
         self.refresh()
         self._actuator.value = comparing.actuator_name
         self._practice.show(comparing.chosen)
+        if comparing.found is not None:
+            self._practice.fold()
         self._result.show(comparing.found)
 
     def _listed(self) -> dict[str, str]:

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 from ema_model.actuator import Actuator
 from ema_model.comparison.compare import weights_of
-from ema_model.discovery.model_fit import Data, fit, gather, twins_of
+from ema_model.discovery.model_fit import Data, fit, gather, in_floors_of
 from ema_model.discovery.path import Step, Story, rung_of
 from ema_model.discovery.repeatability import by_inverse_dynamics, is_lost, with_divergence
 from ema_model.discovery.result import Change
 from ema_model.discovery.sentences import NOT_REPEATABLE
-from ema_model.estimation import after_fit, of_unseen
 from ema_model.models.delay_of_drive import with_delay_of_drive
 from ema_model.models.stretches import fit_stretches
 from ema_model.recordings import Measurement
@@ -66,8 +64,7 @@ def calibrated_story(
     held = None if held is None else held.beside(base)
     if not data.weighs_as(bare):
         base = fit(data, actuator, base.starts, tell)
-    data = replace(data, after_fit=after_fit(data.floors, base.calibration, twins_of(base)))
-    held = None if held is None else replace(held, after_fit=of_unseen(held.floors, data.after_fit))
+    data, held = in_floors_of(base, data, held)
     return Story(data, held, [Step(base, rung_of(Change(), base, data, held), ())], not is_lost(lost))
 
 

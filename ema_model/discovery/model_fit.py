@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator, Tolerance
 from ema_model.effects import find
-from ema_model.estimation import Calibration, Floor, calibrate, default_free, floor
+from ema_model.estimation import Calibration, Floor, after_fit, calibrate, default_free, floor, of_unseen
 from ema_model.estimation.floor import twin_error
 from ema_model.estimation.floor_band import spread
 from ema_model.models import Model, model_for
@@ -132,6 +132,12 @@ def twins_of(found: Fit) -> Sequence[Signals]:
     """As of `twin_error`, by window, of a fit."""
     fitted, k = found.calibration.actuator, found.calibration.k
     return [twin_error(found.plant, place, fitted, k) for place in range(len(found.plant.windows))]
+
+
+def in_floors_of(found: Fit, data: Data, held: Data | None) -> tuple[Data, Data | None]:
+    """Data, and held-out ones, whose errors are told in what a true model leaves that was fitted as this one."""
+    data = replace(data, after_fit=after_fit(data.floors, found.calibration, twins_of(found)))
+    return data, None if held is None else replace(held, after_fit=of_unseen(held.floors, data.after_fit))
 
 
 def with_effect(actuator: Actuator, name: str, settings: Mapping[str, float]) -> Actuator:

@@ -27,6 +27,7 @@ from ema_model.discovery.model_fit import (
     fit,
     floor_ratio,
     holdout_fit,
+    in_floors_of,
     ratio_by_recording,
     rms_by_signal,
     without_effect,
@@ -186,6 +187,8 @@ class Story:
 
     def add(self, trial: Trial, ties: Sequence[str] = ()) -> None:
         """Takes a trial for the next model."""
+        if trial.faults:
+            self._tell_in_floors_of(trial.fit)
         before, moved = self.steps[-1].rung, _stood_in(self.current, trial.fit)
         parameter = "" if trial.faults else stands_for(self.current, trial.candidate.name)
         rung = self._rung(_change(trial, parameter), trial.fit)
@@ -288,6 +291,11 @@ class Story:
     def restart(self) -> None:
         """Takes all effects back."""
         del self.steps[self.bare :]
+
+    def _tell_in_floors_of(self, found: Fit) -> None:
+        """All errors from now on: how far the model is from its three-phase twin depends on the faults."""
+        self.data, self.held = in_floors_of(found, self.data, self.held)
+        self.steps = [replace(one, rung=self._rung(one.rung.change, one.fit)) for one in self.steps]
 
     def _append(self, found: Fit, rung: Rung, added: Sequence[Added], settled_from: Step | None = None) -> None:
         # All with the last model's values: what is added later moves what was there.

@@ -11,7 +11,7 @@ from ema_model.effects import find
 from ema_model.faults import BY_NAME
 from ema_model.quantities.axes import Axes
 from ema_model.quantities.numbers import amount, number, with_uncertainty
-from ema_model.quantities.titles import in_sentence
+from ema_model.quantities.titles import all_of, in_sentence
 
 LOOP_UNTOLD = (
     "In the closed loop no effect explains the whole error, and nothing shows another control law than the file's: how "
@@ -48,17 +48,20 @@ def mismatch(seen: ControllerSeen | None, axes: Axes) -> list[str]:
 
 def masked(added: Sequence[Added], axes: Axes) -> list[str]:
     """One line for each effect that parameters of the model had been standing in for, and where they are now."""
-    lines = []
+    moved: dict[str, dict[str, tuple[float, float]]] = {}  # by effect: at several orders it is one
     for one in added:
-        moved = [
-            f"{in_sentence(on_axes(part.path, axes).title)} ({part.before:+.1f} → {part.after:+.1f} σ)"
-            for part in one.stood_in
-            if part.path != one.stands_for
-        ]
-        if moved:
-            came = ", ".join(moved).replace("-", "−")
-            lines.append(f"{find(one.name).title} had been masked: back toward their nominal values moved {came}.")
-    return lines
+        parts = moved.setdefault(one.name, {})
+        for part in one.stood_in:
+            if part.path != one.stands_for:
+                parts[part.path] = parts.get(part.path, (part.before, part.after))[0], part.after
+    return [f"{find(name).title} had been masked by {_moved(parts, axes)}." for name, parts in moved.items() if parts]
+
+
+def _moved(parts: Mapping[str, tuple[float, float]], axes: Axes) -> str:
+    """'motor torque constant (−2.5 → −0.4 σ), now nearer to its nominal value'."""
+    ends = {path: [f"{round(end, 1) + 0.0:+.1f}".replace("-", "−") for end in both] for path, both in parts.items()}
+    told = [f"{in_sentence(on_axes(path, axes).title)} ({a} → {b} σ)" for path, (a, b) in ends.items()]
+    return f"{all_of(told)}, now nearer to {'its nominal value' if len(told) == 1 else 'their nominal values'}"
 
 
 def as_well(ties: Mapping[str, str], added: Sequence[Added], faults: Sequence[str]) -> list[str]:

@@ -16,6 +16,7 @@ from ema_model.campaign.thesis.cases import ALGORITHMS, CASES, MULTIPLE, case_of
 from ema_model.campaign.thesis.responses import FAMILIES, SIGNALS, Drawn
 from ema_model.campaign.thesis.result import AS_THE_THESIS
 from ema_model.errors import InputError
+from emaviz import colours
 from emaviz.recording import dashboard, series, style
 from emaviz.recording.blueprint import plot
 from emaviz.recording.dashboard import Array, Chart
@@ -29,7 +30,7 @@ ROOT = "/reproduce"
 _PERCENTILES = (("p05", 5.0, 0.5), ("median", 50.0, 1.5), ("p95", 95.0, 0.5))  # with their lines' widths
 _AIR = 0.1  # of the curves' range, above and below
 _SIGNALS = ("current_A", "user_position_rad", "motor_position_rad", "motor_speed_rad_s")
-_COLOURS = ((16, 152, 173, 255), (47, 111, 222, 255), (156, 54, 181, 255), (214, 51, 108, 255), (240, 140, 0, 255))
+_SHADES = tuple((*colours.rgb(shade), 255) for shade in colours.REFERENCE_SHADES)
 
 
 def write_reproduction(evaluation: Evaluation, drawn: Drawn, path: str | Path) -> None:
@@ -104,7 +105,7 @@ class ReproductionWriter(RecordingWriter):
                 runs = drawn.families[family.name, command]
                 for at, (severity, run) in enumerate(runs.items()):
                     for name in SIGNALS:
-                        line = series.line(f"{severity}, {signal_title(name)}", _COLOURS[at % len(_COLOURS)], 1.5)
+                        line = series.line(f"{severity}, {signal_title(name)}", _SHADES[at % len(_SHADES)], 1.5)
                         self._plotted(f"severities/{family.name}/{command}/{name}/s{at}", line, _time(run), run[name])
 
     def _plotted(self, place: str, drawn: series.Style, time: list[rr.TimeColumn], values: ArrayLike) -> None:

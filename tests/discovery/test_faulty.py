@@ -8,6 +8,7 @@ from support.representative import first_of
 
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
+from ema_model.comparison.criteria import BAND
 from ema_model.discovery import discover
 from ema_model.discovery.begin import begun
 from ema_model.discovery.discover import result_of
@@ -45,7 +46,7 @@ def test_a_fault_is_named_and_no_physics_beside_it(fault):
     low, high = found.faults[name].interval90
     assert low <= value <= high or found.faults[name].value == pytest.approx(value, abs=0.03)
     last = found.ladder[-1]
-    assert last.rmse < 1.1 and last.holdout_rmse is not None and last.holdout_rmse < 1.1 < found.ladder[0].rmse
+    assert last.rmse < BAND and last.holdout_rmse is not None and last.holdout_rmse < BAND < found.ladder[0].rmse
 
 
 @pytest.mark.long
@@ -54,7 +55,7 @@ def test_missing_physics_is_found_beside_two_faults():
     assert [one.name for one in found.effects] == ["stribeck_friction"] and set(found.faults) == {"k1", "k2"}
     speed = found.effects[0].parameters["speed_rad_s"]
     assert speed.value == pytest.approx(10.0, rel=0.15)
-    assert found.ladder[-1].rmse < 1.1 and found.ladder[-1].holdout_rmse < 1.1
+    assert found.ladder[-1].rmse < BAND and found.ladder[-1].holdout_rmse < BAND
 
 
 @pytest.mark.long

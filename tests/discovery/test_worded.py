@@ -22,10 +22,11 @@ def test_parameters_that_masked_an_effect_are_named_as_on_the_page(tmp_path):
     found = with_cogging()
     (one,) = found.effects
     moved = StoodIn("motor.torque_constant_Nm_A", -2.5, -0.4), StoodIn("friction.dynamic_Nm", 2.0, 0.1)
-    lines = masked([replace(one, stood_in=moved)], found.actuator.axes)
+    later = replace(one, key="cogging_torque_2", stood_in=(StoodIn("motor.torque_constant_Nm_A", -0.4, -0.02),))
+    lines = masked([replace(one, stood_in=moved), later], found.actuator.axes)
     assert lines == [
-        "Cogging torque had been masked: back toward their nominal values moved motor torque constant (−2.5 → −0.4 σ), "
-        "friction dynamic (+2.0 → +0.1 σ)."
+        "Cogging torque had been masked by motor torque constant (−2.5 → +0.0 σ) and friction dynamic (+2.0 → +0.1 σ), "
+        "now nearer to their nominal values."
     ]
     told = replace(found, warnings=[*lines, untold("cogging_torque", "torque_ripple"), NOT_REPEATABLE])
     assert not any(RAW.search(line) for line in as_dict(told)["warnings"])

@@ -44,4 +44,4 @@ def test_its_size_is_that_of_what_is_read():
         exact = phase + 7.0 * np.arange(500)
         errors.append((STEP * (np.round(exact) - exact)).reshape(-1, SIZE).mean(axis=1))
     whole = np.hypot(beating(read(7.0), SIZE)[400], STEP / np.sqrt(12.0 * SIZE))
-    assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(whole, rel=0.02)
+    assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(whole, rel=0.05)

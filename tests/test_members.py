@@ -246,6 +246,7 @@ def test_an_effect_acts_on_both_kinds_of_axes(copied):
             (copied.folder / name).unlink()
 
 
+@pytest.mark.long
 def test_a_command_a_format_and_a_section_with_its_figure(copied):
     copied("-m", "emaviz", "simulate", "--command", "square", "--duration", "0.2", "--model", "mm", "--out", "run.csv")
     header, *rows = (copied.folder / "run.csv").read_text().splitlines()

@@ -156,7 +156,7 @@ def _implausible(after: Fit, key: str) -> str:
     for parameter in find(catalogue_name(key)).parameters:
         value, low, high = values[parameter.name], *parameter.plausible
         size = _greatest(after, parameter.plausible_at) if parameter.plausible_at else 1.0
-        if not low <= value * size <= high:
+        if (low is not None and value * size < low) or (high is not None and value * size > high):
             at = f" at {number(size)} {SIGNALS[parameter.plausible_at].unit}" if parameter.plausible_at else ""
             return f"its {_title(after, f'effects.{key}.{parameter.name}')} of {number(value)} is not plausible{at}"
         if parameter.name == "period_rad" and value > _travel(after):

@@ -82,7 +82,7 @@ class Parameter:
     linear: tuple[float, float, float] | None = None  # default, low and high where the side's axis is linear
     unit: str = ""  # as shown; the name tells it where it ends in one
     shown: str = ""  # the name in files; `on` fills it in
-    plausible: tuple[float, float] = (-math.inf, math.inf)
+    plausible: tuple[float | None, float | None] = (None, None)  # low and high, None where there is no end
     plausible_at: str = ""  # the signal by whose greatest size the value counts
 
     def __post_init__(self) -> None:

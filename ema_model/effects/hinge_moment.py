@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from ema_model.effects.effect import USER, Effect, Parameter
 from ema_model.physics.jit import scalar
 
@@ -32,7 +30,7 @@ EFFECT = Effect(
             1e6,
             side=USER,
             linear=(1e4, -1e9, 1e9),
-            plausible=(0.0, math.inf),  # a spring pulls back
+            plausible=(0.0, None),  # a spring pulls back
         ),
         Parameter(
             "offset_Nm", "moment H_0 at the neutral position", 0.0, -1e5, 1e5, side=USER, linear=(0.0, -1e6, 1e6)

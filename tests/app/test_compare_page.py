@@ -175,6 +175,7 @@ def test_data_health_tells_a_clock_that_is_late(compare, app, recording, tmp_pat
     page.get_by_text("The file has 2 clocks: brought onto one, linearly between their samples: motor speed.").wait_for()
 
 
+@pytest.mark.long
 def test_a_delay_is_said_and_stays_where_another_thing_is_edited(compare, app, recording, tmp_path):
     page, path = compare, tmp_path / "late clock.csv"
     write_two_clocks(path, recording, 0.005)

@@ -262,6 +262,7 @@ def test_the_answer_is_said_once_and_comes_forward(shared_page, app):
     settings.restore(Settings().saved())
 
 
+@pytest.mark.long
 @pytest.mark.browser
 def test_the_answers_of_a_race_are_seen_above_the_actuator(shared_page, app):
     page, settings = shared_page, app.session.settings

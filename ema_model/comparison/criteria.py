@@ -8,9 +8,9 @@ SLOW = 2.0
 
 # Times the floor, of the error pooled over signals: up to here what is left may be noise and the model's own floor.
 # Where the floor itself is known less well, it is so many of its standard deviations above 1: 99 of 100 true models
-# lie within.  A comparison of healthy three-phase plants leaves 0.9 … 1.1 (the plan
-# `floors`), a discovery, whose floors no fit has taken from, 0.70 … 0.76; a healthy hobby servo 0.93 … 1.04, a
-# drive that the file does not describe 2.7 … 67 (tests/discovery/test_foreign_rigs_study.py).
+# lie within.  Healthy three-phase plants leave 0.9 … 1.1 (the plan `floors`), and 0.70 … 0.76 of floors from which
+# nothing is taken off that a fit takes up, in which a discovery decides; a healthy hobby servo 0.93 … 1.04, a drive
+# that the file does not describe 2.7 … 67 (tests/discovery/test_foreign_rigs_study.py).
 BAND, BEYOND = 1.25, 2.33
 
 # Of what is left of a signal beyond its floor in one recording, that a step at one moment must explain to be told (one

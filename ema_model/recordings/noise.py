@@ -7,7 +7,6 @@ from math import comb
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_opening
 
 from ema_model.quantities.signals import SIGNALS
 
@@ -60,6 +59,8 @@ def beating(values: Array, size: int) -> Array:
     smooth = np.convolve(np.pad(means, _AROUND, mode="edge"), np.full(around, 1.0 / around), "valid")
     pace = np.abs(np.gradient(smooth)) / (size * step)
     whole = (np.round(pace) >= 1.0) & (size * np.abs(pace - np.round(pace)) < _BEAT)
+    from scipy.ndimage import binary_opening  # takes a third of a second to import, which reading does without
+
     lasts = binary_opening(whole, np.ones(_LASTS, dtype=bool))
     return np.where(lasts, step * np.sqrt((1.0 - 1.0 / size) / 12.0), 0.0)
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 import pytest
 from hypothesis import settings
-from support.browser import SOFTWARE_GL, Browser
+from support.browser import Browser
 
 LONGEST = ("real_data", "units", "discovery")  # folders
 
@@ -45,7 +45,7 @@ def no_page_errors(request: pytest.FixtureRequest) -> Iterator[None]:
 
 @pytest.fixture(scope="session")
 def browser() -> Iterator[Browser]:
-    """Headless Chromium with software GL; without one the test is skipped, in CI it fails."""
+    """Headless Chromium; without one the test is skipped, in CI it fails."""
     path = os.environ.get("EMAVIZ_CHROMIUM") or shutil.which("chromium") or shutil.which("chromium-browser")
     if path is None:
         message = "no Chromium found: install Debian's chromium, or name one in EMAVIZ_CHROMIUM"
@@ -55,6 +55,6 @@ def browser() -> Iterator[Browser]:
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
-        chromium = Browser(playwright.chromium.launch(executable_path=path, args=SOFTWARE_GL, headless=True))
+        chromium = Browser(playwright, path)
         yield chromium
         chromium.close()

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
+from support.browser import WINDOW
 from support.on_page import wait_until
 from support.one_tab import Tab
 
@@ -64,7 +65,7 @@ def _at_rest(app: App) -> None:
 @pytest.fixture
 def watched(browser: Any, app: App) -> Iterator[Any]:
     """As `page`, but the Rerun viewer on its own loopback address may be loaded."""
-    tab = browser.new_page(viewport={"width": 1400, "height": 900})
+    tab = browser.new_page(drawn=True, viewport=WINDOW)
     asked: list[str] = []
     tab.on("requestfinished", lambda request: asked.append(request.url))
     tab.goto(app.address)

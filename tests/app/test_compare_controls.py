@@ -33,12 +33,11 @@ def page(browser, app):
         true = simulate_reference(run, load_actuator(), effects=effects)
         write_measurement(Sensors(0.2, 12).record(true, 1), app.comparing.folder.uploads / f"{name}.csv")
     app.tab(CompareTab).panel.refresh_files()
-    page = browser.new_page(viewport={"width": 1400, "height": 900})
-    page.goto(app.address)
-    page.get_by_role("tab", name="Compare", exact=True).click(timeout=60_000)
-    page.set_default_timeout(60_000)
-    yield page
-    page.close()
+    with browser.tab() as page:
+        page.goto(app.address)
+        page.get_by_role("tab", name="Compare", exact=True).click(timeout=60_000)
+        page.set_default_timeout(60_000)
+        yield page
 
 
 def resting(app):

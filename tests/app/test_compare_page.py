@@ -347,11 +347,10 @@ def test_files_of_the_command_line_open_on_compare(browser, recording, tmp_path)
     app = App("127.0.0.1", 0, tmp_path / "data", files=[path])
     try:
         assert app.wait_for_first_picture(120.0)
-        page = browser.new_page(viewport={"width": 1400, "height": 900})
-        page.goto(app.address)
-        page.get_by_role("button", name="Upload a measurement").wait_for(timeout=60_000)
-        page.get_by_text("Compared in").wait_for(timeout=60_000)
-        page.get_by_text("Where the model fails", exact=True).wait_for()
-        page.close()
+        with browser.tab() as page:
+            page.goto(app.address)
+            page.get_by_role("button", name="Upload a measurement").wait_for(timeout=60_000)
+            page.get_by_text("Compared in").wait_for(timeout=60_000)
+            page.get_by_text("Where the model fails", exact=True).wait_for()
     finally:
         app.close()

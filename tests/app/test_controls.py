@@ -42,12 +42,11 @@ def tab(browser, app):
     """One browser tab for all tests here."""
     assert app.session.ready.wait(120.0)
     app.strip.play(False)
-    page = browser.new_page(viewport={"width": 1400, "height": 900})
-    page.goto(app.address)
-    page.get_by_role("tab", name="Explore").wait_for(timeout=60_000)
-    page.set_default_timeout(60_000)
-    yield page
-    page.close()
+    with browser.tab() as page:
+        page.goto(app.address)
+        page.get_by_role("tab", name="Explore").wait_for(timeout=60_000)
+        page.set_default_timeout(60_000)
+        yield page
 
 
 @pytest.fixture

@@ -31,12 +31,11 @@ RIGHT = {
 def tab(browser, app):
     """One window for all tests here."""
     app.strip.play(False)
-    page = browser.new_page(viewport={"width": 1400, "height": 900})
-    page.goto(app.address)
-    page.get_by_role("tab", name="Explore", exact=True).wait_for(timeout=60_000)
-    page.set_default_timeout(20_000)
-    yield page
-    page.close()
+    with browser.tab() as page:
+        page.goto(app.address)
+        page.get_by_role("tab", name="Explore", exact=True).wait_for(timeout=60_000)
+        page.set_default_timeout(20_000)
+        yield page
 
 
 @pytest.fixture(scope="module")

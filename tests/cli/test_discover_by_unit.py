@@ -46,6 +46,7 @@ def discovered(folder: Path, actuator: Path, *more: object) -> dict:
     return json.loads(out.read_text())
 
 
+@pytest.mark.long
 def test_what_all_units_lack_is_one_statement_and_what_differs_stands_beside(tmp_path, actuator, capsys):
     folder = write(tmp_path / "units", dict.fromkeys(FRICTION, COGGING_Nm))
     report, kept = tmp_path / "units.html", tmp_path / "type.toml"

@@ -8,6 +8,7 @@ from typing import Any
 from playwright.sync_api import Error
 
 from emaviz.page.app import App
+from support.browser import WINDOW
 
 CHARTS_DRAWN = "Object.keys(window.__viserTestpoints?.uplots ?? {}).length >= 4"
 BEHIND = "[role=tablist] > [role=tab]:first-child[aria-selected=false]:visible"  # first tabs that are not in front
@@ -32,6 +33,7 @@ class Tab:
     def __init__(self, browser: Any, app: App, scene: bool = False) -> None:
         self._browser, self._app, self._scene = browser, app, scene
         self._page: Any = None
+        self._open = contextlib.ExitStack()
         self._folders: dict[str, bool] = {}
         self._asked: list[str] = []
 
@@ -42,13 +44,17 @@ class Tab:
                 self._take_back()
                 return self._page
             except Error:  # on a loaded machine; a page that is loaded anew is as new, too
-                self._page.close()
+                self.close()
         self._load()
         return self._page
 
     def _load(self) -> None:
-        self._page = self._browser.new_page(viewport={"width": 1400, "height": 900}, drawn=self._scene)
-        self._page.on("request", lambda request: self._asked.append(request.url))
+        if self._scene:
+            self._page = self._browser.new_page(viewport=WINDOW, drawn=True)
+            self._open.callback(self._page.close)
+        else:
+            self._page = self._open.enter_context(self._browser.tab())
+        self._page.on("request", self._note)
         self._page.goto(self._app.address)
         self._page.get_by_role("tab", name="Explore").wait_for(timeout=60_000)
         self._page.wait_for_function(CHARTS_DRAWN, timeout=60_000)
@@ -86,6 +92,11 @@ class Tab:
         assert not outside, "nothing may be fetched from elsewhere"
 
     def close(self) -> None:
-        """Ends the tab."""
+        """Ends the tab, and hears no more of it."""
         if self._page is not None:
-            self._page.close()
+            self._page.remove_listener("request", self._note)
+            self._open.close()
+            self._page = None
+
+    def _note(self, request: Any) -> None:
+        self._asked.append(request.url)

@@ -136,6 +136,7 @@ def test_a_unit_far_from_the_others_does_not_lead_the_search_astray(seed):
     assert ("motor.torque_constant_Nm_A" in {path for _, path in true}) and len(true) >= 2
 
 
+@pytest.mark.long
 def test_the_work_grows_with_the_units_and_no_faster(monkeypatch):
     """Linearisations are what costs: as many for each of six units as for each of three, and a fit each."""
     counted = {}

@@ -7,10 +7,11 @@ from collections.abc import Callable, Sequence
 from ema_model.actuator import Actuator
 from ema_model.comparison.compare import weights_of
 from ema_model.discovery.model_fit import Data, fit, gather, in_floors_of
-from ema_model.discovery.path import Step, Story, rung_of
+from ema_model.discovery.path import Story
 from ema_model.discovery.repeatability import by_inverse_dynamics, is_lost, with_divergence
 from ema_model.discovery.result import Change
 from ema_model.discovery.sentences import NOT_REPEATABLE
+from ema_model.discovery.step import Step, rung_of
 from ema_model.models.delay_of_drive import with_delay_of_drive
 from ema_model.models.stretches import fit_stretches
 from ema_model.recordings import Measurement

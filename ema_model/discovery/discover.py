@@ -13,12 +13,13 @@ from ema_model.actuator import Actuator, load_actuator
 from ema_model.comparison.explain import Explanation
 from ema_model.discovery.begin import begun
 from ema_model.discovery.next_experiment import next_experiment
-from ema_model.discovery.path import Story, refreshed
+from ema_model.discovery.path import Story
 from ema_model.discovery.remaining import left_by, within_band
 from ema_model.discovery.repeated import repeated
 from ema_model.discovery.result import Candidate, Discovery, Experiment
 from ema_model.discovery.second_opinion import support_of
 from ema_model.discovery.sentences import as_well, held_back, masked, mismatch, untold
+from ema_model.discovery.step import refreshed
 from ema_model.discovery.uncertainty import with_intervals
 from ema_model.discovery.verdict import verdict_of
 from ema_model.discovery.walking import named_in, walk

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -25,41 +24,26 @@ from ema_model.discovery.model_fit import (
     Fit,
     as_in,
     fit,
-    floor_ratio,
-    holdout_fit,
     in_floors_of,
-    ratio_by_recording,
-    rms_by_signal,
     without_effect,
 )
 from ema_model.discovery.refit import Trial, again, is_near, promising, stands_for, tried
 from ema_model.discovery.remaining import Left, at_floor, left_by
-from ema_model.discovery.result import Added, Candidate, Change, Contradiction, Rung, StoodIn
+from ema_model.discovery.result import Added, Candidate, Change, Contradiction, Rung
 from ema_model.discovery.score import scored, signatures
+from ema_model.discovery.step import Step, change_of, refreshed, rung_of, stood_in
 from ema_model.discovery.transmission_seen import TransmissionSeen
 from ema_model.discovery.uncertainty import settled
 from ema_model.discovery.unknown import curve_for
 from ema_model.effects import CATALOGUE, catalogue_name, find
-from ema_model.estimation import Calibration
 from ema_model.simulation.one_stack import compile_behind
 
 Progress = Callable[[str], None]
 Array = NDArray[np.float64]
 
-_MOVED = 1.5  # σ that a parameter comes back by, when it had been standing in for an effect
 _LEADS = 0.5  # of the greatest fall of χ², from which on a trial is refitted from the file's values, too
 _MOST_PITCHES = 8  # along a linear motor, each of which is simulated
 _NOT_LOOKED_FOR = ("pendulum_load",)  # whoever has an arm on the shaft knows of it
-
-
-@dataclass(frozen=True, eq=False)
-class Step:
-    """A model on the way: its fit, its rung of the ladder, and the effects that were added so far."""
-
-    fit: Fit
-    rung: Rung
-    added: tuple[Added, ...]
-    settled_from: Step | None = None
 
 
 @dataclass
@@ -189,9 +173,9 @@ class Story:
         """Takes a trial for the next model."""
         if trial.faults:
             self._tell_in_floors_of(trial.fit)
-        before, moved = self.steps[-1].rung, _stood_in(self.current, trial.fit)
+        before, moved = self.steps[-1].rung, stood_in(self.current, trial.fit)
         parameter = "" if trial.faults else stands_for(self.current, trial.candidate.name)
-        rung = self._rung(_change(trial, parameter), trial.fit)
+        rung = self._rung(change_of(trial, parameter), trial.fit)
         errors = before.rmse, rung.rmse, before.holdout_rmse, rung.holdout_rmse
         new = [
             Added(catalogue_name(key), {}, *errors, tuple(ties), key, {}, moved, (), parameter, key in self.of_the_file)
@@ -305,17 +289,6 @@ class Story:
         return rung_of(change, found, self.data, self.held)
 
 
-def _change(trial: Trial, parameter: str) -> Change:
-    """What a step that adds this changes; parameter: the path of the one that it stands for."""
-    if trial.faults:
-        return Change("fault", trial.faults)
-    name = trial.candidate.name
-    if parameter:
-        return Change("parameter", (parameter,))
-    orders = tuple(values["order"] for key, values in trial.effects.items() if key != name and "order" in values)
-    return Change("effect", (name,), orders)
-
-
 def _may_act(name: str, actuator: Actuator) -> bool:
     """Whether an effect is of something that is there: of a drive only where its controller is simulated."""
     effect = find(name)
@@ -324,38 +297,3 @@ def _may_act(name: str, actuator: Actuator) -> bool:
     kinds = actuator.controller.kind, actuator.inverter.kind
     places = {function.__name__ for function in effect.places}
     return effect.family != "drive" or not idle(places, bool(effect.states), *kinds)
-
-
-def rung_of(change: Change, found: Fit, data: Data, held: Data | None) -> Rung:
-    """A fit's errors, with those of what was held out."""
-    shown = found.calibration.signals
-    ratio, rms = floor_ratio(data, found.plant, shown), rms_by_signal(data, found.plant, shown)
-    each = ratio_by_recording(data, found.plant, shown)
-    unseen, unseen_rms, unseen_each = (None, {}, {}) if held is None else holdout_fit(held, found)
-    return Rung(change, ratio, unseen, rms, unseen_rms, shown, each, unseen_each)
-
-
-def with_drops(ranked: Sequence[Candidate], trials: Sequence[Trial]) -> list[Candidate]:
-    """All candidates with what their refits gave, the best first."""
-    drops: Mapping[str, float] = {trial.candidate.name: trial.drop for trial in trials}
-    told = [replace(one, refitted_drop=drops.get(one.name)) for one in ranked]
-    return sorted(told, key=lambda one: -(one.refitted_drop if one.refitted_drop is not None else -math.inf))
-
-
-def _stood_in(before: Fit, after: Fit) -> tuple[StoodIn, ...]:
-    """Parameters that came back toward the file's value."""
-    moved = []
-    for path, one in before.calibration.parameters.items():
-        now = after.calibration.parameters[path]
-        if not path.startswith("effects.") and abs(one.z) - abs(now.z) > _MOVED:
-            moved.append(StoodIn(path, one.z, now.z))
-    return tuple(moved)
-
-
-def refreshed(one: Added, calibration: Calibration) -> Added:
-    """With the values of a calibration."""
-    path = f"effects.{one.key}."
-    fitted = {name.removeprefix(path): value for name, value in calibration.parameters.items() if name.startswith(path)}
-    settings = calibration.actuator.effects[one.key]
-    chosen = {name: value for name, value in settings.items() if name not in fitted}
-    return replace(one, parameters=fitted, chosen=chosen)

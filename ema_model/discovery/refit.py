@@ -243,6 +243,13 @@ def promising(
     return [c for c in chosen if c.predicted_drop >= share * chosen[0].predicted_drop][:most]
 
 
+def with_drops(ranked: Sequence[Candidate], trials: Sequence[Trial]) -> list[Candidate]:
+    """All candidates with what their refits gave, the best first."""
+    drops: Mapping[str, float] = {trial.candidate.name: trial.drop for trial in trials}
+    told = [replace(one, refitted_drop=drops.get(one.name)) for one in ranked]
+    return sorted(told, key=lambda one: -(one.refitted_drop if one.refitted_drop is not None else -math.inf))
+
+
 def fitted_count(name: str, axes: Axes) -> int:
     """Number of an effect's parameters that are fitted."""
     return sum(not parameter.integer for parameter in find(name, axes).parameters)

@@ -15,9 +15,9 @@ from ema_model.comparison.residuals import Residuals
 from ema_model.discovery import Candidate, Discovery, Story
 from ema_model.discovery.alike import alike
 from ema_model.discovery.criteria import LEAST_BIC
-from ema_model.discovery.path import Step
 from ema_model.discovery.remaining import Left
 from ema_model.discovery.result import Added
+from ema_model.discovery.step import Step
 from ema_model.discovery.tracks import primary
 from ema_model.effects import find
 from ema_model.quantities.interval import HALF_90

@@ -16,9 +16,9 @@ from ema_model.comparison.result import SignalError
 from ema_model.comparison.verdict import judge
 from ema_model.discovery import as_dict, begun, result_of
 from ema_model.discovery.model_fit import floor_ratio
-from ema_model.discovery.path import Step, rung_of
 from ema_model.discovery.result import VERDICTS
 from ema_model.discovery.snapshot import known_of
+from ema_model.discovery.step import Step, rung_of
 from ema_model.discovery.words import VERDICTS as IN_WORDS
 from ema_model.discovery.words import headline, sentences
 

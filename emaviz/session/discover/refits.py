@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from ema_model.discovery import Candidate, Story
-from ema_model.discovery.path import Step
 from ema_model.discovery.refit import Trial
 from ema_model.discovery.snapshot import Assessment, Look, known_of
+from ema_model.discovery.step import Step
 from ema_model.effects import find
 from ema_model.errors import InputError
 from ema_model.quantities.titles import in_sentence

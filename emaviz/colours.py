@@ -15,7 +15,7 @@ GHOST = "#85ad8a"  # a frozen run
 SLATE, PINK, BRONZE, ROSE, BROWN = "#3f6a70", "#f075c7", "#7a631f", "#e0859c", "#816056"  # without a meaning
 FORWARD, BACKWARD = BRONZE, PINK  # means of one direction each
 RUNS = (BRONZE, ROSE)  # two runs beside each other
-PHASES = ("#c9a200", "#0fa58a", "#e05fb6")  # A, B, C, in the charts and in the windings: none is a model's or a fault's
+PHASES = ("#b3a300", "#7733ff", "#dd88cc")  # A, B, C, in the charts and in the windings: like nothing with a meaning
 ALGORITHMS = {"robust": MONITOR, "ssa": ROSE, "hba": BROWN, "do": SLATE}
 CASES = (SLATE, PINK, BRONZE, GHOST, BROWN, ROSE)  # of a campaign, in their order
 # Five severities, ever darker: of the monitor model and of the reference model.

@@ -46,7 +46,7 @@ class Progress:
     algorithm: str
     iteration: int
     iterations: int
-    rmse: float  # A, the best so far
+    rmse: float  # A, of the best so far; `robust` ranks by the corrected error, so that this may rise
     k: Array  # (8,), of the best
     population: Array  # (n, 8)
     population_rmse: Array  # (n,), A

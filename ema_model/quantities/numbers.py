@@ -15,6 +15,8 @@ _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _SMALLEST = 0.09995  # reads as 0.1, and is shown as it is; what is smaller gets the next prefix
 _FINE = 1e-3  # an error that takes the next prefix
 _FINE_AT = 0.1  # from which on its value keeps three digits
+_PREFIXES = {-6: "µ", -3: "m", 3: "k", 6: "M"}
+_WITHOUT_PREFIX = ("kg", "1/", "°")
 _LARGEST = 9995.0  # likewise, from which on a kilo is taken
 
 
@@ -76,6 +78,18 @@ class Quantity:
         size = np.abs(np.asarray(values, dtype=float) * self.factor)
         factor, unit = prefixed(float(np.max(size[np.isfinite(size)], initial=0.0)), self.unit)
         return replace(self, unit=unit, factor=self.factor * factor)
+
+    def powered(self, values: ArrayLike) -> Quantity:
+        """As `scaled`, of any unit: 'kN·m/rad', and where none is said with a prefix, 13.8 '10⁻⁶ kg·m²'."""
+        scaled = self.scaled(values)
+        size = np.abs(np.asarray(values, dtype=float) * scaled.factor)
+        largest = float(np.max(size[np.isfinite(size)], initial=0.0))
+        if largest == 0.0 or _SMALLEST <= largest < _LARGEST:
+            return scaled
+        power = 3 * math.floor(math.log10(largest) / 3.0)
+        bare = self.unit.startswith(_WITHOUT_PREFIX) or not self.unit or power not in _PREFIXES
+        unit = f"10{str(power).translate(_RAISED)} {self.unit}".rstrip() if bare else f"{_PREFIXES[power]}{self.unit}"
+        return replace(self, unit=unit, factor=self.factor * 10.0**-power)
 
     def text(self, value: float) -> str:
         """'35.2 mN·m', three digits."""

@@ -41,9 +41,12 @@ class WithEffect:
 
     def change(self, name: str) -> tuple[float, Array]:
         """What changes in a signal, (samples,), and its rms as a share of the signal's range; 0 for next to nothing."""
-        change = self.with_it[name] - self.without[name]
-        share = float(np.sqrt(np.mean(change**2))) / (float(np.ptp(self.without[name])) or 1.0)
+        share, change = self._share(name)
         return (share if share > _LEAST else 0.0), change
+
+    def _share(self, name: str) -> tuple[float, Array]:
+        change = self.with_it[name] - self.without[name]
+        return float(np.sqrt(np.mean(change**2))) / (float(np.ptp(self.without[name])) or 1.0), change
 
     def against(self, variable: str) -> Array:
         """A variable of `ema_model.quantities.variables` in the run with the effect, (samples,), in its unit.
@@ -66,6 +69,11 @@ class WithEffect:
     def visibility(self) -> float:
         """How much of that signal's range changes, rms."""
         return self.change(self.shows)[0]
+
+    @property
+    def trace(self) -> float:
+        """The same where that is next to nothing."""
+        return max(self._share(name)[0] for name in SHOWN)
 
 
 _SIGNALS = {
@@ -97,16 +105,16 @@ class EffectRuns:
     def clearest(self, effect: Effect) -> WithEffect | None:
         """An effect at its clear severity in the run that shows it most; None where the actuator stands none.
 
-        What follows a variable is looked for in the saturated run last.
+        What follows a variable is looked for in the saturated run last; where none shows it, the largest trace counts.
         """
         found: list[WithEffect] = []
         for run in RUNS:
             with suppress(InputError):
                 found.append(self.felt(effect.name, effect.at_severity(1), run))
 
-        def rank(felt: WithEffect) -> tuple[bool, float]:
+        def rank(felt: WithEffect) -> tuple[bool, float, float]:
             fits = effect.against == "time" or felt.run != _SATURATED
-            return fits and felt.visibility > 0.0, felt.visibility
+            return fits and felt.visibility > 0.0, felt.visibility, felt.trace
 
         return max(found, key=rank, default=None)
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import viser
 
-from ema_model.identification.run import algorithm_title
+from ema_model.identification.run import ROBUST, algorithm_title
 from emaviz.colours import ALGORITHMS, MONITOR
 from emaviz.figures.signals import AXIS, PADDING, legend
 from emaviz.text.html import Html, add_html, html
@@ -41,13 +41,13 @@ class LiveConvergence:
             self._algorithms = tuple(algorithms)
             self.handle.data = (np.array([0.0, 1.0]), *(np.array([1.0, 1.0]) for _ in algorithms))
             self.handle.series = ({"label": "iteration"}, *(_line(name) for name in algorithms))
-            self._legend.content = legend(*((colour(name), algorithm_title(name)) for name in algorithms))
+            self._legend.content = legend(*((colour(name), _told(name)) for name in algorithms))
         if iterations != self._iterations:
             self._iterations = iterations
             self.handle.scales = _scales(iterations)
 
     def show(self, rmse: Mapping[str, Sequence[float]]) -> None:
-        """Draws the errors so far, A, by algorithm."""
+        """Draws the errors so far, A, by algorithm; of one whose answer was fitted after the search, its last."""
         if tuple(rmse) != self._algorithms:
             return
         count = max([2, *map(len, rmse.values())])
@@ -65,6 +65,13 @@ def named(algorithm: str) -> Html:
     return html('<span style="color:{}">●</span> <b>{}</b>', colour(algorithm), algorithm_title(algorithm))
 
 
+def _told(algorithm: str) -> str:
+    """In the legend: what rises has a reason."""
+    if algorithm != ROBUST:
+        return algorithm_title(algorithm)
+    return f"{algorithm_title(algorithm)}: ranks by the corrected error, so that this may rise; the last is its fit"
+
+
 def _to_length(rmse: Sequence[float], count: int) -> np.ndarray:
     """The last value goes on: it stays the best."""
     values = np.asarray(rmse if len(rmse) else [1.0], dtype=float)
@@ -80,4 +87,5 @@ _UNSEEN: Any = {**_line(""), "stroke": "#00000000"}  # before anything is search
 
 
 def _scales(iterations: int) -> Any:
-    return {"x": {"time": False, "range": (0.0, float(iterations))}, "y": {"distr": 3}}
+    """With a place for the answer, behind the last iteration."""
+    return {"x": {"time": False, "range": (0.0, iterations + 1.0)}, "y": {"distr": 3}}

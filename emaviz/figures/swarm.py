@@ -14,7 +14,7 @@ from emaviz.text.html import Html, escape, html, unescaped
 
 Array = NDArray[np.floating]
 
-_WIDTH, _PLANE_HEIGHT, _LINES_HEIGHT = 460, 448, 448
+_WIDTH, _PLANE_HEIGHT, _LINES_HEIGHT = 460, 528, 528  # as fills a column of a usual window
 _LEFT, _RIGHT, _TOP, _BOTTOM = 44, 14, 10, 36
 _MOST_DRAWN = 150  # candidates of one swarm
 # of a window: with what stands above and below it, the picture is seen whole

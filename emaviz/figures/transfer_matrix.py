@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import plotly.graph_objects as go
 
-from ema_model.quantities.numbers import number
+from ema_model.quantities.numbers import amount, number
 from ema_model.quantities.shown import of_signal
 from ema_model.quantities.titles import in_sentence
 from ema_model.units.result import UnitsCompared
@@ -19,12 +19,12 @@ _IN_FULL, _IN_SHORT = 7, 12  # units, up to which a cell has both numbers, and u
 def figure(result: UnitsCompared, *, dark: bool = False) -> go.Figure:
     """A row for each model, a column for each unit's recordings; the darker, the worse than that unit's own model."""
     moved, axes = result.transfer, result.actuator.axes
-    shown = of_signal(moved.signal, axes).scaled(float(np.max(moved.error)))
+    shown = of_signal(moved.signal, axes)
     full = len(result.units) <= _IN_FULL
-    beside = f", and {shown.unit} rms of the {in_sentence(shown.title)}" if full else ""
+    beside = f", and rms of the {in_sentence(shown.title)}" if full else ""
     chart = theme.new(f"Error, × floor{beside}", "Recordings of", "Model of", dark=dark)
     names = [theme.plain(name) for name in result.units]
-    errors = [[f"{number(shown.factor * value)} {shown.unit}" for value in row] for row in moved.error]
+    errors = [[amount(value, shown.unit) for value in row] for row in moved.error]
     worse = moved.error / np.maximum(np.diag(moved.error), 1e-300)
     text = None
     if len(names) <= _IN_SHORT:
@@ -47,7 +47,13 @@ def figure(result: UnitsCompared, *, dark: bool = False) -> go.Figure:
             textfont={"color": (theme.DARK if dark else theme.LIGHT).ink},
             xgap=1,
             ygap=1,
-            colorbar={"thickness": 10, "title": {"text": "× own model's error", "side": "right", "font": {"size": 11}}},
+            colorbar={
+                "thickness": 10,
+                "nticks": 5,
+                "exponentformat": "none",
+                "separatethousands": True,
+                "title": {"text": "× own model's error", "side": "right", "font": {"size": 11}},
+            },
         )
     )
     chart.update_yaxes(autorange="reversed", nticks=0, showgrid=False, title={"standoff": 12})

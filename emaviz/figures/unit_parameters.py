@@ -40,7 +40,7 @@ def figure(result: UnitsCompared, *, dark: bool = False) -> go.Figure:
         where = {"row": place // _COLUMNS + 1, "col": place % _COLUMNS + 1}
         one, of_type = result.alone[path], result.of_type[path]
         named = on_axes(path, result.actuator.axes)
-        axis = Quantity(named.title, of_type.unit).scaled(one.value)
+        axis = Quantity(named.title, of_type.unit).powered(one.value)
         differs = {difference.unit for difference in result.differences if path in difference.together}
         low, high = (axis.factor * (of_type.mean + side * HALF_90 * of_type.sigma) for side in (-1.0, 1.0))
         grid.add_trace(
@@ -60,7 +60,9 @@ def figure(result: UnitsCompared, *, dark: bool = False) -> go.Figure:
             **where,
         )
         grid.add_vrect(x0=low, x1=high, fillcolor=_TYPE, line_width=0, layer="below", **where)
-        grid.update_xaxes(title={"text": theme.plain(axis.label), "font": {"size": 11}}, nticks=5, **where)
+        grid.update_xaxes(
+            title={"text": theme.plain(axis.label), "font": {"size": 11}}, nticks=5, exponentformat="none", **where
+        )
     grid.update_yaxes(autorange="reversed", nticks=0, tickfont={"size": 10})
     grid.update_layout(margin={"l": 48, "r": 14, "t": _HEAD_PX, "b": 0})
     return grid

@@ -25,6 +25,7 @@ from emaviz.page.members import tabs
 from emaviz.page.page import Page
 from emaviz.page.playback import PlaybackStrip
 from emaviz.page.tab import AnyTab, Shared
+from emaviz.page.viewer_links import follow_theme
 from emaviz.page.workspaces import Workspaces
 from emaviz.recording.viewer import ViewerHost
 from emaviz.scene.actuator import ActuatorScene
@@ -133,6 +134,7 @@ class App:
                 one.build()
         self.shared.uploads.add_drop(",".join(self.shared.taken()))
         add_chart_tools(Inside(self.server))
+        follow_theme(Inside(self.server))
         undo = self.tab(ExploreTab).panel.undo
         add_keys(self.page, self.strip, [kind.workspace for kind in kinds], undo)
 

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from emaviz.figures.theme import DARK
+from emaviz.colours import rgb
+from emaviz.figures.theme import DARK, LIGHT
 from emaviz.page import chart_heights, inset
 from emaviz.text.html import Html, html, unescaped
 
@@ -114,12 +115,18 @@ def play_head(share: float | None) -> Html:
 
 
 def figures(dark: bool) -> Html:
-    """Text, grids and hover labels of figures that were drawn for a light page, legible on a dark one."""
+    """Text, grids and hover labels of figures that were drawn for a light page, legible on a dark one.
+
+    Numbers at a trace's points and notes in a figure keep a colour of their own, where they have one.
+    """
     if not dark:
         return Html()
     of, seen = ".js-plotly-plot", "stroke-opacity:1!important"
+    red, green, blue = rgb(LIGHT.ink)
+    own = ":is(.textpoint,.annotation) text"
+    text = f".main-svg text:not({own}),{own}[style*='fill: rgb({red}, {green}, {blue})']"
     return unescaped(
-        f"<style>{of} .main-svg text{{fill:{DARK.ink}!important}}.u-title{{color:{DARK.ink}}}"
+        f"<style>{of} :is({text}){{fill:{DARK.ink}!important}}.u-title{{color:{DARK.ink}}}"
         f"{of} :is(.gridlayer,.angular-grid,.radial-grid) path{{stroke:{DARK.grid}!important;{seen}}}"
         f"{of} :is(.zerolinelayer path,path.ticks){{stroke:{DARK.zero}!important;{seen}}}"
         f"{of} .hoverlayer .hovertext path{{fill:{DARK.paper}!important}}"

@@ -46,6 +46,11 @@ class Shared:
     def take(self, path: Path) -> None:
         """A file came from the browser: to the tab that takes its kind; on the server's thread."""
         self.taken()[path.suffix.lower()](path)
+        self.page.screen.post("files", self._refresh_files)
+
+    def _refresh_files(self) -> None:
+        for tab in self.tabs.values():
+            tab.refresh_files()
 
     def taken(self) -> dict[str, Callable[[Path], None]]:
         """By suffix, what takes such a file."""
@@ -83,6 +88,10 @@ class Tab(ABC):
 
     def show_settings(self) -> None:
         """The session's settings have changed: shows them."""
+        return
+
+    def refresh_files(self) -> None:
+        """Reads the data folder's lists again: a file came from a browser; on the screen's thread."""
         return
 
     def close(self) -> None:

@@ -130,7 +130,9 @@ def _dashboard(contents: Contents) -> rrb.Container:
         for signal in contents.charts
     ]
     errors = [f"{algorithm_path(name)}/log10_rmse" for name in names]
-    convergence = plot("Convergence: log10 of the RMSE of the best [A]", errors, legend=len(names) > 1, linked=False)
+    convergence = plot(
+        "Convergence: log10 of the RMSE of the best [A]", errors, legend=len(names) > 1, linked=False, falls=True
+    )
     kinds = ["best", "interval"]
     kinds += ["truth"] if contents.truth else []
     kinds += ["population"] if len(names) == 1 else []  # of several it would hide all else
@@ -267,7 +269,8 @@ def _k_view(root: str, k: str) -> rrb.TimeSeriesView:
 
 def signal_view(contents: Contents, name: str) -> rrb.TimeSeriesView:
     """A signal of every group that has it, in one plot."""
-    return plot(signal_title(name), [f"/{group}/{name}" for group in contents.groups_with(name)])
+    paths = [f"/{group}/{name}" for group in contents.groups_with(name)]
+    return plot(signal_title(name), paths, falls=not name.endswith("position_rad"))
 
 
 def _residual_view(contents: Contents, name: str) -> rrb.TimeSeriesView:
@@ -282,13 +285,18 @@ def plot(
     legend: bool = True,
     linked: bool = True,
     range_: tuple[float, float] | None = None,
+    falls: bool = False,
 ) -> rrb.TimeSeriesView:
-    """Entities over time in one plot; linked: with the same part of time as all others that are."""
+    """Entities over time in one plot; linked: with the same part of time as all others that are.
+
+    falls: as an error, a speed or a current does in the end, which leaves room for the legend above; a position below.
+    """
+    corner = rrb.Corner2D.RightTop if falls else rrb.Corner2D.RightBottom
     return rrb.TimeSeriesView(
         origin="/",
         contents=paths,
         name=title,
         axis_x=rrb.TimeAxis(link="LinkToGlobal" if linked else "Independent"),
         axis_y=None if range_ is None else rrb.ScalarAxis(range=range_),
-        plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop, visible=legend),
+        plot_legend=rrb.PlotLegend(corner=corner, visible=legend),
     )

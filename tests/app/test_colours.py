@@ -68,6 +68,12 @@ def test_what_has_a_meaning_shares_its_colour_with_nothing(other):
     assert not near
 
 
+@pytest.mark.parametrize("phase", colours.PHASES)
+def test_a_phase_is_like_nothing_that_has_a_meaning(phase):
+    near = {name: round(apart(phase, one)) for name, one in MEANT.items() if apart(phase, one) < 35.0}
+    assert not near, "in the windings and beside all else: twenty are too few"
+
+
 @pytest.mark.parametrize("beside", BESIDE)
 @pytest.mark.parametrize("seen", SEEN)
 def test_what_stands_beside_each_other_is_told_apart(beside, seen):

@@ -216,6 +216,10 @@ def test_units_suit_the_size():
     assert torque.scaled([0.035, -0.01]).text(0.035) == "35.0 mN·m"
     assert torque.scaled([2.0]).unit == "N·m" and torque.scaled([3e-6]).unit == "µN·m"
     assert quantity.Quantity("Temperature", "°C").scaled([0.01]).unit == "°C"
+    inertia, stiffness = quantity.Quantity("Inertia", "kg·m²"), quantity.Quantity("Stiffness", "N·m/rad")
+    assert inertia.powered([1.38e-5, 1.2e-5]).text(1.38e-5) == "13.8 10⁻⁶ kg·m²"
+    assert stiffness.powered([100_750.0]).label == "Stiffness [kN·m/rad]"
+    assert torque.powered([0.035]).unit == "mN·m" and torque.powered([0.0]).unit == "N·m"
 
 
 def test_regions_in_time_end_with_their_run(comparison):

@@ -17,7 +17,10 @@ from ema_model.recordings import write_measurement
 from ema_model.simulation.run import Run, simulate_reference
 from ema_model.simulation.sensors import Sensors
 from emaviz.page.app import App
+from emaviz.page.compare.tab import CompareTab
 from emaviz.page.explore.tab import ExploreTab
+from emaviz.page.identify.tab import IdentifyTab
+from emaviz.page.track.tab import TrackTab
 
 pytestmark = pytest.mark.browser
 
@@ -327,6 +330,9 @@ def test_a_file_is_dropped_on_the_scene(compare, app):
     compare.evaluate(DROP, ["dropped.csv", f"time [s],I_motor [A]\n{rows}\n"])
     wait_until(lambda: "uploads/dropped.csv" in app.comparing.opened)
     compare.get_by_text("← I_motor [A]").wait_for()
+    lists = [app.tab(CompareTab).panel._choice, app.tab(IdentifyTab).panel._source]
+    wait_until(lambda: all("uploads/dropped.csv" in one.options for one in lists))
+    wait_until(lambda: any(one.startswith("uploads (") for one in app.tab(TrackTab).panel._folder.control.options))
 
 
 def test_the_panel_on_the_right_follows_what_is_done(compare, app, rig_file):

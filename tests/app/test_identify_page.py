@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -158,6 +159,16 @@ def test_a_long_search_keeps_few_frames_from_its_first_to_its_last():
     assert at_iteration(track, 5000).iteration == 5000 and at_iteration(Track("do", 5), 3) is None
 
 
+def test_the_errors_that_are_drawn_end_at_the_one_that_the_answer_says():
+    track = Track("robust", 5)
+    track.add(progress(0))
+    assert track.errors == [1.0]
+    track.answer = SimpleNamespace(polished=True, rmse=0.5)
+    assert track.errors == [1.0, 0.5] and track.rmse == [1.0]
+    track.answer = SimpleNamespace(polished=False, rmse=1.0)
+    assert track.errors == [1.0], "what the search ended with is there"
+
+
 def test_the_axes_are_those_on_which_the_faults_stand():
     assert set(telling(vector({"k3": 0.4, "k8": 0.9}))) == {2, 7}
     assert telling(vector({"k2": 0.4}))[0] == 1 and telling(vector({"k6": 0.4}))[0] == 5
@@ -167,9 +178,9 @@ def test_the_axes_are_those_on_which_the_faults_stand():
 def test_a_swarm_is_drawn_where_it_is():
     one = swarm.Swarm("do", "#1098ad", np.array([[0.0] * 8, [1.0] * 8]), np.full(8, 0.5))
     plane = swarm.plane([one], 0, 1, np.full(8, 0.25), [np.array([[0.0] * 8, [0.5] * 8])])
-    assert "M44.0 412.0h0M446.0 10.0h0" in plane and 'cx="245.0" cy="211.0"' in plane and "<polyline" in plane
+    assert "M44.0 492.0h0M446.0 10.0h0" in plane and 'cx="245.0" cy="251.0"' in plane and "<polyline" in plane
     lines = swarm.lines([one], np.full(8, 0.25))
-    assert lines.count("<path") == 8 + 3 and "M44 404.0" in lines
+    assert lines.count("<path") == 8 + 3 and "M44 484.0" in lines
 
 
 def test_the_table_escapes_names_and_shows_what_is_unknown():
@@ -276,6 +287,12 @@ def test_the_answers_of_a_race_are_seen_above_the_actuator(shared_page, app):
     for title in ALGORITHMS.values():
         one = left.locator("b", has_text=title).bounding_box()
         assert one["y"] + one["height"] < ends, title
-    link = left.get_by_role("link", name="in Rerun").bounding_box()
+    to_rerun = left.get_by_role("link", name="in Rerun")
+    link = to_rerun.bounding_box()
     assert link["y"] + link["height"] < ends, "nothing of the answer is to be scrolled to"
+    for dark, theme in ((True, "dark"), (False, "light")):
+        app.strip._dark.value = dark
+        page.wait_for_function(f"document.documentElement.dataset.mantineColorScheme === '{theme}'")
+        to_rerun.dispatch_event("pointerdown")
+        assert f"&theme={theme}" in to_rerun.get_attribute("href"), "not as the system is, but as the page is"
     settings.restore(Settings().saved())

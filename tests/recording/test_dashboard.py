@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import rerun.blueprint as rrb
 from rerun.chunk import RrdReader
 
 from emaviz.recording import RecordingWriter
-from emaviz.recording.blueprint import Contents, build
+from emaviz.recording.blueprint import Contents, build, plot
 from emaviz.recording.dashboard import POINTS, Chart, axes_path, fit_path, view
 
 TIME = np.linspace(0.0, 0.5, 5001)
@@ -91,3 +92,9 @@ def test_a_curve_keeps_its_peaks_within_its_axes():
     assert strip[:, 1].min() == pytest.approx(-0.5), "what is off the axes stands at their edge"
     flat = Chart.of("current_A", TIME, np.zeros_like(TIME))
     assert np.all(np.isfinite(flat.strip(TIME, np.zeros_like(TIME))))
+
+
+@pytest.mark.parametrize(("falls", "corner"), [(False, rrb.Corner2D.RightBottom), (True, rrb.Corner2D.RightTop)])
+def test_a_legend_lies_where_curves_seldom_are(falls, corner):
+    legend = plot("current", ["/reference/current_A"], falls=falls).properties["PlotLegend"]
+    assert legend.corner.as_arrow_array().to_pylist() == [corner.value]

@@ -122,6 +122,13 @@ def test_the_saturated_run_is_the_last_to_show_what_follows_a_variable(runs):
     assert sag is not None and sag.run == "step"  # the others leave the drive its voltage
 
 
+def test_what_the_drive_hardly_feels_is_drawn_where_it_leaves_most(runs):
+    effect = CATALOGUE["resistance_drift"]  # the current's loop makes up for it until its voltage ends
+    felt = runs.severities(effect)
+    assert felt[1].run == "step" and felt[1].visibility == 0.0
+    assert np.ptp(heights(charts(pictures(effect, felt))[0])["high"]) > 20.0
+
+
 @pytest.mark.long
 @pytest.mark.browser
 def test_the_ink_follows_light_and_dark(pages, browser):

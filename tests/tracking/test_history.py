@@ -13,6 +13,7 @@ from ema_model.tracking.criteria import LEAST_FLIGHTS
 from ema_model.tracking.history import Came, History
 from ema_model.tracking.track import track
 from ema_model.tracking.words import headline, hindsight
+from emaviz.figures import predicted_life
 
 ALL = flights(0.004 * np.arange(120))
 AT = 0.4  # k1, which is there after flight 100 or so
@@ -63,3 +64,19 @@ def test_before_there_are_enough_there_is_no_look():
     assert [*few.follow(ALL[: LEAST_FLIGHTS - 1])] and few.last is None and few.crossed("k1") is None
     with pytest.raises(InputError, match="no such fault"):
         History({"k9": 0.1})
+
+
+@pytest.mark.parametrize("far", [1.0, 50.0])
+def test_the_band_of_the_predicted_life_stays_within_its_axis(history, far):
+    said = {n: look.faults["k1"].remaining for n, look in history.looks.items() if look.faults["k1"].remaining}
+    first = min(said)
+    look, one = history.looks[first], history.looks[first].faults["k1"]
+    left = replace(said[first], p95=far * sorted(left.p95 for left in said.values())[len(said) // 2])
+    odd = History(history.thresholds)
+    odd.looks = history.looks | {first: replace(look, faults={**look.faults, "k1": replace(one, remaining=left)})}
+    odd.flights = history.flights
+    figure = predicted_life.figure(odd, "k1", 100)
+    low, high = figure.layout.yaxis.range
+    assert all(low <= value <= high for trace in figure.data for value in trace.y if value is not None)
+    cut = any("are cut" in one.text for one in figure.layout.annotations)
+    assert cut or far < 50.0, "one that says little does not press the others flat"

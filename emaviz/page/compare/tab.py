@@ -40,6 +40,10 @@ class CompareTab(Tab):
         """Recordings in, what is compared, and the run."""
         self.panel = ComparePanel(self.page, self.shared.comparing, self.result, self.shared.uploads)
 
+    def refresh_files(self) -> None:
+        """What may be added."""
+        self.panel.refresh_files()
+
     def kept(self) -> dict[str, Part]:
         """What is opened and asked."""
         return {"compare": kept(self.shared.comparing, self.panel.asked.show_settings)}

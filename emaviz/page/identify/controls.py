@@ -18,6 +18,7 @@ from emaviz.page.identify.result import IdentifyResult
 from emaviz.page.job_line import JobLine
 from emaviz.page.page import Page
 from emaviz.page.style import IN_PAIRS
+from emaviz.page.viewer_links import LINK
 from emaviz.recording.viewer import ViewerHost
 from emaviz.session.compare.comparing import Comparing
 from emaviz.session.described import limits
@@ -208,8 +209,9 @@ def recording_link(viewer: ViewerHost | None, path: Path, text: str = "") -> Htm
     if viewer is None:
         return html('<div style="padding:2px 10px;font-size:13px">{}</div>', path.name)
     return html(
-        '<div style="padding:2px 10px;font-size:13px;overflow-wrap:anywhere"><a href="{}" target="_blank" '
-        'rel="noopener">{}</a></div>',
+        '<div style="padding:2px 10px;font-size:13px;overflow-wrap:anywhere"><a class="{}" href="{}" '
+        'target="_blank" rel="noopener">{}</a></div>',
+        LINK,
         viewer.url_of(path.name),
         text or f"Open {path.name} in Rerun ↗",
     )

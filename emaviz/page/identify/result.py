@@ -160,7 +160,7 @@ class IdentifyResult:
         longest = max(track.iterations for track in race.tracks.values())
         with self._page.server.atomic():
             self._convergence.begin(tuple(race.tracks), longest)
-            self._convergence.show({name: list(track.rmse) for name, track in race.tracks.items()})
+            self._convergence.show({name: track.errors for name, track in race.tracks.items()})
             self._swarm.show(race, begun)
 
     def _draw_answer(self) -> None:

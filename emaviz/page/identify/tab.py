@@ -53,6 +53,10 @@ class IdentifyTab(Tab):
         """Of the search."""
         self.panel.show_settings()
 
+    def refresh_files(self) -> None:
+        """What may be identified."""
+        self.panel.refresh_sources()
+
     def kept(self) -> dict[str, Part]:
         """The table of runs."""
         return {"runs": Part(lambda: msgspec.to_builtins(self.result.rows), self._restore)}

@@ -39,6 +39,10 @@ class TrackTab(Tab):
         """Which flights, and where the life ends."""
         self.panel = TrackPanel(self.page, self.following, self.result)
 
+    def refresh_files(self) -> None:
+        """What may be followed."""
+        self.panel.refresh()
+
     def kept(self) -> dict[str, Part]:
         """The flights, as they were identified."""
         return {"track": Part(self.following.saved, self._restore)}

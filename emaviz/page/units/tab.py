@@ -30,6 +30,10 @@ class UnitsTab(Tab):
         """Which units, what is held out, and the run."""
         self.panel = UnitsPanel(self.page, self.comparing, self.result)
 
+    def refresh_files(self) -> None:
+        """What may be compared."""
+        self.panel.refresh()
+
     def kept(self) -> dict[str, Part]:
         """What is chosen, and the answer."""
         return {"units": Part(self.comparing.saved, self._restore, self.comparing.files)}

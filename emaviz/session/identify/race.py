@@ -46,7 +46,7 @@ class Track:
 
     algorithm: str
     iterations: int
-    rmse: list[float] = field(default_factory=list)  # A, the best after each iteration
+    rmse: list[float] = field(default_factory=list)  # A, of the best after each iteration; see `Progress`
     last: Progress | None = None
     frames: list[Frame] = field(default_factory=list)  # every `stride` iterations
     stride: int = 1
@@ -62,6 +62,12 @@ class Track:
         if self.fitting is not None:
             return _SEARCH_SHARE + (1.0 - _SEARCH_SHARE) * min(self.fitting[1], 0.99)
         return _SEARCH_SHARE * len(self.rmse) / (self.iterations + 1.0)
+
+    @property
+    def errors(self) -> list[float]:
+        """A, of the best after each iteration, and of the answer where a fit went on from there."""
+        answer = self.answer
+        return [*self.rmse, answer.rmse] if answer is not None and answer.polished else list(self.rmse)
 
     @property
     def k(self) -> Array | None:

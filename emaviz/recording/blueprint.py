@@ -30,6 +30,7 @@ from emaviz.recording.style import (
 _MAIN = ("current_A", "user_position_rad", "motor_position_rad", "motor_speed_rad_s")
 _BESIDE = ("residual", "floor_high", "floor_low")  # in plots of their own, not in the signal's
 _PHASES = ("phase_a_current_A", "phase_b_current_A", "phase_c_current_A")
+_TOP, _BOTTOM = rrb.Corner2D.RightTop, rrb.Corner2D.RightBottom
 
 
 @dataclass
@@ -130,9 +131,8 @@ def _dashboard(contents: Contents) -> rrb.Container:
         for signal in contents.charts
     ]
     errors = [f"{algorithm_path(name)}/log10_rmse" for name in names]
-    convergence = plot(
-        "Convergence: log10 of the RMSE of the best [A]", errors, legend=len(names) > 1, linked=False, falls=True
-    )
+    title = "Convergence: log10 of the RMSE of the best [A]"
+    convergence = plot(title, errors, legend=len(names) > 1, linked=False, falls=True)
     kinds = ["best", "interval"]
     kinds += ["truth"] if contents.truth else []
     kinds += ["population"] if len(names) == 1 else []  # of several it would hide all else
@@ -291,12 +291,11 @@ def plot(
 
     falls: as an error, a speed or a current does in the end, which leaves room for the legend above; a position below.
     """
-    corner = rrb.Corner2D.RightTop if falls else rrb.Corner2D.RightBottom
     return rrb.TimeSeriesView(
         origin="/",
         contents=paths,
         name=title,
         axis_x=rrb.TimeAxis(link="LinkToGlobal" if linked else "Independent"),
         axis_y=None if range_ is None else rrb.ScalarAxis(range=range_),
-        plot_legend=rrb.PlotLegend(corner=corner, visible=legend),
+        plot_legend=rrb.PlotLegend(corner=_TOP if falls else _BOTTOM, visible=legend),
     )

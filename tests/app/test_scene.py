@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import itertools
 import time
 from dataclasses import replace
@@ -9,6 +10,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from PIL import Image
 from support.on_page import wait_until
 from support.one_tab import Tab
 
@@ -381,6 +383,20 @@ def drawn(browser, app):
     yield tab.as_new()
     tab.check()
     tab.close()
+
+
+@pytest.mark.browser
+def test_the_actuator_is_drawn_between_the_panels(drawn):
+    """By WebGL itself, which calm pages do without; what a shader cannot be made of is an error of the page."""
+    middle = {"x": 450, "y": 250, "width": 450, "height": 400}
+
+    def colours():
+        picture = Image.open(io.BytesIO(drawn.screenshot(clip=middle))).convert("RGB")
+        return len(picture.getcolors(middle["width"] * middle["height"]))
+
+    wait_until(lambda: colours() > 300, 30.0)
+    drawn.add_style_tag(content="canvas { visibility: hidden !important }")
+    wait_until(lambda: colours() < 100, 10.0)
 
 
 @pytest.mark.long

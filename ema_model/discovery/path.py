@@ -19,14 +19,7 @@ from ema_model.discovery.criteria import LEAST_BIC
 from ema_model.discovery.evidence import predicted_evidence
 from ema_model.discovery.faults import fault_for
 from ema_model.discovery.fingerprints import Fingerprint, fingerprints, of_the_file
-from ema_model.discovery.model_fit import (
-    Data,
-    Fit,
-    as_in,
-    fit,
-    in_floors_of,
-    without_effect,
-)
+from ema_model.discovery.model_fit import Data, Fit, as_in, fit, in_floors_of, without_effect
 from ema_model.discovery.refit import Trial, again, is_near, promising, stands_for, tried
 from ema_model.discovery.remaining import Left, at_floor, left_by
 from ema_model.discovery.result import Added, Candidate, Change, Contradiction, Rung

@@ -15,9 +15,9 @@ _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _SMALLEST = 0.09995  # reads as 0.1, and is shown as it is; what is smaller gets the next prefix
 _FINE = 1e-3  # an error that takes the next prefix
 _FINE_AT = 0.1  # from which on its value keeps three digits
-_PREFIXES = {-6: "µ", -3: "m", 3: "k", 6: "M"}
-_WITHOUT_PREFIX = ("kg", "1/", "°")
 _LARGEST = 9995.0  # likewise, from which on a kilo is taken
+_PREFIXES = {-6: "µ", -3: "m", 3: "k", 6: "M"}  # by the power of ten
+_WITHOUT_PREFIX = ("kg", "1/", "°")  # how units begin that take a power of ten in place of one
 
 
 def as_number(value: Any) -> float:

@@ -132,6 +132,7 @@ class App:
         for kind, one in self.shared.tabs.items():
             with group.add_tab(kind.workspace.title, kind.workspace.icon):
                 one.build()
+        self.page.workspaces.entered.connect(self.shared.enter)
         self.shared.uploads.add_drop(",".join(self.shared.taken()))
         add_chart_tools(Inside(self.server))
         follow_theme(Inside(self.server))

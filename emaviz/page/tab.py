@@ -48,6 +48,12 @@ class Shared:
         self.taken()[path.suffix.lower()](path)
         self.page.screen.post("files", self._refresh_files)
 
+    def enter(self, name: str) -> None:
+        """A window came to a workspace; on the screen's thread."""
+        for tab in self.tabs.values():
+            if tab.workspace.name == name:
+                tab.refresh_files()
+
     def _refresh_files(self) -> None:
         for tab in self.tabs.values():
             tab.refresh_files()
@@ -91,7 +97,7 @@ class Tab(ABC):
         return
 
     def refresh_files(self) -> None:
-        """Reads the data folder's lists again: a file came from a browser; on the screen's thread."""
+        """Reads the data folder's lists again: a window came here, or a file from one; on the screen's thread."""
         return
 
     def close(self) -> None:

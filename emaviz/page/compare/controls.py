@@ -9,7 +9,6 @@ import viser
 
 from ema_model.errors import InputError
 from ema_model.recordings.formats import FORMATS
-from emaviz.page.compare import WORKSPACE
 from emaviz.page.compare.cards import health_card, recordings_list
 from emaviz.page.compare.mapping import MappingStep
 from emaviz.page.compare.options import AskedControls
@@ -63,7 +62,6 @@ class ComparePanel:
         events.failed.connect(lambda what, why: page.screen.post(f"failed to {what}", lambda: self._failed(what, why)))
         events.removed.connect(lambda: page.screen.post("removed", self._removed))
         events.compared.connect(lambda found: page.screen.post("compared", lambda: result.show(found)))
-        page.workspaces.entered.connect(lambda name: name == WORKSPACE.name and self.refresh_files())
         comparing.job.began.connect(lambda _: page.screen.post("compare began", self._began))
         comparing.job.ended.connect(lambda _: page.screen.post("compare ended", self._ended))
         self.refresh_files()

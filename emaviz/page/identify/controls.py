@@ -13,7 +13,6 @@ from ema_model.identification.run import ALGORITHMS
 from ema_model.identification.words import facts, verdict, why_best
 from ema_model.simulation.plant import FITNESSES
 from emaviz.figures.convergence import named
-from emaviz.page.identify import WORKSPACE
 from emaviz.page.identify.result import IdentifyResult
 from emaviz.page.job_line import JobLine
 from emaviz.page.page import Page
@@ -94,7 +93,6 @@ class IdentifyPanel:
         self._missing.on_click(
             lambda event: page.screen.post("to discover", lambda: self._look_for_missing(event.client))
         )
-        page.workspaces.entered.connect(lambda name: name == WORKSPACE.name and self.refresh_sources())
         identifying, post = page.session.identifying, page.screen.post
         identifying.progressed.connect(self._progressed)
         identifying.identified.connect(lambda race: post("identification", lambda: self._draw_answer(race)))

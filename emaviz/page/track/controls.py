@@ -14,7 +14,6 @@ from emaviz.page.job_line import JobLine
 from emaviz.page.page import Page
 from emaviz.page.practice import PracticeButtons
 from emaviz.page.style import LONG_LABELS
-from emaviz.page.track import WORKSPACE
 from emaviz.page.track.result import TrackResult
 from emaviz.session.track.following import Following
 from emaviz.text.html import add_html, html, joined
@@ -62,7 +61,6 @@ class TrackPanel:
         following.job.ended.connect(lambda _: post("track ended", lambda: self._busy(False)))
         following.events.followed.connect(lambda history: post("followed", lambda: result.show(history)))
         following.events.left_out.connect(lambda: post("left out", self._show_left_out))
-        page.workspaces.entered.connect(lambda name: name == WORKSPACE.name and self.refresh())
         self.refresh()
 
     def refresh(self) -> None:

@@ -42,7 +42,6 @@ class UnitsPanel:
         comparing.job.began.connect(lambda _: post("units began", lambda: self._busy(True)))
         comparing.job.ended.connect(lambda _: post("units ended", lambda: self._busy(False)))
         comparing.events.compared.connect(lambda found: post("units compared", lambda: result.show(found)))
-        page.workspaces.entered.connect(lambda name: name == WORKSPACE.name and self.refresh())
         self.refresh()
 
     def refresh(self) -> None:

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 
 import numpy as np
 import pytest
+from support.compiled import compiled
 
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
@@ -56,19 +57,19 @@ def test_an_effect_does_nothing_at_its_neutral_settings(name):
     own, states = [*effect.neutral.values()], [0.0] * len(effect.states)
     for place in effect.places:
         names = PLACES[place.__name__]
-        values = arguments(names)
+        values, acts = arguments(names), compiled(place)
         renewed = states and place.__name__ in STAGES  # a controller's memory goes on with what passes it
         if renewed and place.__name__ == "drive_output" and "sampled" in effect.states:
             states[effect.states.index("sampled")] = 1.0  # as `speed_sample` has left it
         for row in zip(*(values[one] for one in names)):
-            told = place(*row, *own, *states)
+            told = acts(*row, *own, *states)
             if renewed:
                 told, states = told[0], [*told[1:]]
             assert told == row[0], f"{name} acts on {place.__name__}"
     if effect.advance_states is not None:
-        values = arguments(ADVANCE)
+        values, advances = arguments(ADVANCE), compiled(effect.advance_states)
         for row in zip(*(values[one] for one in ADVANCE)):
-            assert effect.advance_states(*row, *own, *states) == (*states,)
+            assert advances(*row, *own, *states) == (*states,)
 
 
 # --- the kernels ----------------------------------------------------------------------------------------------------

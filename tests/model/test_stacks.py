@@ -124,7 +124,7 @@ def test_effects_act_at_known_places_with_the_right_arguments(effect):
     declared = CATALOGUE[effect]
     assert declared.places
     for function in declared.places:
-        arguments = function.py_func.__code__.co_varnames[: function.py_func.__code__.co_argcount]
+        arguments = function.__code__.co_varnames[: function.__code__.co_argcount]
         expected = len(PLACES[function.__name__]) + len(declared.parameters) + len(declared.states)
         assert len(arguments) == expected, f"{effect}.{function.__name__} takes {arguments}"
 

@@ -7,7 +7,6 @@ import json
 import numpy as np
 import pytest
 from support.hidden_effects import ACTUATOR, SINE, recorded
-from support.representative import first_of
 
 from ema_model.actuator import load_actuator, save_actuator
 from ema_model.comparison import compare
@@ -37,7 +36,8 @@ def cogged():
     return found_in({"cogging_torque": CASES["cogging_torque"]})
 
 
-@pytest.mark.parametrize("name", first_of([name for name in CASES if name != "cogging_torque"]))
+@pytest.mark.long
+@pytest.mark.parametrize("name", [name for name in CASES if name != "cogging_torque"])
 def test_hidden_effect_is_found_and_the_error_falls_to_the_floor(name):
     found = found_in({name: CASES[name]})
     assert found.verdict == "effects_found" and [one.name for one in found.effects] == [name]

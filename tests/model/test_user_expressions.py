@@ -202,14 +202,14 @@ def test_no_value_makes_a_compiled_expression_raise():
     rng = random.Random(7)
     extremes = [0.0, 1.0, -1.0, 1e308, -1e308, 1e-308, math.inf, math.nan]
     without_value = 0
-    for text in [*(f"theta**-{n}" for n in (1, 2, 3, 16)), *(some_expression(rng, 4) for _ in range(60))]:
+    for text in [*(f"theta**-{n}" for n in (1, 2, 3, 16)), *(some_expression(rng, 4) for _ in range(26))]:
         effect = user_torque(text)
         torque_of = compiled(effect.places[0])
         for _ in range(20):
             theta, omega, current, user, *own = (rng.choice(extremes) for _ in range(4 + len(effect.parameters)))
             torque = torque_of(0.0, theta, omega, current, user, 0.01, 0.0, 0.0, *own)
             without_value += not math.isfinite(torque)
-    assert without_value > 100
+    assert without_value > 50
 
 
 def test_names_of_the_user_reach_no_compiler():

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ema_model.commands.command import Array, Command
 
 _JUMP = 8.0  # times the changes just before and after it: a change within one sample that is no slope
+_LEAST = 1e-6  # of the command's range: less is how its numbers are rounded, and stands beside a 0 anywhere
 _ROUNDING_S = 1e-9
 _OF_A_CURVE = 2  # samples on either side that decide how it bends
 _LONGEST_SAMPLE_S = 0.02  # what is farther apart are corners of a profile, with slopes between them
@@ -44,7 +45,7 @@ def jumps(command: Array) -> NDArray[np.bool_]:
     """Between which samples of a command (n,) it jumps, (n − 1,)."""
     change = np.abs(np.diff(command))
     beside = np.maximum(np.append(0.0, change[:-1]), np.append(change[1:], 0.0))
-    return change > _JUMP * beside
+    return change > np.maximum(_JUMP * beside, _LEAST * np.ptp(command))
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ema_model.commands import COMMANDS, Command, Recorded, command
-from ema_model.commands.recorded import between
+from ema_model.commands.recorded import between, jumps
 from ema_model.errors import InputError
 
 T = np.linspace(0.0, 1.0, 100_001)
@@ -167,3 +167,21 @@ def test_a_sampled_command_goes_smoothly_between_its_samples_and_keeps_its_corne
     np.testing.assert_allclose(between(fine, time, ramp), np.clip(fine - 0.2, 0.0, 0.1), atol=1e-12)
     step = between(fine, time, np.where(time > 0.1, 0.005, 0.0))
     assert set(np.unique(step)) == {0.0, 0.005}
+
+
+@pytest.mark.parametrize("digits", [None, 9])
+def test_how_numbers_are_rounded_is_no_jump(digits):
+    """Between two places the command stands at numbers that are not round, and so does what is interpolated there."""
+    places = np.array([0.0, math.pi / 7, -0.3 / 7, 1.1 / 3])
+    move = np.linspace(0.0, 1.0, 60)
+    smooth = move**3 * (10.0 - 15.0 * move + 6.0 * move**2)
+    command = np.concatenate(
+        [np.concatenate([a + (b - a) * smooth, np.full(50, b)]) for a, b in zip(places[:-1], places[1:])]
+    )
+    command = command if digits is None else command.round(digits)
+    time = 0.002 * np.arange(len(command))
+    fine = between(np.arange(0.0, time[-1], 1e-4), time, command)
+    assert not np.any(jumps(command)) and not np.any(jumps(fine))
+    stepped = command.copy()
+    stepped[100:] += 1e-3
+    assert np.flatnonzero(jumps(stepped)).tolist() == [99]

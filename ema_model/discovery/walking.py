@@ -47,7 +47,8 @@ def walk(
     """
     own = _Walk(story, tell, candidates, most_effects)
     beside = _Beside(story, tell, candidates, most_effects)
-    if own.suspects_drive() and beside.settles():  # a loop whose drive is another one is walked in vain
+    # A loop whose drive is another one is walked in vain.
+    if own.is_untold() and (own.suspects_drive() or beside.blames_controller()) and beside.settles():
         walked = beside.taken_over()
     else:
         own.go()
@@ -81,15 +82,18 @@ class _Walk:
         self._going = True
         self._ranked: tuple[Fit, Left, list[Candidate]] | None = None
 
-    def suspects_drive(self) -> bool:
-        """Whether the loop is far off, and what would tell most of it is of the drive, and does not tell it well."""
+    def is_untold(self) -> bool:
+        """Whether the loop is far off, and nothing would tell most of it."""
         story = self.story
         if ratio(story.data, story.current) <= FAR or not story.current.plant.simulates_commands:
             return False
-        best = next(iter(self._scored()[1]), None)
-        if best is None:
-            return False
-        return find(best.name).family == "drive" and best.predicted_drop < TOLD_WELL * story.current.chi2
+        best = self._best()
+        return best is not None and best.predicted_drop < TOLD_WELL * story.current.chi2
+
+    def suspects_drive(self) -> bool:
+        """Whether what would tell most of what is left is of the drive."""
+        best = self._best()
+        return best is not None and find(best.name).family == "drive"
 
     def go(self) -> None:
         """One step, of a fault or an effect; where nothing pays, it has come to its end."""
@@ -109,6 +113,9 @@ class _Walk:
             unknown = _with_curve(story, self._curve, unknown, tell)
         story.settle(tell)  # last: beside a settled model any refit falls that only goes back to the sensors' noise
         return Walked(self._first, self._rivals, unknown)
+
+    def _best(self) -> Candidate | None:
+        return next(iter(self._scored()[1]), None)
 
     def _scored(self) -> tuple[Left, list[Candidate]]:
         """What the last model leaves, and all candidates for it."""

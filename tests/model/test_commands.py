@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -175,9 +176,7 @@ def test_how_numbers_are_rounded_is_no_jump(digits):
     places = np.array([0.0, math.pi / 7, -0.3 / 7, 1.1 / 3])
     move = np.linspace(0.0, 1.0, 60)
     smooth = move**3 * (10.0 - 15.0 * move + 6.0 * move**2)
-    command = np.concatenate(
-        [np.concatenate([a + (b - a) * smooth, np.full(50, b)]) for a, b in zip(places[:-1], places[1:])]
-    )
+    command = np.concatenate([np.concatenate([a + (b - a) * smooth, np.full(50, b)]) for a, b in pairwise(places)])
     command = command if digits is None else command.round(digits)
     time = 0.002 * np.arange(len(command))
     fine = between(np.arange(0.0, time[-1], 1e-4), time, command)

@@ -24,6 +24,7 @@ from emaviz.recording.read import check
 
 _FOLDER = "/recordings/"
 _FOLLOW_S = 0.1  # between two looks at a recording that grows
+_CLOSED_S = 0.1  # after which it is seen at the latest that the host is to end
 _CSP = "; ".join(
     (
         "default-src 'self'",
@@ -62,7 +63,9 @@ class ViewerHost:
         self._server.host = self
         self.port: int = self._server.server_address[1]
         self.address = f"http://127.0.0.1:{self.port}"
-        self._thread = threading.Thread(target=self._server.serve_forever, name="rerun-viewer", daemon=True)
+        self._thread = threading.Thread(
+            target=self._server.serve_forever, args=(_CLOSED_S,), name="rerun-viewer", daemon=True
+        )
         self._thread.start()
 
     def __enter__(self) -> ViewerHost:

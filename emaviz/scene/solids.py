@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -47,6 +48,13 @@ def joined(*parts: Solid) -> Solid:
 
 def block(length_x: float, length_y: float, length_z: float) -> Solid:
     """A box about the origin."""
+    cube = _cube()
+    return Solid((cube.vertices * np.array([length_x, length_y, length_z])).astype(np.float32), cube.faces)
+
+
+@cache
+def _cube() -> Solid:
+    """Of edges of 1: a scene has hundreds of boxes."""
     sides = []
     for axis in range(3):
         for sign in (-1.0, 1.0):
@@ -54,8 +62,7 @@ def block(length_x: float, length_y: float, length_z: float) -> Solid:
             corners[:, axis] = sign
             corners[:, (axis + 1) % 3] = np.array([-1.0, 1.0, 1.0, -1.0])
             corners[:, (axis + 2) % 3] = np.array([-1.0, -1.0, 1.0, 1.0]) * sign
-            face = _solid(corners * 0.5 * np.array([length_x, length_y, length_z]), [[0, 1, 2], [0, 2, 3]])
-            sides.append(_facing(face, sign * np.eye(3)[axis]))
+            sides.append(_facing(_solid(0.5 * corners, [[0, 1, 2], [0, 2, 3]]), sign * np.eye(3)[axis]))
     return joined(*sides)
 
 

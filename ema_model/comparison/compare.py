@@ -15,7 +15,7 @@ from ema_model.comparison.result import Compared, Comparison, SignalError
 from ema_model.comparison.verdict import judge, judged
 from ema_model.effects import find
 from ema_model.errors import InputError, quoted
-from ema_model.estimation import Calibration, Floor, after_fit, floor
+from ema_model.estimation import Calibration, Floor, after_fit, floor, of_unseen, taken_up
 from ema_model.estimation import calibrate as fit
 from ema_model.estimation.floor import twin_error
 from ema_model.estimation.floor_band import band, spread
@@ -56,8 +56,23 @@ def compare(
     on_progress is told what goes on, and may raise to stop.
     Raises InputError for recordings that cannot be compared.
     """
-    actuator = actuator or load_actuator()
     tell = on_progress or (lambda text: None)
+    return _compare(measurements, actuator or load_actuator(), k, effects, calibrate, free, signals, holdout, tell)
+
+
+def _compare(
+    measurements: Sequence[Measurement],
+    actuator: Actuator,
+    k: ArrayLike | None,
+    effects: Mapping[str, Mapping[str, float]] | None,
+    calibrate: bool,
+    free: Sequence[str] | None,
+    signals: Sequence[str] | Mapping[str, float] | None,
+    holdout: Sequence[Measurement],
+    tell: Progress,
+    elsewhere: tuple[Calibration, Array] | None = None,
+) -> Comparison:
+    """elsewhere: the calibration that these are held out of, and what it took up of the model's own error there."""
     check_same_actuator(measurements)
     tell("checking the data")
     recordings = [prepared(measurement, actuator) for measurement in measurements]
@@ -85,12 +100,14 @@ def compare(
     )
     tell("looking where it fails")
     twins = [twin_error(fitted, i, calibration.actuator, calibration.k) for i in range(len(fitted.windows))]
-    floors = after_fit(floors, calibration, twins)
+    taken = taken_up(floors, calibration, twins)
+    if elsewhere is None:
+        floors = after_fit(floors, calibration, twins)
+    else:
+        floors = of_unseen(fitted, floors, *elsewhere, twins, wanted)
     plant, floors, before, after = _everywhere(recordings, fitted, floors, calibration, actuator)
-    known = twins if plant is fitted else [{} for _ in plant.windows]
-    residuals = residuals_of(
-        plant, floors, after, known, calibration.actuator, calibration if plant is fitted else None
-    )
+    own = twins if plant is fitted else [{} for _ in plant.windows]
+    residuals = residuals_of(plant, floors, after, own, calibration.actuator, calibration if plant is fitted else None)
     compared = [
         _compared(i, recordings[i], cards[i], plant, floors, before, after, actuator) for i in range(len(recordings))
     ]
@@ -102,7 +119,9 @@ def compare(
     held: Sequence[Compared] = ()
     if unseen:
         tell("holding it against what was not fitted")
-        held = compare(unseen, calibration.actuator, k=calibration.k, calibrate=False, signals=signals).recordings
+        known = calibration, taken
+        k, known = calibration.k, (calibration, taken)
+        held = _compare(unseen, calibration.actuator, k, None, False, None, signals, (), tell, known).recordings
     return Comparison(
         actuator=actuator,
         calibration=fitted_to,

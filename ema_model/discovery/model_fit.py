@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator, Tolerance
 from ema_model.effects import find
-from ema_model.estimation import Calibration, Floor, after_fit, calibrate, default_free, floor, of_unseen
+from ema_model.estimation import Calibration, Floor, after_fit, calibrate, default_free, floor, of_unseen, taken_up
 from ema_model.estimation.floor import twin_error
 from ema_model.estimation.floor_band import spread
 from ema_model.models import Model, model_for
@@ -136,8 +136,15 @@ def twins_of(found: Fit) -> Sequence[Signals]:
 
 def in_floors_of(found: Fit, data: Data, held: Data | None) -> tuple[Data, Data | None]:
     """Data, and held-out ones, whose errors are told in what a true model leaves that was fitted as this one."""
-    data = replace(data, after_fit=after_fit(data.floors, found.calibration, twins_of(found)))
-    return data, None if held is None else replace(held, after_fit=of_unseen(held.floors, data.after_fit))
+    calibration, twins = found.calibration, twins_of(found)
+    data = replace(data, after_fit=after_fit(data.floors, calibration, twins))
+    if held is None:
+        return data, None
+    plant = held.plant(calibration.actuator)
+    there = [twin_error(plant, place) for place in range(len(plant.windows))]
+    taken = taken_up(data.floors, calibration, twins)
+    unseen = of_unseen(plant, held.floors, calibration, taken, there, held.signals)
+    return data, replace(held, after_fit=unseen)
 
 
 def with_effect(actuator: Actuator, name: str, settings: Mapping[str, float]) -> Actuator:

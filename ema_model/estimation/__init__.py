@@ -2,8 +2,18 @@
 
 from __future__ import annotations
 
-from ema_model.estimation.after_fit import after_fit, of_unseen
+from ema_model.estimation.after_fit import after_fit, of_unseen, taken_up
 from ema_model.estimation.calibrate import Calibrated, Calibration, calibrate, default_free
 from ema_model.estimation.floor import Floor, floor
 
-__all__ = ["Calibrated", "Calibration", "Floor", "after_fit", "calibrate", "default_free", "floor", "of_unseen"]
+__all__ = [
+    "Calibrated",
+    "Calibration",
+    "Floor",
+    "after_fit",
+    "calibrate",
+    "default_free",
+    "floor",
+    "of_unseen",
+    "taken_up",
+]

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ema_model.estimation.calibrate import Calibration
+from ema_model.estimation.calibrate import Calibration, by_window, problem_of
 from ema_model.estimation.floor import Floor, local_rms
+from ema_model.models import Model
 from ema_model.models.model import Signals
 
 Array = NDArray[np.float64]
@@ -21,36 +22,71 @@ def after_fit(floors: Sequence[Floor], calibration: Calibration, twins: Sequence
     t − J(JᵀJ + I)⁻¹Jᵀt, weighted as the fit was: J are its sensitivities, and I is the prior.  twins: as of
     `twin_error`, by window, with the calibrated parameters.  Floors without a twin stay as they are.
     """
-    parts = [
+    taken = taken_up(floors, calibration, twins)
+    return _floors_left(floors, twins, calibration.weighted_sensitivities, taken)
+
+
+def taken_up(floors: Sequence[Floor], calibration: Calibration, twins: Sequence[Signals]) -> Array:
+    """By how much a calibration's unknowns are off, as they take up what its twins differ by: (unknowns,), in σ."""
+    return _solved(_parts(floors, twins, calibration.weighted_sensitivities), calibration.x.size)
+
+
+def of_unseen(
+    model: Model,
+    floors: Sequence[Floor],
+    calibration: Calibration,
+    taken: Array,
+    twins: Sequence[Signals],
+    signals: Mapping[str, float],
+) -> list[Floor]:
+    """Floors of recordings that were not fitted, with `left` as of `after_fit`.
+
+    model: the calibrated one beside them; taken: as of `taken_up`, there; twins: here.  The parameters are off by what
+    they took up elsewhere, which moves this model, too; only where it starts is fitted here.
+    """
+    problem = problem_of(model, floors, free=calibration.free, signals=signals)
+    if not problem.count:
+        return list(floors)
+    _, jacobian = problem.jacobians(np.zeros((1, problem.count)), in_whole_blocks=True)
+    slopes = by_window(problem, jacobian[0], weighted=True)
+    shared = len(calibration.free)
+    moved = np.concatenate([taken[:shared], np.zeros(problem.count - shared)])
+    rest = [(place, name, part, own - part @ moved) for place, name, part, own in _parts(floors, twins, slopes)]
+    own_starts = [(place, name, part[:, shared:], own) for place, name, part, own in rest]
+    moved[shared:] = _solved(own_starts, problem.count - shared)
+    return _floors_left(floors, twins, slopes, moved)
+
+
+_Part = tuple[int, str, Array, Array]  # window, signal; weighted: sensitivities (blocks, unknowns), twin's difference
+
+
+def _parts(floors: Sequence[Floor], twins: Sequence[Signals], slopes: Sequence[Mapping[str, Array]]) -> list[_Part]:
+    return [
         (place, name, part[name], twins[place][name] / floors[place].fit_sigma(name))
-        for place, part in enumerate(calibration.weighted_sensitivities)
+        for place, part in enumerate(slopes)
         for name in part
         if name in twins[place]
     ]
-    if not parts or not calibration.x.size:
-        return list(floors)
+
+
+def _solved(parts: Sequence[_Part], unknowns: int) -> Array:
+    """(JᵀJ + I)⁻¹Jᵀt"""
+    if not parts or not unknowns:
+        return np.zeros(unknowns)
     jacobian, twin = (np.concatenate(one) for one in zip(*((j, t) for _, _, j, t in parts)))
-    taken = np.linalg.solve(jacobian.T @ jacobian + np.eye(calibration.x.size), jacobian.T @ twin)
+    return np.asarray(np.linalg.solve(jacobian.T @ jacobian + np.eye(unknowns), jacobian.T @ twin), dtype=float)
+
+
+def _floors_left(
+    floors: Sequence[Floor], twins: Sequence[Signals], slopes: Sequence[Mapping[str, Array]], taken: Array
+) -> list[Floor]:
+    """With `left`, where unknowns that are off by `taken` move the model by its weighted sensitivities."""
+    if not taken.size:
+        return list(floors)
     left: list[dict[str, Array]] = [{} for _ in floors]
-    for place, name, part, own in parts:
+    for place, name, part, own in _parts(floors, twins, slopes):
         one = floors[place]
         before, after = (local_rms(t * one.fit_sigma(name), one.block_s) for t in (own, own - part @ taken))
         besides = 0.5 * (np.maximum(one.model[name], before) ** 2 - before**2)  # also by how much two twins differ
         left[place][name] = np.sqrt(besides + np.minimum(before, after) ** 2)
     return [replace(one, left=its) for one, its in zip(floors, left)]
-
-
-def of_unseen(floors: Sequence[Floor], fitted: Sequence[Floor]) -> list[Floor]:
-    """Floors of recordings that were not fitted, of which as much is left, by signal, as of those that were."""
-    shares = {name: _share_left(fitted, name) for name in {name for one in fitted for name in one.left}}
-    return [
-        replace(one, left={name: share * one.model[name] for name, share in shares.items() if name in one.model})
-        for one in floors
-    ]
-
-
-def _share_left(fitted: Sequence[Floor], name: str) -> float:
-    known = [one for one in fitted if name in one.left]
-    left = sum(float(one.counts @ one.left[name] ** 2) for one in known)
-    whole = sum(float(one.counts @ one.model[name] ** 2) for one in known)
-    return float(np.sqrt(left / whole)) if whole else 1.0

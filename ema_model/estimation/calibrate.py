@@ -123,8 +123,8 @@ def calibrate(
         covariance_scale=scale,
         signals=shown,
         before=before,
-        sensitivities=_split(problem, fit.jacobian, weighted=False),
-        weighted_sensitivities=_split(problem, fit.jacobian, weighted=True),
+        sensitivities=by_window(problem, fit.jacobian, weighted=False),
+        weighted_sensitivities=by_window(problem, fit.jacobian, weighted=True),
         x=x,
         room=(problem.low - x, problem.high - x),
         evaluations=search.evaluations,
@@ -246,7 +246,7 @@ def _signals(problem: Problem, x: Array) -> list[list[dict[str, Array]]]:
     return [[{name: values[i] for name, values in one.items()} for one in shown] for i in range(len(x))]
 
 
-def _split(problem: Problem, jacobian: Array, *, weighted: bool) -> list[dict[str, Array]]:
+def by_window(problem: Problem, jacobian: Array, *, weighted: bool) -> list[dict[str, Array]]:
     """A Jacobian per window and signal, in the signals' own units unless weighted: (blocks, unknowns) each."""
     parts: list[dict[str, Array]] = [{} for _ in problem.weights]
     for i, name, rows in problem.parts():

@@ -10,7 +10,8 @@ import pytest
 from ema_model.actuator import load_actuator
 from ema_model.campaign.draws import base_parameters
 from ema_model.commands import command
-from ema_model.estimation import Floor, after_fit, calibrate, floor, of_unseen
+from ema_model.comparison import compare
+from ema_model.estimation import Floor, after_fit, calibrate, floor
 from ema_model.estimation.floor import twin_error
 from ema_model.estimation.floor_band import spread
 from ema_model.models import ClosedLoop
@@ -82,16 +83,21 @@ def test_the_spread_of_white_noise_is_that_of_its_mean_square():
     assert spread([certain], [["current_A"]]) == pytest.approx(0.5 * np.sqrt(2.0 / 40.0), rel=0.05)
 
 
-def test_of_a_recording_that_was_not_fitted_as_much_is_left_as_of_those_that_were():
-    """The shares are pooled in mean square, by signal: of 1 and 3 there, whose fit leaves 0.5 and 1.5, a half."""
-
-    def one(size: float, left: dict[str, float]) -> Floor:
-        model = {"current_A": np.full(50, size), "user_position_rad": np.full(50, 2.0 * size)}
-        kept = {name: np.full(50, value) for name, value in left.items()}
-        return Floor(dict.fromkeys(model, 0.1), model, np.ones(50), 1e-3, left=kept)
-
-    [unseen] = of_unseen([one(4.0, {})], [one(1.0, {"current_A": 0.5}), one(3.0, {"current_A": 1.5})])
-    assert unseen.left["current_A"] == pytest.approx(np.full(50, 2.0))
-    assert unseen.sigma("user_position_rad") == pytest.approx(np.hypot(0.1, 8.0)), "no fit tells of that signal"
-    [apart] = of_unseen([one(4.0, {})], [one(1.0, {"current_A": 0.0}), one(3.0, {"current_A": 3.0})])
-    assert apart.left["current_A"] == pytest.approx(4.0 * np.sqrt(0.9))
+def test_a_true_model_is_at_its_floor_where_it_was_not_fitted():
+    """What its parameters took up of the model's own error elsewhere moves it here: as in `after_fit`, 1 on average."""
+    ratios = []
+    for seed in range(4):
+        plant = ACTUATOR.with_values(base_parameters(ACTUATOR, "free", 1.0, seed))
+        runs = [
+            Run(command("chirp"), duration_s=0.5, sample_rate_Hz=5_000.0),
+            Run(command("sine", {"amplitude_rad": 0.03, "frequency_Hz": 3.0}), 0.7, sample_rate_Hz=5_000.0),
+            Run(command("multisine"), 0.5, sample_rate_Hz=5_000.0),
+        ]
+        seen = [Sensors(0.2, 14).record(simulate_reference(run, plant), 10 * seed + i) for i, run in enumerate(runs)]
+        found = compare(seen[:2], ACTUATOR, holdout=seen[2:])
+        blind = compare(seen[2:], found.actuator, calibrate=False)
+        fitted = (blind.recordings[0], *found.holdout)
+        ratios.append([one.errors["current_A"].rmse / one.errors["current_A"].noise_floor for one in fitted])
+    apart, told = np.mean(ratios, axis=0)
+    assert told == pytest.approx(1.0, abs=0.08)
+    assert abs(told - 1.0) < abs(apart - 1.0), "floors of a model that no fit has moved"

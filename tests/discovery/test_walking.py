@@ -26,19 +26,22 @@ DELAY, COGGING = Candidate("computation_delay", 550.0, {}), Candidate("cogging_t
 
 
 @pytest.mark.parametrize(
-    ("ranked", "given", "suspected"),
+    ("ranked", "given", "untold", "suspected"),
     [
-        ([DELAY, COGGING], {}, True),
-        ([COGGING, DELAY], {}, False),
-        ([Candidate("dead_band", 900.0, {})], {}, False),
-        ([DELAY], {"floors": 1.5}, False),
-        ([DELAY], {"simulates": False}, False),
-        ([], {}, False),
+        ([DELAY, COGGING], {}, True, True),
+        ([COGGING, DELAY], {}, True, False),
+        ([Candidate("dead_band", 900.0, {})], {}, False, True),
+        ([DELAY], {"floors": 1.5}, False, True),
+        ([DELAY], {"simulates": False}, False, True),
+        ([], {}, False, False),
     ],
     ids=["a little of several", "an effect first", "one thing tells it well", "near", "without a loop", "none"],
 )
-def test_a_far_loop_whose_drive_tells_a_little_is_suspected(monkeypatch, ranked, given, suspected):
-    assert walk_of(monkeypatch, ranked, **given).suspects_drive() is suspected
+def test_a_far_loop_is_untold_and_its_drive_suspected_where_that_tells_a_little(
+    monkeypatch, ranked, given, untold, suspected
+):
+    walk = walk_of(monkeypatch, ranked, **given)
+    assert walk.is_untold() is untold and walk.suspects_drive() is suspected
 
 
 def test_candidates_are_scored_once_for_a_model(monkeypatch):

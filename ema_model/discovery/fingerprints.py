@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
+from ema_model.actuator.unread import idle
 from ema_model.discovery.model_fit import Data, Fit
 from ema_model.effects import Effect, find
 
@@ -183,3 +184,13 @@ def _gentler(effect: Effect, settings: dict[str, float], size: float, error: flo
         return None
     share = 2.0 * max(1.0, error) / size if np.isfinite(size) else 1e-3
     return {**settings, first.name: max(share, 1e-4) * settings[first.name]}
+
+
+def may_act(name: str, actuator: Actuator) -> bool:
+    """Whether an effect is of something that is there: of a drive only where its controller is simulated."""
+    effect = find(name)
+    if not effect.has_part(actuator.axes):
+        return False
+    kinds = actuator.controller.kind, actuator.inverter.kind
+    places = {function.__name__ for function in effect.places}
+    return effect.family != "drive" or not idle(places, bool(effect.states), *kinds)

@@ -11,14 +11,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ema_model.actuator import Actuator
-from ema_model.actuator.unread import idle
 from ema_model.comparison.explain import Explanation
 from ema_model.discovery.controller_seen import ControllerSeen
 from ema_model.discovery.criteria import LEAST_BIC
 from ema_model.discovery.evidence import predicted_evidence
 from ema_model.discovery.faults import fault_for
-from ema_model.discovery.fingerprints import Fingerprint, fingerprints, of_the_file
+from ema_model.discovery.fingerprints import Fingerprint, fingerprints, may_act, of_the_file
 from ema_model.discovery.model_fit import Data, Fit, as_in, fit, in_floors_of, without_effect
 from ema_model.discovery.refit import Trial, again, is_near, promising, stands_for, tried
 from ema_model.discovery.remaining import Left, at_floor, left_by
@@ -95,7 +93,7 @@ class Story:
         """All effects (or these) with the fall of χ² that is predicted for each, the most promising first."""
         known = self.current.actuator.effects
         actuator = self.current.actuator
-        looked_for = [name for name in CATALOGUE if name not in _NOT_LOOKED_FOR and _may_act(name, actuator)]
+        looked_for = [name for name in CATALOGUE if name not in _NOT_LOOKED_FOR and may_act(name, actuator)]
         wanted = [name for name in names or looked_for if name not in known and name not in _NOT_LOOKED_FOR]
         given = [name for name in self.of_the_file if name not in {one.key for one in self.added}]
         orders = (left or self.left()).orders
@@ -117,19 +115,28 @@ class Story:
         }
         return signatures(self.current, {name: its for name, its in prints.items() if its})
 
-    def tried(self, ranked: Sequence[Candidate], share: float, most: int, tell: Progress) -> list[Trial]:
-        """The most promising candidates, each in the model and refitted, the best first."""
+    def tried(
+        self, ranked: Sequence[Candidate], share: float, most: int, tell: Progress, known: Sequence[Trial] = ()
+    ) -> list[Trial]:
+        """The most promising candidates, each in the model and refitted, the best first; known: refitted before."""
         trials = []
-        expected = {
-            name: predicted_evidence(self.data, self.current, part) for name, part in self.signatures(ranked).items()
-        }
-        for candidate in promising(self.current, ranked, share, most, expected):
-            tell(f"trying {candidate.name}")
-            trials.append(self.trial(candidate, tell))
+        for candidate in self.promising(ranked, share, most):
+            trial = next((one for one in known if one.candidate is candidate), None)
+            if trial is None:
+                tell(f"trying {candidate.name}")
+                trial = self.trial(candidate, tell)
+            trials.append(trial)
         if is_near(self.current):
             leading = max([LEAST_BIC, *(_LEADS * trial.drop for trial in trials)])
             trials = [again(self.data, self.current, t, tell) if t.drop > leading else t for t in trials]
         return sorted(trials, key=lambda trial: -trial.drop)
+
+    def promising(self, ranked: Sequence[Candidate], share: float, most: int) -> list[Candidate]:
+        """The candidates that are worth a refit."""
+        expected = {
+            name: predicted_evidence(self.data, self.current, part) for name, part in self.signatures(ranked).items()
+        }
+        return promising(self.current, ranked, share, most, expected)
 
     def tried_whole(self, ranked: Sequence[Candidate], tell: Progress) -> list[Trial]:
         """The candidates that act by a speed, refitted from where all of their change comes nearest.
@@ -280,13 +287,3 @@ class Story:
 
     def _rung(self, change: Change, found: Fit) -> Rung:
         return rung_of(change, found, self.data, self.held)
-
-
-def _may_act(name: str, actuator: Actuator) -> bool:
-    """Whether an effect is of something that is there: of a drive only where its controller is simulated."""
-    effect = find(name)
-    if not effect.has_part(actuator.axes):
-        return False
-    kinds = actuator.controller.kind, actuator.inverter.kind
-    places = {function.__name__ for function in effect.places}
-    return effect.family != "drive" or not idle(places, bool(effect.states), *kinds)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -47,12 +48,16 @@ def walk(
     """
     own = _Walk(story, tell, candidates, most_effects)
     beside = _Beside(story, tell, candidates, most_effects)
+    left = max(FAR, LOOP_TOLD * ratio(story.data, story.base))
     # A loop whose drive is another one is walked in vain.
-    if own.is_untold() and (own.suspects_drive() or beside.blames_controller()) and beside.settles():
+    if own.is_untold():
+        in_vain = own.suspects_drive() or beside.blames_controller()
+    else:
+        in_vain = own.suspects_drive() and beside.blames_controller() and own.drive_leaves() > left
+    if in_vain and beside.settles():
         walked = beside.taken_over()
     else:
         own.go()
-        left = max(FAR, LOOP_TOLD * ratio(story.data, story.base))
         if ratio(story.data, story.current) > left and beside.blames_controller() and beside.settles():
             walked = beside.taken_over()
         else:
@@ -81,19 +86,27 @@ class _Walk:
         self._curve: Trial | None = None
         self._going = True
         self._ranked: tuple[Fit, Left, list[Candidate]] | None = None
+        self._tried: list[Trial] = []  # before the first step
 
     def is_untold(self) -> bool:
         """Whether the loop is far off, and nothing would tell most of it."""
-        story = self.story
-        if ratio(story.data, story.current) <= FAR or not story.current.plant.simulates_commands:
-            return False
         best = self._best()
-        return best is not None and best.predicted_drop < TOLD_WELL * story.current.chi2
+        return best is not None and best.predicted_drop < TOLD_WELL * self.story.current.chi2
 
     def suspects_drive(self) -> bool:
-        """Whether what would tell most of what is left is of the drive."""
+        """Whether the loop is far off, and what would tell most of it is of the drive."""
         best = self._best()
-        return best is not None and find(best.name).family == "drive"
+        return best is not None and _of_drive(best)
+
+    def drive_leaves(self) -> float:
+        """What the best of the drive's candidates leaves, refitted, in floors."""
+        ranked = self._scored()[1]
+        promising = self.story.promising(ranked, _REFITTED_SHARE, _MOST_REFITTED)
+        for one in promising:
+            if _of_drive(one):
+                self._tell(f"trying {one.name}")
+                self._tried.append(self.story.trial(one, self._tell))
+        return min((ratio(self.story.data, trial.fit) for trial in self._tried), default=math.inf)
 
     def go(self) -> None:
         """One step, of a fault or an effect; where nothing pays, it has come to its end."""
@@ -115,6 +128,10 @@ class _Walk:
         return Walked(self._first, self._rivals, unknown)
 
     def _best(self) -> Candidate | None:
+        """What would tell most of a loop that is far off."""
+        story = self.story
+        if ratio(story.data, story.current) <= FAR or not story.current.plant.simulates_commands:
+            return None
         return next(iter(self._scored()[1]), None)
 
     def _scored(self) -> tuple[Left, list[Candidate]]:
@@ -130,7 +147,7 @@ class _Walk:
         if story.data.guarded and named_in(story) and at_floor(story.data, story.current):
             return False  # without a controller no twin says which faint rest is the model's own
         left, ranked = self._scored()
-        trials = story.tried(ranked, _REFITTED_SHARE, _MOST_REFITTED, tell)
+        trials = story.tried(ranked, _REFITTED_SHARE, _MOST_REFITTED, tell, self._tried)
         fault = story.fault(ranked, lambda: trials, tell)
         if fault:
             story.add(fault)
@@ -227,6 +244,10 @@ def _with_curve(story: Story, curve: Trial | None, unknown: Explanation, tell: P
     if curve:
         story.add(curve)
     return unknown
+
+
+def _of_drive(one: Candidate) -> bool:
+    return find(one.name).family == "drive"
 
 
 def named_in(story: Story) -> list[str]:

@@ -11,13 +11,15 @@ from ema_model.comparison.result import Compared, Comparison, Region, SignalErro
 from ema_model.comparison.sentences import cause_of
 from ema_model.estimation.words import calibration_table
 from ema_model.quantities.axes import ROTARY
-from ema_model.quantities.numbers import Quantity, number
+from ema_model.quantities.numbers import number
 from ema_model.quantities.shown import of_residual, of_signal
 from ema_model.quantities.titles import in_sentence
 from ema_model.quantities.variables import of_variable
+from ema_model.recordings.noise import least_noise
 from ema_model.text import Document, Lines, Note, Severity, Table
 
 _NEAR_FLOOR, _FAR_FROM_FLOOR = 1.2, 2.0  # error over floor, from which on one is looked at, and stands out
+_TOLD = 2.0  # times the least that any noise can be, from which on a recording tells it
 _MOST_TOLD = 6  # held-out recordings, each in a line of its own
 
 
@@ -52,32 +54,36 @@ def document_of(result: Comparison) -> Document:
 
 def errors(result: Comparison) -> Table:
     """Of each signal, over all recordings that were fitted."""
-    shown = {name: of_signal(name, result.actuator.axes) for name in result.signals}
+    axes = result.actuator.axes
     return _errors(
-        "signal", result, [(shown[name].title, shown[name], one, "") for name, one in result.signals.items()]
+        "signal", result, [(of_signal(name, axes).title, name, one, "") for name, one in result.signals.items()]
     )
 
 
 def errors_by_recording(result: Comparison, signal: str) -> Table | None:
     """Of one signal, in each recording, fitted or not; None where there is but one."""
     every = [(one, "") for one in result.recordings] + [(one, ", held out") for one in result.holdout]
-    shown = of_signal(signal, result.actuator.axes)
-    known = [(one.name, shown, one.errors[signal], how) for one, how in every if signal in one.errors]
-    return _errors(f"recording, {in_sentence(shown.title)}", result, known) if len(known) > 1 else None
+    known = [(one.name, signal, one.errors[signal], how) for one, how in every if signal in one.errors]
+    title = in_sentence(of_signal(signal, result.actuator.axes).title)
+    return _errors(f"recording, {title}", result, known) if len(known) > 1 else None
 
 
-def _errors(title: str, result: Comparison, of: Sequence[tuple[str, Quantity, SignalError, str]]) -> Table:
-    """of: by row its name, the signal, its error, and what else is to be said."""
+def _errors(title: str, result: Comparison, of: Sequence[tuple[str, str, SignalError, str]]) -> Table:
+    """of: by row its name, the signal, its error, and what else is to be said.
+
+    A signal whose noise the recording does not tell, as of a speed that is 0 for most of the time, has no floor.
+    """
     rows, units, severities = [], [], []
     for name, signal, error, said in of:
-        shown = error.quantity(signal)
-        over = error.rmse / error.noise_floor if error.noise_floor > 0.0 else math.nan
+        shown = error.quantity(of_signal(signal, result.actuator.axes))
+        floor = error.noise_floor if error.noise_floor > _TOLD * least_noise(signal) else math.nan
+        over = error.rmse / floor
         before = [error.rmse_initial] if result.calibration is not None else []
-        numbers = [number(shown.factor * one) for one in (*before, error.rmse, error.noise_floor)]
+        numbers = [number(shown.factor * one) for one in (*before, error.rmse, floor)]
         mean, share = number(shown.factor * error.mean_absolute), f"{number(100.0 * error.nrmse)} %"
         rows.append([name, *numbers, mean, share, number(over)])
         units.append(f"{shown.unit}{said}")
-        severities.append(_severity(over))
+        severities.append(_severity(over) if math.isfinite(over) else "note")
     head = ["before"] if result.calibration is not None else []
     head += ["rms error", "floor", "mean |e|", "of range", "error / floor"]
     return Table(head, rows, title, units, severities=severities)

@@ -11,6 +11,7 @@ import pytest
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
 from ema_model.comparison import compare
+from ema_model.comparison.words import errors
 from ema_model.discovery import discover
 from ema_model.estimation.floor import floor
 from ema_model.identification.objective import Objective
@@ -121,3 +122,14 @@ def test_nothing_to_calibrate_at_all_is_searched_for_effects():
 def _filled(plant: InverseDynamics, needed: np.ndarray) -> np.ndarray:
     """What the motion needs at each sample, from its blocks."""
     return np.interp(TIME, plant.windows[0].time_s, needed)
+
+
+@pytest.mark.parametrize(("noise_rad_s", "told"), [(0.0, False), (0.5, True)])
+def test_an_error_is_counted_in_floors_only_where_the_recording_tells_its_noise(noise_rad_s, told):
+    """A drive that tells a speed of 0 at rest, and rests, tells nothing of that signal's noise."""
+    still = simulate_reference(STILL, ACTUATOR)
+    noise = np.random.default_rng(0).standard_normal(still.samples)
+    speed, current = still["motor_speed_rad_s"] + noise_rad_s * noise, still["current_A"] + 0.1 * noise
+    table = errors(compare([still.with_signals(current_A=current, motor_speed_rad_s=speed)], ACTUATOR))
+    rows = {row[0]: row[-1] for row in table.rows}
+    assert rows["Equivalent current"] != "–" and (rows["Motor speed"] != "–") is told

@@ -26,6 +26,7 @@ from emaviz.session.opened import Opened
 from emaviz.text.html import Html, add_html, html, joined, unescaped
 from emaviz.text.notes import begin
 from emaviz.text.told import folded, large, shown, warned
+from emaviz.text.verdict import of_comparison
 
 _BOX = Html('style="padding:2px 12px 6px;font-size:13px;line-height:1.45"')
 _CARD = "height:auto!important;min-height:2em;padding:4px 8px;font-weight:400;font-size:13px;"
@@ -217,11 +218,10 @@ def headline(comparison: Comparison) -> Html:
     """The sentences."""
     first, *others = comparison.sentences or ("",)
     regions = {region.sentence for region in comparison.worst_regions}  # which stand in their own list
-    severity = "good" if comparison.adequate else "bad"
     return html(
         "<div {}>{}{}{}</div>",
         _BOX,
-        large(first, severity),
+        large(first, of_comparison(comparison)),
         joined(html("<div>{}</div>", text) for text in [*others, of_floor(comparison)] if text not in regions),
         warned(comparison.warnings),
     )

@@ -48,8 +48,9 @@ def test_a_discovery_is_green_where_nothing_is_missing():
     for meaning, answers in meanings.items():
         assert [of_discovery(one) for one in answers] == [meaning] * len(answers)
     told: Any
-    for one, meaning in ((replace(found, verdict="effects_found"), "found"), (nothing, "good")):
-        assert MEANINGS[meaning] in answer(look(one)) and (GREEN in answer(look(one))) == (meaning == "good")
+    for one in (replace(found, verdict="effects_found"), nothing):
+        meaning = of_discovery(one)
+        assert MEANINGS[meaning] in answer(look(one)) and (GREEN in answer(look(one))) == (one is nothing)
         told = SimpleNamespace(found=one)
         assert f'class="verdict {meaning}"' in Verdict().body(told, Figures())
     assert GREEN not in answer(look(nothing, assessed=False)), "it is not yet known"

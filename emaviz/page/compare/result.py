@@ -21,6 +21,7 @@ from emaviz.page.inset import ALL_COLUMNS, COLUMNS, NEXT_COLUMN, PLOTS_EARLY
 from emaviz.page.kept import Cleared
 from emaviz.page.page import Page
 from emaviz.page.playback import PlaybackStrip
+from emaviz.page.style import IN_PAIRS
 from emaviz.server.viser_private import selector_of
 from emaviz.session.opened import Opened
 from emaviz.text.html import Html, add_html, html, joined, unescaped
@@ -49,7 +50,8 @@ class ResultPanel:
     """Everything here is built and changed on the screen's thread.
 
     strip: its clock, for Compare's recording on the 3D actuator; lines(): adds a text's first lines, above the preview;
-    leads(): adds what may follow, below the answer; keep(): adds what saves a comparison, below it.
+    leads(): adds what may follow, below the plots, where it is seen however much is answered; keep(): adds what saves
+    a comparison, below it.
     """
 
     def __init__(
@@ -80,14 +82,15 @@ class ResultPanel:
         with self._answer:
             self._hint = add_html(gui)
             self._style = add_html(gui)
-        self._next = gui.add_folder("Next", visible=False)
-        with self._next:
-            leads()
         self._plots_folder = gui.add_folder("Plots", visible=False)
         with self._plots_folder:
             add_html(gui, NEXT_COLUMN)
             self._recording = gui.add_dropdown("Measurement", ["–"], visible=False)
             self._plots = ComparePlots(page)
+        self._next = gui.add_folder("Next", visible=False)
+        with self._next:
+            add_html(gui, IN_PAIRS)
+            leads()
         self._save = gui.add_folder("Keep it", visible=False)
         with self._save:
             self._kept = keep()

@@ -7,6 +7,7 @@ from typing import Literal
 from ema_model.comparison.result import Comparison
 from ema_model.discovery.result import Discovery
 from ema_model.text import COLOURS
+from ema_model.units.result import UnitsCompared
 
 Meaning = Literal["good", "found", "warning", "bad", "open"]
 MEANINGS: dict[Meaning, str] = {
@@ -21,6 +22,11 @@ MEANINGS: dict[Meaning, str] = {
 def of_comparison(comparison: Comparison) -> Meaning:
     """A comparison says where the model fails, and never why."""
     return "good" if comparison.adequate else "warning"
+
+
+def of_units(found: UnitsCompared) -> Meaning:
+    """Units that differ call for attention, and models that miss something cannot say that none does."""
+    return "warning" if found.differences or found.scattering or found.is_missed else "good"
 
 
 def of_discovery(found: Discovery) -> Meaning:

@@ -15,7 +15,7 @@ from emaviz.page.discover.result import answer
 from emaviz.report.comparison.answer import Answer
 from emaviz.report.discovery.verdict import Verdict
 from emaviz.report.section import Figures
-from emaviz.text.verdict import MEANINGS, of_discovery
+from emaviz.text.verdict import MEANINGS, of_discovery, of_units
 
 GREEN = MEANINGS["good"]
 
@@ -31,6 +31,12 @@ def test_a_comparison_is_green_where_the_model_is_adequate(adequate, meaning):
     compared = replace(comparison(), adequate=adequate)
     assert (GREEN in headline(compared)) == adequate and MEANINGS[meaning] in headline(compared)
     assert f'class="verdict {meaning}"' in Answer().body(compared, Figures())
+
+
+def test_units_are_green_where_their_models_miss_nothing():
+    for known, meaning in (({}, "good"), ({"is_missed": True}, "warning"), ({"differences": ["one"]}, "warning")):
+        found: Any = SimpleNamespace(**{"differences": [], "scattering": [], "is_missed": False, **known})
+        assert of_units(found) == meaning
 
 
 def test_a_discovery_is_green_where_nothing_is_missing():

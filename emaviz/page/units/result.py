@@ -6,7 +6,6 @@ from typing import Any
 
 import plotly.graph_objects as go
 
-from ema_model.text import COLOURS
 from ema_model.units.result import UnitsCompared
 from ema_model.units.words import document_of, lacking, notes, rests_on, sentences
 from emaviz.figures import transfer_matrix, unit_parameters
@@ -18,6 +17,7 @@ from emaviz.session.units.comparing_units import ComparingUnits
 from emaviz.text.html import Html, add_html, html, joined
 from emaviz.text.notes import BOX, DIM, begin
 from emaviz.text.told import warned, whole
+from emaviz.text.verdict import MEANINGS, of_units
 
 _CONFIG = {"displayModeBar": False}
 _STEPS = (
@@ -73,11 +73,10 @@ class UnitsResult:
 
 def said(found: UnitsCompared) -> Html:
     """The sentences, what the answer rests on, warnings, and which recordings lack."""
-    colour = COLOURS["warning" if found.differences or found.scattering else "good"]
     return html(
         '<div {}><div style="font-size:16px;font-weight:600;color:{};padding:4px 0">{}</div><div {}>{}</div>{}{}</div>',
         BOX,
-        colour,
+        MEANINGS[of_units(found)],
         joined(html("<div>{}</div>", line) for line in sentences(found)),
         DIM,
         rests_on(found),

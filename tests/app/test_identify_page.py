@@ -28,7 +28,7 @@ from emaviz.session.settings import Settings
 
 CHART = """(title) => {
   const charts = Object.values(window.__viserTestpoints.uplots).map(u => u.chart);
-  const chart = charts.find(c => c.root.querySelector('.u-title')?.textContent === title);
+  const chart = charts.find(c => c.root.querySelector('.u-title')?.textContent.startsWith(title));
   return chart ? Array.from(chart.data, a => Array.from(a)) : null;
 }"""
 

@@ -24,9 +24,11 @@ _CALLOUT_SCALE = 1.15
 _EDGE_PX, _APART_PX = 6.0, 3.0  # from the picture's edge, and between labels
 _AROUND = np.radians(np.arange(0.0, 360.0, 22.5))
 _AWAY_PX = (10.0, 26.0, 44.0, 64.0, 90.0, 120.0, 160.0, 210.0, 270.0)
-_COVERED_PX, _CROSSED_PX = 60.0, 90.0  # what covering the machine, and crossing another label, counts as way
+_COVERED_PX, _SURFACE_PX = 300.0, 60.0  # what covering the machine, and its surface, counts as way
+_CROSSED_PX = 90.0  # and crossing another label
 _SCREW = ((0.42, 1.2), (-0.06, 0.06), (-0.24, -0.06))
-_SOLID = (BOXES[0], *BOXES[3:], _SCREW)  # what labels had better leave to be seen
+# what labels had better leave to be seen, and by how much
+_SOLID = ((BOXES[0], _COVERED_PX), (BOXES[3], _SURFACE_PX), (BOXES[4], _COVERED_PX), (_SCREW, _COVERED_PX))
 _LEADER_PX = 9.0  # from where on a line leads to the place
 _FIRST_PICTURE = (604, 832)  # px, until a browser tells
 _LEAST_NAMED_PX = 400  # high: a smaller picture has room for what is told, but not for the parts' names
@@ -93,7 +95,7 @@ def lay_out(labels: Sequence[Label], shown: Frame, picture: tuple[int, int]) -> 
             cost = cost + _CROSSED_PX * _crossed(one, low, high)
         others = np.delete(targets, i, axis=0)[:, None]
         hides = ((others > low - _APART_PX) & (others < high + _APART_PX)).all(axis=2).sum(axis=0)
-        cost = cost + 30.0 * hides + _COVERED_PX * _covered(low, high, machine)
+        cost = cost + 30.0 * hides + _covered(low, high, machine)
         if free.any():
             best = int(np.argmin(np.where(free, cost, np.inf)))
             placed.append(Placed(labels[i], middles[best], targets[i], float(seen[i, 2])))
@@ -103,7 +105,7 @@ def lay_out(labels: Sequence[Label], shown: Frame, picture: tuple[int, int]) -> 
 def _machine(shown: Frame, size: NDArray[np.float64]) -> list[NDArray[np.float64]]:
     """Boxes in the picture that the machine's parts fill, px (4,)."""
     boxes = []
-    for box in _SOLID:
+    for box, _ in _SOLID:
         corners = (shown.seen(list(product(*box)))[:, :2] * (1.0, -1.0) + 1.0) * 0.5 * size
         boxes.append(np.concatenate([corners.min(axis=0), corners.max(axis=0)]))
     return boxes
@@ -112,13 +114,13 @@ def _machine(shown: Frame, size: NDArray[np.float64]) -> list[NDArray[np.float64
 def _covered(
     low: NDArray[np.float64], high: NDArray[np.float64], boxes: list[NDArray[np.float64]]
 ) -> NDArray[np.float64]:
-    """Share of each rectangle that lies on the machine."""
+    """What each rectangle covers of the machine, as way."""
     area = np.prod(high - low, axis=1)
-    shares = [
-        np.prod(np.clip(np.minimum(high, box[2:]) - np.maximum(low, box[:2]), 0.0, None), axis=1) / area
-        for box in boxes
+    ways = [
+        counted * np.prod(np.clip(np.minimum(high, box[2:]) - np.maximum(low, box[:2]), 0.0, None), axis=1) / area
+        for box, (_, counted) in zip(boxes, _SOLID)
     ]
-    return np.max(shares, axis=0)
+    return np.max(ways, axis=0)
 
 
 _ALONG = np.linspace(0.1, 0.9, 7)[:, None]

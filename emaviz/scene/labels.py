@@ -24,11 +24,11 @@ _CALLOUT_SCALE = 1.15
 _EDGE_PX, _APART_PX = 6.0, 3.0  # from the picture's edge, and between labels
 _AROUND = np.radians(np.arange(0.0, 360.0, 22.5))
 _AWAY_PX = (10.0, 26.0, 44.0, 64.0, 90.0, 120.0, 160.0, 210.0, 270.0)
-_COVERED_PX, _SURFACE_PX = 300.0, 60.0  # what covering the machine, and its surface, counts as way
-_CROSSED_PX = 90.0  # and crossing another label
+_COVERED_PX, _CROSSED_PX = 300.0, 90.0  # what covering the machine, and crossing another label, counts as way
+_OWN_PX = 60.0  # and covering a part that is named as a whole
 _SCREW = ((0.42, 1.2), (-0.06, 0.06), (-0.24, -0.06))
-# what labels had better leave to be seen, and by how much
-_SOLID = ((BOXES[0], _COVERED_PX), (BOXES[3], _SURFACE_PX), (BOXES[4], _COVERED_PX), (_SCREW, _COVERED_PX))
+# what labels had better leave to be seen, and what that counts for those which have their place there
+_SOLID = ((BOXES[0], _COVERED_PX), (BOXES[3], _OWN_PX), (BOXES[4], _OWN_PX), (_SCREW, _COVERED_PX))
 _LEADER_PX = 9.0  # from where on a line leads to the place
 _FIRST_PICTURE = (604, 832)  # px, until a browser tells
 _LEAST_NAMED_PX = 400  # high: a smaller picture has room for what is told, but not for the parts' names
@@ -95,7 +95,7 @@ def lay_out(labels: Sequence[Label], shown: Frame, picture: tuple[int, int]) -> 
             cost = cost + _CROSSED_PX * _crossed(one, low, high)
         others = np.delete(targets, i, axis=0)[:, None]
         hides = ((others > low - _APART_PX) & (others < high + _APART_PX)).all(axis=2).sum(axis=0)
-        cost = cost + 30.0 * hides + _covered(low, high, machine)
+        cost = cost + 30.0 * hides + _covered(labels[i], low, high, machine)
         if free.any():
             best = int(np.argmin(np.where(free, cost, np.inf)))
             placed.append(Placed(labels[i], middles[best], targets[i], float(seen[i, 2])))
@@ -112,15 +112,21 @@ def _machine(shown: Frame, size: NDArray[np.float64]) -> list[NDArray[np.float64
 
 
 def _covered(
-    low: NDArray[np.float64], high: NDArray[np.float64], boxes: list[NDArray[np.float64]]
+    label: Label, low: NDArray[np.float64], high: NDArray[np.float64], boxes: list[NDArray[np.float64]]
 ) -> NDArray[np.float64]:
     """What each rectangle covers of the machine, as way."""
     area = np.prod(high - low, axis=1)
     ways = [
-        counted * np.prod(np.clip(np.minimum(high, box[2:]) - np.maximum(low, box[:2]), 0.0, None), axis=1) / area
-        for box, (_, counted) in zip(boxes, _SOLID)
+        (own if _within(label.place, solid) else _COVERED_PX)
+        * np.prod(np.clip(np.minimum(high, box[2:]) - np.maximum(low, box[:2]), 0.0, None), axis=1)
+        / area
+        for box, (solid, own) in zip(boxes, _SOLID)
     ]
     return np.max(ways, axis=0)
+
+
+def _within(place: tuple[float, float, float], box: tuple[tuple[float, float], ...]) -> bool:
+    return all(low <= one <= high for one, (low, high) in zip(place, box))
 
 
 _ALONG = np.linspace(0.1, 0.9, 7)[:, None]

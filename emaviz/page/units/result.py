@@ -80,12 +80,17 @@ def said(found: UnitsCompared) -> Html:
         '<div {}><div style="font-size:16px;font-weight:600;color:{};padding:4px 0">{}</div><div {}>{}</div>{}{}</div>',
         BOX,
         MEANINGS[of_units(found)],
-        joined(html("<div>{}</div>", line) for line in sentences(found)),
+        joined(html("<div>{}</div>", _begun(line, found.units)) for line in sentences(found)),
         DIM,
         rests_on(found),
         warned(notes(found)),
         _listed(lacking(found)),
     )
+
+
+def _begun(line: str, units: tuple[str, ...]) -> str:
+    """With a capital letter; a unit's name stays as it is written."""
+    return line if line.startswith(units) else line[:1].upper() + line[1:]
 
 
 def _listed(lines: list[str]) -> Html:

@@ -70,7 +70,7 @@ class Placed:
 
 
 def lay_out(labels: Sequence[Label], shown: Frame, picture: tuple[int, int]) -> list[Placed]:
-    """Each label near its place, callouts first; one that finds no room is left out.
+    """Each label near its place, callouts first, the large before the small; one that finds no room is left out.
 
     picture: width and height in px.
     """
@@ -82,7 +82,7 @@ def lay_out(labels: Sequence[Label], shown: Frame, picture: tuple[int, int]) -> 
     machine = _machine(shown, size)
     placed: list[Placed] = []
     directions = np.column_stack([np.cos(_AROUND), np.sin(_AROUND)])
-    for i in sorted(range(len(labels)), key=lambda i: not labels[i].callout):
+    for i in sorted(range(len(labels)), key=lambda i: (not labels[i].callout, -labels[i].size_px().prod())):
         half = 0.5 * labels[i].size_px()
         middles = np.concatenate([targets[i] + directions * (half + away) for away in _AWAY_PX])
         cost = np.repeat(_AWAY_PX, len(directions))

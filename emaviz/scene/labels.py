@@ -25,6 +25,7 @@ _EDGE_PX, _APART_PX = 6.0, 3.0  # from the picture's edge, and between labels
 _AROUND = np.radians(np.arange(0.0, 360.0, 22.5))
 _AWAY_PX = (10.0, 26.0, 44.0, 64.0, 90.0, 120.0, 160.0, 210.0, 270.0)
 _COVERED_PX, _CROSSED_PX = 300.0, 90.0  # what covering the machine, and crossing another label, counts as way
+_MOST_COVERED_PX = 200.0  # and from where on a mere name is left out for that
 _OWN_PX = 60.0  # and covering a part that is named as a whole
 _SCREW = ((0.42, 1.2), (-0.06, 0.06), (-0.24, -0.06))
 # what labels had better leave to be seen, and what that counts for those which have their place there
@@ -70,8 +71,9 @@ class Placed:
 
 
 def lay_out(labels: Sequence[Label], shown: Frame, picture: tuple[int, int]) -> list[Placed]:
-    """Each label near its place, callouts first, the large before the small; one that finds no room is left out.
+    """Each label near its place, callouts first, the large before the small.
 
+    One that finds no room is left out, and a mere name that would hide the machine, too.
     picture: width and height in px.
     """
     if not labels:
@@ -95,9 +97,11 @@ def lay_out(labels: Sequence[Label], shown: Frame, picture: tuple[int, int]) -> 
             cost = cost + _CROSSED_PX * _crossed(one, low, high)
         others = np.delete(targets, i, axis=0)[:, None]
         hides = ((others > low - _APART_PX) & (others < high + _APART_PX)).all(axis=2).sum(axis=0)
-        cost = cost + 30.0 * hides + _covered(labels[i], low, high, machine)
+        covered = _covered(labels[i], low, high, machine)
+        if not labels[i].callout:
+            free &= covered < _MOST_COVERED_PX
         if free.any():
-            best = int(np.argmin(np.where(free, cost, np.inf)))
+            best = int(np.argmin(np.where(free, cost + 30.0 * hides + covered, np.inf)))
             placed.append(Placed(labels[i], middles[best], targets[i], float(seen[i, 2])))
     return placed
 

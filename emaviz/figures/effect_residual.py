@@ -1,4 +1,4 @@
-"""How an effect looks in the current's residual at three severities, against a variable and over time, as SVG."""
+"""How an effect looks in the current's residual, against a variable and over time, as SVG."""
 
 from __future__ import annotations
 
@@ -26,15 +26,24 @@ SEVERITIES = (("low", "#ff9a9a"), ("medium", DIFFERENCE), ("high", "#991b1b"))  
 _SIGNAL = "current_A"
 _DOTS, _POINTS = 400, 600  # of a severity
 _SHARE, _FEWEST = 0.005, 200  # of a change's power that may lie before or behind what is shown; samples
+# of a window: below the text and the sliders of most effects it is seen whole
+_FITS = "width:100%;max-height:clamp(180px,calc(100vh - 665px),330px)"
 _FLAT = 1e-3  # of the current's range: a change below is drawn as none
 
 
 def pictures(effect: Effect, felt: Sequence[WithEffect], axes: Axes = ROTARY) -> Html:
     """The charts of an effect in one run, at each of its severities; against time there is but one."""
-    drawn = [_series(effect, felt, axes, "time")]
+    shown = [(name, colour, one) for (name, colour), one in zip(SEVERITIES, felt)]
+    drawn = [_series(shown, axes, "time")]
     if effect.against != "time":
-        drawn.insert(0, _series(effect, felt, axes, effect.against))
+        drawn.insert(0, _series(shown, axes, effect.against))
     return html('<div class="pictures">{}</div>', joined(drawn))
+
+
+def picture(effect: Effect, felt: WithEffect, axes: Axes) -> Html:
+    """One run against the variable that the effect follows; over time where it follows none."""
+    drawn = _series([("", DIFFERENCE, felt)], axes, effect.against, _FITS)
+    return html('<div class="emaviz-picture" style="padding:4px 6px">{}</div>', drawn)
 
 
 def legend(effect: Effect) -> Html:
@@ -48,12 +57,14 @@ def legend(effect: Effect) -> Html:
     return html('<p class="legend">{} {}</p>', first.title, joined(lines, " "))
 
 
-def _series(effect: Effect, felt: Sequence[WithEffect], axes: Axes, variable: str) -> Html:
+def _series(felt: Sequence[tuple[str, str, WithEffect]], axes: Axes, variable: str, style: str = "") -> Html:
+    """felt: with its name and its colour each, the slightest first; style: the picture's, in CSS."""
     residual, axis = of_residual(_SIGNAL, axes), of_variable(variable, axes)
     title = f"{residual.title} {'over' if variable == 'time' else 'against'} {in_sentence(axis.title)}"
-    part = _where(felt[-1].change(_SIGNAL)[1])
+    strongest = felt[-1][2]
+    part = _where(strongest.change(_SIGNAL)[1])
     lines = []
-    for (name, colour), one in reversed(list(zip(SEVERITIES, felt))):  # so that a strong one hides no slight one
+    for name, colour, one in reversed(felt):  # so that a strong one hides no slight one
         x, y = one.against(variable)[part], one.change(_SIGNAL)[1][part]
         if variable == "time":
             x, y = envelope(x, [y], _POINTS)
@@ -62,8 +73,8 @@ def _series(effect: Effect, felt: Sequence[WithEffect], axes: Axes, variable: st
             x = np.mod(x, 2.0 * np.pi) if is_turn(variable, axes) else x
             places = scattered(x, y, _DOTS)
             lines.append(Series(name, colour, x[places], y[places], joined=False))
-    least = _FLAT * float(np.ptp(felt[0].without[_SIGNAL]))
-    return chart(title, axis, residual, lines, least)
+    least = _FLAT * float(np.ptp(strongest.without[_SIGNAL]))
+    return chart(title, axis, residual, lines, least, style)
 
 
 def _where(change: Array) -> slice:

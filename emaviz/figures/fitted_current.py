@@ -11,30 +11,37 @@ from numpy.typing import NDArray
 
 from ema_model.identification.run import algorithm_title
 from emaviz.colours import DIFFERENCE, REFERENCE
+from emaviz.figures import cut
 from emaviz.figures.convergence import colour
 from emaviz.figures.decimate import envelope
 from emaviz.figures.signals import CURSOR, LAST_MORE_PX, PADDING, PLANT_LINE, POINTS, legend, time_axis, value_axis
 from emaviz.text.html import add_html
 
 Array = NDArray[np.float64]
+_LEFT = "Monitor − measured"
 
 
 def _line(label: str, drawn: str, width: float = 1.5) -> Any:
     return {"label": label, "stroke": drawn, "width": width, "points": {"show": False}}
 
 
+def _scales(end: float | None) -> dict[str, Any]:
+    """The chart's, whose values end there on either side of zero; None: with the values."""
+    return {"x": {"time": False}, "y": {"auto": True} if end is None else {"range": (-end, end)}}
+
+
 MEASURED: Any = {**PLANT_LINE, "label": "measured"}
 
 
 class LiveFit:
-    """Two charts on one time base: the currents, and monitor − measured."""
+    """Two charts on one time base: the currents, and monitor − measured, whose axis a start does not set."""
 
     def __init__(self, gui: viser.GuiApi, height: int = 171) -> None:
         empty = np.array([0.0, 1.0])
         self._algorithms: tuple[str, ...] = ()
         self._legend: Any = add_html(gui)
         common: Any = {
-            "scales": {"x": {"time": False}, "y": {"auto": True}},
+            "scales": _scales(None),
             "legend": {"show": False},
             "cursor": CURSOR,
             "padding": PADDING,
@@ -50,7 +57,7 @@ class LiveFit:
         self._left: Any = gui.add_uplot(
             data=(empty, empty),
             series=({"label": "t [s]"}, _line("left", REFERENCE)),
-            title="Monitor − measured",
+            title=_LEFT,
             axes=(time_axis(True), value_axis("A")),
             height=height + LAST_MORE_PX,
             **common,
@@ -72,11 +79,16 @@ class LiveFit:
                 MEASURED,
                 *(_line(name, drawn) for name, drawn in names),
             )
-            left = names if len(names) > 1 else [(names[0][0], DIFFERENCE)]
-            self._left.series = ({"label": "t [s]"}, *(_line(name, drawn) for name, drawn in left))
+            lines = names if len(names) > 1 else [(names[0][0], DIFFERENCE)]
+            self._left.series = ({"label": "t [s]"}, *(_line(name, drawn) for name, drawn in lines))
             self._legend.content = legend(
                 (REFERENCE, "measured"), *((drawn, algorithm_title(name)) for name, drawn in names)
             )
         fitted = list(fitted_A.values())
         self._currents.data = envelope(time_s, [measured_A, *fitted], POINTS)
-        self._left.data = envelope(time_s, [one - measured_A for one in fitted], POINTS)
+        left = [one - measured_A for one in fitted]
+        self._left.data = envelope(time_s, left, POINTS)
+        end = cut.end_of(left)
+        title = _LEFT if end is None else f"{_LEFT}, {cut.told(end, left, 'A')}"
+        if title != self._left.title:
+            self._left.title, self._left.scales = title, _scales(end)

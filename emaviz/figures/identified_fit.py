@@ -9,7 +9,7 @@ import plotly.graph_objects as go
 from numpy.typing import ArrayLike
 
 from ema_model.identification.objective import Objective
-from emaviz.figures import theme
+from emaviz.figures import cut, theme
 from emaviz.figures.lines import line
 
 
@@ -26,6 +26,7 @@ def figures(objective: Objective, k: ArrayLike, *, dark: bool = False) -> Iterat
         yield chart
         chart = theme.new(f"Measured − identified, {name}", "Time [s]", "ΔI_eq [A]", dark=dark)
         _add(chart, window.time_s, measured - fitted, "residual", theme.RESIDUAL)
+        cut.cut(chart, measured - fitted, "A")
         yield chart
 
 

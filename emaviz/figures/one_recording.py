@@ -7,6 +7,7 @@ from plotly.subplots import make_subplots
 
 from ema_model.recordings import SIGNALS
 from emaviz.colours import DIFFERENCE, MONITOR, REFERENCE
+from emaviz.figures import cut
 from emaviz.figures.lines import line
 from emaviz.figures.theme import DARK, LIGHT
 from emaviz.recording.read import Recording
@@ -43,6 +44,7 @@ def figure(recording: Recording, *, dark: bool = False) -> go.Figure | None:
         look = {"color": DIFFERENCE, "width": 1.3}
         drawn.add_trace(go.Scatter(x=x, y=y, name="residual", mode="lines", line=look), row=2, col=1)
         drawn.update_yaxes(title_text=f"Residual<br>[{unit}]", row=2, col=1)
+        cut.cut(drawn, left.values, unit, row=2, col=1)
     drawn.update_xaxes(title_text="Time [s]", row=rows, col=1)
     drawn.update_layout(
         template=(DARK if dark else LIGHT).template(),

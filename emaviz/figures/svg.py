@@ -31,10 +31,10 @@ class Series:
     joined: bool = True
 
 
-def chart(title: str, x: Quantity, y: Quantity, series: Sequence[Series], least: float = 0.0) -> Html:
+def chart(title: str, x: Quantity, y: Quantity, series: Sequence[Series], least: float = 0.0, style: str = "") -> Html:
     """One chart with its axes' titles and units, what comes first lying below.
 
-    least: the half width of y's range, in its SI unit, that a line which hardly moves is drawn in.
+    least: the half width of y's range, in its SI unit, that a line which hardly moves is drawn in; style: in CSS.
     Raises ValueError for points that are not finite.
     """
     across = np.concatenate([one.x for one in series])
@@ -49,8 +49,8 @@ def chart(title: str, x: Quantity, y: Quantity, series: Sequence[Series], least:
     parts = [_grid(horizontal, vertical), _titles(title, x, y)]
     parts += [_drawn(one, horizontal.at(x.factor * one.x), vertical.at(y.factor * one.y)) for one in series]
     return unescaped(
-        f'<svg viewBox="0 0 {_WIDTH} {_HEIGHT}" role="img" aria-label="{escape(title)}" fill="currentColor" '
-        f'font-size="12" font-family="system-ui,sans-serif">{"".join(parts)}</svg>'
+        f'<svg viewBox="0 0 {_WIDTH} {_HEIGHT}" role="img" aria-label="{escape(title)}" style="{style}" '
+        f'fill="currentColor" font-size="12" font-family="system-ui,sans-serif">{"".join(parts)}</svg>'
     )
 
 

@@ -14,11 +14,11 @@ from emaviz.text.html import Html, escape, html, unescaped
 
 Array = NDArray[np.floating]
 
-_WIDTH, _PLANE_HEIGHT, _LINES_HEIGHT = 460, 528, 528  # as fills a column of a usual window
+_WIDTH, _PLANE_HEIGHT, _LINES_HEIGHT = 460, 572, 572  # as fills a column of a usual window
 _LEFT, _RIGHT, _TOP, _BOTTOM = 44, 14, 10, 36
 _MOST_DRAWN = 150  # candidates of one swarm
 # of a window: with what stands above and below it, the picture is seen whole
-_FITS = "max-height:calc(100vh - 370px);min-height:200px"
+_FITS = "max-height:calc(100vh - 335px);min-height:200px"
 _INK = 'fill="currentColor"'
 
 

@@ -15,8 +15,9 @@ from emaviz.colours import LIMIT, REFERENCE
 from emaviz.figures import theme
 
 _TYPE = "rgba(134,142,150,0.30)"
-_COLUMNS = 2
-_HEAD_PX, _AXIS_PX, _ROW_PX = 46, 58, 17  # of the whole, below each chart, and of a unit in it
+_COLUMNS = 3
+_HEAD_PX, _AXIS_PX = 38, 60  # of the whole, and below each chart
+_LEAST_ROW_PX, _ROW_PX, _MOST_ROW_PX = 11, 17, 40  # of a unit in it: as it can be read, easily, and with much room
 
 
 def figure(result: UnitsCompared, *, dark: bool = False) -> go.Figure:
@@ -25,13 +26,12 @@ def figure(result: UnitsCompared, *, dark: bool = False) -> go.Figure:
     if not paths:
         return theme.missing("Parameters of each unit", "the recordings tell none of them", dark=dark)
     rows = -(-len(paths) // _COLUMNS)
-    height = height_px(result)
     grid: Any = make_subplots(
         rows=rows,
         cols=_COLUMNS,
         shared_yaxes=True,
-        horizontal_spacing=0.06,
-        vertical_spacing=min(_AXIS_PX / height, 0.9 / max(rows - 1, 1)),
+        horizontal_spacing=0.05,
+        vertical_spacing=min(_AXIS_PX / (least_px(result) - _HEAD_PX - _AXIS_PX), 0.9 / max(rows - 1, 1)),
     )
     like: Any = theme.new("Parameters of each unit, alone (90 % intervals)", "", "", dark=dark).layout
     grid.update_layout(template=like.template, title=like.title)
@@ -61,10 +61,14 @@ def figure(result: UnitsCompared, *, dark: bool = False) -> go.Figure:
         )
         grid.add_vrect(x0=low, x1=high, fillcolor=_TYPE, line_width=0, layer="below", **where)
         grid.update_xaxes(
-            title={"text": theme.plain(axis.label), "font": {"size": 11}}, nticks=5, exponentformat="none", **where
+            title={"text": f"{theme.plain(axis.title)}<br>[{theme.plain(axis.unit or '-')}]", "font": {"size": 10}},
+            tickfont={"size": 10},
+            nticks=4,
+            exponentformat="none",
+            **where,
         )
-    grid.update_yaxes(autorange="reversed", nticks=0, tickfont={"size": 10})
-    grid.update_layout(margin={"l": 48, "r": 14, "t": _HEAD_PX, "b": 0})
+    grid.update_yaxes(autorange="reversed", tickmode="linear", dtick=1, tickfont={"size": 9})
+    grid.update_layout(margin={"l": 48, "r": 14, "t": _HEAD_PX, "b": _AXIS_PX})
     return grid
 
 
@@ -75,6 +79,20 @@ def shown(result: UnitsCompared) -> list[str]:
 
 
 def height_px(result: UnitsCompared) -> int:
-    """As all of it is legible."""
+    """As all of it is read easily."""
+    return _height_px(result, _ROW_PX)
+
+
+def least_px(result: UnitsCompared) -> int:
+    """Of a figure that can still be read."""
+    return _height_px(result, _LEAST_ROW_PX)
+
+
+def most_px(result: UnitsCompared) -> int:
+    """Above which it would only look empty."""
+    return _height_px(result, _MOST_ROW_PX)
+
+
+def _height_px(result: UnitsCompared, row_px: int) -> int:
     rows = -(-max(len(shown(result)), 1) // _COLUMNS)
-    return _HEAD_PX + rows * (_AXIS_PX + _ROW_PX * (len(result.units) + 1))
+    return _HEAD_PX + rows * (_AXIS_PX + row_px * (len(result.units) + 1))

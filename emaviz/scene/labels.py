@@ -24,9 +24,12 @@ _CALLOUT_SCALE = 1.15
 _EDGE_PX, _APART_PX = 6.0, 3.0  # from the picture's edge, and between labels
 _AROUND = np.radians(np.arange(0.0, 360.0, 22.5))
 _AWAY_PX = (10.0, 26.0, 44.0, 64.0, 90.0, 120.0, 160.0, 210.0, 270.0)
-_COVERED_PX, _CROSSED_PX = 60.0, 90.0  # what covering the machine, and crossing another label, counts as way
+_COVERED_PX, _CROSSED_PX = 300.0, 90.0  # what covering the machine, and crossing another label, counts as way
+_MOST_COVERED_PX = 200.0  # and from where on a mere name is left out for that
+_OWN_PX = 60.0  # and covering a part that is named as a whole
 _SCREW = ((0.42, 1.2), (-0.06, 0.06), (-0.24, -0.06))
-_SOLID = (BOXES[0], *BOXES[3:], _SCREW)  # what labels had better leave to be seen
+# what labels had better leave to be seen, and what that counts for those which have their place there
+_SOLID = ((BOXES[0], _COVERED_PX), (BOXES[3], _OWN_PX), (BOXES[4], _OWN_PX), (_SCREW, _COVERED_PX))
 _LEADER_PX = 9.0  # from where on a line leads to the place
 _FIRST_PICTURE = (604, 832)  # px, until a browser tells
 _LEAST_NAMED_PX = 400  # high: a smaller picture has room for what is told, but not for the parts' names
@@ -68,8 +71,9 @@ class Placed:
 
 
 def lay_out(labels: Sequence[Label], shown: Frame, picture: tuple[int, int]) -> list[Placed]:
-    """Each label near its place, callouts first; one that finds no room is left out.
+    """Each label near its place, callouts first, the large before the small.
 
+    One that finds no room is left out, and a mere name that would hide the machine, too.
     picture: width and height in px.
     """
     if not labels:
@@ -80,7 +84,7 @@ def lay_out(labels: Sequence[Label], shown: Frame, picture: tuple[int, int]) -> 
     machine = _machine(shown, size)
     placed: list[Placed] = []
     directions = np.column_stack([np.cos(_AROUND), np.sin(_AROUND)])
-    for i in sorted(range(len(labels)), key=lambda i: not labels[i].callout):
+    for i in sorted(range(len(labels)), key=lambda i: (not labels[i].callout, -labels[i].size_px().prod())):
         half = 0.5 * labels[i].size_px()
         middles = np.concatenate([targets[i] + directions * (half + away) for away in _AWAY_PX])
         cost = np.repeat(_AWAY_PX, len(directions))
@@ -93,9 +97,11 @@ def lay_out(labels: Sequence[Label], shown: Frame, picture: tuple[int, int]) -> 
             cost = cost + _CROSSED_PX * _crossed(one, low, high)
         others = np.delete(targets, i, axis=0)[:, None]
         hides = ((others > low - _APART_PX) & (others < high + _APART_PX)).all(axis=2).sum(axis=0)
-        cost = cost + 30.0 * hides + _COVERED_PX * _covered(low, high, machine)
+        covered = _covered(labels[i], low, high, machine)
+        if not labels[i].callout:
+            free &= covered < _MOST_COVERED_PX
         if free.any():
-            best = int(np.argmin(np.where(free, cost, np.inf)))
+            best = int(np.argmin(np.where(free, cost + 30.0 * hides + covered, np.inf)))
             placed.append(Placed(labels[i], middles[best], targets[i], float(seen[i, 2])))
     return placed
 
@@ -103,22 +109,28 @@ def lay_out(labels: Sequence[Label], shown: Frame, picture: tuple[int, int]) -> 
 def _machine(shown: Frame, size: NDArray[np.float64]) -> list[NDArray[np.float64]]:
     """Boxes in the picture that the machine's parts fill, px (4,)."""
     boxes = []
-    for box in _SOLID:
+    for box, _ in _SOLID:
         corners = (shown.seen(list(product(*box)))[:, :2] * (1.0, -1.0) + 1.0) * 0.5 * size
         boxes.append(np.concatenate([corners.min(axis=0), corners.max(axis=0)]))
     return boxes
 
 
 def _covered(
-    low: NDArray[np.float64], high: NDArray[np.float64], boxes: list[NDArray[np.float64]]
+    label: Label, low: NDArray[np.float64], high: NDArray[np.float64], boxes: list[NDArray[np.float64]]
 ) -> NDArray[np.float64]:
-    """Share of each rectangle that lies on the machine."""
+    """What each rectangle covers of the machine, as way."""
     area = np.prod(high - low, axis=1)
-    shares = [
-        np.prod(np.clip(np.minimum(high, box[2:]) - np.maximum(low, box[:2]), 0.0, None), axis=1) / area
-        for box in boxes
+    ways = [
+        (own if _within(label.place, solid) else _COVERED_PX)
+        * np.prod(np.clip(np.minimum(high, box[2:]) - np.maximum(low, box[:2]), 0.0, None), axis=1)
+        / area
+        for box, (solid, own) in zip(boxes, _SOLID)
     ]
-    return np.max(shares, axis=0)
+    return np.max(ways, axis=0)
+
+
+def _within(place: tuple[float, float, float], box: tuple[tuple[float, float], ...]) -> bool:
+    return all(low <= one <= high for one, (low, high) in zip(place, box))
 
 
 _ALONG = np.linspace(0.1, 0.9, 7)[:, None]

@@ -95,6 +95,10 @@ class Inside:
         """How high a chart is in one page, and how its axes are drawn there."""
         self._push(client, _messages.GuiUpdateMessage(chart._impl.uuid, {"height": height_px, "axes": axes}))
 
+    def set_aspect(self, client: int, figure: Any, aspect: float) -> None:
+        """How high a Plotly figure is in one page, over its width."""
+        self._push(client, _messages.GuiUpdateMessage(figure._impl.uuid, {"aspect": aspect}))
+
     def pages(self) -> tuple[int, ...]:
         """The pages that are open, by their numbers."""
         return tuple(self._server.get_clients())

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from ema_model.text import COLOURS, Block, Document, Severity, Table
+from ema_model.text import COLOURS, Block, Document, Table
 from emaviz.text.html import Html, html, joined, unescaped
+from emaviz.text.verdict import MEANINGS, Meaning
 
 
 def shown(block: Block | None) -> Html:
@@ -25,9 +26,9 @@ def folded(title: str, told: Table | None) -> Html:
     return html('<details><summary style="cursor:pointer">{}</summary>{}</details>', title, shown(told))
 
 
-def large(text: str, severity: Severity) -> Html:
+def large(text: str, meaning: Meaning) -> Html:
     """The answer in one line."""
-    style = f"font-size:16px;font-weight:600;color:{COLOURS[severity]};padding:4px 0"
+    style = f"font-size:16px;font-weight:600;color:{MEANINGS[meaning]};padding:4px 0"
     return html('<div style="{}">{}</div>', style, text)
 
 

@@ -28,7 +28,7 @@ from emaviz.session.settings import Settings
 
 CHART = """(title) => {
   const charts = Object.values(window.__viserTestpoints.uplots).map(u => u.chart);
-  const chart = charts.find(c => c.root.querySelector('.u-title')?.textContent === title);
+  const chart = charts.find(c => c.root.querySelector('.u-title')?.textContent.startsWith(title));
   return chart ? Array.from(chart.data, a => Array.from(a)) : null;
 }"""
 
@@ -178,9 +178,9 @@ def test_the_axes_are_those_on_which_the_faults_stand():
 def test_a_swarm_is_drawn_where_it_is():
     one = swarm.Swarm("do", "#1098ad", np.array([[0.0] * 8, [1.0] * 8]), np.full(8, 0.5))
     plane = swarm.plane([one], 0, 1, np.full(8, 0.25), [np.array([[0.0] * 8, [0.5] * 8])])
-    assert "M44.0 492.0h0M446.0 10.0h0" in plane and 'cx="245.0" cy="251.0"' in plane and "<polyline" in plane
+    assert "M44.0 536.0h0M446.0 10.0h0" in plane and 'cx="245.0" cy="273.0"' in plane and "<polyline" in plane
     lines = swarm.lines([one], np.full(8, 0.25))
-    assert lines.count("<path") == 8 + 3 and "M44 484.0" in lines
+    assert lines.count("<path") == 8 + 3 and "M44 528.0" in lines
 
 
 def test_the_table_escapes_names_and_shows_what_is_unknown():

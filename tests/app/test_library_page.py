@@ -10,6 +10,16 @@ from emaviz.page.library.tab import LibraryTab
 pytestmark = pytest.mark.browser
 
 
+def test_an_effect_is_drawn_against_what_it_follows(shared_page, app):
+    page = shared_page
+    page.get_by_role("tab", name="Library", exact=True).click()
+    for effect, variable in (("Cogging torque", "motor angle"), ("Constant load", "motor speed")):
+        page.get_by_role("button", name=effect).locator("visible=true").first.click()
+        picture = page.get_by_role("img", name=f"Residual current against {variable}")
+        picture.wait_for(timeout=60_000)
+        assert picture.locator("path[stroke='#e03131']").get_attribute("d").count("M") > 100
+
+
 def test_pictures_that_must_wait_are_told_beside_their_button(shared_page, app, monkeypatch):
     page = shared_page
     page.get_by_role("tab", name="Library", exact=True).click()

@@ -223,6 +223,10 @@ def test_recordings_are_opened_compared_renamed_and_deleted(watched, app):
     page.get_by_role("tab", name="Runs").click()
     wait_until(lambda: page.get_by_label("Run", exact=True).input_value() == second.name)
     assert page.get_by_label("With", exact=True).input_value() == first.name
+    page.get_by_label("With", exact=True).click()
+    others = page.get_by_role("option").all_inner_texts()
+    assert first.name in others and second.name not in others, "nothing is compared with itself"
+    page.keyboard.press("Escape")
     page.get_by_text("iterations 8").first.wait_for()
 
     page.get_by_role("button", name="Overlay both runs").click()

@@ -238,6 +238,19 @@ def test_the_drive_says_its_bus_and_its_delay(actuator):
     assert drive_box.said(late) == "controller and inverter\n48 V bus, delay 0.100 ms"
 
 
+def test_labels_leave_the_motor_to_be_seen(actuator):
+    shown = motion(*run_of(actuator, k1=0.25, k2=0.7, k3=0.3, k6=0.5), actuator)
+    said = [Label(one.fault, one.text, one.place, callout=True) for one in shown.callouts]
+    said += [Label("drive", shown.drive_says, NAMED_AT), *_NAMES]
+    for picture in pictures():
+        view = frame(picture[0] / picture[1])
+        corners = (view.seen(list(itertools.product(*BOXES[0])))[:, :2] * (1.0, -1.0) + 1.0) * 0.5 * picture
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        boxes = [one.box() for one in lay_out(said, view, picture)]
+        covered = [np.prod(np.clip(np.minimum(high, one[2:]) - np.maximum(low, one[:2]), 0.0, None)) for one in boxes]
+        assert sum(covered) < (0.1 if picture[0] > 340 else 0.3) * np.prod(high - low)
+
+
 ALL = {f"k{i}": 0.7 for i in range(1, 9)}
 
 

@@ -9,6 +9,7 @@ from support.on_page import choose, fill, wait_until
 from ema_model.actuator import load_actuator
 from emaviz.cli import main
 from emaviz.colours import LIMIT
+from emaviz.page.style import STRIP_HEIGHT_PX
 from emaviz.page.units.tab import UnitsTab
 
 pytestmark = pytest.mark.browser
@@ -17,6 +18,17 @@ pytestmark = pytest.mark.browser
 @pytest.fixture
 def page(shared_page):
     return shared_page
+
+
+def parameters_are_seen_whole(page, width, height):
+    """In a column of their own, above the playback strip."""
+
+    def seen():
+        box = page.locator(".js-plotly-plot").filter(has_text="Parameters of each unit").bounding_box()
+        return box and 0.5 * width < box["x"] and box["y"] + box["height"] < height - STRIP_HEIGHT_PX
+
+    page.set_viewport_size({"width": width, "height": height})
+    wait_until(seen, 20.0)
 
 
 def test_units_are_compared(page, app):
@@ -42,6 +54,8 @@ def test_units_are_compared(page, app):
     parameters, matrix = tab.result._parameters.figure, tab.result._transfer.figure
     marker = parameters.data[0].marker
     assert list(marker.color).count(LIMIT) == list(marker.symbol).count("diamond") == 1, "the unit that differs"
+    for width, height in ((1900, 1060), (1400, 900)):
+        parameters_are_seen_whole(page, width, height)
     assert matrix.data[0].text[0][2].endswith("A") and "×" in matrix.data[0].text[0][2]
     page.get_by_role("button", name="Save the type as an actuator").click()
     wait_until(lambda: len(folder.actuator_files()) == 2)

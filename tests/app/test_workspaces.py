@@ -120,6 +120,10 @@ def test_another_window_keeps_its_own_workspace_and_a_reload_its_place(tab, app,
 
 def test_compare_leads_on_to_identify_and_discover(tab, app, compared):
     go(tab, "Compare")
+    strip = tab.get_by_role("button", name="Reset view").bounding_box()["y"]
+    for lead in ("Find what is missing", "Identify faults"):
+        box = tab.get_by_role("button", name=lead).bounding_box()
+        assert 0.0 < box["y"] < strip - box["height"], "both are seen without scrolling"
     tab.get_by_role("button", name="Identify faults").click()
     tab.get_by_role("tab", name="Search", exact=True).wait_for()
     assert app.session.settings.source == next(iter(app.comparing.opened))

@@ -98,7 +98,7 @@ class ComparePlots:
         self._choose(comparison.primary, first)
         fit = comparison.calibration
         table = shown(calibration_table(fit, comparison.actuator.axes) if fit is not None else None)
-        self._numbers.content = html('<div style="overflow-x:auto;font-size:12px;padding:0 8px">{}</div>', table)
+        self._numbers.content = html('<div style="overflow-x:auto;font-size:11px;padding:0 2px">{}</div>', table)
         self._draw(list(self._all()))
 
     def show(self, view: View) -> None:

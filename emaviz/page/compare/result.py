@@ -21,11 +21,13 @@ from emaviz.page.inset import ALL_COLUMNS, COLUMNS, NEXT_COLUMN, PLOTS_EARLY
 from emaviz.page.kept import Cleared
 from emaviz.page.page import Page
 from emaviz.page.playback import PlaybackStrip
+from emaviz.page.style import IN_PAIRS
 from emaviz.server.viser_private import selector_of
 from emaviz.session.opened import Opened
 from emaviz.text.html import Html, add_html, html, joined, unescaped
 from emaviz.text.notes import begin
 from emaviz.text.told import folded, large, shown, warned
+from emaviz.text.verdict import of_comparison
 
 _BOX = Html('style="padding:2px 12px 6px;font-size:13px;line-height:1.45"')
 _CARD = "height:auto!important;min-height:2em;padding:4px 8px;font-weight:400;font-size:13px;"
@@ -48,7 +50,8 @@ class ResultPanel:
     """Everything here is built and changed on the screen's thread.
 
     strip: its clock, for Compare's recording on the 3D actuator; lines(): adds a text's first lines, above the preview;
-    leads(): adds what may follow, below the answer; keep(): adds what saves a comparison, below it.
+    leads(): adds what may follow, below the plots, where it is seen however much is answered; keep(): adds what saves
+    a comparison, below it.
     """
 
     def __init__(
@@ -79,14 +82,15 @@ class ResultPanel:
         with self._answer:
             self._hint = add_html(gui)
             self._style = add_html(gui)
-        self._next = gui.add_folder("Next", visible=False)
-        with self._next:
-            leads()
         self._plots_folder = gui.add_folder("Plots", visible=False)
         with self._plots_folder:
             add_html(gui, NEXT_COLUMN)
             self._recording = gui.add_dropdown("Measurement", ["–"], visible=False)
             self._plots = ComparePlots(page)
+        self._next = gui.add_folder("Next", visible=False)
+        with self._next:
+            add_html(gui, IN_PAIRS)
+            leads()
         self._save = gui.add_folder("Keep it", visible=False)
         with self._save:
             self._kept = keep()
@@ -217,11 +221,10 @@ def headline(comparison: Comparison) -> Html:
     """The sentences."""
     first, *others = comparison.sentences or ("",)
     regions = {region.sentence for region in comparison.worst_regions}  # which stand in their own list
-    severity = "good" if comparison.adequate else "bad"
     return html(
         "<div {}>{}{}{}</div>",
         _BOX,
-        large(first, severity),
+        large(first, of_comparison(comparison)),
         joined(html("<div>{}</div>", text) for text in [*others, of_floor(comparison)] if text not in regions),
         warned(comparison.warnings),
     )

@@ -28,6 +28,7 @@ from emaviz.session.discover.discovering import Discovering
 from emaviz.text.html import Html, add_html, html, joined
 from emaviz.text.notes import BOX, begin, boxed
 from emaviz.text.told import folded, large, shown, warned
+from emaviz.text.verdict import of_discovery
 
 _STEPS = (
     "Choose measurements on the left: those of Compare, or one of the challenges.",
@@ -173,12 +174,12 @@ class DiscoveryPanel:
 def answer(look: Look) -> Html:
     """The verdict in words, its warnings, and what 1 means."""
     found = look.found
-    done = found.at_floor
+    meaning = of_discovery(found)
     if look.assessment is None:
-        first, others = sentences(found)[0], ["Analysing the residual …"]
+        first, others, meaning = sentences(found)[0], ["Analysing the residual …"], "open"
     elif not look.added and look.promising:  # before anything was added, of which a verdict could speak
         left = look.assessment.left.explanation
-        first = "Physics is missing."
+        first, meaning = "Physics is missing.", "warning"
         others = [sentences(found)[0], *([left.sentence] if left is not None else [])]
     else:
         first, others = headline(found), sentences(found)
@@ -186,7 +187,7 @@ def answer(look: Look) -> Html:
         '<div {}>{}{}{}<div style="opacity:.65;font-size:12px" title="{}">The floor is what noise and the model\'s own '
         "limits leave: 1 on the ladder.</div>{}</div>",
         BOX,
-        large(first, "good" if done else "bad"),
+        large(first, meaning),
         joined(html("<div>{}</div>", text) for text in others),
         warned(found.warnings),
         FLOOR_NOTE,

@@ -8,6 +8,7 @@ from typing import Any
 from ema_model.effects import Effect, find
 from ema_model.faults import HEALTHY
 from ema_model.simulation.with_effect import RUNS, WithEffect
+from emaviz.figures.effect_residual import picture
 from emaviz.figures.effect_signature import EffectCharts
 from emaviz.page.discover.effect import about
 from emaviz.page.inset import COLUMNS, NEXT_COLUMN
@@ -41,6 +42,7 @@ class EffectPage:
         with self._place:
             add_html(gui, LONG_LABELS)
         self._status = add_html(gui)
+        self._picture = add_html(gui)
         add_html(gui, NEXT_COLUMN)  # a signal and its difference stay together
         self._charts = EffectCharts(gui, page.session.actuator.axes)
         page.workspaces.heights.add(self._charts.handles)
@@ -77,6 +79,8 @@ class EffectPage:
         if felt.name == self._name:
             with self._page.server.atomic():
                 self._charts.show(felt)
+                axes = self._page.session.actuator.axes
+                self._picture.content = picture(find(felt.name, axes), felt, axes)
             self._strip.put(motion(felt.with_it, HEALTHY, self._page.session.actuator), WORKSPACE.name)
 
     def say(self, text: str) -> None:

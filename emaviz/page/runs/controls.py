@@ -94,11 +94,9 @@ class RunsPanel:
             self._by_hand, chosen = False, (names or [NONE])[0]
         else:
             chosen = self._choice.value
-        others = [name for name in names if name != chosen] or [chosen]
-        other = self._other.value if self._other.value in others else others[0]
         if list(self._choice.options) != (names or [NONE]):
-            self._choice.options = self._other.options = names or [NONE]
-        self._choice.value, self._other.value = chosen, other
+            self._choice.options = names or [NONE]
+        self._choice.value = chosen
         entries = self._entries(names[:_SHOWN])
         more = html("<div {}>… and {} more</div>", _BOX, len(names) - _SHOWN) if len(names) > _SHOWN else ""
         self._list.content = _listed(entries) + more
@@ -106,10 +104,16 @@ class RunsPanel:
 
     def _take_choice(self) -> None:
         self._by_hand = True
-        others = [name for name in self._other.options if name != self._choice.value]
-        if self._other.value == self._choice.value and others:
-            self._other.value = others[0]  # a recording is compared with another one
         self._show_chosen()
+
+    def _offer_others(self) -> None:
+        """A run is compared with another one, which stays chosen as long as it is one."""
+        others = [name for name in self._choice.options if name != self._choice.value] or [NONE]
+        if list(self._other.options) != others:
+            other = self._other.value
+            self._other.options = others
+            self._other.value = other if other in others else others[0]
+        self._compare.disabled = others == [NONE]
 
     def _entries(self, names: list[str]) -> list[Entry]:
         entries = []
@@ -124,7 +128,8 @@ class RunsPanel:
         name = str(self._choice.value)
         exists = name != NONE
         self._open.disabled = not exists or self._viewer is None
-        self._compare.disabled = self._rename.disabled = self._delete.disabled = not exists
+        self._rename.disabled = self._delete.disabled = not exists
+        self._offer_others()
         if not exists:
             self._card.content, self._link.content = _empty("None yet."), ""
             self._result.show(Html(), None)
@@ -157,8 +162,6 @@ class RunsPanel:
 
     def _compare_two(self) -> None:
         names = [str(entry.value) for entry in (self._choice, self._other)]
-        if names[0] == names[1]:
-            raise InputError("these are the same run; choose another one below")
         self._result.compare(*((self._recorded.entry(name), self._recorded.read(name)) for name in names))
 
     def _rename_chosen(self) -> None:

@@ -6,11 +6,10 @@ from typing import Any
 
 import plotly.graph_objects as go
 
-from ema_model.text import COLOURS
 from ema_model.units.result import UnitsCompared
 from ema_model.units.words import document_of, lacking, notes, rests_on, sentences
 from emaviz.figures import transfer_matrix, unit_parameters
-from emaviz.page.inset import COLUMNS, NEXT_COLUMN
+from emaviz.page.inset import COLUMNS, NEXT_COLUMN, PLOTS_EARLY
 from emaviz.page.page import Page
 from emaviz.page.practice import Seal
 from emaviz.page.units.keep import UnitsKeep
@@ -18,6 +17,7 @@ from emaviz.session.units.comparing_units import ComparingUnits
 from emaviz.text.html import Html, add_html, html, joined
 from emaviz.text.notes import BOX, DIM, begin
 from emaviz.text.told import warned, whole
+from emaviz.text.verdict import MEANINGS, of_units
 
 _CONFIG = {"displayModeBar": False}
 _STEPS = (
@@ -25,6 +25,7 @@ _STEPS = (
     Html("Press <b>Compare units</b>: the type is calibrated on all, and what differs is freed for each unit."),
     "You see which unit differs from the rest, in which parameter and by how much, checked by what is held out.",
 )
+_BESIDE_PX = 200  # of a window, what stands above and below the parameters
 _WIDTH_PX = 540  # of a figure on a usual panel, by which its share of height is made
 _HEAD_PX, _ROW_PX, _FEWEST_ROWS = 110, 34, 4  # of the matrix
 
@@ -37,12 +38,9 @@ class UnitsResult:
         gui = page.server.gui
         add_html(gui, COLUMNS)
         self._told = add_html(gui, begin("No units are compared yet", _STEPS))
-        self._figures = gui.add_folder("Parameters of each unit", visible=False)
-        with self._figures:
-            self._parameters: Any = gui.add_plotly(go.Figure(), config=_CONFIG, aspect=1.0)
+        add_html(gui, PLOTS_EARLY)
         self._matrix = gui.add_folder("The model of one unit on another", visible=False)
         with self._matrix:
-            add_html(gui, NEXT_COLUMN)
             self._transfer: Any = gui.add_plotly(go.Figure(), config=_CONFIG, aspect=0.6)
         self._seal = Seal(page, comparing.practice, lambda: comparing.chosen, lambda: comparing.found)
         self._words = gui.add_folder("All results in numbers", visible=False, expand_by_default=False)
@@ -51,6 +49,10 @@ class UnitsResult:
         self._save = gui.add_folder("Keep it", visible=False)
         with self._save:
             self._keep = UnitsKeep(page, comparing)
+        self._figures = gui.add_folder("Parameters of each unit", visible=False)
+        with self._figures:
+            add_html(gui, NEXT_COLUMN)
+            self._parameters: Any = gui.add_plotly(go.Figure(), config=_CONFIG, aspect=1.0)
 
     def show(self, found: UnitsCompared | None) -> None:
         """An answer; None for none."""
@@ -64,7 +66,8 @@ class UnitsResult:
                 return
             self._told.content = said(found)
             self._parameters.figure = unit_parameters.figure(found)
-            self._parameters.aspect = unit_parameters.height_px(found) / _WIDTH_PX
+            heights = unit_parameters.least_px(found), unit_parameters.most_px(found)
+            self._page.workspaces.heights.set_figure(self._parameters, *heights, _BESIDE_PX)
             self._transfer.figure = transfer_matrix.figure(found)
             rows = max(len(found.units), _FEWEST_ROWS)
             self._transfer.aspect = (_HEAD_PX + _ROW_PX * rows) / _WIDTH_PX
@@ -73,17 +76,21 @@ class UnitsResult:
 
 def said(found: UnitsCompared) -> Html:
     """The sentences, what the answer rests on, warnings, and which recordings lack."""
-    colour = COLOURS["warning" if found.differences or found.scattering else "good"]
     return html(
         '<div {}><div style="font-size:16px;font-weight:600;color:{};padding:4px 0">{}</div><div {}>{}</div>{}{}</div>',
         BOX,
-        colour,
-        joined(html("<div>{}</div>", line) for line in sentences(found)),
+        MEANINGS[of_units(found)],
+        joined(html("<div>{}</div>", _begun(line, found.units)) for line in sentences(found)),
         DIM,
         rests_on(found),
         warned(notes(found)),
         _listed(lacking(found)),
     )
+
+
+def _begun(line: str, units: tuple[str, ...]) -> str:
+    """With a capital letter; a unit's name stays as it is written."""
+    return line if line.startswith(units) else line[:1].upper() + line[1:]
 
 
 def _listed(lines: list[str]) -> Html:

@@ -6,6 +6,7 @@ from ema_model.comparison.result import Comparison
 from ema_model.comparison.words import of_floor, verdict
 from emaviz.report.markup import bullets, escape, paragraph
 from emaviz.report.section import Figures, Section
+from emaviz.text.verdict import of_comparison
 
 
 class Answer(Section[Comparison]):
@@ -17,10 +18,10 @@ class Answer(Section[Comparison]):
 
     def body(self, subject: Comparison, figures: Figures) -> str:
         """Always there."""
-        kind, told = "good" if subject.adequate else "bad", verdict(subject)
+        told = verdict(subject)
         first, *others = subject.sentences or (f"The model is {told}.",)
         return (
-            f'<p><span class="verdict {kind}">{escape(told)}</span></p>'
+            f'<p><span class="verdict {of_comparison(subject)}">{escape(told)}</span></p>'
             + paragraph(first, "answer")
             + "".join(paragraph(sentence) for sentence in [*others, of_floor(subject)])
             + bullets(subject.warnings, "warning")

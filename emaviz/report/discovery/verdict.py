@@ -6,8 +6,7 @@ from ema_model.discovery.words import headline, sentences, verdict_name
 from emaviz.report.discovery.subject import Told
 from emaviz.report.markup import bullets, escape, paragraph
 from emaviz.report.section import Figures, Section
-
-_KINDS = {"adequate": "good", "effects_found": "note"}
+from emaviz.text.verdict import of_discovery
 
 
 class Verdict(Section[Told]):
@@ -20,9 +19,8 @@ class Verdict(Section[Told]):
     def body(self, subject: Told, figures: Figures) -> str:
         """Always there."""
         found = subject.found
-        kind = _KINDS.get(found.verdict, "bad")
         return (
-            f'<p><span class="verdict {kind}">{escape(verdict_name(found))}</span></p>'
+            f'<p><span class="verdict {of_discovery(found)}">{escape(verdict_name(found))}</span></p>'
             + paragraph(headline(found), "answer")
             + "".join(paragraph(sentence) for sentence in sentences(found))
             + bullets(found.warnings, "warning")

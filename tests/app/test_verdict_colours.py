@@ -1,0 +1,62 @@
+"""Green says that nothing is missing, and nothing else: on the page as in the reports."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from support.comparison_by_hand import comparison
+from support.discovered import with_cogging
+
+from emaviz.page.compare.result import headline
+from emaviz.page.discover.result import answer
+from emaviz.report.comparison.answer import Answer
+from emaviz.report.discovery.verdict import Verdict
+from emaviz.report.section import Figures
+from emaviz.text.verdict import MEANINGS, of_discovery, of_units
+
+GREEN = MEANINGS["good"]
+
+
+def look(found, assessed=True) -> Any:
+    """A story as it stands, of which nothing is promising any more."""
+    assessment = SimpleNamespace(left=SimpleNamespace(explanation=None)) if assessed else None
+    return SimpleNamespace(found=found, assessment=assessment, added=list(found.effects), promising=[])
+
+
+@pytest.mark.parametrize("adequate, meaning", [(True, "good"), (False, "warning")])
+def test_a_comparison_is_green_where_the_model_is_adequate(adequate, meaning):
+    compared = replace(comparison(), adequate=adequate)
+    assert (GREEN in headline(compared)) == adequate and MEANINGS[meaning] in headline(compared)
+    assert f'class="verdict {meaning}"' in Answer().body(compared, Figures())
+
+
+def test_units_are_green_where_their_models_miss_nothing():
+    for known, meaning in (({}, "good"), ({"is_missed": True}, "warning"), ({"differences": ["one"]}, "warning")):
+        found: Any = SimpleNamespace(**{"differences": [], "scattering": [], "is_missed": False, **known})
+        assert of_units(found) == meaning
+
+
+def test_a_discovery_is_green_where_nothing_is_missing():
+    found = with_cogging()
+    nothing = replace(found, verdict="adequate", effects=[], faults={}, parameters_outside_tolerance=())
+    meanings = {
+        "good": [nothing],
+        "found": [
+            replace(found, verdict="effects_found"),
+            replace(nothing, faults={"k1": next(iter(found.calibration.parameters.values()))}),
+            replace(nothing, parameters_outside_tolerance=("motor.inertia_kgm2",)),
+        ],
+        "warning": [replace(found, verdict=one) for one in ("partly_explained", "unknown_effect", "not_converged")],
+    }
+    for meaning, answers in meanings.items():
+        assert [of_discovery(one) for one in answers] == [meaning] * len(answers)
+    told: Any
+    for one in (replace(found, verdict="effects_found"), nothing):
+        meaning = of_discovery(one)
+        assert MEANINGS[meaning] in answer(look(one)) and (GREEN in answer(look(one))) == (one is nothing)
+        told = SimpleNamespace(found=one)
+        assert f'class="verdict {meaning}"' in Verdict().body(told, Figures())
+    assert GREEN not in answer(look(nothing, assessed=False)), "it is not yet known"

@@ -288,5 +288,5 @@ def _warnings(fit: Adequacy) -> tuple[str, ...]:
         return ()
     return (
         f"The model does not fit, whatever k: {fit.reason}. What is found here may stand in for physics that the model "
-        "lacks; `emaviz discover` on the same recordings looks for it.",
+        "lacks; Discover, on the same recordings, looks for it.",
     )

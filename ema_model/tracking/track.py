@@ -90,7 +90,7 @@ class Tracker:
         if not trusted:
             warnings.append(
                 f"The model does not fit {bad} of the last {len(last)} flights: no trend is trusted; physics that it "
-                "lacks may stand behind it, and `emaviz discover` on these recordings looks for it."
+                "lacks may stand behind it; Discover, on these recordings, looks for it."
             )
         whole = _Whole(*(np.stack([getattr(one, part) for one in self._usable]) for part in ("k", "own", "common")))
         own = whole.own.mean(axis=0)

@@ -247,7 +247,7 @@ def _warnings(units: Mapping[str, Sequence[Measurement]], fits: Sequence[Fitted]
         worst = max(missing, key=lambda one: one.error)
         found.append(
             f"the models leave up to {worst.error:.1f} × the floor ({worst.unit.name}): physics is missing, and "
-            "differences are judged by what is left; `emaviz discover` looks for it"
+            "differences are judged by what is left; Discover looks for it"
         )
     loose = [one.unit.name for one in fits if not one.calibration.converged]
     if loose:

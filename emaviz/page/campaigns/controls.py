@@ -43,7 +43,7 @@ class CampaignControls:
             self._group: Any = gui.add_dropdown("Group", (NONE,))
             self._row: Any = gui.add_dropdown("Row", (NONE,))
             self._open = gui.add_button("Open as a run", icon=viser.Icon.PLAYER_PLAY, disabled=True)
-            self._status = add_html(gui, _box("None below the data folder; `emaviz gui --campaign DIR` opens one."))
+            self._status = add_html(gui, _box("None below the data folder; emaviz gui --campaign DIR opens one."))
             JobLine(page, campaigns.job)
             again = gui.add_button("Look for campaigns again", icon=viser.Icon.REFRESH, color="gray")
         with panel.add_tab("Campaign", viser.Icon.TABLE):

@@ -96,7 +96,7 @@ def test_flights_that_do_not_fit_are_left_out_and_many_of_them_end_the_trust():
     assert result.trusted and result.faults["k1"].trend and len(result.usable) == 80 - 11
     assert "left out: f003" in str(result)
     lost = track([*life[:72], *bad[72:]], {"k1": 0.5})
-    assert not lost.trusted and lost.faults["k1"].remaining is None and "emaviz discover" in lost.warnings[0]
+    assert not lost.trusted and lost.faults["k1"].remaining is None and "Discover" in lost.warnings[0]
 
 
 def test_noise_larger_than_stated_is_seen():

@@ -80,7 +80,8 @@ class Page:
 
     def one_at_a_time(self, button: Any = None) -> None:
         """Says that another long run goes on; with a button by raising InputError, which `checked` says beside it."""
-        self._wait("One at a time", "Another long run goes on; stop it first.", button)
+        running = self.session.worker.doing or "Another long run"
+        self._wait("One at a time", f"{running} goes on; stop it first.", button)
 
     def _wait(self, title: str, text: str, button: Any) -> None:
         if button is not None:

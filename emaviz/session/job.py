@@ -140,7 +140,7 @@ class Job:
         how long it took.
         """
         run = Run(title, self._tells, self._worker)
-        started = self._worker.start(self._steps(run, work, done))
+        started = self._worker.start(self._steps(run, work, done), title)
         if started:
             self._waits.set()
             self._run, self.running, self.finished, self.error = run, True, False, ""

@@ -37,6 +37,7 @@ class Worker:
         self._wake = threading.Condition()
         self._quick: dict[str, Job] = {}
         self._long: Steps | None = None
+        self._title = ""  # of the long job that was begun last
         self._closing = False
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
         self._thread.start()
@@ -47,12 +48,12 @@ class Worker:
             self._quick[kind] = job  # keeps its place in the line
             self._wake.notify()
 
-    def start(self, steps: Steps) -> bool:
+    def start(self, steps: Steps, title: str = "") -> bool:
         """Begins a long job, a step at a time; False, and nothing is begun, while another one runs."""
         with self._wake:
             if self._long is not None:
                 return False
-            self._long = steps
+            self._long, self._title = steps, title
             self._wake.notify()
             return True
 
@@ -76,6 +77,11 @@ class Worker:
     def busy(self) -> bool:
         """Whether a long job runs."""
         return self._long is not None
+
+    @property
+    def doing(self) -> str:
+        """The title of the long job that runs; "" for none."""
+        return self._title if self.busy else ""
 
     def close(self) -> None:
         """Ends the thread after its current step."""

@@ -53,12 +53,12 @@ def test_a_second_long_job_is_refused_until_the_first_ends(worker):
             time.sleep(0.001)
             yield
 
-    assert worker.start(long())
-    assert not worker.start(long())
+    assert worker.start(long(), "Identifying") and worker.doing == "Identifying"
+    assert not worker.start(long(), "Comparing") and worker.doing == "Identifying", "as who must wait is told"
     assert worker.busy
     release.set()
     wait_until(lambda: not worker.busy)
-    assert worker.start(long())
+    assert worker.doing == "" and worker.start(long())
 
 
 def test_double_click_from_many_threads_starts_one(worker):

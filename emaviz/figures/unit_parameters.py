@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
@@ -40,9 +41,10 @@ def figure(result: UnitsCompared, *, dark: bool = False) -> go.Figure:
         where = {"row": place // _COLUMNS + 1, "col": place % _COLUMNS + 1}
         one, of_type = result.alone[path], result.of_type[path]
         named = on_axes(path, result.actuator.axes)
-        axis = Quantity(named.title, of_type.unit).powered(one.value)
+        ends = of_type.mean + np.array([-1.0, 1.0]) * HALF_90 * of_type.sigma
+        axis = Quantity(named.title, of_type.unit).powered(np.append(one.value, ends))
         differs = {difference.unit for difference in result.differences if path in difference.together}
-        low, high = (axis.factor * (of_type.mean + side * HALF_90 * of_type.sigma) for side in (-1.0, 1.0))
+        low, high = axis.factor * ends
         grid.add_trace(
             go.Scatter(
                 x=axis.factor * one.value,

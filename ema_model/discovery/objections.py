@@ -18,13 +18,15 @@ from ema_model.discovery.criteria import (
     FAR,
     LEAST_FALL,
     LEAST_SHARE,
+    OF_FAINT,
     TIE,
 )
 from ema_model.discovery.evidence import colour_of, evidence, signals_of
 from ema_model.discovery.model_fit import ANGLES, Data, Fit, floor_ratio
-from ema_model.discovery.remaining import at_floor, left_by, used_left
+from ema_model.discovery.remaining import at_floor, left_by, used_left, within_band
 from ema_model.discovery.stability import disagreement
 from ema_model.effects import catalogue_name, find
+from ema_model.estimation.floor_band import band
 from ema_model.quantities.numbers import number
 from ema_model.quantities.titles import in_sentence
 from ema_model.recordings import SIGNALS
@@ -47,6 +49,7 @@ def against(data: Data, before: Fit, after: Fit, keys: Sequence[str], settled: C
         next((reason for key in keys if (reason := _unmeasured(data, key) or _within(before, after, key))), "")
         or _worse(data, before, after)
         or _little(data, before, after)
+        or _faint(data, before, after)
         or outdone(data, before, after)
         or _dated(data, before, after)
         or _against_settled(data, before, after, keys, settled)
@@ -194,6 +197,15 @@ def _little(data: Data, before: Fit, after: Fit) -> str:
     first, second = (float(one.residual @ one.residual) for one in (before, after))
     share = (first - second) / max(first - len(before.residual), len(before.residual))
     return "" if share >= LEAST_SHARE else f"it explains {100.0 * share:.0f} % of an error whose cause is not known"
+
+
+def _faint(data: Data, before: Fit, after: Fit) -> str:
+    """Whether a model that may be true as it is would keep most of what it leaves beyond the floor."""
+    first, last = (floor_ratio(data, one.plant, one.calibration.signals) for one in (before, after))
+    if not within_band(data, before) or last <= band(data.floor_spread)[1]:
+        return ""
+    kept = (last**2 - 1.0) / max(first**2 - 1.0, 1e-9)
+    return "" if kept < OF_FAINT else "a true model may leave as much, and most of it stays"
 
 
 def _unsteady(data: Data, after: Fit, key: str) -> str:

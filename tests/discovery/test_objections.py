@@ -130,3 +130,17 @@ def test_the_share_that_counts_is_of_what_the_settled_models_leave(monkeypatch, 
     settled = {found: fitted([1.0, 1.0], noise=one) for found, one in zip((before, after), calm)}
     found = objections._against_settled(DATA, before, after, [KEY], settled.__getitem__)
     assert found.startswith(said) and bool(found) == bool(said)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "kept"),
+    [(1.09, 1.07, True), (1.09, 1.03, False), (1.2, 1.06, False), (1.6, 1.5, False), (1.03, 1.03, False)],
+    ids=["hardly less", "in the band", "most of it", "far from true", "in the band before"],
+)
+def test_of_a_model_that_may_be_true_an_effect_takes_most_or_is_not_claimed(monkeypatch, before, after, kept):
+    """Nine of ten true models leave up to 1.04 floors here, and one of a hundred up to 1.25."""
+    monkeypatch.setattr(objections, "floor_ratio", lambda data, plant, signals: plant)
+    monkeypatch.setattr(objections, "within_band", lambda data, fit: fit.plant <= 1.25)
+    fits = [SimpleNamespace(plant=error, calibration=SimpleNamespace(signals=[])) for error in (before, after)]
+    said = objections._faint(SimpleNamespace(floor_spread=0.04 / 1.645), *fits)
+    assert said == ("a true model may leave as much, and most of it stays" if kept else "")

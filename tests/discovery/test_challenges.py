@@ -150,6 +150,7 @@ def test_mistakes_in_a_challenge_are_one_clear_line(tmp_path):
         challenges(tmp_path)
 
 
+@pytest.mark.long
 def test_the_easy_one_is_solved():
     found, truth = solved("first_bench_run"), read_truth(folder() / "truth" / "first_bench_run.toml")
     [(name, hidden)] = truth.effects.items()

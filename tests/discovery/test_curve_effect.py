@@ -194,6 +194,7 @@ def test_what_is_no_torque_at_the_shaft_is_told():
     assert not is_torque(explanation("user_position_rad", "motor_speed"), unknown)
 
 
+@pytest.mark.long
 def test_knots_are_free_and_the_rest_of_the_actuator_stays():
     data = data_of([SINE], {"cogging_torque": {"amplitude_Nm": 0.03}}, 5)
     base = fit(data, ACTUATOR)

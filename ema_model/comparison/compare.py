@@ -102,7 +102,7 @@ def _compare(
     twins = [twin_error(fitted, i, calibration.actuator, calibration.k) for i in range(len(fitted.windows))]
     taken = taken_up(floors, calibration, twins)
     if elsewhere is None:
-        floors = after_fit(floors, calibration, twins)
+        floors = after_fit(floors, calibration, twins, taken)
     else:
         floors = of_unseen(fitted, floors, *elsewhere, twins, wanted)
     plant, floors, before, after = _everywhere(recordings, fitted, floors, calibration, actuator)

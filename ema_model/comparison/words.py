@@ -28,7 +28,8 @@ def held_out(one: Compared) -> str:
     told = []
     for name, error in one.errors.items():
         shown = error.quantity(of_signal(name, ROTARY))  # by the name in files, which says all
-        told.append(f"{in_sentence(shown.title)} {shown.text(error.rmse)} (floor {shown.text(error.noise_floor)})")
+        floor = f" (floor {shown.text(error.noise_floor)})" if _has_floor(name, error) else ""
+        told.append(f"{in_sentence(shown.title)} {shown.text(error.rmse)}{floor}")
     return f"{one.name or 'the recording'} was not fitted; the calibrated model is off by: {', '.join(told)}"
 
 
@@ -69,14 +70,11 @@ def errors_by_recording(result: Comparison, signal: str) -> Table | None:
 
 
 def _errors(title: str, result: Comparison, of: Sequence[tuple[str, str, SignalError, str]]) -> Table:
-    """of: by row its name, the signal, its error, and what else is to be said.
-
-    A signal whose noise the recording does not tell, as of a speed that is 0 for most of the time, has no floor.
-    """
+    """of: by row its name, the signal, its error, and what else is to be said."""
     rows, units, severities = [], [], []
     for name, signal, error, said in of:
         shown = error.quantity(of_signal(signal, result.actuator.axes))
-        floor = error.noise_floor if error.noise_floor > _TOLD * least_noise(signal) else math.nan
+        floor = error.noise_floor if _has_floor(signal, error) else math.nan
         over = error.rmse / floor
         before = [error.rmse_initial] if result.calibration is not None else []
         numbers = [number(shown.factor * one) for one in (*before, error.rmse, floor)]
@@ -87,6 +85,11 @@ def _errors(title: str, result: Comparison, of: Sequence[tuple[str, str, SignalE
     head = ["before"] if result.calibration is not None else []
     head += ["rms error", "floor", "mean |e|", "of range", "error / floor"]
     return Table(head, rows, title, units, severities=severities)
+
+
+def _has_floor(signal: str, error: SignalError) -> bool:
+    """Whether a recording tells the signal's noise; that of a speed which is 0 for most of the time does not."""
+    return error.noise_floor > _TOLD * least_noise(signal)
 
 
 def _severity(over: float) -> Severity:

@@ -137,12 +137,12 @@ def twins_of(found: Fit) -> Sequence[Signals]:
 def in_floors_of(found: Fit, data: Data, held: Data | None) -> tuple[Data, Data | None]:
     """Data, and held-out ones, whose errors are told in what a true model leaves that was fitted as this one."""
     calibration, twins = found.calibration, twins_of(found)
-    data = replace(data, after_fit=after_fit(data.floors, calibration, twins))
+    taken = taken_up(data.floors, calibration, twins)
+    data = replace(data, after_fit=after_fit(data.floors, calibration, twins, taken))
     if held is None:
         return data, None
     plant = held.plant(calibration.actuator)
     there = [twin_error(plant, place) for place in range(len(plant.windows))]
-    taken = taken_up(data.floors, calibration, twins)
     unseen = of_unseen(plant, held.floors, calibration, taken, there, held.signals)
     return data, replace(held, after_fit=unseen)
 

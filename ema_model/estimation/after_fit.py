@@ -16,13 +16,16 @@ from ema_model.models.model import Signals
 Array = NDArray[np.float64]
 
 
-def after_fit(floors: Sequence[Floor], calibration: Calibration, twins: Sequence[Signals]) -> list[Floor]:
+def after_fit(
+    floors: Sequence[Floor], calibration: Calibration, twins: Sequence[Signals], taken: Array | None = None
+) -> list[Floor]:
     """The floors of a calibration's windows with `left`: what no parameter takes up of the twin's difference t.
 
     t − J(JᵀJ + I)⁻¹Jᵀt, weighted as the fit was: J are its sensitivities, and I is the prior.  twins: as of
-    `twin_error`, by window, with the calibrated parameters.  Floors without a twin stay as they are.
+    `twin_error`, by window, with the calibrated parameters; taken: as of `taken_up`, where it is known.  Floors
+    without a twin stay as they are.
     """
-    taken = taken_up(floors, calibration, twins)
+    taken = taken_up(floors, calibration, twins) if taken is None else taken
     return _floors_left(floors, twins, calibration.weighted_sensitivities, taken)
 
 

@@ -11,7 +11,7 @@ import pytest
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
 from ema_model.comparison import compare
-from ema_model.comparison.words import errors
+from ema_model.comparison.words import errors, held_out
 from ema_model.discovery import discover
 from ema_model.estimation.floor import floor
 from ema_model.identification.objective import Objective
@@ -130,6 +130,10 @@ def test_an_error_is_counted_in_floors_only_where_the_recording_tells_its_noise(
     still = simulate_reference(STILL, ACTUATOR)
     noise = np.random.default_rng(0).standard_normal(still.samples)
     speed, current = still["motor_speed_rad_s"] + noise_rad_s * noise, still["current_A"] + 0.1 * noise
-    table = errors(compare([still.with_signals(current_A=current, motor_speed_rad_s=speed)], ACTUATOR))
+    seen = still.with_signals(current_A=current, motor_speed_rad_s=speed)
+    table = errors(compare([seen], ACTUATOR))
     rows = {row[0]: row[-1] for row in table.rows}
     assert rows["Equivalent current"] != "–" and (rows["Motor speed"] != "–") is told
+    [unseen] = compare([seen], ACTUATOR, holdout=[seen]).holdout
+    [speed] = [part for part in held_out(unseen).split(", ") if part.startswith("motor speed")]
+    assert ("(floor " in speed) is told

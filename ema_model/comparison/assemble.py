@@ -46,6 +46,7 @@ def residuals_of(
                 values={name: window.measured[name] - signals[name] for name in names},
                 sigma={name: one.sigma(name) for name in names},
                 noise={name: np.full(blocks, one.noise[name]) for name in names},
+                white={name: one.white_part(name) for name in names},
                 variables=variables,
                 recording=np.full(blocks, window.recording),
                 run=np.zeros(blocks, np.intp),

@@ -250,7 +250,7 @@ def advance_of(residuals: Residuals, used: Used) -> Array | None:
 
 def _floor_power(residuals: Residuals, signal: str, used: Used) -> float:
     """χ² that what is left of the model floor may hold, the twins' own difference taken off."""
-    model2 = (residuals.sigma[signal] ** 2 - residuals.noise[signal] ** 2)[used.chosen]
+    model2 = (residuals.sigma[signal] ** 2 - residuals.white[signal] ** 2)[used.chosen]
     return float(_LEFT_OF_FLOOR * np.sum(model2 * used.weight**2))
 
 

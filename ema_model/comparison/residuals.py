@@ -42,7 +42,8 @@ class Residuals:
     time_s: Array
     values: dict[str, Array]
     sigma: dict[str, Array]  # standard deviation that a perfect model would leave: noise and model floor
-    noise: dict[str, Array]  # the sensor noise's part of it, white
+    noise: dict[str, Array]  # the sensor noise's part of it
+    white: dict[str, Array]  # and of that, what lasts no longer than a sample
     variables: dict[str, Array]
     recording: NDArray[np.intp]  # which of the joined recordings, from 0
     run: NDArray[np.intp]  # which run; time is continuous within one, and no run crosses recordings
@@ -94,6 +95,7 @@ def join(parts: Sequence[Residuals]) -> Residuals:
         values=together("values"),
         sigma=together("sigma"),
         noise=together("noise"),
+        white=together("white"),
         variables=together("variables"),
         recording=np.concatenate([part.recording for part in parts]),
         run=np.concatenate([part.run + first for part, first in zip(parts, first_run)]),

@@ -125,7 +125,7 @@ def slow_ratio(residuals: Residuals, name: str) -> float:
     """rms of the residual's means over 25 ms, over what noise and model floor give."""
     size = max(1, round(CORRELATED_S / residuals.block_s))
     used = np.isfinite(residuals.values[name]) & ~residuals.saturated
-    values, sigma, noise = residuals.values[name][used], residuals.sigma[name][used], residuals.noise[name][used]
+    values, sigma, white = residuals.values[name][used], residuals.sigma[name][used], residuals.white[name][used]
     count = values.size // size
     if count < 4:
         return 0.0
@@ -133,7 +133,7 @@ def slow_ratio(residuals: Residuals, name: str) -> float:
     def means(array: Array) -> Array:
         return array[: count * size].reshape(count, size).mean(axis=1)
 
-    floor = means(noise**2) / size + means(sigma**2 - noise**2)
+    floor = means(white**2) / size + means(sigma**2 - white**2)
     return float(np.sqrt(np.mean(means(values) ** 2) / np.mean(floor)))
 
 

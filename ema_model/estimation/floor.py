@@ -43,19 +43,47 @@ class Floor:
     white: frozenset[str] = frozenset()  # signals whose model error does not last while the motor moves
     left: Mapping[str, Array] = field(default_factory=dict)  # of `model`, that a fit does not take up, (blocks,) each
     beating: Mapping[str, Array] = field(default_factory=dict)  # of quantisation, (blocks,); told once it was fitted
+    held_s: Mapping[str, Array] = field(default_factory=dict)  # how long a reading stays the same, (blocks,)
+    samples: int = 1  # in a block
 
     def sigma(self, signal: str) -> Array:
         """Both together, (blocks,); once fitted, what a true model leaves: `left` in place of `model`."""
+        noise = np.hypot(self.white_part(signal), self._held(signal))
         if signal not in self.left:
-            return np.hypot(self.noise[signal], self.model[signal])
-        return np.hypot(np.hypot(self.noise[signal], self.beating.get(signal, 0.0)), self.left[signal])
+            return np.hypot(noise, self.model[signal])
+        return np.hypot(np.hypot(noise, self.beating.get(signal, 0.0)), self.left[signal])
 
     def fit_sigma(self, signal: str) -> Array:
-        """What to weight a fit by: the correlated part counts as often as it repeats, (blocks,)."""
+        """What to weight a fit by: what lasts counts as often as it repeats, (blocks,)."""
         repeats = self.repeats
         if signal in self.white:
             repeats = np.where(repeats > np.min(repeats), repeats, 1.0)
-        return np.hypot(self.noise[signal], np.sqrt(repeats) * self.model[signal])
+        return np.hypot(self.fit_noise(signal), np.sqrt(repeats) * self.model[signal])
+
+    def fit_noise(self, signal: str) -> Array:
+        """The noise as a fit counts it: a reading that is held is one, however many samples repeat it, (blocks,)."""
+        white = self.white_part(signal)
+        if signal not in self.held_s:
+            return white
+        return np.hypot(white, np.sqrt(np.maximum(1.0, self.held_s[signal] / self.block_s)) * self._held(signal))
+
+    def white_part(self, signal: str) -> Array:
+        """Of the noise, what a mean over 25 ms takes away, (blocks,)."""
+        return self.noise[signal] * np.sqrt(1.0 - self._held_share(signal))
+
+    def _held(self, signal: str) -> Array:
+        """Of quantisation, what lasts: a mean takes nothing of it away, not that of a block either, (blocks,)."""
+        return self.noise[signal] * np.sqrt(self.samples * self._held_share(signal))
+
+    def _held_share(self, signal: str) -> Array:
+        """Of the noise's variance, (blocks,).
+
+        A motion that crosses m < 1 steps of a grid in a time is read off by e there, in the mean, where e is uniform
+        over 1 − m of a step: the reading stays the same for 1/m of that time.
+        """
+        if signal not in self.held_s:
+            return np.zeros(len(self.repeats))
+        return (1.0 - np.minimum(1.0, CORRELATED_S / self.held_s[signal])) ** 2
 
     @property
     def counts(self) -> Array:
@@ -89,7 +117,15 @@ def floor(
         jump = late[name] / np.sqrt(12.0) if late else 0.0  # anywhere within the sample
         own = np.hypot(np.hypot(lasting, jump), window.lasting.get(name, 0.0))
         slow[name] = np.hypot(own, given.get(name, {}).get("accuracy", 0.0))
-    return Floor(noise, slow, repeats_of(window, noise), window.block_s, beating=window.beating)
+    return Floor(
+        noise,
+        slow,
+        repeats_of(window, noise),
+        window.block_s,
+        beating=window.beating,
+        held_s=window.held_s,
+        samples=window.samples_per_block,
+    )
 
 
 def local_rms(values: Array, block_s: float) -> Array:

@@ -27,7 +27,7 @@ def spread(floors: Sequence[Floor], signals: Sequence[Collection[str]]) -> float
         size = max(1, round(CORRELATED_S / one.block_s))
         lasting = np.zeros(len(one.counts))
         for name in names:
-            of_noise = one.counts * (one.noise[name] / one.sigma(name)) ** 2
+            of_noise = one.counts * (one.white_part(name) / one.sigma(name)) ** 2
             lasting += one.counts - of_noise
             variance += 2.0 * float(of_noise @ of_noise) + 4.0 * _OF_NOISE / len(of_noise) * float(of_noise.sum()) ** 2
             total += float(one.counts.sum())

@@ -138,7 +138,7 @@ def _covariance(found: Fitted) -> Array:
     meat = np.diag(held**4 / problem.prior**2)
     for window, name, rows in problem.parts():
         part = slopes[rows]
-        noise = np.full(rows.stop - rows.start, problem.floors[window].noise[name])
+        noise = problem.floors[window].fit_noise(name)
         if found.twins is None:  # the model's own error, taken to last as its weight says
             noise = 1.0 / problem.over_sigma(window, name, np.ones(len(noise)))
         weighted = part * problem.over_sigma(window, name, noise)[:, None]

@@ -12,7 +12,7 @@ from ema_model.commands.recorded import between
 from ema_model.errors import InputError, quoted
 from ema_model.models.model import Window
 from ema_model.recordings import SIGNALS, Measurement
-from ema_model.recordings.noise import beating
+from ema_model.recordings.noise import beating, held
 from ema_model.simulation.pack import integral_at_start
 from ema_model.simulation.run import steps_per_sample
 
@@ -131,6 +131,7 @@ def cut(
                     for name in known
                     if name in measurement and SIGNALS[name].kind == "position"
                 },
+                held_s={name: held(measurement[name][compared], samples) * period for name in known if name in measurement},
             )
         )
     if not windows:

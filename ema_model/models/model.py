@@ -38,6 +38,7 @@ class Window:
     values: dict[str, float] = field(default_factory=dict)  # of the actuator, in this recording alone
     lasting: Signals = field(default_factory=dict)  # rms of what sensors are off by, where that lasts: block arrays
     beating: Signals = field(default_factory=dict)  # rms of quantisation that no mean takes away: block arrays
+    held_s: Signals = field(default_factory=dict)  # how long a reading stays the same: block arrays
 
     @property
     def blocks(self) -> int:

@@ -65,6 +65,17 @@ def beating(values: Array, size: int) -> Array:
     return np.where(lasts, step * np.sqrt((1.0 - 1.0 / size) / 12.0), 0.0)
 
 
+def held(values: Array, size: int) -> Array:
+    """For how many samples a value stays where it is, in the mean of each of the means over size samples, (means,)."""
+    values = values[: len(values) // size * size]
+    if not len(values):
+        return np.zeros(0)
+    new = np.abs(np.diff(values)) > _ROUNDING * (1.0 + np.max(np.abs(values)))
+    ends = np.flatnonzero(np.concatenate([[True], new, [True]]))
+    lengths = np.diff(ends)
+    return np.repeat(lengths, lengths).astype(float).reshape(-1, size).mean(axis=1)
+
+
 def _step(values: Array) -> float:
     """The step of a grid on which values lie, that all their differences are multiples of; 0 where there is none."""
     steps = np.diff(values)

@@ -131,7 +131,7 @@ def linearised(
         share = lasting[rows].copy()
         if found is not None:
             floors = problem.floors[window]
-            share *= problem.over_sigma(window, name, np.full(rows.stop - rows.start, floors.noise[name])) ** 2
+            share *= problem.over_sigma(window, name, floors.fit_noise(name)) ** 2
             moved = problem.over_sigma(window, name, found.deviations[window][name]) @ slope[rows]
             ripple = moved if not len(ripple) else ripple + moved
         by_recording[unit.model.windows[window].recording] += np.sum(slope[rows, :count] ** 2, axis=0) / WIDER**2

@@ -15,6 +15,7 @@ from ema_model.estimation import Floor, after_fit, calibrate, floor
 from ema_model.estimation.floor import twin_error
 from ema_model.estimation.floor_band import spread
 from ema_model.models import ClosedLoop
+from ema_model.recordings.noise import held
 from ema_model.simulation.run import Run, simulate_reference
 from ema_model.simulation.sensors import Sensors
 
@@ -101,3 +102,47 @@ def test_a_true_model_is_at_its_floor_where_it_was_not_fitted():
     apart, told = np.mean(ratios, axis=0)
     assert told == pytest.approx(1.0, abs=0.08)
     assert abs(told - 1.0) < abs(apart - 1.0), "floors of a model that no fit has moved"
+
+
+@pytest.mark.parametrize("steps", [0.02, 0.1, 0.3, 0.6, 2.2])  # crossed in 25 ms
+@pytest.mark.parametrize("samples", [1, 5])  # of 0.5 ms, in a block
+def test_a_coarse_grid_that_is_crossed_slowly_is_off_by_as_much_as_its_floor_says(steps, samples):
+    """In blocks and in means over 25 ms, over all places on the grid where a motion may begin."""
+    period, count = 0.5e-3, 4000
+    blocks, means, told, lasts = [], [], [], []
+    for phase in np.linspace(0.0, 1.0, 40, endpoint=False):
+        exact = phase + steps * period / 0.025 * np.arange(count)
+        seen = np.round(exact)
+        off = (seen - exact).reshape(-1, samples).mean(axis=1)
+        of_noise = 1.0 / np.sqrt(12.0 * samples)
+        own = Floor(
+            {"user_position_rad": of_noise},
+            {"user_position_rad": np.zeros(len(off))},
+            np.ones(len(off)),
+            samples * period,
+            held_s={"user_position_rad": held(seen, samples) * period},
+            samples=samples,
+        )
+        sigma, white = own.sigma("user_position_rad"), own.white_part("user_position_rad")
+        size = 50 // samples
+        blocks.append(off**2)
+        told.append(sigma**2)
+        means.append(off.reshape(-1, size).mean(axis=1) ** 2)
+        lasts.append((white**2 / size + sigma**2 - white**2).reshape(-1, size).mean(axis=1))
+    assert np.sqrt(np.mean(means) / np.mean(lasts)) == pytest.approx(1.0, abs=0.25) or steps > 1.0
+    assert np.mean(means) < 1.1 * np.mean(lasts)
+    if samples == 1:
+        assert np.sqrt(np.mean(blocks) / np.mean(told)) == pytest.approx(1.0, rel=0.02)
+
+
+def test_a_reading_that_is_held_counts_once_in_a_fit():
+    """However often it was sampled: over a standstill, quantisation is one error."""
+    for samples in (40, 400):
+        own = Floor(
+            {"user_position_rad": 1.0},
+            {"user_position_rad": np.zeros(samples)},
+            np.ones(samples),
+            1e-2 / samples,
+            held_s={"user_position_rad": np.full(samples, 10.0)},
+        )
+        assert np.sum(own.fit_sigma("user_position_rad") ** -2.0) < 0.01

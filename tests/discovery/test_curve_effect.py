@@ -90,6 +90,7 @@ def residuals(signal: str, values: np.ndarray, **variables: np.ndarray) -> Resid
         values={signal: values},
         sigma={signal: np.full(n, 0.01 * float(np.std(values)))},
         noise={signal: np.full(n, 0.01 * float(np.std(values)))},
+        white={signal: np.full(n, 0.01 * float(np.std(values)))},
         variables=variables,
         recording=np.zeros(n, np.intp),
         run=np.zeros(n, np.intp),

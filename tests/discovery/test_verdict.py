@@ -151,6 +151,7 @@ def test_compare_is_bound_by_the_same_band():
         values={"current_A": values},
         sigma={"current_A": np.ones(n)},
         noise={"current_A": np.ones(n)},
+        white={"current_A": np.ones(n)},
         variables={"motor_speed": 50.0 + random.uniform(-1.0, 1.0, n)},
         recording=np.zeros(n, np.intp),
         run=np.zeros(n, np.intp),

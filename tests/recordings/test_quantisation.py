@@ -1,11 +1,11 @@
-"""Quantisation that no mean takes away: of a signal that goes on by whole steps a sample."""
+"""Quantisation that no mean takes away: of a signal that goes on by whole steps a sample, or stays on one."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from ema_model.recordings.noise import beating
+from ema_model.recordings.noise import beating, held
 
 STEP, SIZE = 1e-6, 5
 
@@ -45,3 +45,18 @@ def test_its_size_is_that_of_what_is_read():
         errors.append((STEP * (np.round(exact) - exact)).reshape(-1, SIZE).mean(axis=1))
     whole = np.hypot(beating(read(7.0), SIZE)[400], STEP / np.sqrt(12.0 * SIZE))
     assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(whole, rel=0.05)
+
+
+def test_a_reading_is_held_until_it_changes():
+    assert held(np.repeat([0.0, 1.0, 2.0, 2.0], [3, 5, 4, 3]), 1) == pytest.approx(np.repeat([3.0, 5.0, 7.0], [3, 5, 7]))
+    assert held(read(0.02), 1)[100:-100] == pytest.approx(np.full(3800, 50.0), abs=1.0)
+
+
+def test_a_mean_has_the_length_that_its_readings_have():
+    assert held(np.repeat([0.0, 1.0], [6, 4]), 5) == pytest.approx([6.0, (6.0 + 4.0 * 4.0) / 5.0])
+    assert len(held(np.zeros(13), 5)) == 2 and not len(held(np.zeros(3), 5))
+
+
+def test_what_is_noisier_than_its_grid_is_not_held():
+    random = np.random.default_rng(7)
+    assert np.mean(held(STEP * np.round(2.0 * random.standard_normal(4000)), 1)) < 1.5

@@ -86,6 +86,7 @@ def _recording(
         values={s: measured[s] - last[s] for s in SIGNALS},
         sigma=sigma,
         noise=white,
+        white=white,
         variables={
             "motor_angle": last["motor_position_rad"],
             "user_position": last["user_position_rad"],

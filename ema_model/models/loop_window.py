@@ -131,7 +131,9 @@ def cut(
                     for name in known
                     if name in measurement and SIGNALS[name].kind == "position"
                 },
-                held_s={name: held(measurement[name][compared], samples) * period for name in known if name in measurement},
+                held_s={
+                    name: held(measurement[name][compared], samples) * period for name in known if name in measurement
+                },
             )
         )
     if not windows:

@@ -69,7 +69,7 @@ def _chosen(story: Story, accepted: Sequence[Trial]) -> tuple[Trial, list[Trial]
         for trial in accepted
         if _short_of(story, trial, first) < TIE or (is_far and trial.drop > ALIKE * first.drop)
     ]
-    effects = [trial for trial in tied if not stands_for(story.current, trial.candidate.name)] or tied[:1]
+    effects = [trial for trial in tied if not stands_for(story.current, trial)] or tied[:1]
     if not is_far or story.held is None:
         best = min(effects, key=lambda trial: _short_of(story, trial, first) + price(story.data, story.current, trial))
         return best, [trial for trial in tied if trial is not best]

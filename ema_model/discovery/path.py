@@ -174,7 +174,7 @@ class Story:
         if trial.faults:
             self._tell_in_floors_of(trial.fit)
         before, moved = self.steps[-1].rung, stood_in(self.current, trial.fit)
-        parameter = "" if trial.faults else stands_for(self.current, trial.candidate.name)
+        parameter = "" if trial.faults else stands_for(self.current, trial)
         rung = self._rung(change_of(trial, parameter), trial.fit)
         errors = before.rmse, rung.rmse, before.holdout_rmse, rung.holdout_rmse
         new = [

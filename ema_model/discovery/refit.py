@@ -32,6 +32,7 @@ _HELD_BACK = 2.0  # σ of that guess, from which on it did
 _FOUND = (*ANGLES, "order")  # what no guess holds back: any angle is as likely, a pitch is as exact as the travel
 _UNMOVED = 1.0  # σ
 _NEAR = 5.0  # of the floor
+_ALIKE = 0.9  # cosine of two parameters' columns, from which on they do the same
 _STRAINED = 2.0  # σ, from which on a parameter may be what holds an effect's place
 _AS_IN_THE_FILE: Mapping[str, float] = {}  # a start
 _FAINT = 0.1  # of the suggested strength, from which a fit that went astray begins anew
@@ -125,17 +126,30 @@ def settings_in(found: Fit, effects: Iterable[str]) -> dict[str, Mapping[str, fl
     return settings
 
 
-def stands_for(before: Fit, name: str) -> str:
+def stands_for(before: Fit, trial: Trial) -> str:
     """The path of the base parameter outside its tolerance that an effect beside this fit would be; "" for none.
 
-    A parameter that is free, and stays where the file has it, is not what is missing, though a reading alone would not
-    tell the two apart: a constant load moves the axis, a current sensor's bias need not.
+    A parameter that is free, and stays where the file has it, is not what is missing, nor is one that moves the signals
+    otherwise, though a reading alone would not tell the two apart: a constant load moves the axis, the bias of a
+    logger's current does not.
     """
+    name = trial.candidate.name
     path = find(name).duplicates
     if not path:
         return ""
     free = before.calibration.parameters.get(path)
-    return "" if free is not None and not free.at_bound and abs(free.z) < _UNMOVED else path
+    if free is not None and not free.at_bound and abs(free.z) < _UNMOVED:
+        return ""
+    return path if _moves_alike(trial.fit, path, f"effects.{name}.{find(name).parameters[0].name}") else ""
+
+
+def _moves_alike(found: Fit, *paths: str) -> bool:
+    """Whether two parameters move the fitted signals in the same way, as far as both are free."""
+    names = [*found.calibration.parameters]
+    if any(path not in names for path in paths):
+        return True
+    one, other = (found.calibration.weighted_jacobian[:, names.index(path)] for path in paths)
+    return abs(float(one @ other)) > _ALIKE * float(np.linalg.norm(one) * np.linalg.norm(other))
 
 
 def worth(data: Data, current: Fit, trial: Trial) -> float:

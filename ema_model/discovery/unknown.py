@@ -46,7 +46,7 @@ def curve_instead(
     """
     if explanation is None:
         return None
-    stands_in = bool(stands_for(current, best.candidate.name))
+    stands_in = bool(stands_for(current, best))
     if not stands_in and best.drop > _HALF * explanation.r2 * current.chi2:
         return None
     curve = curve_for(data, held, current, explanation, tell)

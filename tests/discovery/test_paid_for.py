@@ -4,37 +4,58 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from ema_model.actuator import Tolerance
 from ema_model.discovery import objections, refit
+from ema_model.effects import find
 from ema_model.estimation import Calibrated
 
 ARM = "effects.pendulum_load.moment_Nm"
 
 
-def fit_with(z: float, at_bound: bool = False, path: str = "sensors.current_bias_A"):
+BIAS = "sensors.current_bias_A"
+LOAD = [1.0, 1.0, 0.0]  # what a constant load moves
+AS_LOAD, READING_ALONE = [2.0, 2.1, 0.0], [1.0, 1.0, 5.0]  # what a bias does
+
+
+def fit_with(z: float, at_bound: bool = False, path: str = BIAS):
     """A fit in which a parameter stands so many σ from the file."""
     one = Calibrated(0.0, 0.0, (0.0, 0.0), "", z, at_bound)
     return SimpleNamespace(calibration=SimpleNamespace(parameters={path: one}))
 
 
+def trial_of(name: str, path: str = BIAS, bias: list[float] = AS_LOAD):
+    """An effect refitted beside a parameter: bias, LOAD are how they move the signals."""
+    names = dict.fromkeys([path, f"effects.{name}.{find(name).parameters[0].name}"])
+    columns = np.array([bias, LOAD]).T
+    fit = SimpleNamespace(calibration=SimpleNamespace(parameters=names, weighted_jacobian=columns))
+    return SimpleNamespace(candidate=SimpleNamespace(name=name), fit=fit)
+
+
 @pytest.mark.parametrize(
-    ("before", "path"),
+    ("before", "bias", "path"),
     [
-        (fit_with(0.3), ""),
-        (fit_with(2.5), "sensors.current_bias_A"),
-        (fit_with(3.0, at_bound=True), "sensors.current_bias_A"),
-        (fit_with(0.0, path="motor.inertia_kgm2"), "sensors.current_bias_A"),
+        (fit_with(0.3), AS_LOAD, ""),
+        (fit_with(2.5), AS_LOAD, BIAS),
+        (fit_with(2.5), READING_ALONE, ""),
+        (fit_with(3.0, at_bound=True), AS_LOAD, BIAS),
+        (fit_with(3.0, at_bound=True), READING_ALONE, ""),
     ],
-    ids=["free and unmoved", "moved", "at its bound", "not free"],
+    ids=["free and unmoved", "moved", "moves otherwise", "at its bound", "at its bound, moves otherwise"],
 )
-def test_a_parameter_that_is_free_and_stays_is_not_what_is_missing(before, path):
-    assert refit.stands_for(before, "constant_load") == path
+def test_a_parameter_that_stays_or_moves_otherwise_is_not_what_is_missing(before, bias, path):
+    assert refit.stands_for(before, trial_of("constant_load", bias=bias)) == path
+
+
+def test_a_parameter_that_is_not_free_may_be_what_is_missing():
+    other = "motor.inertia_kgm2"
+    assert refit.stands_for(fit_with(0.0, path=other), trial_of("constant_load", other, READING_ALONE)) == BIAS
 
 
 def test_an_effect_that_is_no_parameter_stands_for_none():
-    assert refit.stands_for(fit_with(3.0), "cogging_torque") == ""
+    assert refit.stands_for(fit_with(3.0), trial_of("cogging_torque")) == ""
 
 
 @pytest.mark.parametrize(

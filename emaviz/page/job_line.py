@@ -6,8 +6,9 @@ import viser
 
 from emaviz.page.page import Page
 from emaviz.session.job import Job
-from emaviz.text.html import add_html
+from emaviz.text.html import Html, add_html
 from emaviz.text.notes import boxed
+from emaviz.text.sentence import begun
 from emaviz.text.time_left import going_on
 from emaviz.text.told import warned
 
@@ -39,7 +40,7 @@ class JobLine:
 
     def say(self, text: str) -> None:
         """On the screen's thread."""
-        self._text.content = boxed(text) if text else ""
+        self._text.content = boxed(text if isinstance(text, Html) else begun(text)) if text else ""
 
     def _waits(self, text: str) -> None:
         """For its turn, and can be stopped before that has come; or, with no text, does not wait any more."""
@@ -50,7 +51,7 @@ class JobLine:
             self.say(text)
         elif not self._job.waiting:
             self._stop.visible = False
-            if self._waited and self._text.content == boxed(self._waited):  # nothing was said since
+            if self._waited and self._text.content == boxed(begun(self._waited)):  # nothing was said since
                 self.say("")
 
     def _began(self, title: str) -> None:

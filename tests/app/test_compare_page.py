@@ -6,9 +6,11 @@ import re
 import shutil
 import threading
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.comparison_by_hand import comparison as by_hand
 from support.on_page import choose, field, fill, wait_until
 from support.two_clocks import write_two_clocks
 
@@ -18,6 +20,7 @@ from ema_model.recordings import write_measurement
 from ema_model.simulation.run import Run, simulate_reference
 from ema_model.simulation.sensors import Sensors
 from emaviz.page.app import App
+from emaviz.page.compare.plots import View
 from emaviz.page.compare.tab import CompareTab
 from emaviz.page.explore.tab import ExploreTab
 from emaviz.page.identify.tab import IdentifyTab
@@ -399,3 +402,14 @@ def test_files_of_the_command_line_open_on_compare(browser, recording, tmp_path)
             page.get_by_text("Where the model fails", exact=True).wait_for()
     finally:
         app.close()
+
+
+def test_a_plot_with_nothing_in_it_is_a_line(app):
+    bare = replace(by_hand(), orders=())
+    plots = app.tab(CompareTab).result._plots
+    plots.begin(View(bare))
+    spectrum, polar = plots._turn
+    assert not spectrum.handle.visible and spectrum.why.visible and "nothing repeats" in spectrum.why.content
+    assert polar.handle.visible and not polar.why.visible
+    plots.begin(View(by_hand()))
+    assert spectrum.handle.visible and not spectrum.why.visible

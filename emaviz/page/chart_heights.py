@@ -31,17 +31,18 @@ class _Stack:
 
 @dataclass(frozen=True)
 class _Figure:
-    """The height that a figure needs, and that it takes where there is room; what its column holds besides, px."""
+    """The height that a figure needs, that it is read at easily, and that it takes at most; what stands besides, px."""
 
     figure: Any
     least_px: int
+    usual_px: int
     most_px: int
     beside_px: int
 
     def aspect(self, width_px: int, window_px: int) -> float:
-        """In a window; where one column holds everything, which is scrolled, the figure takes what it can."""
+        """In a window; where one column holds everything, and is scrolled, no more than is read easily."""
         columns = 2 if width_px >= _TWO_COLUMNS_PX else 1
-        room = window_px - self.beside_px if columns == 2 else self.most_px
+        room = window_px - self.beside_px if columns == 2 else self.usual_px
         return min(self.most_px, max(self.least_px, room)) / ((width_px - LEFT_PX) / columns - _FRAME_PX)
 
 
@@ -62,12 +63,12 @@ class ChartHeights:
         more = spare_px // max(len(charts), 1)
         self._stacks.append(_Stack(tuple((one, int(one.height) + more) for one in charts), beside_px))
 
-    def set_figure(self, figure: Any, least_px: int, most_px: int, beside_px: int) -> None:
+    def set_figure(self, figure: Any, least_px: int, usual_px: int, most_px: int, beside_px: int) -> None:
         """A Plotly figure alone in its column, from now on as high as that leaves it, between these heights.
 
-        beside_px: of a window, what else stands above and below it.
+        usual_px: where one column holds everything; beside_px: of a window, what else stands above and below it.
         """
-        one = self._figures[id_of(figure)] = _Figure(figure, least_px, most_px, beside_px)
+        one = self._figures[id_of(figure)] = _Figure(figure, least_px, usual_px, most_px, beside_px)
         figure.aspect = one.aspect(_USUAL_WIDTH_PX, _USUAL_PX)
         for client in self._inside.pages():
             self._set_aspects(client)

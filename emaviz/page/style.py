@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from emaviz.colours import HELD_OUT, rgb
+from emaviz.colours import HELD_OUT, LIMIT, rgb
 from emaviz.figures.theme import DARK, LIGHT
 from emaviz.page import chart_heights, inset
 from emaviz.text.html import Html, html, unescaped
@@ -20,7 +20,7 @@ IN_PAIRS = Html('<div class="emaviz-pairs"></div>')  # stands before short contr
 # stands before the upload button that takes dropped files, which is not to be seen
 WIDE_MODAL = Html("<style>.mantine-Modal-root{--modal-size:min(960px,92vw)!important}</style>")
 STRIP_HEIGHT_PX = 68
-_HELD_OUT_ON_DARK = "#d17ee3"  # of its numbers, which are thin
+_HELD_OUT_ON_DARK, _LIMIT_ON_DARK = "#d17ee3", "#f06595"  # of numbers and notes, which are thin
 _ROW_PX = 48
 _LABEL = "> div > .mantine-Flex-root > div:first-child"
 
@@ -130,6 +130,8 @@ def figures(dark: bool) -> Html:
         f"<style>{of} :is({text}){{fill:{DARK.ink}!important}}.u-title{{color:{DARK.ink}}}"
         f"{of} .textpoint text[style*='fill: rgb({', '.join(map(str, rgb(HELD_OUT)))})']"
         f"{{fill:{_HELD_OUT_ON_DARK}!important}}"
+        f"{of} .annotation text[style*='fill: rgb({', '.join(map(str, rgb(LIMIT)))})']"
+        f"{{fill:{_LIMIT_ON_DARK}!important}}"
         f"{of} :is(.gridlayer,.angular-grid,.radial-grid) path{{stroke:{DARK.grid}!important;{seen}}}"
         f"{of} :is(.zerolinelayer path,path.ticks){{stroke:{DARK.zero}!important;{seen}}}"
         f"{of} .hoverlayer .hovertext path{{fill:{DARK.paper}!important}}"

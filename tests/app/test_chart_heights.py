@@ -8,7 +8,9 @@ from typing import Any
 import pytest
 
 from emaviz.figures.signals import LEAST_SPACE_PX, value_axis
+from emaviz.page import docked
 from emaviz.page.chart_heights import ChartHeights, spaced
+from emaviz.page.docked import TWO_COLUMNS_PX
 
 
 def test_values_keep_a_distance_in_proportion_to_the_height():
@@ -28,6 +30,10 @@ class Pages:
 
     def set_aspect(self, client, figure, aspect):
         self.aspects.append(aspect)
+
+
+def test_a_window_that_has_just_two_columns_is_told_from_one_that_has_not():
+    assert TWO_COLUMNS_PX in docked.WINDOWS_PX
 
 
 def test_a_figure_takes_what_its_column_has_between_what_it_needs_and_what_fills_it():

@@ -70,9 +70,9 @@ def sentences(k: ArrayLike, actuator: Actuator) -> tuple[str, ...]:
     return (
         f"friction × {r['friction_factor']:.2f}",
         f"backlash {_play(r[_backlash(actuator)], actuator.axes.unit('rad', USER))}",
-        f"phase A: {r['turns_a']:.0%} of turns",
-        f"phase B: {r['turns_b']:.0%} of turns",
-        f"phase C: {r['turns_c']:.0%} of turns",
+        f"phase A: {100.0 * r['turns_a']:.0f} % of turns",
+        f"phase B: {100.0 * r['turns_b']:.0f} % of turns",
+        f"phase C: {100.0 * r['turns_c']:.0f} % of turns",
         f"eccentricity ζ = {r['eccentricity']:.2f}",
         f"thinnest gap at {round(np.degrees(r['eccentricity_phase_rad'])):+d}°".replace("-", "−"),
         f"gain × {physical(k).gain_factor:.2f}",

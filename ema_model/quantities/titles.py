@@ -7,12 +7,13 @@ from collections.abc import Sequence
 from ema_model.quantities.si import of_name, without_unit
 
 _PROPER = frozenset(("Stribeck",))
+_OWNERS = {"sensors": "sensor"}  # of a section with several, of which each has its own
 
 
 def parameter_title(path: str) -> str:
     """'Motor inertia' of 'motor.inertia_kgm2', 'Amplitude' of 'amplitude_rad'."""
     section, _, name = path.rpartition(".")
-    words = f"{section.replace('.', ' ')} {without_unit(name)}".replace("_", " ").strip()
+    words = f"{_OWNERS.get(section, section).replace('.', ' ')} {without_unit(name)}".replace("_", " ").strip()
     return words[:1].upper() + words[1:]
 
 

@@ -10,10 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
+from ema_model.actuator.layout import WITHOUT_DRIVE
 from ema_model.commands import command
 from ema_model.effects import Effect, find
 from ema_model.errors import InputError
 from ema_model.recordings import Measurement
+from ema_model.simulation.one_stack import stack_at_hand
+from ema_model.simulation.precompile import is_compiled
 from ema_model.simulation.run import Run, simulate_monitor
 
 Array = NDArray[np.float64]
@@ -91,6 +94,12 @@ class EffectRuns:
     def __init__(self, actuator: Actuator) -> None:
         self.actuator = actuator
         self._without: dict[str, Measurement] = {}
+
+    def is_compiled(self, name: str) -> bool:
+        """Whether a run with that effect begins at once; else its kernel is compiled first."""
+        if self.actuator.controller.kind in WITHOUT_DRIVE:
+            return True  # it is refused at once
+        return is_compiled(stack_at_hand(self.actuator, {name}, "reduced", "traces"), "traces")
 
     def felt(self, name: str, settings: Mapping[str, float], run: str) -> WithEffect:
         """With and without, by the Monitor Model; InputError where the actuator does not stand the effect."""

@@ -19,7 +19,7 @@ _LABEL = 0.14  # height of a number and its distance from its point, of the char
 
 def figure(found: Discovery, *, dark: bool = False) -> go.Figure:
     """A line for what was fitted, one for what was held out, and the floor at 1 with how well it is known."""
-    chart = theme.new("Error after each step", "", "Rms error / floor [-]", dark=dark)
+    chart = theme.new("Error after each step", "", "Error / floor [-]", dark=dark)
     # Numbered within: two steps may have the same title.
     places = list(range(len(found.ladder)))
     titles = [theme.plain(rung_title(rung.change, found.actuator.axes)) for rung in found.ladder]

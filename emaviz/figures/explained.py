@@ -26,7 +26,7 @@ def figure(
     best = {v: max(e.r2 for e in found if e.variable == v) for v in dict.fromkeys(e.variable for e in found)}
     # a horizontal bar chart counts from the bottom
     variables = sorted(best, key=lambda v: best[v])
-    chart = theme.new(title, "Residual variance explained, cross-validated [%]", "", dark=dark)
+    chart = theme.new(title, "Explained variance, cross-validated [%]", "", dark=dark)
     names = {v: _name(v, highlight) for v in variables}
     for modulator in reversed(MODULATORS):
         bars = {e.variable: e for e in found if e.modulator == modulator}

@@ -27,7 +27,7 @@ def figure(before: Sequence[Explanation], now: Sequence[Explanation], *, dark: b
         return theme.missing(_TITLE, "no variable to explain it with is known", dark=dark)
     variables = sorted(order, key=lambda variable: order[variable])  # a horizontal bar chart counts from the bottom
     titles = [variable_title(variable) for variable in variables]
-    chart = theme.new(_TITLE, "Residual variance explained, cross-validated [%]", "", dark=dark)
+    chart = theme.new(_TITLE, "Explained variance, cross-validated [%]", "", dark=dark)
     for (name, found), colour in zip(reversed(runs.items()), (theme.RESIDUAL, theme.INITIAL)):
         known = [found.get(variable) for variable in variables]
         chart.add_trace(

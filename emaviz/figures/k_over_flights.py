@@ -15,6 +15,7 @@ from emaviz.figures import theme
 CLICKED = "flights"  # by which a page knows the chart, of which a point's text is its flight
 _BAND = "rgba(240,140,0,0.18)"
 _FAN = "rgba(240,140,0,0.30)"
+_BESIDE_AXIS_PX = 24  # to the right of the line at no flight
 
 
 def figure(
@@ -68,7 +69,7 @@ def figure(
         chart.add_hline(
             y=one.threshold,
             line={"width": 1, "dash": "dash", "color": theme.MARK},
-            annotation={"text": "threshold", "font": {"color": theme.MARK}},
+            annotation={"text": "threshold", "font": {"color": theme.MARK}, "xshift": _BESIDE_AXIS_PX},
             annotation_position="bottom left",
         )
     if one.remaining is not None and one.threshold is not None:

@@ -43,7 +43,7 @@ def figure(history: History, name: str, number: int, *, dark: bool = False) -> g
     theme.moment(chart, number)
     chart.update_yaxes(range=[0.0, _ROOM * top])
     if cut:
-        told = f"upper ends above {top:.0f} flights are cut"
+        told = f"Upper ends above {top:.0f} flights are cut"
         chart.add_annotation(
             text=told, x=1.0, xref="x domain", xanchor="right", y=top, yanchor="bottom", showarrow=False,
             font={"size": 10},

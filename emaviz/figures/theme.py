@@ -120,12 +120,19 @@ def lowered(text: str) -> str:
 
 
 def missing(title: str, why: str, *, dark: bool = False) -> go.Figure:
-    """A figure that says why there is nothing to draw."""
+    """A figure that says why there is nothing to draw; where a line has room only, `why_missing` says it."""
     figure = new(title, "", "", dark=dark)
+    figure.update_layout(meta={"missing": f"{title}: {why}."})
     figure.update_xaxes(visible=False)
     figure.update_yaxes(visible=False)
     figure.add_annotation(text=plain(why), showarrow=False, x=0.5, y=0.5, xref="paper", yref="paper")
     return figure
+
+
+def why_missing(figure: go.Figure) -> str:
+    """The sentence of a figure in which there is nothing; "" of any other."""
+    meta: object = figure.layout["meta"]
+    return str(meta["missing"]) if isinstance(meta, dict) and "missing" in meta else ""
 
 
 def shade(figure: go.Figure, ranges: Iterable[tuple[float, float]], window: tuple[float, float] | None = None) -> None:

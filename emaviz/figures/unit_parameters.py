@@ -95,6 +95,9 @@ def most_px(result: UnitsCompared) -> int:
     return _height_px(result, _MOST_ROW_PX)
 
 
+HEIGHTS_PX = least_px, height_px, most_px  # from the least
+
+
 def _height_px(result: UnitsCompared, row_px: int) -> int:
     rows = -(-max(len(shown(result)), 1) // _COLUMNS)
     return _HEAD_PX + rows * (_AXIS_PX + row_px * (len(result.units) + 1))

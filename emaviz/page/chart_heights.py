@@ -7,14 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from emaviz.figures.signals import LEAST_SPACE_PX
-from emaviz.page.docked import LEFT_PX
+from emaviz.page.docked import LEFT_PX, TWO_COLUMNS_PX
 from emaviz.server.viser_private import Inside, id_of
 from emaviz.text.html import Html, unescaped
 
 # Heights by which windows are told apart: charts are laid out for the tallest that is no taller than the window.
 WINDOWS_PX = (600, 640, 680, 700, 740, 780, 820, 860, 900, 940, 980, 1020, 1060, 1100, 1150, 1200, 1300, 1400)
 _USUAL_WIDTH_PX, _USUAL_PX = 1400, 900  # of a window, for which charts are built
-_TWO_COLUMNS_PX = 1240  # wide, from where on what stands in two columns does
 _LEAST_PX = 64
 _FRAME_PX = 45  # of a column, beside a figure in a folder
 _VALUES = 6  # of a chart's height, which its title shares: at most so many values stand at an axis
@@ -31,17 +30,18 @@ class _Stack:
 
 @dataclass(frozen=True)
 class _Figure:
-    """The height that a figure needs, and that it takes where there is room; what its column holds besides, px."""
+    """The height that a figure needs, that it is read at easily, and that it takes at most; what stands besides, px."""
 
     figure: Any
     least_px: int
+    usual_px: int
     most_px: int
     beside_px: int
 
     def aspect(self, width_px: int, window_px: int) -> float:
-        """In a window; where one column holds everything, which is scrolled, the figure takes what it can."""
-        columns = 2 if width_px >= _TWO_COLUMNS_PX else 1
-        room = window_px - self.beside_px if columns == 2 else self.most_px
+        """In a window; where one column holds everything, and is scrolled, no more than is read easily."""
+        columns = 2 if width_px >= TWO_COLUMNS_PX else 1
+        room = window_px - self.beside_px if columns == 2 else self.usual_px
         return min(self.most_px, max(self.least_px, room)) / ((width_px - LEFT_PX) / columns - _FRAME_PX)
 
 
@@ -62,12 +62,12 @@ class ChartHeights:
         more = spare_px // max(len(charts), 1)
         self._stacks.append(_Stack(tuple((one, int(one.height) + more) for one in charts), beside_px))
 
-    def set_figure(self, figure: Any, least_px: int, most_px: int, beside_px: int) -> None:
+    def set_figure(self, figure: Any, least_px: int, usual_px: int, most_px: int, beside_px: int) -> None:
         """A Plotly figure alone in its column, from now on as high as that leaves it, between these heights.
 
-        beside_px: of a window, what else stands above and below it.
+        usual_px: where one column holds everything; beside_px: of a window, what else stands above and below it.
         """
-        one = self._figures[id_of(figure)] = _Figure(figure, least_px, most_px, beside_px)
+        one = self._figures[id_of(figure)] = _Figure(figure, least_px, usual_px, most_px, beside_px)
         figure.aspect = one.aspect(_USUAL_WIDTH_PX, _USUAL_PX)
         for client in self._inside.pages():
             self._set_aspects(client)
@@ -82,7 +82,7 @@ class ChartHeights:
         """Lays one window out for its width."""
         before, height = self._window(client)
         self._windows[client] = window_px, height
-        if (before >= _TWO_COLUMNS_PX) != (window_px >= _TWO_COLUMNS_PX):
+        if (before >= TWO_COLUMNS_PX) != (window_px >= TWO_COLUMNS_PX):
             self._lay_out(client)
         self._set_aspects(client)
 
@@ -106,7 +106,7 @@ class ChartHeights:
     def _lay_out(self, client: int, only: Any = None) -> None:
         width, window_px = self._window(client)
         for stack in self._stacks:
-            spare = window_px - _USUAL_PX + (stack.beside_px if width >= _TWO_COLUMNS_PX else 0)
+            spare = window_px - _USUAL_PX + (stack.beside_px if width >= TWO_COLUMNS_PX else 0)
             more = spare // len(stack.charts) + (_TITLE_SAVED_PX if window_px < _LOW_PX else 0)
             for chart, usual in stack.charts:
                 if only is None or chart is only:

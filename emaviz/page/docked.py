@@ -11,8 +11,9 @@ from emaviz.server.viser_private import Inside
 LEFT_PX = 380
 _USUAL_WINDOW_PX = 1400
 _NARROWEST_PX, _WIDEST_PX = 340, 1000
+TWO_COLUMNS_PX = 1240  # from which width on what stands in two columns does
 # Widths by which windows are told apart: what is docked is laid out for the widest that is no wider than the window.
-WINDOWS_PX = (900, 1000, 1100, 1200, 1300, 1400, 1500, 1600, 1700, 1800, 1900, 2100, 2300, 2600)
+WINDOWS_PX = (900, 1000, 1100, 1200, TWO_COLUMNS_PX, 1300, 1400, 1500, 1600, 1700, 1800, 1900, 2100, 2300, 2600)
 _SHOWN_S = 0.15
 
 

@@ -6,6 +6,7 @@ names in viser's own page; where one has changed, the actuator stands between th
 
 from __future__ import annotations
 
+from emaviz.page.docked import TWO_COLUMNS_PX
 from emaviz.text.html import Html, unescaped
 
 COLUMNS = Html('<div class="emaviz-columns"></div>')  # stands in a tab whose parts take two columns where there is room
@@ -13,7 +14,7 @@ NEXT_COLUMN = Html('<div class="emaviz-next-column"></div>')  # stands in the fo
 ALL_COLUMNS = Html('<div class="emaviz-all-columns"></div>')  # stands in a folder that is as wide as both
 # Stands before what gives way to the second column where there is one only.
 PLOTS_EARLY = Html('<div class="emaviz-early"></div>')
-_LEAST_WIDTH_PX, _TWO_COLUMNS_PX = 900, 1240  # of a window
+_LEAST_WIDTH_PX = 900  # of a window
 _CLICK_PX = 4  # a pointer that moves further turns the actuator
 
 _SCRIPT = """
@@ -91,11 +92,11 @@ def style() -> Html:
         ".emaviz-grow{position:fixed;z-index:7;width:26px;height:26px;padding:0;border-radius:4px;cursor:pointer;"
         "font-size:15px;line-height:24px;border:1px solid rgba(134,142,150,.55);"
         "background:var(--mantine-color-body);color:var(--mantine-color-text)}"
-        f"@media (min-width:{_TWO_COLUMNS_PX}px){{{columns}{{columns:2;column-gap:6px;padding-top:12px}}"
+        f"@media (min-width:{TWO_COLUMNS_PX}px){{{columns}{{columns:2;column-gap:6px;padding-top:12px}}"
         f"{columns} > div{{break-inside:avoid}}"
         f"{columns} > div:has(.emaviz-next-column){{break-before:column}}"
         f"{columns} > div:has(.emaviz-all-columns){{column-span:all}}}}"
-        f"@media (max-width:{_TWO_COLUMNS_PX - 1}px){{{columns}:has(> div > .emaviz-early)"
+        f"@media (max-width:{TWO_COLUMNS_PX - 1}px){{{columns}:has(> div > .emaviz-early)"
         "{display:flex;flex-direction:column}"
         f"{columns} > div:has(> .emaviz-early) ~ div{{order:2}}"
         f"{columns} > div:has(> .emaviz-early) ~ div:has(.emaviz-next-column){{order:1}}}}"

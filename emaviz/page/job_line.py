@@ -6,8 +6,9 @@ import viser
 
 from emaviz.page.page import Page
 from emaviz.session.job import Job
-from emaviz.text.html import add_html
+from emaviz.text.html import Html, add_html
 from emaviz.text.notes import boxed
+from emaviz.text.sentence import begun
 from emaviz.text.time_left import going_on
 from emaviz.text.told import warned
 
@@ -18,7 +19,7 @@ class JobLine:
     def __init__(self, page: Page, job: Job, *, stop: str = "Stop", pauses: str = "") -> None:
         """stop: the button's label; pauses: what its other button pauses, as in 'the search', or none."""
         self._page, self._job, self._pauses = page, job, pauses
-        self._title = ""
+        self._title = self._waited = ""
         self._stopping = False
         gui = page.server.gui
         self._pause = gui.add_button(
@@ -32,14 +33,26 @@ class JobLine:
         self._pause.on_click(lambda _: post(f"{self._name} rests", lambda: job.pause(not job.paused)))
         self._stop.on_click(lambda _: post(f"{self._name} stops", self._ask_to_stop))
         job.began.connect(lambda title: post(self._name, lambda: self._began(title)))
-        job.waits.connect(lambda text: post(self._name, lambda: self.say(text)))
+        job.waits.connect(lambda text: post(f"{self._name} waits", lambda: self._waits(text)))
         job.progressed.connect(lambda *said: post(f"{self._name} goes on", lambda: self._goes_on(*said)))
         job.rests.connect(lambda rests: post(f"{self._name} is paused", lambda: self._show_paused(rests)))
         job.ended.connect(lambda text: post(self._name, lambda: self._ended(text)))
 
     def say(self, text: str) -> None:
         """On the screen's thread."""
-        self._text.content = boxed(text) if text else ""
+        self._text.content = boxed(text if isinstance(text, Html) else begun(text)) if text else ""
+
+    def _waits(self, text: str) -> None:
+        """For its turn, and can be stopped before that has come; or, with no text, does not wait any more."""
+        if self._job.running:
+            return
+        if self._job.waiting and text:
+            self._stop.visible, self._stop.disabled, self._waited = True, False, text
+            self.say(text)
+        elif not self._job.waiting:
+            self._stop.visible = False
+            if self._waited and self._text.content == boxed(begun(self._waited)):  # nothing was said since
+                self.say("")
 
     def _began(self, title: str) -> None:
         self._title, self._stopping = title, False
@@ -68,6 +81,9 @@ class JobLine:
         if self._job.running:
             self._stopping = self._stop.disabled = True
             self.say("Stopping after the present simulation …")
+        else:  # it waited for its turn
+            self._stop.visible = False
+            self.say("Stopped.")
 
     def _ended(self, text: str) -> None:
         with self._page.server.atomic():

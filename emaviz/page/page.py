@@ -14,6 +14,7 @@ from emaviz.server.beside import say_beside
 from emaviz.server.viser_private import Inside, id_of
 from emaviz.session.session import Session
 from emaviz.session.worker import Worker
+from emaviz.text.sentence import begun
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,7 @@ class Page:
     def notify(self, title: str, text: str, colour: Any = "red") -> None:
         """A message in every open browser."""
         for client in self.server.get_clients().values():
-            client.add_notification(title, text, auto_close_seconds=8.0, color=colour)
+            client.add_notification(title, begun(text), auto_close_seconds=8.0, color=colour)
 
     def checked(self, change: Callable[[], Any], control: Any = None) -> bool:
         """Applies a change of settings; a bad value becomes a message and leaves the old one.

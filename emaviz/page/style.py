@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from emaviz.colours import HELD_OUT, rgb
+from emaviz.colours import HELD_OUT, LIMIT, rgb
 from emaviz.figures.theme import DARK, LIGHT
 from emaviz.page import chart_heights, inset
 from emaviz.text.html import Html, html, unescaped
@@ -17,10 +17,11 @@ STRIP = Html('<div class="emaviz-strip"></div>')  # stands in the panel that bec
 TIME_CHARTS = Html('<div class="emaviz-time"></div>')  # stands beside charts over time
 LONG_LABELS = Html('<div class="emaviz-long"></div>')  # stands beside controls with long labels
 IN_PAIRS = Html('<div class="emaviz-pairs"></div>')  # stands before short controls, two of which share a line
+IN_ROW = Html('<div class="emaviz-row"></div>')  # stands before buttons, four of which share a line
 # stands before the upload button that takes dropped files, which is not to be seen
 WIDE_MODAL = Html("<style>.mantine-Modal-root{--modal-size:min(960px,92vw)!important}</style>")
 STRIP_HEIGHT_PX = 68
-_HELD_OUT_ON_DARK = "#d17ee3"  # of its numbers, which are thin
+_HELD_OUT_ON_DARK, _LIMIT_ON_DARK = "#d17ee3", "#f06595"  # of numbers and notes, which are thin
 _ROW_PX = 48
 _LABEL = "> div > .mantine-Flex-root > div:first-child"
 
@@ -50,6 +51,11 @@ def page() -> Html:
         f"div:has(> div > .emaviz-long) {_LABEL}{{width:11.6em!important}}"
         "div:has(> div > .emaviz-pairs){display:grid;grid-template-columns:1fr 1fr}"
         "div:has(> .emaviz-pairs){display:none!important}"
+        "div:has(> div > .emaviz-row){display:grid;grid-template-columns:repeat(4,1fr);padding:0 6px}"
+        "div:has(> .emaviz-row){display:none!important}div:has(> div > .emaviz-row) > div:not(:has(button))"
+        "{grid-column:1/-1;order:1}div:has(> div > .emaviz-row) > div:has(button){margin-inline:3px!important}"
+        "div:has(> div > .emaviz-row) button{padding:0 4px;font-size:12.5px}"
+        "@media (max-width:1700px){div:has(> div > .emaviz-row) .mantine-Button-section{display:none}}"
         f"div:has(> div > .emaviz-pairs) {_LABEL}{{width:5.6em!important}}"
         f"div:has(> div > .emaviz-pairs) > div:has(input[type=checkbox]) > .mantine-Flex-root > div:first-child"
         "{width:8.4em!important}"
@@ -130,6 +136,8 @@ def figures(dark: bool) -> Html:
         f"<style>{of} :is({text}){{fill:{DARK.ink}!important}}.u-title{{color:{DARK.ink}}}"
         f"{of} .textpoint text[style*='fill: rgb({', '.join(map(str, rgb(HELD_OUT)))})']"
         f"{{fill:{_HELD_OUT_ON_DARK}!important}}"
+        f"{of} .annotation text[style*='fill: rgb({', '.join(map(str, rgb(LIMIT)))})']"
+        f"{{fill:{_LIMIT_ON_DARK}!important}}"
         f"{of} :is(.gridlayer,.angular-grid,.radial-grid) path{{stroke:{DARK.grid}!important;{seen}}}"
         f"{of} :is(.zerolinelayer path,path.ticks){{stroke:{DARK.zero}!important;{seen}}}"
         f"{of} .hoverlayer .hovertext path{{fill:{DARK.paper}!important}}"

@@ -6,6 +6,7 @@ import json
 from typing import Any
 
 from emaviz.server.viser_private import Inside, id_of
+from emaviz.text.sentence import begun
 
 _SAY = r"""
 ((id, text) => {
@@ -31,6 +32,6 @@ _SAY = r"""
 
 def say_beside(inside: Inside, control: Any, text: str, client: int | None = None) -> None:
     """Says it in one page, or in all that are open; no text takes it away."""
-    source = _SAY.replace("(ID, TEXT)", f"({json.dumps(id_of(control))}, {json.dumps(text)})")
+    source = _SAY.replace("(ID, TEXT)", f"({json.dumps(id_of(control))}, {json.dumps(begun(text))})")
     for one in inside.pages() if client is None else (client,):
         inside.run(source, one)

@@ -11,11 +11,12 @@ from ema_model.errors import InputError
 from emaviz.session.pace import Pace
 from emaviz.session.signal import Signal
 from emaviz.session.worker import Steps, Worker
+from emaviz.text.time_left import going_on
 
 _TICK_S = 0.5
 _PAUSE_S = 0.01  # between two looks whether to go on; sliders are answered in between
-_RESTED = 2  # looks, a quarter of a second apart, at a compute thread that is free
-_MOST_WAIT_S = 20.0  # for what may never be ready
+_LOOK_S = 0.25  # between two looks whether it is a run's turn
+RESTED = 2  # looks at a compute thread that is free, after which nobody is about to ask for it
 
 
 class Tell(Protocol):
@@ -126,46 +127,64 @@ class Job:
         self._worker, self._on_stop, self._on_divergence = worker, on_stop, on_divergence
         self._run: Run | None = None
         self._pace = Pace()
-        self._waits = threading.Event()  # set: whoever waits to begin shall not any more
+        self._over = threading.Event()  # set: whoever waits to begin shall not any more
+        self._over.set()
 
     @property
     def paused(self) -> bool:
         """Whether it rests."""
         return self.running and self._run is not None and self._run.paused
 
+    @property
+    def waiting(self) -> bool:
+        """Whether a run waits for its turn."""
+        return not self._over.is_set()
+
     def begin(self, title: str, work: Work, done: Callable[[], str | None] | None = None) -> bool:
-        """Runs it soon; False, and nothing is begun, while another long run goes on.
+        """Runs it soon; False, and nothing is begun, while another long run goes on, or the end of one is to be told.
 
         done(): called just before its `ended`, if it came to its end; returns what came of it, if that says more than
         how long it took.
         """
         run = Run(title, self._tells, self._worker)
-        started = self._worker.start(self._steps(run, work, done), title)
-        if started:
-            self._waits.set()
-            self._run, self.running, self.finished, self.error = run, True, False, ""
-            self.began(title)
-        return started
 
-    def begin_when_free(self, title: str, work: Work, ready: Callable[[], bool]) -> None:
-        """Begins once ready() and no other long run goes on, unless another one begins first or it is stopped."""
-        self._waits.set()
-        self._waits = over = threading.Event()
-        self.waits(f"{title}: waiting until nothing else runs …")
+        def taken() -> None:
+            self._over.set()
+            self._run, self.running, self.finished, self.error = run, True, False, ""
+            self.began(title)  # before its end, which may come at once
+
+        return not self.running and self._worker.start(self._steps(run, work, done), title, taken)
+
+    def begin_in_turn(
+        self, title: str, begin: Callable[[], bool], waits_for: Callable[[], str] = lambda: "", rests: int = 0
+    ) -> None:
+        """Calls begin() until that is true, as soon as no other long run goes on; says meanwhile for what it waits.
+
+        It gives up once another run begins first, or it is stopped.
+        waits_for(): what else must end before, in words; rests: how many looks must find the compute thread free, so
+        that whatever a person asks for meanwhile goes first.
+        """
+        self._over.set()
+        self._over = over = threading.Event()
 
         def wait() -> None:
-            rested, until = 0, time.perf_counter() + _MOST_WAIT_S
-            while not over.wait(_TICK_S / 2.0):
-                ready_now = ready() or time.perf_counter() > until
-                rested = rested + 1 if ready_now and not self._worker.busy else 0
-                if rested > _RESTED and self.begin(title, work):
+            free = 0
+            while not over.is_set():
+                what = waits_for() or self._worker.goes_on
+                free = 0 if what else free + 1
+                if free > rests and begin():
+                    over.set()
+                    self.waits("")
                     return
+                if not self.running and not over.is_set():  # else its line says how far that is
+                    self.waits(f"{title}: waiting {f'for {what}' if what else 'its turn'} …")
+                over.wait(_LOOK_S)
 
         threading.Thread(target=wait, name="emaviz-job-waits", daemon=True).start()
 
     def stop(self) -> None:
         """Ends what runs, as soon as its present simulation is done, or the wait for its turn."""
-        self._waits.set()
+        self._over.set()
         if self._run is not None:
             self._run.stop()
 
@@ -177,7 +196,10 @@ class Job:
 
     def _tells(self, text: str, elapsed_s: float, share: float | None) -> None:
         known = self._pace.at(text, elapsed_s)
-        self.progressed(text, elapsed_s, known if share is None else share)
+        share = known if share is None else share
+        said = "" if self._run is not None and text == self._run.title else f"{text}, "
+        self._worker.progress = f"{said}{going_on(elapsed_s, share)}"
+        self.progressed(text, elapsed_s, share)
 
     def _steps(self, run: Run, work: Work, done: Callable[[], str | None] | None) -> Steps:
         yield

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -12,6 +14,11 @@ from ema_model.simulation.with_effect import RUNS, EffectRuns, WithEffect
 from emaviz.session.job import Job, Tell
 from emaviz.session.session import Session
 from emaviz.session.signal import Signal
+from emaviz.text.time_left import going_on
+
+_USUAL_S, _TICK_S = 30.0, 1.0  # on two idle cores; between two lines
+_COMPILING = "Compiling the library of effects for this computer, once"
+_ABOUT = f"about {_USUAL_S:.0f} s"
 
 
 @dataclass
@@ -31,20 +38,35 @@ class Library:
         self.events = LibraryEvents()
         self.job = Job(session.worker)
         self._runs = EffectRuns(session.actuator)
+        self._compiled = threading.Event()  # what is asked for; else how long it takes is being told
+        self._compiled.set()
 
     def feel(self, name: str, settings: Mapping[str, float], run: str) -> None:
         """Simulates soon; of several requests the last one counts.  InputError for a setting out of range."""
         if run not in RUNS:
             raise InputError(f"no run {quoted(run, 40)!r}; runs are {', '.join(RUNS)}")
         full = find(name, self.session.actuator.axes).settings(dict(settings))
+        if self._compiled.is_set() and not self._runs.is_compiled(name):
+            self._compiled.clear()
+            threading.Thread(target=self._tell_compiling, name="emaviz-library", daemon=True).start()
 
         def job() -> None:
-            self._say("Simulating; the first time, the library is compiled, which takes some seconds …")
-            found = self._runs.felt(name, full, run)
-            self._say("")
+            try:
+                found = self._runs.felt(name, full, run)
+            finally:
+                self._compiled.set()
             self.events.felt(found)
 
         self.session.worker.post("library", job)
+
+    def _tell_compiling(self) -> None:
+        """How long it goes on, as long as it does, in place of the charts that it is for."""
+        began = time.perf_counter()
+        while not self._compiled.is_set():
+            elapsed = time.perf_counter() - began
+            self.events.said(f"{_COMPILING} … {going_on(elapsed, elapsed / _USUAL_S) if elapsed >= 1.0 else _ABOUT}")
+            self._compiled.wait(_TICK_S)
+        self.events.said("")
 
     def draw_all(self) -> bool:
         """Runs every effect at its clear severity, where it shows most; False while another long run goes on."""
@@ -57,6 +79,3 @@ class Library:
             best = self._runs.clearest(effect)
             if best is not None:
                 self.events.drawn(best)
-
-    def _say(self, text: str) -> None:
-        self.events.said(text)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
-from ema_model.errors import InputError
+from ema_model.errors import InputError, quoted
 from ema_model.files.limits import PAGE_BYTES
 from ema_model.files.refusal import shown
 from ema_model.recordings import ColumnMapping, Measurement, hints_of, prepared, read_columns, read_head, read_side_file
@@ -37,6 +38,21 @@ class Opened:
     measurement: Measurement | None = None  # as the chosen actuator's model needs it
     health: Health | None = None
     problem: str = ""  # why there are no columns
+
+
+def all_measured(opened: Iterable[Opened]) -> list[Measurement]:
+    """What was measured in each; InputError for one whose columns are not known yet, and where there is none."""
+    found: list[Measurement] = []
+    for one in opened:
+        if one.measurement is None:
+            todo = "columns are not mapped yet; check them and press Use"
+            if one.problem:
+                todo = "table was not found; say under Columns… where it begins, or remove the file"
+            raise InputError(f"{quoted(one.name)}: its {todo}")
+        found.append(one.measurement)
+    if not found:
+        raise InputError("no measurement is chosen; upload one, or choose one of the data folder")
+    return found
 
 
 def side_file_of(path: Path, folder: DataFolder) -> SideFile | None:

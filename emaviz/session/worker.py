@@ -38,6 +38,7 @@ class Worker:
         self._quick: dict[str, Job] = {}
         self._long: Steps | None = None
         self._title = ""  # of the long job that was begun last
+        self.progress = ""  # how far that says it is
         self._closing = False
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
         self._thread.start()
@@ -48,12 +49,16 @@ class Worker:
             self._quick[kind] = job  # keeps its place in the line
             self._wake.notify()
 
-    def start(self, steps: Steps, title: str = "") -> bool:
-        """Begins a long job, a step at a time; False, and nothing is begun, while another one runs."""
+    def start(self, steps: Steps, title: str = "", taken: Job = lambda: None) -> bool:
+        """Begins a long job, a step at a time; False, and nothing is begun, while another one runs.
+
+        taken(): called before its first step, however quick that is.
+        """
         with self._wake:
             if self._long is not None:
                 return False
-            self._long, self._title = steps, title
+            self._long, self._title, self.progress = steps, title, ""
+            taken()
             self._wake.notify()
             return True
 
@@ -82,6 +87,12 @@ class Worker:
     def doing(self) -> str:
         """The title of the long job that runs; "" for none."""
         return self._title if self.busy else ""
+
+    @property
+    def goes_on(self) -> str:
+        """The same, and how far that says it is: 'Identifying (12 s, about 40 s left)'."""
+        title, progress = self.doing or "another long run", self.progress
+        return "" if not self.busy else f"{title} ({progress})" if progress else title
 
     def close(self) -> None:
         """Ends the thread after its current step."""

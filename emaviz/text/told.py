@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 from ema_model.text import COLOURS, Block, Document, Table
 from emaviz.text.html import Html, html, joined, unescaped
+from emaviz.text.sentence import begun
 from emaviz.text.verdict import MEANINGS, Meaning
 
 
@@ -32,7 +33,7 @@ def large(text: str, meaning: Meaning) -> Html:
     return html('<div style="{}">{}</div>', style, text)
 
 
-def warned(warnings: Iterable[str]) -> Html:
-    """A line for each warning."""
+def warned(warnings: Iterable[str], names: Iterable[str] = ()) -> Html:
+    """A line for each warning; names that may stand first in one stay as they are written."""
     style = f"color:{COLOURS['warning']};overflow-wrap:anywhere"
-    return joined(html('<div style="{}">▲ {}</div>', style, text) for text in warnings)
+    return joined(html('<div style="{}">▲ {}</div>', style, begun(text, names)) for text in warnings)

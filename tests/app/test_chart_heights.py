@@ -8,7 +8,9 @@ from typing import Any
 import pytest
 
 from emaviz.figures.signals import LEAST_SPACE_PX, value_axis
+from emaviz.page import docked
 from emaviz.page.chart_heights import ChartHeights, spaced
+from emaviz.page.docked import TWO_COLUMNS_PX
 
 
 def test_values_keep_a_distance_in_proportion_to_the_height():
@@ -30,16 +32,20 @@ class Pages:
         self.aspects.append(aspect)
 
 
+def test_a_window_that_has_just_two_columns_is_told_from_one_that_has_not():
+    assert TWO_COLUMNS_PX in docked.WINDOWS_PX
+
+
 def test_a_figure_takes_what_its_column_has_between_what_it_needs_and_what_fills_it():
     pages: Any = Pages()
     heights, figure = ChartHeights(pages), SimpleNamespace(_impl=SimpleNamespace(uuid="one"), aspect=0.0)
-    heights.set_figure(figure, 300, 800, 200)
+    heights.set_figure(figure, 300, 500, 800, 200)
     assert figure.aspect == pages.aspects[-1] == pytest.approx(700 / 465), "in the usual window"
     for width, height, px, across in (
         (1900, 1060, 800, 715),
         (1400, 900, 700, 465),
         (1400, 400, 300, 465),
-        (1100, 400, 800, 675),
+        (1100, 400, 500, 675),
     ):
         heights.fit_width(1, width)
         heights.fit(1, height)

@@ -27,6 +27,7 @@ from emaviz.figures import (
 from emaviz.figures.binned import binned
 from emaviz.figures.lines import band, line, scattered
 from emaviz.figures.region_blocks import time_ranges
+from emaviz.figures.theme import why_missing
 
 FIGURES = {
     "overlay": overlay.figure,
@@ -240,3 +241,11 @@ def test_a_figure_with_its_legend_fits_a_panel_that_is_narrow_for_a_moment(brows
     for width, aspect in ((261, 0.42), (261, 0.3), (500, 0.42)):
         page.evaluate(draw, [figure.to_json(), width, aspect * width])
     page.close()
+
+
+def test_a_figure_with_nothing_in_it_is_a_line_in_words(comparison):
+    bare = replace(comparison, orders=(), explained_by=())
+    assert why_missing(order_spectrum.figure(bare)).endswith(
+        "orders of the motor's turn: nothing repeats with the motor's turn."
+    )
+    assert why_missing(order_spectrum.figure(comparison)) == why_missing(overlay.figure(comparison)) == ""

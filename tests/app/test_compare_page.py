@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import re
 import shutil
+import threading
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.comparison_by_hand import comparison as by_hand
 from support.on_page import choose, field, fill, wait_until
 from support.two_clocks import write_two_clocks
 
@@ -17,10 +20,12 @@ from ema_model.recordings import write_measurement
 from ema_model.simulation.run import Run, simulate_reference
 from ema_model.simulation.sensors import Sensors
 from emaviz.page.app import App
+from emaviz.page.compare.plots import View
 from emaviz.page.compare.tab import CompareTab
 from emaviz.page.explore.tab import ExploreTab
 from emaviz.page.identify.tab import IdentifyTab
 from emaviz.page.track.tab import TrackTab
+from emaviz.session.compare import comparing as comparing_module
 
 pytestmark = pytest.mark.browser
 
@@ -308,13 +313,50 @@ def test_a_file_that_cannot_be_read_is_told_beside_the_button_that_sent_it_as_of
     assert not compare.get_by_text("The comparison has failed").count()
 
 
-def test_a_comparison_that_must_wait_is_told_beside_its_button(compare, app, rig_file, monkeypatch):
-    upload(compare, rig_file)
+def test_compare_pressed_while_the_upload_is_still_being_read_is_carried_out(compare, app, recording, tmp_path, reads):
+    path = tmp_path / "at_once.csv"
+    write_measurement(recording, path)
+    before = app.comparing.comparison
+    upload(compare, path)
+    compare.get_by_text("Reading uploads/at_once.csv …").wait_for()
+    compare.get_by_role("button", name="Compare", exact=True).click()
+    compare.get_by_text("waiting for uploads/at_once.csv to be read …").wait_for()
+    reads.set()
+    wait_until(lambda: app.comparing.comparison is not before, 60.0)
+    compare.get_by_text("Compared in").wait_for()
+    assert compare.locator(".emaviz-beside").count() == 0
+
+
+@pytest.fixture
+def reads(monkeypatch):
+    """No file is read before this is set."""
+    go_on, plain = threading.Event(), comparing_module.read_opened
+    monkeypatch.setattr(comparing_module, "read_opened", lambda *asked: go_on.wait(30.0) and plain(*asked))
+    yield go_on
+    go_on.set()
+
+
+def test_a_comparison_that_must_wait_says_for_what_and_can_be_stopped(compare, app, recording):
     start = compare.get_by_role("button", name="Compare", exact=True)
-    wait_until(lambda: start.is_enabled() and not app.session.worker.busy, 60.0)
-    monkeypatch.setattr(app.comparing, "compare", lambda: False)  # as while a search goes on
     start.click()
-    compare.locator(".emaviz-beside").filter(has_text="Another long run goes on; stop it first.").wait_for()
+    compare.locator(".emaviz-beside").filter(has_text="no measurement is chosen; upload one").wait_for()
+    over = threading.Event()
+
+    def another():
+        while not over.wait(0.02):
+            yield
+
+    wait_until(lambda: app.session.worker.start(another(), "Taking the session's steps again"))
+    write_measurement(recording, app.comparing.folder.uploads / "waits.csv")
+    before = app.comparing.comparison
+    app.comparing.add("uploads/waits.csv")
+    compare.get_by_text("waiting for Taking the session's steps again").wait_for()
+    compare.get_by_role("button", name="Stop", exact=True).click()
+    compare.get_by_text("Stopped.").wait_for()
+    start.click()
+    compare.get_by_text("waiting for Taking the session's steps again").wait_for()
+    over.set()
+    wait_until(lambda: app.comparing.comparison is not before, 60.0)
 
 
 def test_a_kind_of_file_that_is_none_of_ours_is_refused(compare, app, tmp_path):
@@ -360,3 +402,14 @@ def test_files_of_the_command_line_open_on_compare(browser, recording, tmp_path)
             page.get_by_text("Where the model fails", exact=True).wait_for()
     finally:
         app.close()
+
+
+def test_a_plot_with_nothing_in_it_is_a_line(app):
+    bare = replace(by_hand(), orders=())
+    plots = app.tab(CompareTab).result._plots
+    plots.begin(View(bare))
+    spectrum, polar = plots._turn
+    assert not spectrum.handle.visible and spectrum.why.visible and "nothing repeats" in spectrum.why.content
+    assert polar.handle.visible and not polar.why.visible
+    plots.begin(View(by_hand()))
+    assert spectrum.handle.visible and not spectrum.why.visible

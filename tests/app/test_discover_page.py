@@ -6,9 +6,11 @@ import time
 
 import numpy as np
 import pytest
+from support.browser import WINDOW
 from support.on_page import wait_until
 
 from emaviz.page.explore.tab import ExploreTab
+from emaviz.page.style import STRIP_HEIGHT_PX
 
 pytestmark = pytest.mark.browser
 
@@ -95,6 +97,14 @@ def revealed(page):
     return verdict.inner_text()
 
 
+def in_one_row_without_scrolling(page, buttons):
+    boxes = [page.get_by_role("button", name=name, exact=True).bounding_box() for name in buttons]
+    if None in boxes:
+        return False
+    ends = max(one["y"] + one["height"] for one in boxes)
+    return len({round(one["y"]) for one in boxes}) == 1 and ends < WINDOW["height"] - STRIP_HEIGHT_PX
+
+
 def test_one_effect_with_the_guide(discover, app):
     page = discover
     page.get_by_role("button", name="Guided first challenge").click()
@@ -116,6 +126,8 @@ def test_one_effect_with_the_guide(discover, app):
     wait_until(lambda: drawn(page, "Error after each step") == 2)
     wait_until(lambda: drawn(page, "What the residual depends on") > 2)
     page.locator("math", has_text="sin").first.wait_for()
+    kept = ("Save report", "Record", "Save model", "Use in Explore")
+    wait_until(lambda: in_one_row_without_scrolling(page, kept), 20.0)  # the panel takes its width a moment later
     assert revealed(page).startswith("Your answer agrees")
     page.get_by_text("Step 6 of 6").wait_for()
     page.get_by_role("button", name="Leave the guide").click()

@@ -203,6 +203,10 @@ def test_a_race_is_watched_paused_and_looked_back_at(page, app):
     settings.set_fault(0, 0.25)
     settings.set_fault(5, 0.3)
     page.get_by_role("tab", name="Identify").click()
+    page.get_by_role("tab", name="Landscape").click()
+    page.get_by_text("No landscape yet").wait_for()  # and how to get there, in place of controls that do nothing
+    assert not page.get_by_role("button", name="Draw the landscape").count()
+    page.get_by_role("tab", name="Search").click()
     page.get_by_label("Robust", exact=True).click()
     page.get_by_text("no algorithm is chosen").wait_for(timeout=10_000)
     assert settings.algorithms == ("robust",)

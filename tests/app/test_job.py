@@ -152,3 +152,34 @@ def test_why_one_failed_is_kept_until_the_next_begins(worker, errors):
     assert job.begin("Comparing", lambda tell: None)
     wait_until(lambda: len(heard.ended) == 3)
     assert job.error == ""
+
+
+def test_a_run_that_is_over_at_once_has_begun_before_and_runs_no_more(worker):
+    job, said = Job(worker), []
+    job.began.connect(lambda title: said.append(f"{title} began"))
+    job.ended.connect(said.append)
+    for i in range(50):  # its end is on another thread
+        wait_until(lambda i=i: job.begin(f"{i}", lambda tell: None, lambda i=i: f"{i} ended"))
+    wait_until(lambda: said[-1] == "49 ended")
+    assert said == [f"{i} {what}" for i in range(50) for what in ("began", "ended")] and not job.running
+
+
+def test_what_waits_for_its_turn_says_for_what_and_lets_what_a_person_asks_for_go_first(worker):
+    waits, first, order = Job(worker), Job(worker), []
+    said, go_on = [], threading.Event()
+    waits.waits.connect(said.append)
+
+    def long(tell):
+        tell("step 2 of 5")
+        while not go_on.wait(0.02):
+            tell("step 2 of 5")
+
+    first.begin("Looking", long)
+    wait_until(lambda: worker.progress)
+    waits.begin_in_turn("Restoring", lambda: waits.begin("Restoring", lambda tell: order.append("restored")), rests=2)
+    wait_until(lambda: said)
+    assert said[0] == "Restoring: waiting for Looking (step 2 of 5, 0 s) …"
+    go_on.set()
+    wait_until(lambda: first.begin("Comparing", lambda tell: order.append("compared")))
+    wait_until(lambda: len(order) == 2)
+    assert order == ["compared", "restored"] and not waits.waiting

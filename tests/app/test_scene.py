@@ -180,9 +180,9 @@ def drawn_nodes(scene, actuator, **faults):
     [
         ("k1", "friction × 2.40", "motor/bearings"),
         ("k2", "shown × 400", "drive/nut/jaw_low/block"),
-        ("k3", "phase A: 30% of turns", "motor/burnt"),
-        ("k4", "phase B: 30% of turns", "motor/burnt"),
-        ("k5", "phase C: 30% of turns", "motor/burnt"),
+        ("k3", "phase A: 30 % of turns", "motor/burnt"),
+        ("k4", "phase B: 30 % of turns", "motor/burnt"),
+        ("k5", "phase C: 30 % of turns", "motor/burnt"),
         ("k6", "ζ = 0.70\nshown × 20", "motor/axis/rotor/thinnest_gap"),
         ("k7", "+72°\n(no effect: ζ = 0)", "motor/axis/rotor/direction"),
         ("k8", "gain × 1.20", "controller/front"),

@@ -155,7 +155,7 @@ def test_a_discovery_is_gone_back_to_without_computing_and_is_used_in_explore(ta
     assert discovering.look is first and not discovering.running, "as it was left, and nothing is computed"
     tab.get_by_text("physics is missing").first.wait_for()
 
-    tab.get_by_role("button", name="Use it in Explore").click()
+    tab.get_by_role("button", name="Use in Explore").click()
     tab.get_by_role("tab", name="Signals", exact=True).wait_for()
     wait_until(lambda: app.session.plants[app.session.plant] is first.found.actuator)
     tab.get_by_text(f"improved model of discovery {entry.number}").first.wait_for()

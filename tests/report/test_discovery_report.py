@@ -174,6 +174,6 @@ def test_all_figures_are_drawn_without_network_and_every_axis_has_its_unit(which
     )
     assert count >= 5 and drawn == count
     titles = tab.locator("[data-figure] .ytitle, [data-figure] .xtitle").all_text_contents()
-    assert "Rms error / floor [-]" in titles and "Time [s]" in titles
+    assert "Error / floor [-]" in titles and "Time [s]" in titles
     assert all(re.search(r"\[.+\]$", title) for title in titles if title)
     assert tab.evaluate("document.documentElement.scrollWidth <= innerWidth + 1")  # nothing sticks out

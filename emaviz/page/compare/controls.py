@@ -7,7 +7,6 @@ from typing import Any
 
 import viser
 
-from ema_model.errors import InputError
 from ema_model.recordings.formats import FORMATS
 from emaviz.page.compare.cards import health_card, recordings_list
 from emaviz.page.compare.mapping import MappingStep
@@ -32,7 +31,6 @@ class ComparePanel:
     def __init__(self, page: Page, comparing: Comparing, result: ResultPanel, uploads: Uploads) -> None:
         self._page, self._comparing, self._result = page, comparing, result
         self._shown: str | None = None
-        self._again = False
         self._asked_at: Any = None  # by which control the last file was asked for
         gui = page.server.gui
         gui.add_markdown("Upload a measurement of a test bench, or **drop it anywhere** on the page.")
@@ -45,7 +43,7 @@ class ComparePanel:
             self._columns = gui.add_button("Columns…", icon=viser.Icon.TABLE, color="gray", visible=False)
             self._remove = gui.add_button("Remove", icon=viser.Icon.X, color="gray", visible=False)
         self._mapping = MappingStep(page, comparing, result.preview)
-        self._start = gui.add_button("Compare", icon=viser.Icon.ARROWS_DIFF, disabled=True)
+        self._start = gui.add_button("Compare", icon=viser.Icon.ARROWS_DIFF)
         self._line = JobLine(page, comparing.job)
         self._health_folder = gui.add_folder("Data health", visible=False)
         with self._health_folder:
@@ -55,15 +53,16 @@ class ComparePanel:
         self._which.on_update(lambda event: event.client and self._post_show(str(self._which.value)))
         self._columns.on_click(lambda _: page.screen.post("columns", self._open_columns))
         self._remove.on_click(lambda _: self._remove_shown())
-        self._start.on_click(lambda _: self._begin())
+        self._start.on_click(lambda _: comparing.asking.ask(by_hand=True))
         events = comparing.events
         events.opened.connect(lambda opened: page.screen.post(f"opened {opened.name}", lambda: self._opened(opened)))
         events.refused.connect(lambda: page.screen.post("columns", self._open_columns))
         events.failed.connect(lambda what, why: page.screen.post(f"failed to {what}", lambda: self._failed(what, why)))
         events.removed.connect(lambda: page.screen.post("removed", self._removed))
         events.compared.connect(lambda found: page.screen.post("compared", lambda: result.show(found)))
-        comparing.job.began.connect(lambda _: page.screen.post("compare began", self._began))
-        comparing.job.ended.connect(lambda _: page.screen.post("compare ended", self._ended))
+        events.missing.connect(lambda why, by_hand: page.screen.post("missing", lambda: self._missing(why, by_hand)))
+        comparing.job.began.connect(lambda _: page.screen.post("compare runs", self._show_running))
+        comparing.job.ended.connect(lambda _: page.screen.post("compare runs", self._show_running))
         self.refresh_files()
 
     def refresh_files(self) -> None:
@@ -80,14 +79,19 @@ class ComparePanel:
         if path.suffix.lower() == ACTUATOR_SUFFIX:
             self._page.screen.post("actuator", lambda: self.asked.choose(UPLOADED + name))
         else:
-            self._asked_at = self._upload
-            self._comparing.add(name)
+            self._open(name, self._upload)
 
     def _add(self) -> None:
         name = str(self._choice.value)
         if name != _NONE:
-            self._asked_at = self._add_it
-            self._comparing.add(name)
+            self._open(name, self._add_it)
+
+    def _open(self, name: str, asked_at: Any) -> None:
+        """Large files take seconds: says so, until more can be said."""
+        self._asked_at = asked_at
+        if not self._comparing.running:
+            self._page.screen.post("reading", lambda: self._line.say(f"Reading {name} …"))
+        self._comparing.add(name)
 
     def _remove_shown(self) -> None:
         if self._shown is not None:
@@ -101,10 +105,12 @@ class ComparePanel:
             return
         if self._comparing.comparison is None:
             self._result.preview(opened)
-        self._begin(told=False)
+        self._comparing.asking.ask(by_hand=False)
 
     def _failed(self, what: str, why: str) -> None:
         """Beside what was asked for; no reason takes it away."""
+        if what == OPEN and why and not self._comparing.running:
+            self._line.say("")
         if what == OPEN:  # beside the control that was used last, and no longer beside the other
             for control in (self._upload, self._add_it):
                 self._page.say_beside(control, why if control is (self._asked_at or self._add_it) else "")
@@ -121,7 +127,7 @@ class ComparePanel:
 
     def _show(self, name: str | None) -> None:
         """One of the recordings in the cards below the list."""
-        everything = self._comparing.opened
+        everything = dict(self._comparing.opened)
         opened = everything.get(name or "")
         self._shown = opened.name if opened is not None else None
         self._list.content = recordings_list(everything.values())
@@ -131,7 +137,6 @@ class ComparePanel:
             self._which.value = self._shown or next(iter(everything))
         for control in (self._columns, self._remove):
             control.visible = opened is not None
-        self._start.disabled = self._comparing.session.worker.busy or opened is None
         self.asked.show_signals()
         card = opened.health if opened is not None else None
         self._health_folder.visible = card is not None
@@ -149,23 +154,12 @@ class ComparePanel:
 
     # --- the run ----------------------------------------------------------------------------------------------------
 
-    def _begin(self, told: bool = True) -> None:
-        """Starts a comparison; of one that runs already, and is out of date, a second one follows."""
-        try:
-            started = self._comparing.compare()
-            self._again = not started and self._comparing.running
-            if not started and not self._again:
-                self._page.one_at_a_time(self._start)
-        except InputError as error:
-            if told:
-                self._page.say_beside(self._start, str(error))
-            else:
-                self._line.say(str(error))
+    def _missing(self, why: str, by_hand: bool) -> None:
+        """What a comparison lacks: beside the button, or, where nobody pressed it, in the line below."""
+        self._page.say_beside(self._start, why if by_hand else "")
+        if why and not by_hand:
+            self._line.say(why)
 
-    def _began(self) -> None:
-        self._start.disabled = True
-
-    def _ended(self) -> None:
-        self._start.disabled = not self._comparing.opened
-        if self._again:
-            self._begin(told=False)
+    def _show_running(self) -> None:
+        """While one runs it is asked for already; else a press is carried out, or says what is missing."""
+        self._start.disabled = self._comparing.running

@@ -22,8 +22,10 @@ from emaviz.figures import (
     residual_polar,
     residual_time,
 )
+from emaviz.figures.theme import why_missing
 from emaviz.page.page import Page
 from emaviz.text.html import add_html, html
+from emaviz.text.notes import note
 from emaviz.text.told import shown
 
 _CONFIG = {"displayModeBar": False}
@@ -43,11 +45,12 @@ class View:
 
 @dataclass
 class _Plot:
-    """A place of a figure on the page; aspect is height over width."""
+    """A place of a figure on the page, and of the line that says why there is none; aspect is height over width."""
 
     draw: Callable[[View], go.Figure]
     aspect: float
-    handle: Any = None
+    handle: Any
+    why: Any
 
 
 class ComparePlots:
@@ -131,8 +134,9 @@ class ComparePlots:
 
     def _add(self, draw: Callable[[View], go.Figure], aspect: float) -> _Plot:
         """A plot at this place of the page; it is drawn when there is something to draw."""
-        handle = self._page.server.gui.add_plotly(go.Figure(), config=_CONFIG, aspect=aspect, visible=False)
-        return _Plot(draw, aspect, handle)
+        gui = self._page.server.gui
+        handle = gui.add_plotly(go.Figure(), config=_CONFIG, aspect=aspect, visible=False)
+        return _Plot(draw, aspect, handle, add_html(gui, visible=False))
 
     def _all(self) -> Iterator[_Plot]:
         for group in (self._time, self._against, self._turn, self._why, self._fit):
@@ -145,9 +149,15 @@ class ComparePlots:
         if self._view is None:
             return
         for plot in plots:
-            plot.handle.figure = plot.draw(self._view)
-            if not plot.handle.visible:
-                plot.handle.visible = True
+            figure = plot.draw(self._view)
+            why = why_missing(figure)
+            if why:
+                plot.why.content = note(why)
+            else:
+                plot.handle.figure = figure
+            for one, seen in ((plot.handle, not why), (plot.why, bool(why))):
+                if one.visible != seen:
+                    one.visible = seen
 
 
 def _marks(view: View) -> dict[str, Any]:

@@ -13,9 +13,9 @@ from emaviz.session.discover.discovering import Discovering
 
 _MODEL = ".toml"
 _BUTTONS = (
-    Keeps("Save the report", ".html", viser.Icon.FILE_TEXT, "One HTML file that opens offline"),
-    Keeps("Record the discovery", ".rrd", viser.Icon.DEVICE_FLOPPY, "An .rrd file for the Rerun viewer"),
-    Keeps("Save the improved model", _MODEL, viser.Icon.TOPOLOGY_STAR, "An actuator file; Compare lists it"),
+    Keeps("Save report", ".html", viser.Icon.FILE_TEXT, "One HTML file that opens offline"),
+    Keeps("Record", ".rrd", viser.Icon.DEVICE_FLOPPY, "An .rrd file for the Rerun viewer"),
+    Keeps("Save model", _MODEL, viser.Icon.TOPOLOGY_STAR, "The improved model as an actuator file; Compare lists it"),
 )
 
 

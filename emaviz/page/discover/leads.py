@@ -23,7 +23,7 @@ def leads(page: Page, discovering: Discovering) -> Leads:
         page,
         [
             Lead(
-                "Use it in Explore",
+                "Use in Explore",
                 viser.Icon.ADJUSTMENTS,
                 "Explore's plant takes this improved model; the monitor there stays the file's",
                 "explore",

@@ -23,6 +23,7 @@ from emaviz.page.inset import COLUMNS, NEXT_COLUMN
 from emaviz.page.kept import Cleared
 from emaviz.page.page import Page
 from emaviz.page.playback import PlaybackStrip
+from emaviz.page.style import IN_ROW
 from emaviz.session.discover import beside_truth
 from emaviz.session.discover.discovering import Discovering
 from emaviz.text.html import Html, add_html, html, joined
@@ -35,6 +36,7 @@ _STEPS = (
     Html("Press <b>Start</b>: the model is calibrated, and its residual is compared with every effect of the library."),
     "Add an effect: the error falls, also on what was held out. Then save the improved model, or use it in Explore.",
 )
+_LADDER_PX = 215, 290, 330, 685  # least, in one column, most, and what a window holds beside it
 
 
 class DiscoveryPanel:
@@ -59,7 +61,13 @@ class DiscoveryPanel:
         gui = page.server.gui
         add_html(gui, COLUMNS)
         self._headline = add_html(gui, begin("No discovery yet", _STEPS))
-        self._ladder: Any = gui.add_plotly(go.Figure(), config=CONFIG, aspect=0.5, visible=False)
+        self._keep_folder = gui.add_folder("Keep it", visible=False)
+        with self._keep_folder:  # where it is seen without scrolling
+            add_html(gui, IN_ROW)
+            self._kept = keep()
+            leads()
+        self._ladder: Any = gui.add_plotly(go.Figure(), config=CONFIG, visible=False)
+        page.workspaces.heights.set_figure(self._ladder, *_LADDER_PX)
         self._effect = EffectView(page, discovering)
         self._truth_folder = gui.add_folder("The challenge's truth", visible=False)
         with self._truth_folder:
@@ -80,10 +88,6 @@ class DiscoveryPanel:
         with self._left_folder:
             self._left: Any = gui.add_plotly(go.Figure(), config=CONFIG, aspect=0.5, visible=False)
         self._next = NextTest(page, discovering, load)
-        self._keep_folder = gui.add_folder("Keep it", visible=False)
-        with self._keep_folder:
-            self._kept = keep()
-            leads()
         self._recording.on_update(lambda event: event.client and page.screen.post("residual", self._draw_residual))
         self._signal.on_update(lambda event: event.client and page.screen.post("residual", self._draw_residual))
         self._reveal.on_click(lambda _: page.screen.post("reveal", self._revealed))

@@ -99,7 +99,7 @@ class ExplorePanel:
     def show_model(self, simulation: Simulation) -> None:
         """Says which model is drawn beside which plant; on the screen's thread."""
         plant = html(" · plant: <b>{}</b>", simulation.plant) if simulation.plant else ""
-        line = said(html("model: <b>{}</b>{}", simulation.model, plant))
+        line = said(html("Monitor model: <b>{}</b>{}", simulation.model, plant))
         if self._model.content != line:
             self._model.content = line
 

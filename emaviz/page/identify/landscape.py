@@ -20,11 +20,16 @@ from emaviz.page.page import Page
 from emaviz.session.identify.landscape import Landscapes, ends
 from emaviz.session.identify.race import Race
 from emaviz.session.worker import Worker
-from emaviz.text.html import add_html, joined
-from emaviz.text.notes import note
+from emaviz.text.html import Html, add_html, joined
+from emaviz.text.notes import begin, note
 
 _BEST = "the answer"
 _WHOLE, _CLOSE = "all of 0 … 1", "close to it"
+_STEPS = (
+    Html("Press <b>Identify</b> on the left, and wait for the answer."),
+    Html("Choose two of k1 … k8 here, and press <b>Draw the landscape</b>: the search's cost is simulated over both."),
+    "You see whether the answer lies in a narrow valley, in a long one, or beside another that fits as well.",
+)
 _NAMES = tuple(fault.label for fault in FAULTS)
 _CONFIG = {"displayModeBar": False, "responsive": False}
 
@@ -45,7 +50,8 @@ class LandscapeView:
         self._extent: Any = gui.add_dropdown("Shown", (_WHOLE, _CLOSE))
         self._draw = gui.add_button("Draw the landscape", icon=viser.Icon.MAP_2, disabled=True)
         self._line = JobLine(page, self._landscapes.job, stop="Stop drawing")
-        self._line.say("Once something is identified, its cost over two k can be drawn here.")
+        self._first = add_html(gui, begin("No landscape yet", _STEPS))
+        self._show_controls(False)
         self._place = gui.add_folder("Map", visible=False)
         with self._place:
             add_html(gui, NEXT_COLUMN)
@@ -65,7 +71,7 @@ class LandscapeView:
         self._place.visible = False
         self._words.content = ""
         best = race.best
-        self._draw.disabled = best is None or best.k is None
+        self._show_controls(best is not None and best.k is not None)
         if best is None or best.k is None:
             return
         others = [algorithm_title(name) for name in race.tracks if race.tracks[name] is not best]
@@ -75,6 +81,14 @@ class LandscapeView:
             x, y = telling(best.k if race.truth is None else race.truth)
             self._x.value, self._y.value = _NAMES[x], _NAMES[y]
         self._line.say(f"{POINTS} × {POINTS} simulations, the other six k held.")
+
+    def _show_controls(self, shown: bool) -> None:
+        """Of the landscape of an answer; before there is one, how to get there."""
+        self._draw.disabled, self._first.visible = not shown, not shown
+        for control in (self._x, self._y, self._through, self._extent, self._draw):
+            control.visible = shown
+        if not shown:
+            self._line.say("")
 
     def _chosen(self) -> None:
         self._by_hand = True

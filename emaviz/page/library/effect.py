@@ -41,9 +41,9 @@ class EffectPage:
         self._place = gui.add_folder("Parameters", visible=False)
         with self._place:
             add_html(gui, LONG_LABELS)
-        self._status = add_html(gui)
         self._picture = add_html(gui)
         add_html(gui, NEXT_COLUMN)  # a signal and its difference stay together
+        self._status = add_html(gui)
         self._charts = EffectCharts(gui, page.session.actuator.axes)
         page.workspaces.heights.add(self._charts.handles)
         page.workspaces.entered.connect(self._enter)

@@ -159,7 +159,7 @@ def said(then: Tracked, name: str, history: History) -> str:
         colour,
         headline(then),
         DIM,
-        f"after {then.flights[-1].name}: {number} flights, {len(then.usable)} of them usable",
+        f"After {then.flights[-1].name}: {number} flights, {len(then.usable)} of them usable",
         html("<div>{}</div>", later[:1].upper() + later[1:]) if later else "",
     )
 

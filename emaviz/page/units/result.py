@@ -16,6 +16,7 @@ from emaviz.page.units.keep import UnitsKeep
 from emaviz.session.units.comparing_units import ComparingUnits
 from emaviz.text.html import Html, add_html, html, joined
 from emaviz.text.notes import BOX, DIM, begin
+from emaviz.text.sentence import begun
 from emaviz.text.told import warned, whole
 from emaviz.text.verdict import MEANINGS, of_units
 
@@ -66,8 +67,8 @@ class UnitsResult:
                 return
             self._told.content = said(found)
             self._parameters.figure = unit_parameters.figure(found)
-            heights = unit_parameters.least_px(found), unit_parameters.most_px(found)
-            self._page.workspaces.heights.set_figure(self._parameters, *heights, _BESIDE_PX)
+            least, usual, most = (one(found) for one in unit_parameters.HEIGHTS_PX)
+            self._page.workspaces.heights.set_figure(self._parameters, least, usual, most, _BESIDE_PX)
             self._transfer.figure = transfer_matrix.figure(found)
             rows = max(len(found.units), _FEWEST_ROWS)
             self._transfer.aspect = (_HEAD_PX + _ROW_PX * rows) / _WIDTH_PX
@@ -80,17 +81,12 @@ def said(found: UnitsCompared) -> Html:
         '<div {}><div style="font-size:16px;font-weight:600;color:{};padding:4px 0">{}</div><div {}>{}</div>{}{}</div>',
         BOX,
         MEANINGS[of_units(found)],
-        joined(html("<div>{}</div>", _begun(line, found.units)) for line in sentences(found)),
+        joined(html("<div>{}</div>", begun(line, found.units)) for line in sentences(found)),
         DIM,
         rests_on(found),
-        warned(notes(found)),
-        _listed(lacking(found)),
+        warned(notes(found), found.units),
+        _listed([begun(line, found.units) for line in lacking(found)]),
     )
-
-
-def _begun(line: str, units: tuple[str, ...]) -> str:
-    """With a capital letter; a unit's name stays as it is written."""
-    return line if line.startswith(units) else line[:1].upper() + line[1:]
 
 
 def _listed(lines: list[str]) -> Html:

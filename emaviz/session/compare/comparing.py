@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import time
-import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,14 +17,15 @@ from ema_model.recordings import SIGNALS, ColumnMapping, Measurement, change_sid
 from ema_model.recordings.formats.text_layout import Hints
 from ema_model.recordings.side_file.read import SideFile
 from emaviz.session import actuators as actuator_files
+from emaviz.session.compare.asking import Asking
 from emaviz.session.compare.events import LAY_OUT, MAP, OPEN, SAVE, CompareEvents
+from emaviz.session.compare.file_jobs import FileJobs
 from emaviz.session.compare.keep import keep
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.described import number
 from emaviz.session.job import Job, Tell
-from emaviz.session.opened import Opened, guesses, measured, read_opened, side_file_of, side_with
+from emaviz.session.opened import Opened, all_measured, guesses, measured, read_opened, side_file_of, side_with
 from emaviz.session.session import Session
-from emaviz.session.worker import Worker
 
 MOST_RECORDINGS = 20
 # By their names on a rotary axis.  The speed is mostly the position's difference, so it is not fitted unless asked for.
@@ -51,8 +51,9 @@ class Comparing:
         self.window_s: tuple[float, float] | None = None
         advice = "check the actuator's file and the measurement's units"
         self.job = Job(session.worker, on_divergence=advice)
-        # Reading a large file takes seconds, in which the sliders of the other tabs shall answer.
-        self._files = Worker("emaviz-files", self._on_error)
+        self._files = FileJobs(folder, self.events.failed, session.events.told)
+        self.on_error = self._files.on_error
+        self.asking = Asking(self.job, lambda: self._title, self.compare, self._chosen, self.events.missing)
         self._use(session.actuator)
 
     def close(self) -> None:
@@ -69,7 +70,7 @@ class Comparing:
 
     def add(self, name: str) -> None:
         """Opens a file of the data folder soon; what is wrong with it is told."""
-        self._files.post(f"open {name}", lambda: self._try(OPEN, lambda: self._open(name)))
+        self._read(OPEN, name, lambda: self._open(name))
 
     def measurement(self, name: str, actuator: Actuator | None = None) -> Measurement:
         """A file of the data folder for an actuator, the app's without one; as Compare has it, if it is open here."""
@@ -89,11 +90,15 @@ class Comparing:
 
     def use_mapping(self, name: str, mapping: ColumnMapping) -> None:
         """Reads the file with this mapping soon, and remembers it in the side file."""
-        self._files.post(f"map {name}", lambda: self._try(MAP, lambda: self._map(name, mapping)))
+        self._read(MAP, name, lambda: self._map(name, mapping))
 
     def use_layout(self, name: str, hints: Hints) -> None:
         """Reads the text anew, as somebody says that it is laid out, soon, and remembers it in the side file."""
-        self._files.post(f"lay out {name}", lambda: self._try(LAY_OUT, lambda: self._lay_out(name, hints)))
+        self._read(LAY_OUT, name, lambda: self._lay_out(name, hints))
+
+    def _read(self, what: str, name: str, job: Callable[[], object]) -> None:
+        self.asking.reads(name)
+        self._files.post(what, name, job, lambda: self.asking.has_read(name))
 
     def _open(self, name: str) -> None:
         path = self.folder.measurement(name)
@@ -137,6 +142,7 @@ class Comparing:
 
     def _opened(self, opened: Opened) -> None:
         self.opened[opened.name] = opened
+        self.asking.has_read(opened.name)
         self.events.opened(opened)
 
     def _take_actuator(self, side: SideFile) -> InputError | None:
@@ -202,7 +208,7 @@ class Comparing:
 
     def signals_available(self) -> list[str]:
         """Those of `COMPARABLE` that every recording has, or can be given."""
-        measurements = [o.measurement for o in self.opened.values() if o.measurement is not None]
+        measurements = [o.measurement for o in list(self.opened.values()) if o.measurement is not None]
         return [name for name in COMPARABLE if measurements and all(name in m for m in measurements)]
 
     # --- comparison -------------------------------------------------------------------------------------------------
@@ -212,14 +218,7 @@ class Comparing:
 
         Raises InputError when something is missing.
         """
-        for waiting in (o for o in self.opened.values() if o.measurement is None):
-            todo = "columns are not mapped yet; check them and press Use"
-            if waiting.problem:
-                todo = "table was not found; say under Columns… where it begins, or remove the file"
-            raise InputError(f"{quoted(waiting.name)}: its {todo}")
-        measurements = [o.measurement for o in self.opened.values() if o.measurement is not None]
-        if not measurements:
-            raise InputError("no measurement is chosen; upload one, or choose one of the data folder")
+        measurements = all_measured(list(self.opened.values()))
         if not self.weights:
             wanted = ", ".join(in_sentence(SIGNALS[name].title) for name in COMPARABLE)
             raise InputError(f"no signal to fit is chosen; choose one or more of {wanted}")
@@ -244,7 +243,17 @@ class Comparing:
             fitted = "" if found.calibration is None else f", calibrated in {found.calibration.evaluations} steps"
             return f"Compared in {elapsed_s:.1f} s{fitted}."
 
-        return self.job.begin("Calibrating and comparing" if self.calibrate else "Comparing", work, done)
+        return self.job.begin(self._title, work, done)
+
+    @property
+    def _title(self) -> str:
+        return "Calibrating and comparing" if self.calibrate else "Comparing"
+
+    def _chosen(self) -> Hashable:
+        """What a comparison would take now."""
+        weights = frozenset(self.weights.items())
+        asked = self.calibrate, frozenset(self.free), weights, self.window_s
+        return tuple(self.opened.values()), id(self.actuator), *asked
 
     def _asked(self) -> dict[str, Any]:
         """What `compare` is asked beside the recordings; None stands for what the actuator's file says."""
@@ -260,39 +269,13 @@ class Comparing:
 
     def save(self, suffix: str) -> None:
         """Writes the last comparison as a report (.html) or for Rerun (.rrd) into the data folder, soon."""
-        self._files.post(f"comparison {suffix}", lambda: self._try(SAVE, lambda: self._keep(suffix)))
+        self._files.post(SAVE, suffix, lambda: self._keep(suffix))
 
     def _keep(self, suffix: str) -> None:
         comparison = self.comparison
         if comparison is None:
             raise InputError("nothing is compared yet; press Compare first")
         self.events.kept(keep(comparison, self.folder, suffix))
-
-    def _try(self, what: str, job: Callable[[], object]) -> None:
-        """Does it on the files' thread; an error is told where it was asked for as well."""
-        try:
-            job()
-        except InputError as error:
-            self.events.failed(what, self._line(error))
-            self.session.events.told(_CANNOT[what], self._line(error))
-            return
-        self.events.failed(what, "")
-
-    def _line(self, error: InputError) -> str:
-        """The page knows its files by their names in the data folder."""
-        return str(error).replace(f"{self.folder.folder}/", "")
-
-    def _on_error(self, error: BaseException) -> None:
-        traceback.print_exception(error)
-        self.session.events.told("Something failed; the app goes on", f"{type(error).__name__}: {quoted(error)}")
-
-
-_CANNOT = {
-    OPEN: "The file cannot be read",
-    MAP: "These columns cannot be used",
-    LAY_OUT: "The text cannot be read like this",
-    SAVE: "It cannot be saved",
-}
 
 
 def _freed(actuator: Actuator) -> set[str]:

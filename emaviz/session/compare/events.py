@@ -20,5 +20,6 @@ class CompareEvents:
     refused: Signal[[]] = field(default_factory=Signal)  # a layout that does not fit: all is as it was
     failed: Signal[[str, str]] = field(default_factory=Signal)  # which of those above, and why; "": it is done
     removed: Signal[[]] = field(default_factory=Signal)
+    missing: Signal[[str, bool]] = field(default_factory=Signal)  # for a comparison, "": it began; asked for by hand
     compared: Signal[[Comparison]] = field(default_factory=Signal)
     kept: Signal[[Path]] = field(default_factory=Signal)  # a report or a recording is written

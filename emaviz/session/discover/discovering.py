@@ -46,7 +46,7 @@ class Discovering:
         self._shown = Shown(self.source, self.entries, self.events.looked)
         self._stories = SavedStories(self.job, self.source, self.entries, self._shown, lambda: comparing.opened)
         self._own = OwnPreview()
-        self._files = Worker("emaviz-discovery-files", comparing._on_error)
+        self._files = Worker("emaviz-discovery-files", comparing.on_error)
 
     def close(self) -> None:
         """Ends the threads."""

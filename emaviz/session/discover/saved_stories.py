@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
@@ -12,9 +13,11 @@ from emaviz.session.discover.record import take_again
 from emaviz.session.discover.saved_story import SavedStory, story_of
 from emaviz.session.discover.shown import Shown
 from emaviz.session.discover.source import DiscoverySource
-from emaviz.session.job import Job, Tell
+from emaviz.session.job import RESTED, Job, Tell
 
 _MOST_BROUGHT = 50  # discoveries beside the shown one
+_MOST_WAIT_S = 20.0  # for measurements that may never be there
+_TITLE = "Taking the session's steps again"
 
 
 class SavedStories:
@@ -79,5 +82,10 @@ class SavedStories:
                 self._again = None
             shown.assess(told, tell)
 
-        wanted = {*saved.recipe.fitted, *saved.recipe.held}
-        self._job.begin_when_free("Taking the session's steps again", job, lambda: wanted <= {*self._opened()})
+        wanted, until = {*saved.recipe.fitted, *saved.recipe.held}, time.perf_counter() + _MOST_WAIT_S
+
+        def waits_for() -> str:
+            open_or_late = wanted <= {*self._opened()} or time.perf_counter() > until
+            return "" if open_or_late else "its measurements, which are being read"
+
+        self._job.begin_in_turn(_TITLE, lambda: self._job.begin(_TITLE, job), waits_for, RESTED)

@@ -23,7 +23,7 @@ from ema_model.tracking.result import Tracked
 from ema_model.tracking.track import check_thresholds
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.described import number
-from emaviz.session.job import Job, Run, Stopped
+from emaviz.session.job import RESTED, Job, Run, Stopped
 from emaviz.session.opened import side_file_of
 from emaviz.session.practice import Practice
 from emaviz.session.session import Session
@@ -274,7 +274,8 @@ class Following:
             if self.history is not None and self.last is not None:
                 self.events.followed(self.history)
 
-        self.job.begin_when_free("Following k", work, lambda: True)
+        title = "Following k"
+        self.job.begin_in_turn(title, lambda: self.job.begin(title, work), rests=RESTED)
 
     # --- what stays -------------------------------------------------------------------------------------------------
 

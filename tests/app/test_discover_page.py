@@ -146,7 +146,7 @@ def test_two_effects_undo_and_a_wrong_answer(discover, app):
     page.get_by_role("option", name="as measured").click()
     wait_until(lambda: np.array_equal(app.playback.motion.motor_rad, measured.motor_rad))
     page.get_by_text("Load-dependent friction had been masked").wait_for()
-    page.get_by_text("No effect in the library would reduce the error significantly.").wait_for()
+    page.get_by_text("No candidate would reduce the error significantly.").wait_for()
 
 
 @pytest.mark.long

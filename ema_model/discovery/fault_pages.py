@@ -42,7 +42,7 @@ PAGES = {
         "Lubricant has aged or is gone, a bearing or the screw is damaged: dry friction at rest and in motion grows, "
         "all of it by the same factor.",
         "in the current, with the sign of the speed",
-        "demagnetisation, load-dependent friction, stribeck friction, a tolerance of the file's friction",
+        "demagnetisation, load-dependent friction, Stribeck friction, a tolerance of the file's friction",
         "friction",
     ),
     "k2": FaultPage(
@@ -57,9 +57,10 @@ PAGES = {
     "k4": _short("B"),
     "k5": _short("C"),
     "k6": FaultPage(
-        "B_i → (1 + ζ cos(θ − φ + 2π i/3)) B_i, ζ = k_6, φ = 2π (k_7 − ½)",
-        "The rotor does not turn in the middle of the stator: bearings are worn, or the shaft is bent. The field B_i "
-        "of each phase is stronger where the air gap is thin, at the angle φ, and weaker where it is wide.",
+        "B → (1 + k_6 cos(θ − φ)) B",
+        "The rotor does not turn in the middle of the stator: bearings are worn, or the shaft is bent. The field B is "
+        "stronger where the air gap is thin, at the angle φ = 2π(k7 − ½), and weaker on the other side; each phase "
+        "meets it a third of a turn after the one before.",
         "in the current, once per turn beside the poles' own periods",
         "torque ripple, cogging torque, encoder eccentricity",
         "motion",
@@ -83,12 +84,12 @@ def page_of(name: str) -> FaultPage:
 def size(one: Candidate, actuator: Actuator) -> str:
     """A fault's suggested size, physical and in k: 'backlash 703 µrad, k2 ≈ 0.20'."""
     phrases = dict(zip(NAMES, sentences(vector(one.settings), actuator)))
-    k = (f"{name} ≈ {value:.2f}" for name, value in one.settings.items())
-    return ", ".join([*(phrases[name] for name in one.settings), *k])
+    return ", ".join([*(phrases[name] for name in one.settings), f"{one.name} ≈ {one.settings[one.name]:.2f}"])
 
 
 def typical(name: str, actuator: Actuator) -> str:
-    """'friction × 1.50 to friction × 2.50 (k1 0.25 to 0.75)'."""
+    """'friction × 1.50 to 2.50 (k1 0.25 to 0.75)'."""
     first = cause_of(name)[0]
-    low, high = (sentences(vector({first: k}), actuator)[NAMES.index(first)] for k in _TYPICAL)
-    return f"{low} to {high} ({first} {_TYPICAL[0]:g} to {_TYPICAL[1]:g})"
+    low, high = (sentences(vector({first: k}), actuator)[NAMES.index(first)].split(" ") for k in _TYPICAL)
+    apart = next(i for i, (one, other) in enumerate(zip(low, high)) if one != other)
+    return f"{' '.join(low)} to {' '.join(high[apart:])} ({first} {_TYPICAL[0]:g} to {_TYPICAL[1]:g})"

@@ -41,6 +41,8 @@ def rung_title(one: Change, axes: Axes) -> str:
     if one.kind == "replaced":
         before, after = (effect_title(name) for name in one.names)
         return f"{after} in place of {in_sentence(before)}"
+    if one.kind == "fault":  # a phase belongs to its modulus
+        return f"Fault {all_of([BY_NAME[name].label for name in one.names if name == cause_of(name)[0]])}"
     label = rung_label(one, axes)
     return label[:1].upper() + label[1:]
 

@@ -129,7 +129,7 @@ def about_fault(name: str, actuator: Actuator) -> Html:
     """The same of a fault of the actuator."""
     page = page_of(name)
     rows = [
-        ("Belongs to", "the actuator: a fault, which an effect of the library may be taken for"),
+        ("Belongs to", "the actuator itself: a fault, and no missing physics"),
         ("Why", page.explanation),
         ("Typical", typical_fault(name, actuator)),
         ("Shows", page.shows),

@@ -40,8 +40,15 @@ FAULTS = (
 )
 NAMES = tuple(fault.name for fault in FAULTS)
 BY_NAME = {fault.name: fault for fault in FAULTS}
+# What is one cause: of the eccentricity its modulus and its phase.
+CAUSES = (("k1",), ("k2",), ("k3",), ("k4",), ("k5",), ("k6", "k7"), ("k8",))
 HEALTHY: NDArray[np.float64] = np.array([fault.healthy for fault in FAULTS])
 HEALTHY.setflags(write=False)
+
+
+def cause_of(name: str) -> tuple[str, ...]:
+    """The faults that one stands for together with, the first of which names them."""
+    return next(names for names in CAUSES if name in names)
 
 
 class PhysicalFaults(SimpleNamespace):

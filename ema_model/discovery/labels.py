@@ -9,16 +9,22 @@ from ema_model.discovery.result import Added, Change, Discovery
 from ema_model.effects import CATALOGUE, find
 from ema_model.errors import InputError
 from ema_model.estimation import Calibrated
-from ema_model.faults import BY_NAME
+from ema_model.faults import BY_NAME, cause_of
 from ema_model.quantities.axes import Axes
 from ema_model.quantities.numbers import amount, with_uncertainty
 from ema_model.quantities.titles import all_of, in_sentence
 
+_FAULTS = {"k6": "Rotor eccentricity"}  # that are called otherwise than their number: with its phase it is one cause
 _SIGNS = {"effect": "+", "removed": "−"}
 
 
 def effect_title(name: str) -> str:
-    """'Cogging torque' of 'cogging_torque'; the name itself of an effect that is not known here."""
+    """'Cogging torque' of 'cogging_torque'; the name itself of an effect that is not known here.
+
+    Of a fault 'Backlash (fault k2)', since effects have names like its title.
+    """
+    if name in BY_NAME:
+        return f"{_FAULTS.get(name, BY_NAME[name].title)} (fault {name})"
     try:
         return find(name).title
     except InputError:
@@ -28,12 +34,15 @@ def effect_title(name: str) -> str:
 def rung_title(one: Change, axes: Axes) -> str:
     """'+ Cogging torque'."""
     if one.kind in _SIGNS:
-        return f"{_SIGNS[one.kind]} {all_of([effect_title(name) for name in one.names])}{_of_orders(one, axes)}"
+        names = [name for name in one.names if name not in BY_NAME or name == cause_of(name)[0]]
+        return f"{_SIGNS[one.kind]} {all_of([effect_title(name) for name in names])}{_of_orders(one, axes)}"
     if one.kind == "parameter":
         return f"{on_axes(one.names[0], axes).title} freed"
     if one.kind == "replaced":
         before, after = (effect_title(name) for name in one.names)
         return f"{after} in place of {in_sentence(before)}"
+    if one.kind == "fault":  # a phase belongs to its modulus
+        return f"Fault {all_of([BY_NAME[name].label for name in one.names if name == cause_of(name)[0]])}"
     label = rung_label(one, axes)
     return label[:1].upper() + label[1:]
 
@@ -50,6 +59,8 @@ def rung_label(one: Change, axes: Axes) -> str:
         return "calibrated, without the controller"
     if one.kind == "calibrated":
         return one.kind
+    if one.names[0] in BY_NAME:
+        return f"{_SIGNS[one.kind]} fault {all_of([BY_NAME[name].label for name in one.names])}"
     names = [name if name in CATALOGUE else in_sentence(effect_title(name)) for name in one.names]
     return f"{_SIGNS[one.kind]} {all_of(names)}{_of_orders(one, axes)}"
 

@@ -17,9 +17,11 @@ from ema_model.actuator import Actuator
 from ema_model.commands import command
 from ema_model.discovery.model_fit import Data, Fit
 from ema_model.discovery.result import Experiment
+from ema_model.estimation import default_free
 from ema_model.estimation.calibrate import problem_of
 from ema_model.estimation.floor import Floor, floor
 from ema_model.estimation.problem import SIGNALS, Problem
+from ema_model.faults import NAMES
 from ema_model.models import ClosedLoop, Model
 from ema_model.simulation.run import Run, simulate_monitor
 
@@ -114,8 +116,14 @@ def expected_chi2(
         plants = [ClosedLoop([recording], rival.actuator) for rival in (first, second)]
         floors = [_floor(data, plants[0], place) for place in range(len(plants[0].windows))]
         played, problem = (
-            problem_of(plant, floors, k=rival.calibration.k, signals=signals)
-            for plant, rival in zip(plants, (first, second))
+            problem_of(
+                plant,
+                floors,
+                free=(*default_free(rival.actuator), *_own_faults(rival, other)),
+                k=rival.calibration.k,
+                signals=signals,
+            )
+            for plant, rival, other in zip(plants, (first, second), (second, first))
         )
         # Both models go the same way from the command to the blocks, so that the rivals alone make the difference.
         [as_played] = played.residuals(_fitted(first, played)[None, :])
@@ -131,7 +139,7 @@ def expected_chi2(
 
 def _fitted(found: Fit, problem: Problem) -> Array:
     """A fit's parameters as the unknowns of another problem, whose runs start where they should."""
-    known = {name: value for name, value in found.starts.items() if "." in name}
+    known = {name: value for name, value in found.starts.items() if "." in name or name in NAMES}
     return np.array([known.get(unknown.name, 0.0) for unknown in problem.unknowns])
 
 
@@ -140,11 +148,16 @@ def _information(found: Fit, names: Sequence[str]) -> Array:
     columns = found.calibration.weighted_jacobian
     all_names = list(found.starts)
     covariance = np.linalg.inv(columns.T @ columns + np.eye(columns.shape[1]))
-    known = [i for i, name in enumerate(names) if "." in name]
+    known = [i for i, name in enumerate(names) if "." in name or name in NAMES]
     at = [all_names.index(names[i]) for i in known]
     information = np.eye(len(names))
     information[np.ix_(known, known)] = np.linalg.inv(covariance[np.ix_(at, at)])
     return information
+
+
+def _own_faults(found: Fit, other: Fit) -> list[str]:
+    """Faults that one of two models has and the other has not: they may move, as a rival effect's parameters do."""
+    return [name for name in found.faults if name not in other.faults]
 
 
 def _floor(data: Data, plant: Model, place: int) -> Floor:
@@ -179,6 +192,6 @@ def _load(actuator: Actuator) -> float:
 
 def _names(first: Fit, second: Fit) -> tuple[str, str]:
     """What each of two models has and the other has not."""
-    one = next(name for name in first.effects if name not in second.effects)
-    other = next(name for name in second.effects if name not in first.effects)
-    return one, other
+    ours, theirs = (*first.effects, *first.faults), (*second.effects, *second.faults)
+    one = next(name for name in ours if name not in theirs)
+    return one, next(name for name in theirs if name not in ours)

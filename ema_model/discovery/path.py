@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import takewhile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from ema_model.comparison.explain import Explanation
 from ema_model.discovery.controller_seen import ControllerSeen
 from ema_model.discovery.criteria import LEAST_BIC
 from ema_model.discovery.evidence import predicted_evidence
-from ema_model.discovery.faults import fault_for
+from ema_model.discovery.faults import fault_for, fault_trial, tried_faults, without_fault
 from ema_model.discovery.fingerprints import Fingerprint, fingerprints, may_act, of_the_file
 from ema_model.discovery.model_fit import Data, Fit, as_in, fit, in_floors_of, without_effect
 from ema_model.discovery.refit import Trial, again, is_near, promising, stands_for, tried
@@ -27,6 +28,8 @@ from ema_model.discovery.transmission_seen import TransmissionSeen
 from ema_model.discovery.uncertainty import settled
 from ema_model.discovery.unknown import curve_for
 from ema_model.effects import CATALOGUE, catalogue_name, find
+from ema_model.faults import NAMES as FAULTS
+from ema_model.faults import cause_of
 from ema_model.simulation.one_stack import compile_behind
 
 Progress = Callable[[str], None]
@@ -154,13 +157,17 @@ class Story:
 
     def trial(self, candidate: Candidate, tell: Progress = lambda text: None) -> Trial:
         """One candidate in the model, refitted."""
+        if candidate.name in FAULTS:
+            return fault_trial(self.data, self.current, candidate, tell)
         return tried(self.data, self.current, candidate, {candidate.name: candidate.settings}, tell)
 
-    def fault(
-        self, ranked: Sequence[Candidate], effects: Callable[[], Sequence[Trial]], tell: Progress = lambda text: None
-    ) -> Trial | None:
-        """A fault of the actuator in the model, refitted, where it tells more than any of the effects() refitted."""
-        found = fault_for(self.data, self.held, self.current, ranked, effects, tell)
+    def faults(self, ranked: Sequence[Candidate], tell: Progress = lambda text: None) -> list[Trial]:
+        """The actuator's faults that are worth a refit beside these effects, each in the model and refitted."""
+        return tried_faults(self.data, self.current, ranked, tell)
+
+    def fault(self, faults: Sequence[Trial], effects: Callable[[], Sequence[Trial]]) -> Trial | None:
+        """Of the faults() refitted the one that tells more than any of the effects() refitted."""
+        found = fault_for(self.data, self.held, self.current, faults, effects)
         if found and found.same_as:
             self.ties[found.candidate.name] = found.same_as
         return None if found and found.yields else found
@@ -173,6 +180,8 @@ class Story:
         """Takes a trial for the next model."""
         if trial.faults:
             self._tell_in_floors_of(trial.fit)
+            if ties:
+                self.ties[trial.candidate.name] = ties[0]
         before, moved = self.steps[-1].rung, stood_in(self.current, trial.fit)
         parameter = "" if trial.faults else stands_for(self.current, trial)
         rung = self._rung(change_of(trial, parameter), trial.fit)
@@ -185,10 +194,12 @@ class Story:
         compile_behind(trial.fit.actuator)
 
     def remove(self, key: str, found: Fit | None = None) -> None:
-        """Takes an effect out again, as a step of its own; found: the fit without it, if it is known."""
+        """Takes an effect or a fault out again, as a step of its own; found: the fit without it, if it is known."""
         smaller = found or self.without(key)
-        name = next(one.name for one in self.added if one.key == key)
-        rung = self._rung(Change("removed", (name,)), smaller)
+        if key in FAULTS:
+            self._tell_in_floors_of(smaller)
+        names = cause_of(key) if key in FAULTS else (next(one.name for one in self.added if one.key == key),)
+        rung = self._rung(Change("removed", names), smaller)
         self._append(smaller, rung, tuple(one for one in self.added if one.key != key))
 
     def swap(self, key: str, trial: Trial) -> None:
@@ -196,17 +207,8 @@ class Story:
         place = next(i for i, one in enumerate(self.added) if one.key == key)
         old, name = self.added[place], trial.candidate.name
         rung = self._rung(Change("replaced", (old.name, name)), trial.fit)
-        new = Added(
-            name,
-            {},
-            old.rmse_before,
-            rung.rmse,
-            old.holdout_before,
-            rung.holdout_rmse,
-            (),
-            name,
-            of_the_file=name in self.of_the_file,
-        )
+        errors = old.rmse_before, rung.rmse, old.holdout_before, rung.holdout_rmse
+        new = Added(name, {}, *errors, (), name, of_the_file=name in self.of_the_file)
         self._append(trial.fit, rung, (*self.added[:place], new, *self.added[place + 1 :]))
         compile_behind(trial.fit.actuator)
 
@@ -222,7 +224,9 @@ class Story:
         self.steps[-1] = replace(last, added=tuple(added))
 
     def without(self, key: str, tell: Progress = lambda text: None) -> Fit:
-        """The last model without one of its effects, refitted."""
+        """The last model without one of its effects or faults, refitted."""
+        if key in FAULTS:
+            return without_fault(self.data, self.current, key, tell)
         actuator = without_effect(self.current.actuator, key)
         if key in self.of_the_file:
             actuator = as_in(self.base.actuator, key, actuator)
@@ -257,7 +261,10 @@ class Story:
         """Takes the last step back; False where there is none."""
         if len(self.steps) == 1:
             return False
-        self.steps.pop()
+        faults = self.steps.pop().fit.faults
+        if faults != self.current.faults:
+            as_now = takewhile(lambda step: step.fit.faults == self.current.faults, reversed(self.steps))
+            self._tell_in_floors_of([*as_now][-1].fit)
         return True
 
     @property
@@ -279,7 +286,8 @@ class Story:
     def _tell_in_floors_of(self, found: Fit) -> None:
         """All errors from now on: how far the model is from its three-phase twin depends on the faults."""
         self.data, self.held = in_floors_of(found, self.data, self.held)
-        self.steps = [replace(one, rung=self._rung(one.rung.change, one.fit)) for one in self.steps]
+        told = (self._rung(one.rung.change, one.fit) for one in self.steps)
+        self.steps = [replace(one, rung=rung, settled_from=one) for one, rung in zip(self.steps, told)]
 
     def _append(self, found: Fit, rung: Rung, added: Sequence[Added], settled_from: Step | None = None) -> None:
         # All with the last model's values: what is added later moves what was there.

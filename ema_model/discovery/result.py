@@ -27,9 +27,9 @@ VERDICTS = ("effects_found", "adequate", "partly_explained", "unknown_effect", "
 
 @dataclass(frozen=True)
 class Candidate:
-    """One effect that might be missing, with its best settings so far."""
+    """One effect that might be missing, with its best settings so far; or a fault of the actuator, with its k."""
 
-    name: str
+    name: str  # of a fault k1 … k8, of an eccentricity k6, which has k7 among its settings
     predicted_drop: float  # of χ², before any refit
     settings: dict[str, float]
     untestable_reason: str = ""
@@ -46,8 +46,8 @@ class Change:
     """What a rung's model has beyond the one before.
 
     kind: "calibrated", "without_controller", "fault" (k1 … k8), "effect", "parameter" (its path: freed beyond its
-    tolerance), "removed", or "replaced" (an effect, and what came in its place); orders: of a periodic effect that was
-    there already, at others.
+    tolerance), "removed" (an effect or a fault), or "replaced" (an effect, and what came in its place); orders: of a
+    periodic effect that was there already, at others.
     """
 
     kind: str = "calibrated"
@@ -88,7 +88,7 @@ class Added:
     rmse_after: float
     holdout_before: float | None
     holdout_after: float | None
-    same_as: tuple[str, ...]  # effects that this recording cannot tell from it
+    same_as: tuple[str, ...]  # effects and faults that this recording cannot tell from it
     key: str  # under which the model holds it: `name`, or `name_2` for a second order of the same
     chosen: dict[str, float] = field(default_factory=dict)  # parameters that are not fitted: a whole order
     stood_in: tuple[StoodIn, ...] = ()  # parameters that had been standing in for it

@@ -51,7 +51,7 @@ def signatures(found: Fit, prints: Mapping[str, Sequence[Fingerprint]]) -> dict[
     beyond = _beyond_all(*movable(found), [one.columns for its in prints.values() for one in its if not one.frees])
     told = {}
     for name, its in prints.items():
-        own = [_beyond(*movable(found, one.frees), one.columns) if one.frees else next(beyond) for one in its]
+        own = [beyond_of(*movable(found, one.frees), one.columns) if one.frees else next(beyond) for one in its]
         parts = [columns @ np.linalg.lstsq(columns, -found.residual, rcond=None)[0] for columns in own]
         told[name] = min(parts, key=lambda part: float(np.sum((found.residual + part) ** 2)))
     return told
@@ -101,7 +101,7 @@ def movable(found: Fit, but: Sequence[str] = ()) -> tuple[Array, Array]:
     return jacobian, jacobian.T @ jacobian + np.eye(jacobian.shape[1])
 
 
-def _beyond(jacobian: Array, gram: Array, columns: Array) -> Array:
+def beyond_of(jacobian: Array, gram: Array, columns: Array) -> Array:
     """What of some columns the parameters cannot do; gram: JᵀJ with the prior's weights."""
     return columns - jacobian @ np.linalg.solve(gram, jacobian.T @ columns)
 
@@ -110,7 +110,7 @@ def _beyond_all(jacobian: Array, gram: Array, columns: Sequence[Array]) -> Itera
     """The same of many, solved together."""
     if columns:
         widths = np.cumsum([one.shape[1] for one in columns])
-        yield from np.split(_beyond(jacobian, gram, np.concatenate(columns, axis=1)), widths[:-1], axis=1)
+        yield from np.split(beyond_of(jacobian, gram, np.concatenate(columns, axis=1)), widths[:-1], axis=1)
 
 
 def amounts_of(
@@ -121,11 +121,18 @@ def amounts_of(
     The amounts a (columns,), and E and t, such that χ² falls by 2 a·t − a·E·a with any amounts.
     beyond: what of the columns the parameters cannot do, if it is known.
     """
-    own = _beyond(jacobian, gram, columns) if beyond is None else beyond
+    own = beyond_of(jacobian, gram, columns) if beyond is None else beyond
     energy = columns.T @ own
     toward = -(own.T @ found.residual)  # the residual is model − measurement
     ridge = energy + 1e-9 * (np.trace(energy) + 1e-300) * np.eye(len(energy))
     return np.linalg.solve(ridge, toward), energy, toward
+
+
+def unseen(energy: Array, strong: float) -> str:
+    """Why these recordings cannot show what has this energy, and `strong` times the size in a strong case; "" if so."""
+    if np.max(np.diag(energy)) * strong**2 < _LEAST_ENERGY:
+        return "these recordings cannot show it: what it would change is within the noise"
+    return ""
 
 
 def _scored(found: Fit, one: Fingerprint, jacobian: Array, gram: Array, beyond: Array | None = None) -> Candidate:
@@ -135,9 +142,7 @@ def _scored(found: Fit, one: Fingerprint, jacobian: Array, gram: Array, beyond: 
         return _beyond_the_file(found, one, effect, amounts, float(toward @ amounts))
     first = effect.parameters[0]
     strong = effect.severities[2] / one.settings[first.name]
-    reason = ""
-    if np.max(np.diag(energy)) * strong**2 < _LEAST_ENERGY:
-        reason = "these recordings cannot show it: what it would change is within the noise"
+    reason = unseen(energy, strong)
     settings = dict(one.settings)
     if len(amounts) == 1:
         amount = float(amounts[0])

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from ema_model.actuator.naming import on_axes
 from ema_model.discovery.controller_seen import ControllerSeen
+from ema_model.discovery.labels import effect_title
 from ema_model.discovery.result import Added
 from ema_model.effects import find
 from ema_model.faults import BY_NAME
@@ -67,11 +68,11 @@ def _moved(parts: Mapping[str, tuple[float, float]], axes: Axes) -> str:
 def as_well(ties: Mapping[str, str], added: Sequence[Added], faults: Sequence[str]) -> list[str]:
     """One line for each fault and effect of which one was taken, and the other would explain as much.
 
-    ties: effects by fault.
+    ties: effects by fault; or other faults.
     """
-    names, lines = {one.name for one in added}, []
+    names, lines = {*faults, *(one.name for one in added)}, []
     for fault, effect in ties.items():
-        label, title = f"the fault {BY_NAME[fault].label}", find(effect).title
+        label, title = f"the fault {BY_NAME[fault].label}", effect_title(effect)
         if effect in names and fault not in faults:
             lines.append(f"T{label[1:]} would explain as much as {in_sentence(title)}.")
         elif fault in faults and effect not in names:
@@ -92,5 +93,5 @@ def held_back(paths: Sequence[str], axes: Axes) -> list[str]:
 
 def untold(first: str, second: str) -> str:
     """That no test is known which would tell two effects apart."""
-    one, other = (in_sentence(find(name).title) for name in (first, second))
+    one, other = (in_sentence(effect_title(name)) for name in (first, second))
     return f"No command within the range of these recordings tells {one} from {other}."

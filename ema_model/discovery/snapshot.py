@@ -15,16 +15,18 @@ from ema_model.comparison.residuals import Residuals
 from ema_model.discovery import Candidate, Discovery, Story
 from ema_model.discovery.alike import alike
 from ema_model.discovery.criteria import LEAST_BIC
+from ema_model.discovery.ranking import signatures, with_faults
 from ema_model.discovery.remaining import Left
 from ema_model.discovery.result import Added
 from ema_model.discovery.step import Step
 from ema_model.discovery.tracks import primary
 from ema_model.effects import find
+from ema_model.faults import BY_NAME, CAUSES
 from ema_model.quantities.interval import HALF_90
 
 Array = NDArray[np.float64]
 
-_RIVAL = 25.0  # of χ², below which an effect is too faint to be taken for another
+_RIVAL = 25.0  # of χ², below which a candidate is too faint to be taken for another
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,10 +101,17 @@ class Look:
 
         A strength that explains d of χ² is known to 1/√d of itself.
         """
+        if one.name in BY_NAME:
+            return None  # a fault is not straight in k: only a fit tells how well it is known
         first = find(one.name, self.found.actuator.axes).parameters[0]
         if first.low > 0.0 or one.predicted_drop <= 0.0:
             return None
         return HALF_90 * abs(one.settings[first.name]) / math.sqrt(one.predicted_drop)
+
+    @property
+    def removable(self) -> list[str]:
+        """Keys of what was added, which can be taken out again: of the effects, then the first of each fault's."""
+        return [one.key for one in self.added] + [one[0] for one in CAUSES if one[0] in self.found.faults]
 
     @property
     def primary(self) -> str:
@@ -127,11 +136,11 @@ class Look:
 def assessed(story: Story) -> Assessment:
     """What the last model of a story leaves; takes a second, and the first time a compilation."""
     left = story.left()
-    ranked = story.ranked(None, left)
+    ranked = with_faults(story, story.ranked(None, left))
     worth = [one for one in ranked if not one.untestable_reason]
-    signatures = story.signatures(worth)
-    rivals = {one.name: signatures[one.name] for one in worth if one.predicted_drop > _RIVAL and one.name in signatures}
-    return Assessment(left, ranked, signatures, alike(rivals))
+    found = signatures(story, worth)
+    rivals = {one.name: found[one.name] for one in worth if one.predicted_drop > _RIVAL and one.name in found}
+    return Assessment(left, ranked, found, alike(rivals))
 
 
 def known_of(step: Step, known: Mapping[Step, Assessment]) -> Assessment | None:

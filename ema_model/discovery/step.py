@@ -19,7 +19,7 @@ class Step:
     fit: Fit
     rung: Rung
     added: tuple[Added, ...]
-    settled_from: Step | None = None
+    settled_from: Step | None = None  # the same before its fit was settled, or its errors were told in other floors
 
 
 def change_of(trial: Trial, parameter: str) -> Change:

@@ -11,9 +11,12 @@ from ema_model.actuator.naming import on_axes
 from ema_model.comparison.summary import calibration_dict, event_dict, parameter_dict, plain
 from ema_model.discovery.controller_seen import ControllerSeen
 from ema_model.discovery.labels import rung_label
-from ema_model.discovery.result import Added, Discovery, Experiment, Rung
+from ema_model.discovery.result import Added, Candidate, Discovery, Experiment, Rung
 from ema_model.effects import find
+from ema_model.faults import BY_NAME
 from ema_model.quantities.axes import Axes
+
+_FAULT = "fault"  # in place of the family of a candidate that is one
 
 
 def as_dict(found: Discovery) -> dict[str, Any]:
@@ -27,20 +30,7 @@ def as_dict(found: Discovery) -> dict[str, Any]:
             "calibration": calibration_dict(found.calibration, axes),
             "effects": [_added(one, axes) for one in found.effects],
             "ladder": [_rung(rung, axes, is_believable) for rung in found.ladder],
-            "candidates": [
-                {
-                    "name": one.name,
-                    "family": find(one.name).family,
-                    "predicted_drop": one.predicted_drop,
-                    "tested": one.refitted_drop is not None,
-                    "refitted_drop": one.refitted_drop,
-                    "settings": {
-                        on_axes(f"effects.{one.name}.{name}", axes).name: value for name, value in one.settings.items()
-                    },
-                    "untestable_reason": one.untestable_reason,
-                }
-                for one in found.candidates
-            ],
+            "candidates": [_candidate(one, axes) for one in found.candidates],
             "faults": {name: parameter_dict(one) for name, one in found.faults.items()},
             "parameters_outside_tolerance": [on_axes(name, axes).path for name in found.parameters_outside_tolerance],
             "unknown": None
@@ -82,6 +72,20 @@ def as_dict(found: Discovery) -> dict[str, Any]:
             "warnings": list(found.warnings),
         }
     )
+
+
+def _candidate(one: Candidate, axes: Axes) -> dict[str, Any]:
+    is_fault = one.name in BY_NAME
+    names = {name: name if is_fault else on_axes(f"effects.{one.name}.{name}", axes).name for name in one.settings}
+    return {
+        "name": one.name,
+        "family": _FAULT if is_fault else find(one.name).family,
+        "predicted_drop": one.predicted_drop,
+        "tested": one.refitted_drop is not None,
+        "refitted_drop": one.refitted_drop,
+        "settings": {names[name]: value for name, value in one.settings.items()},
+        "untestable_reason": one.untestable_reason,
+    }
 
 
 def _rung(one: Rung, axes: Axes, is_believable: bool) -> dict[str, Any]:

@@ -67,7 +67,7 @@ def per_recording(found: Discovery) -> Table | None:
 
 
 def candidates(found: Discovery) -> Table | None:
-    """What each effect alone would take away from χ²; None where none was scored."""
+    """What each effect or fault alone would take away from χ²; None where none was scored."""
     if not found.candidates:
         return None
     rows = [

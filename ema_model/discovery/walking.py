@@ -14,6 +14,7 @@ from ema_model.discovery.dropped import drop_doubtful, drop_idle
 from ema_model.discovery.model_fit import Fit
 from ema_model.discovery.objections import ratio
 from ema_model.discovery.path import Story
+from ema_model.discovery.ranking import with_faults
 from ema_model.discovery.refit import Trial, pays, with_drops
 from ema_model.discovery.remaining import Left, at_floor
 from ema_model.discovery.result import Candidate
@@ -148,11 +149,12 @@ class _Walk:
             return False  # without a controller no twin says which faint rest is the model's own
         left, ranked = self._scored()
         trials = story.tried(ranked, _REFITTED_SHARE, _MOST_REFITTED, tell, self._tried)
-        fault = story.fault(ranked, lambda: trials, tell)
+        faults = story.faults(ranked, tell)
+        self._first = self._first or with_drops(with_faults(story, ranked), [*trials, *faults])
+        fault = story.fault(faults, lambda: trials)
         if fault:
             story.add(fault)
             return True
-        self._first = self._first or with_drops(ranked, trials)
         accepted = [trial for trial in trials if pays(story.current, trial, story.data, story.held)]
         if not accepted and ratio(story.data, story.current) > FAR:
             trials = story.tried_whole([one for one in ranked if one not in [t.candidate for t in trials]], tell)

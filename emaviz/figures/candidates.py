@@ -19,7 +19,7 @@ def height(found: Discovery) -> int:
 
 def figure(found: Discovery, *, dark: bool = False) -> go.Figure:
     """Bars for each candidate, the best on top; grey names are those that these recordings cannot show."""
-    title = "What each effect would take away from the error"
+    title = "What each candidate would take away from the error"
     shown = found.ranked[::-1]  # a horizontal bar chart counts from the bottom
     if not shown:
         return theme.missing(title, "no candidates were scored", dark=dark)

@@ -6,10 +6,13 @@ import re
 from collections.abc import Sequence
 
 from ema_model.discovery import Discovery
+from ema_model.discovery.fault_pages import page_of
 from ema_model.discovery.labels import effect_title, settings
 from ema_model.discovery.result import Added
+from ema_model.discovery.words import faults
 from ema_model.effects import Effect, find
 from ema_model.effects.effect import STAGES
+from ema_model.faults import CAUSES
 from emaviz.text.html import Html, html, joined
 from emaviz.text.mathml import mathml
 
@@ -41,24 +44,19 @@ _OF_PLACE = {
 
 
 def equation(found: Discovery, added: Sequence[Added]) -> Html:
-    """The lines that added effects change, each with its terms and their fitted values; "" without an effect."""
+    """The lines that added effects and faults change, each with its terms and fitted values; "" without any."""
     by_line: dict[str, list[Html]] = {}
     for one in added:
         effect = find(one.key)
         values = ", ".join(f"{_symbol(effect, name)}{text}" for name, text in settings(found, one).items())
         if len(effect.parameters) > 6:
             values = f"{len(effect.parameters)} knots, fitted"
-        by_line.setdefault(_line(effect), []).append(
-            html(
-                '<div style="margin:2px 0 4px 6px;padding-left:8px;border-left:3px solid rgba(134,142,150,.55)">'
-                "<b>{}:</b> "
-                '<span style="font-size:15px">{}</span>'
-                '<div style="font-size:12px;opacity:.85">{}</div></div>',
-                effect_title(one.name),
-                mathml(effect.equation, "inline"),
-                values,
-            )
-        )
+        by_line.setdefault(_line(effect), []).append(_term(effect_title(one.name), effect.equation, values))
+    for names in CAUSES:
+        if names[0] in found.faults:
+            page, told = page_of(names[0]), faults(found)
+            term = _term(effect_title(names[0]), page.equation, ", ".join(told[name] for name in names))
+            by_line.setdefault(page.line, []).append(term)
     rows = []
     for line, base in _LINES.items():
         if line in by_line or line == "motion":
@@ -66,7 +64,19 @@ def equation(found: Discovery, added: Sequence[Added]) -> Html:
             more = html(' <span style="opacity:.65">and</span>') if extra else ""
             shown = mathml(base, "inline")
             rows.append(html('<div style="font-size:15px">{}{}</div>{}', shown, more, extra))
-    return joined(rows if added else [])
+    return joined(rows if by_line else [])
+
+
+def _term(title: str, equation: str, values: str) -> Html:
+    return html(
+        '<div style="margin:2px 0 4px 6px;padding-left:8px;border-left:3px solid rgba(134,142,150,.55)">'
+        "<b>{}:</b> "
+        '<span style="font-size:15px">{}</span>'
+        '<div style="font-size:12px;opacity:.85">{}</div></div>',
+        title,
+        mathml(equation, "inline"),
+        values,
+    )
 
 
 def _line(effect: Effect) -> str:

@@ -14,10 +14,14 @@ from ema_model.discovery.criteria import LEAST_BIC
 from ema_model.discovery.result import Change
 from ema_model.discovery.words import faults, headline, sentences
 from ema_model.errors import InputError
-from ema_model.text import COLOURS
+from emaviz.figures import signature
+from emaviz.figures.model_equation import equation
+from emaviz.page.discover import cards
+from emaviz.page.discover.effect import about_fault
 from emaviz.page.discover.result import answer
 from emaviz.session.discover.beside_truth import agrees, document_of
 from emaviz.session.discover.saved_story import story_of
+from emaviz.text.verdict import MEANINGS
 
 
 @pytest.fixture(scope="module")
@@ -33,6 +37,9 @@ def rig(tmp_path_factory):
     rig.discovering.choose(name)
     assert rig.discovering.start()
     rig.done()
+    rig.offered = rig.discovering.look
+    assert rig.discovering.add("k2")
+    rig.done()
     yield rig
     rig.close()
 
@@ -42,8 +49,22 @@ def worn(rig):
     return rig.discovering
 
 
-@pytest.mark.long
-def test_start_takes_the_fault_into_the_model(worn):
+def test_start_offers_the_fault_beside_the_effects(rig):
+    look = rig.offered
+    assert not look.found.faults and look.steps == 1, "a person decides"
+    best = look.promising[0]
+    assert best.name == "k2" and look.share(best) > 0.5
+    text = cards.label(look, best)
+    assert text.startswith("Backlash (fault k2)\nremoves about") and "backlash " in text and "µrad, k2 ≈ 0." in text
+    assert "strong evidence" in text
+    assert "Physics is missing, or the actuator has a fault." in answer(look)
+    shown = signature.figure(look, best)
+    assert len(shown.data) == 2 and "backlash (fault k2) would change" in shown.data[1].name
+    about = about_fault("k2", look.found.actuator)
+    assert "99" in about and "Mistaken for" in about and "k2 0.25 to 0.75" in about
+
+
+def test_it_is_added_by_its_name(worn):
     look = worn.look
     assert list(look.found.faults) == ["k2"] and not look.added
     assert all(one.predicted_drop < 2.0 * LEAST_BIC for one in look.promising), "what is left asks for no effect"
@@ -52,7 +73,9 @@ def test_start_takes_the_fault_into_the_model(worn):
     assert headline(look.found) == "No physics is missing: the actuator has the fault k2 backlash."
     assert "k2 backlash" in faults(look.found)["k2"] and "µrad" in faults(look.found)["k2"]
     assert any("k2 backlash" in text for text in sentences(look.found))
-    assert COLOURS["good"] in answer(look), "at the floor"
+    assert MEANINGS["found"] in answer(look), "at the floor, and not as it should be"
+    assert "Backlash (fault k2):" in equation(look.found, look.added) and look.removable == ["k2"]
+    assert worn.entries.current.result.startswith("1 added")
 
 
 @pytest.mark.long
@@ -92,8 +115,29 @@ def test_a_session_keeps_the_fault_and_undo_takes_it_back(rig, worn):
     assert worn.look.rmse == pytest.approx(before.ladder[-1].rmse, rel=0.01)
     assert worn.look.found.faults["k2"].value == pytest.approx(before.faults["k2"].value, abs=0.01)
     worn.undo()
-    assert not worn.look.found.faults and worn.look.rmse > 10.0
+    assert not worn.look.found.faults and worn.look.rmse == pytest.approx(rig.offered.rmse)
     wait_until(lambda: not worn.running)
+
+
+@pytest.mark.long
+def test_a_fault_is_removed_as_a_step_of_its_own_and_found_again_by_find_all(rig, worn):
+    rig.ended.clear()
+    with pytest.raises(InputError, match="not in the model"):
+        worn.remove("k2")
+    for begin in (lambda: worn.add("k2"), lambda: worn.remove("k2")):
+        assert begin()
+        rig.done()
+    look = worn.look
+    assert not look.found.faults and look.removable == [] and look.promising[0].name == "k2"
+    assert [rung.change.kind for rung in look.found.ladder] == ["calibrated", "fault", "removed"]
+    saved = json.loads(json.dumps(worn.saved()))
+    assert [step["faults"] for step in saved["steps"]] == [["k2"], []]
+    worn.restore(saved, {name: name for name in worn.files()})
+    rig.done()
+    assert [rung.change for rung in worn.look.found.ladder] == [rung.change for rung in look.found.ladder]
+    assert worn.find_all()
+    rig.done()
+    assert list(worn.look.found.faults) == ["k2"] and worn.look.rmse < 1.1
 
 
 @pytest.mark.parametrize("bad", [7, ["k9"], ["k2", "k2"], [["k2"]], "k2"])

@@ -134,6 +134,41 @@ def test_one_effect_with_the_guide(discover, app):
     page.get_by_text("Step 6 of 6").wait_for(state="hidden")
 
 
+@pytest.fixture
+def worn(app):
+    """A sealed challenge, whose actuator has lost its grease."""
+    sealed = []
+    app.discovering.sealing.sealed.connect(sealed.append)
+    app.session.settings.set_fault(0, 0.3)
+    assert app.discovering.sealing.seal("Worn", "It runs heavily.")
+    wait_until(lambda: sealed)
+    app.session.settings.set_fault(0, 0.0)
+    return "Worn"
+
+
+def test_a_fault_is_a_card_among_the_effects_and_is_added_and_removed(discover, worn, app):
+    page = discover
+    begin(page, app, worn)
+    page.get_by_text("Physics is missing, or the actuator has a fault.").wait_for()
+    first = app.discovering.look.promising[0]
+    assert "k1" in (first.name, *app.discovering.look.assessment.alike[first.name])
+    open_card(page, "Friction (fault k1)")
+    page.get_by_text("Suggested: friction ×").wait_for()
+    page.get_by_text("Lubricant has aged or is gone").wait_for()
+    wait_until(lambda: drawn(page, "Friction (fault k1) and the residual") > 5)
+    page.get_by_role("button", name="Add it to the model").click()
+    done(page, app)
+    page.get_by_text("No physics is missing: the actuator has the fault k1 friction.").wait_for()
+    page.locator("math", has_text="2").first.wait_for()
+    fitted, held = errors(app)
+    assert fitted[0] > 2.0 and fitted[-1] < 1.1 and held[-1] < 1.1
+    assert revealed(page).startswith("Your answer agrees")
+    page.get_by_role("button", name="Remove Friction (fault k1)").click()
+    done(page, app)
+    page.get_by_text("Physics is missing, or the actuator has a fault.").wait_for()
+    assert not app.discovering.look.found.faults and errors(app)[0][-1] == pytest.approx(errors(app)[0][0], rel=0.02)
+
+
 @pytest.mark.long
 def test_two_effects_undo_and_a_wrong_answer(discover, app):
     page = discover
@@ -158,7 +193,7 @@ def test_two_effects_undo_and_a_wrong_answer(discover, app):
     page.get_by_role("option", name="as measured").click()
     wait_until(lambda: np.array_equal(app.playback.motion.motor_rad, measured.motor_rad))
     page.get_by_text("Load-dependent friction had been masked").wait_for()
-    page.get_by_text("No effect in the library would reduce the error significantly.").wait_for()
+    page.get_by_text("No candidate would reduce the error significantly.").wait_for()
 
 
 @pytest.mark.long

@@ -22,7 +22,6 @@ from emaviz.page.discover.next_experiment import as_csv
 from emaviz.recording.read import read
 from emaviz.scene.motion import motion
 from emaviz.session.discover.beside_truth import agrees, document_of
-from emaviz.session.discover.progress import Telling
 
 EASY = "first_bench_run"
 
@@ -112,14 +111,6 @@ def test_a_step_back_is_at_once_and_shows_the_same_cards(fresh):
     assert [one.name for one in fresh.look.promising] == before
     with pytest.raises(InputError, match="no step to take back"):
         fresh.undo()
-
-
-def test_faults_are_weighed_after_each_effect_as_the_command_line_does(fresh, monkeypatch):
-    weighed = []
-    monkeypatch.setattr(Telling, "take_faults", lambda told, tell: bool(weighed.append(len(told.story.steps))))
-    fresh.add("cogging_torque")
-    wait_until(lambda: not fresh.running)
-    assert weighed == [2]
 
 
 def test_an_effect_is_removed_as_a_step_of_its_own(fresh):

@@ -51,9 +51,9 @@ def test_a_damaged_run_is_listed_as_one(tmp_path):
 
 
 def test_the_guide_does_not_go_back_while_the_next_step_is_looked_for():
-    look: Any = SimpleNamespace(added=["cogging"], assessment=None, rmse=0.8)
+    look: Any = SimpleNamespace(removable=["cogging"], assessment=None, rmse=0.8)
     assert step(look, True, None, False)[0] == 4
-    calibrating: Any = SimpleNamespace(added=[], assessment=None, rmse=2.0)
+    calibrating: Any = SimpleNamespace(removable=[], assessment=None, rmse=2.0)
     assert step(calibrating, True, None, False)[0] == 2
 
 

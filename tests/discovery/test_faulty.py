@@ -12,7 +12,7 @@ from ema_model.comparison.criteria import BAND
 from ema_model.discovery import discover
 from ema_model.discovery.begin import begun
 from ema_model.discovery.discover import result_of
-from ema_model.discovery.faults import fault_for
+from ema_model.discovery.faults import scored_faults, tried_faults
 from ema_model.discovery.model_fit import holdout_error
 from ema_model.discovery.result import Change
 from ema_model.discovery.summary import as_dict
@@ -80,13 +80,13 @@ def test_a_fault_stays_in_the_model_that_is_judged_shown_and_taken_back():
     recordings = [recorded(run, {"k2": 0.2}, seed=seed) for seed, run in enumerate((CHIRP, SINE))]
     story = begun(recordings, ACTUATOR, [recorded(UNSEEN, {"k2": 0.2}, seed=9)])
     healthy = story.current
-    trial = story.fault(story.ranked(), lambda: [])
+    trial = story.fault(story.faults(story.ranked()), lambda: [])
     assert trial is not None and trial.faults == ("k2",) and trial.drop > 1e4
     story.add(trial)
     assert story.current.faults == ("k2",) and story.ladder[-1].change == Change("fault", ("k2",)) and not story.added
     assert story.held is not None
     assert holdout_error(story.held, story.current) < 1.1 < holdout_error(story.held, healthy)
-    assert story.fault(story.ranked(), lambda: []) is None, "there is no second one"
+    assert story.fault(story.faults(story.ranked()), lambda: []) is None, "there is no second one"
     told = as_dict(result_of(story))
     assert told["faults"]["k2"]["value"] == pytest.approx(0.2, abs=0.02)
     story.restart()
@@ -99,5 +99,5 @@ def test_other_actuators_have_no_such_faults():
     story = begun(recordings, ACTUATOR)
     servo = load_actuator("assets/actuators/xl330.toml")
     other = type(story.current)(servo, story.current.plant, story.current.calibration, {})
-    assert fault_for(story.data, None, other, [], lambda: [], lambda text: None) is None
+    assert scored_faults(story.data, other) == () and tried_faults(story.data, other, [], lambda text: None) == []
     assert np.all(story.current.calibration.k == vector({}))

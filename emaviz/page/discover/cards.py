@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ema_model.discovery import Candidate
+from ema_model.discovery.fault_pages import size
 from ema_model.discovery.labels import effect_title
 from ema_model.discovery.snapshot import Look
 from ema_model.effects import find
+from ema_model.faults import BY_NAME
 from ema_model.quantities.numbers import amount, number, with_uncertainty
 from ema_model.quantities.titles import in_sentence
 from emaviz.text.html import Html, unescaped
@@ -22,7 +24,7 @@ _BAR = "rgba(240,140,0,.28)"
 
 
 def label(look: Look, one: Candidate) -> str:
-    """The lines of a card; its first is the effect's name."""
+    """The lines of a card; its first is the effect's or fault's name."""
     title = effect_title(one.name)
     if one.untestable_reason:
         return title
@@ -41,11 +43,13 @@ def label(look: Look, one: Candidate) -> str:
 
 
 def strength(look: Look, one: Candidate) -> str:
-    """'Amplitude 20.4 ± 0.8 mN·m, order 14', as the residual suggests it."""
+    """'amplitude 20.4 ± 0.8 mN·m, order 14', as the residual suggests it; of a fault its size."""
+    if one.name in BY_NAME:
+        return size(one, look.found.actuator)
     first = find(one.name, look.found.actuator.axes).parameters[0]
     value, half = one.settings[first.name], look.uncertainty(one)
-    size = amount(value, first.unit) if half is None else with_uncertainty(value, half, first.unit)
-    told = f"{in_sentence(first.title)} {size}"
+    shown = amount(value, first.unit) if half is None else with_uncertainty(value, half, first.unit)
+    told = f"{in_sentence(first.title)} {shown}"
     order = one.settings.get("order")
     return told if order is None else f"{told}, order {order:g}"
 

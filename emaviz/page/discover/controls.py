@@ -11,6 +11,7 @@ from ema_model.discovery import Candidate
 from ema_model.discovery.labels import effect_title, rung_title
 from ema_model.discovery.snapshot import Look
 from ema_model.effects import CATALOGUE
+from ema_model.faults import CAUSES
 from ema_model.quantities.numbers import number
 from emaviz.page.discover import cards
 from emaviz.page.discover.entries import EntriesControl
@@ -26,7 +27,7 @@ from emaviz.session.discover.discovering import Discovering
 from emaviz.text.html import add_html
 from emaviz.text.notes import boxed, note
 
-_MOST_ADDED = 6
+_MOST_ADDED = 6 + len(CAUSES)
 
 
 class DiscoverPanel:
@@ -57,10 +58,10 @@ class DiscoverPanel:
             self._all = gui.add_button("Find all", icon=viser.Icon.WAND, hint="Adds what pays, step by step")
         self._little_folder = gui.add_folder("Little effect on the error", visible=False, expand_by_default=False)
         with self._little_folder:
-            self._little = [self._slot() for _ in CATALOGUE]
+            self._little = [self._slot() for _ in (*CATALOGUE, *CAUSES)]
         self._never_folder = gui.add_folder("Not seen in these measurements", visible=False, expand_by_default=False)
         with self._never_folder:
-            self._never = [self._slot() for _ in CATALOGUE]
+            self._never = [self._slot() for _ in (*CATALOGUE, *CAUSES)]
         self._own = OwnEffect(page, discovering)
         self._listen()
         self.source.show(None)
@@ -102,8 +103,8 @@ class DiscoverPanel:
 
     def _remove(self, index: int) -> None:
         look = self._look
-        if look is not None and index < len(look.added):
-            self.ask(lambda: self._discovering.remove(look.added[index].key), self._removes[index])
+        if look is not None and index < len(look.removable):
+            self.ask(lambda: self._discovering.remove(look.removable[index]), self._removes[index])
 
     # --- the run ----------------------------------------------------------------------------------------------------
 
@@ -146,11 +147,11 @@ class DiscoverPanel:
         self.source.show(look)
 
     def _draw_model(self, look: Look | None) -> None:
-        added = look.added if look is not None else ()
+        added = look.removable if look is not None else ()
         for i, button in enumerate(self._removes):
             button.visible = i < len(added)
             if i < len(added):
-                button.label = f"Remove {effect_title(added[i].key)}"
+                button.label = f"Remove {effect_title(added[i])}"
         self._undo.disabled = look is None or look.steps < 2 or self._discovering.running
         if look is not None:
             self._model.content = boxed(_so_far(look))
@@ -204,12 +205,12 @@ class DiscoverPanel:
         if look is None:
             return ""
         if look.assessment is None:
-            return "Analysing the residual and scoring the library's effects …"
+            return "Analysing the residual and scoring the library's effects and the actuator's faults …"
         if look.promising:
             return "The bar is the share of the error that it would remove. Click a card to see why, and to add it."
         if look.assessment.left.explanation is not None and not look.found.at_floor:
-            return "No effect in the library explains the residual: try its curve, or an expression of your own, below."
-        return "No effect in the library would reduce the error significantly."
+            return "No candidate explains the residual: try its curve, or an expression of your own, below."
+        return "No candidate would reduce the error significantly."
 
 
 def _so_far(look: Look) -> str:

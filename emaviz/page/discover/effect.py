@@ -8,11 +8,15 @@ from typing import Any
 import plotly.graph_objects as go
 import viser
 
+from ema_model.actuator import Actuator
 from ema_model.discovery import Candidate
+from ema_model.discovery.fault_pages import page_of
+from ema_model.discovery.fault_pages import typical as typical_fault
 from ema_model.discovery.labels import effect_title
 from ema_model.discovery.snapshot import Look
 from ema_model.effects import Effect, find
 from ema_model.effects.effect import FAMILIES
+from ema_model.faults import BY_NAME
 from ema_model.quantities.numbers import Quantity, number
 from ema_model.quantities.titles import in_sentence
 from ema_model.text import COLOURS
@@ -73,7 +77,9 @@ class EffectView:
         self._drawn = (look, one.name)
         self._folder.label = effect_title(one.name)
         self._head.content = head(look, one)
-        self._text.content = about(find(one.name, look.found.actuator.axes))
+        actuator = look.found.actuator
+        is_fault = one.name in BY_NAME
+        self._text.content = about_fault(one.name, actuator) if is_fault else about(find(one.name, actuator.axes))
         self._untestable = bool(one.untestable_reason)
         self._enable()
         self._plot.visible = not self._untestable
@@ -113,10 +119,26 @@ def about(effect: Effect, equation: bool = True) -> Html:
         ("Why", effect.explanation),
         ("Typical", typical(effect)),
         ("Shows", effect.shows),
+        ("Mistaken for", effect.mistaken_for),
+        ("Source", effect.source),
     ]
-    if effect.mistaken_for:
-        rows.append(("Mistaken for", effect.mistaken_for))
-    rows.append(("Source", effect.source))
+    return _written(effect.equation if equation else "", rows)
+
+
+def about_fault(name: str, actuator: Actuator) -> Html:
+    """The same of a fault of the actuator."""
+    page = page_of(name)
+    rows = [
+        ("Belongs to", "the actuator itself: a fault, and no missing physics"),
+        ("Why", page.explanation),
+        ("Typical", typical_fault(name, actuator)),
+        ("Shows", page.shows),
+        ("Mistaken for", page.mistaken_for),
+    ]
+    return _written(page.equation, rows)
+
+
+def _written(equation: str, rows: list[tuple[str, str]]) -> Html:
     table = joined(
         html(
             '<tr><td style="opacity:.65;vertical-align:top;padding-right:8px;white-space:nowrap">{}</td>'
@@ -125,9 +147,10 @@ def about(effect: Effect, equation: bool = True) -> Html:
             text,
         )
         for title, text in rows
+        if text
     )
-    written = html('<div style="font-size:17px;padding:4px 0 6px">{}</div>', mathml(effect.equation, "inline"))
-    return html("<div {}>{}<table>{}</table></div>", BOX, written if equation else "", table)
+    shown = html('<div style="font-size:17px;padding:4px 0 6px">{}</div>', mathml(equation, "inline"))
+    return html("<div {}>{}<table>{}</table></div>", BOX, shown if equation else "", table)
 
 
 def typical(effect: Effect) -> str:

@@ -22,7 +22,7 @@ def step(look: Look | None, running: bool, opened: str | None, revealed: bool) -
         return 1, Html(
             "Read the challenge's story below. Then press <b>Start</b>: the model is calibrated to the measurements."
         )
-    if look is not None and look.added and look.assessment is None:
+    if look is not None and look.removable and look.assessment is None:
         return 4, Html(
             "The effect is in the model, and all its parameters are fitted anew; what that leaves is compared with "
             "the library again."
@@ -32,13 +32,13 @@ def step(look: Look | None, running: bool, opened: str | None, revealed: bool) -
             "The model's parameters move within their tolerances until it fits as well as it can; then every effect "
             "of the library is compared with the residual. This takes some seconds."
         )
-    if not look.added and opened is None:
+    if not look.removable and opened is None:
         return 3, html(
             "Even calibrated, the error is <b>{} times the floor</b>: physics is missing. "
             "Click the <b>first card</b> below: its bar is the share of the error that it would take away.",
             number(look.rmse),
         )
-    if not look.added:
+    if not look.removable:
         name = effect_title(opened or "")
         return 4, html(
             "On the right, {} would follow the orange line, and the blue points are what the model lacks. "

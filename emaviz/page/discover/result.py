@@ -13,6 +13,7 @@ from ema_model.discovery.tables import per_recording
 from ema_model.discovery.tracks import Track, tracks
 from ema_model.discovery.words import FLOOR_NOTE, headline, sentences
 from ema_model.effects import CATALOGUE
+from ema_model.faults import BY_NAME
 from ema_model.recordings import SIGNALS
 from emaviz.figures import error_ladder, explained_steps, missing_curve, residual_steps
 from emaviz.figures.model_equation import equation
@@ -114,7 +115,7 @@ class DiscoveryPanel:
         for folder in (self._before_folder, self._keep_folder):
             folder.visible = look is not None
         self._truth_folder.visible = look is not None and self._discovering.source.challenge is not None
-        self._model_folder.visible = look is not None and bool(look.added)
+        self._model_folder.visible = look is not None and bool(look.removable)
         self._left_folder.visible = look is not None and look.found.unknown is not None
         self._ladder.visible = look is not None
         self._next.show(look)
@@ -181,9 +182,13 @@ def answer(look: Look) -> Html:
     meaning = of_discovery(found)
     if look.assessment is None:
         first, others, meaning = sentences(found)[0], ["Analysing the residual …"], "open"
-    elif not look.added and look.promising:  # before anything was added, of which a verdict could speak
+    elif (
+        not look.added and not found.faults and look.promising
+    ):  # before anything was added, of which a verdict could speak
         left = look.assessment.left.explanation
-        first, meaning = "Physics is missing.", "warning"
+        best, meaning = look.promising[0].name, "warning"
+        may_be_worn = any(name in BY_NAME for name in (best, *look.assessment.alike.get(best, ())))
+        first = "Physics is missing, or the actuator has a fault." if may_be_worn else "Physics is missing."
         others = [sentences(found)[0], *([left.sentence] if left is not None else [])]
     else:
         first, others = headline(found), sentences(found)

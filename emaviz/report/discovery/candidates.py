@@ -9,8 +9,9 @@ from emaviz.report.markup import document_table, paragraph
 from emaviz.report.section import Figures, Section
 
 _NOTE = (
-    "Predicted: from the effect's fingerprint, less what the calibrated parameters can do as well. The promising ones "
-    "are fitted together with all parameters; that is the refitted fall. The ranking is of the first step."
+    "Effects of the library and faults of the actuator. Predicted: from what each would change, less what the "
+    "calibrated parameters can do as well. The promising ones are fitted together with all parameters; that is the "
+    "refitted fall. The ranking is of the first step."
 )
 
 

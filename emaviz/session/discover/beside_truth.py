@@ -68,7 +68,7 @@ def document_of(truth: Truth, found: Discovery, added: tuple[Added, ...]) -> Doc
         rows.append(_row(own is not None, what, how))
     for one in added:
         if one.name in CATALOGUE and one.name not in truth.effects:
-            tied = [name for name in one.same_as if name in truth.effects]
+            tied = [name for name in one.same_as if name in truth.effects or name in truth.faults]
             if one.stands_for:
                 why = "a parameter outside its tolerance; nothing of the kind is hidden"
             elif tied:

@@ -6,15 +6,17 @@ from collections.abc import Mapping
 from typing import Any
 
 from ema_model.discovery import Candidate, verified, walk
+from ema_model.discovery.labels import effect_title
 from ema_model.discovery.next_experiment import next_experiment
 from ema_model.discovery.refit import Trial
 from ema_model.discovery.result import Experiment
 from ema_model.discovery.snapshot import Look
 from ema_model.discovery.unknown import curve_for
 from ema_model.discovery.words import verification
-from ema_model.effects import CATALOGUE, find
+from ema_model.effects import CATALOGUE
 from ema_model.effects.user import UserEffect
 from ema_model.errors import InputError, quoted
+from ema_model.faults import NAMES
 from ema_model.quantities.titles import in_sentence
 from emaviz.session.compare.comparing import Comparing
 from emaviz.session.discover.entries import Entries, Entry
@@ -100,17 +102,11 @@ class Discovering:
             told = self._shown.begin(self.source.recipe(), tell)
             self._stories.forget()
             self._shown.assess(told, tell)
-            self._take_faults(told, tell)
 
         return self.job.begin("Calibrating the model", job)
 
-    def _take_faults(self, told: Telling, tell: Tell) -> None:
-        """After each step, as `emaviz discover` does: a worn actuator is not passed by."""
-        while told.take_faults(tell):
-            self._shown.assess(told, tell)
-
     def add(self, name: str) -> bool:
-        """The best of that effect into the model, refitted; then looks again."""
+        """The best of that effect, or that fault, into the model, refitted; then looks again."""
         told, look = self._seen()
         candidate = look.candidate(name)
         if candidate is None:
@@ -130,12 +126,11 @@ class Discovering:
         def job(tell: Tell) -> None:
             tell("fitting; a combination of effects is compiled on its first use, which takes some seconds")
             trial = told.trials.of(told.story, candidate, tell)
-            if candidate.name not in CATALOGUE:
+            if candidate.name not in CATALOGUE and candidate.name not in NAMES:
                 trial = told.trials.followed(told.story, trial, tell)
             self._shown.take(told, trial, alike, tell)
-            self._take_faults(told, tell)
 
-        return self.job.begin(f"Adding {in_sentence(find(candidate.name).title)}", job)
+        return self.job.begin(f"Adding {in_sentence(effect_title(candidate.name))}", job)
 
     def preview_own(self, effect: UserEffect, settings: Mapping[str, float]) -> None:
         """Tells soon what a user's torque with these values would change; of several requests the last one counts."""
@@ -167,9 +162,9 @@ class Discovering:
         return self.job.begin("Adding the curve", job)
 
     def remove(self, key: str) -> bool:
-        """One of the added effects out of the model again, refitted."""
+        """One of the added effects or faults out of the model again, refitted."""
         told, look = self._seen()
-        if all(one.key != key for one in look.added):
+        if key not in look.removable:
             raise InputError(f"{quoted(key, 60)} is not in the model")
 
         def job(tell: Tell) -> None:
@@ -179,7 +174,7 @@ class Discovering:
             told.story.remove(key, smaller)
             self._shown.assess(told, tell)
 
-        return self.job.begin(f"Removing {in_sentence(find(key).title)}", job)
+        return self.job.begin(f"Removing {in_sentence(effect_title(key))}", job)
 
     def find_all(self) -> bool:
         """Adds what pays, a step after another, as `emaviz discover` does."""
@@ -221,7 +216,7 @@ class Discovering:
         def job(tell: Tell) -> None:
             trials: list[Trial] = []
             for one in pair:
-                tell(f"fitting {in_sentence(find(one.name).title)}")
+                tell(f"fitting {in_sentence(effect_title(one.name))}")
                 trials.append(told.trials.of(base, one, tell))
             tell("simulating the tests that the actuator allows")
             told.experiment = next_experiment(base.data, trials[0].fit, trials[1].fit)

@@ -51,7 +51,7 @@ class Entry:
         """Steps and error: '2 added, 1.02 × floor'."""
         if self.look is None:
             return self.brought.says[:80] if self.brought is not None else "not opened yet"
-        added = len(self.look.added)
+        added = len(self.look.removable)
         return f"{f'{added} added' if added else 'calibrated'}, {number(self.look.rmse)} × floor"
 
     @property

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from ema_model.comparison.explain import Explanation
 from ema_model.discovery import Candidate, Story, result_of
-from ema_model.discovery.refit import Trial, promising, with_drops
+from ema_model.discovery.refit import Trial, with_drops
 from ema_model.discovery.result import Experiment
 from ema_model.discovery.snapshot import Assessment, Look, assessed, known_of, look_at
 from ema_model.discovery.step import Step
@@ -15,9 +15,6 @@ from ema_model.effects import CATALOGUE
 from emaviz.session.discover.record import steps_of
 from emaviz.session.discover.refits import Trials
 from emaviz.session.discover.saved_story import Recipe, SavedStory
-from emaviz.session.job import Tell
-
-_SHARE, _MOST = 0.25, 3  # of the best effect's score, and how many effects are refitted to compare a fault with
 
 
 @dataclass(eq=False)
@@ -41,21 +38,8 @@ class Telling:
         found = self.known[self.story.steps[-1]] = assessed(self.story)
         self.first = self.first or found.candidates
 
-    def take_faults(self, tell: Tell) -> bool:
-        """Takes the actuator's fault into the model that tells more than any effect would; False if there is none."""
-        story, ranked = self.story, self.known[self.story.steps[-1]].candidates
-        fault = story.fault(ranked, lambda: self._refitted(ranked, tell), tell)
-        if fault:
-            story.add(fault)
-            self.first = ()  # what was ranked was ranked without it
-        return fault is not None
-
-    def _refitted(self, ranked: Sequence[Candidate], tell: Tell) -> list[Trial]:
-        """The most promising of the last model's candidates; what is added of them later is fitted already."""
-        return [self.trials.of(self.story, one, tell) for one in promising(self.story.current, ranked, _SHARE, _MOST)]
-
     def add(self, trial: Trial, alike: Sequence[str]) -> None:
-        """Takes a trial for the next model; alike: effects that cannot be told from it."""
+        """Takes a trial for the next model; alike: effects and faults that cannot be told from it."""
         self.story.add(trial, ties=alike)
         if self.first and trial.candidate.predicted_drop:
             self.first = with_drops(self.first, [trial])

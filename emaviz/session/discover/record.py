@@ -13,6 +13,7 @@ from ema_model.discovery.refit import Trial
 from ema_model.discovery.step import Step
 from ema_model.effects import CATALOGUE, catalogue_name
 from ema_model.errors import InputError
+from ema_model.faults import NAMES
 from emaviz.session.discover.refits import check_value
 from emaviz.session.discover.saved_story import SavedStep
 from emaviz.session.discover.source import actuator_of
@@ -29,7 +30,7 @@ def steps_of(story: Story) -> tuple[SavedStep, ...]:
             as_toml(step.fit.actuator),
             dict(step.fit.starts),
             tuple(step.fit.faults),
-            tuple(sorted({name for one in step.added if one.key not in _keys(before) for name in one.same_as})),
+            _rivals(story, before, step),
         )
         for before, step in pairwise(story.steps)
     )
@@ -57,11 +58,17 @@ def _take(story: Story, saved: SavedStep, tell: Tell) -> None:
         tell,
         saved.faults,
     )
-    more = found.faults[len(story.current.faults) :]
+    more = tuple(name for name in found.faults if name not in story.current.faults)
+    less = [name for name in story.current.faults if name not in found.faults]
+    rivals = [one for one in saved.same_as if one in (*CATALOGUE, *NAMES) and one not in model.effects]
     new = [key for key in model.effects if key not in before.effects]
     gone = [key for key in before.effects if key not in model.effects]
-    if more and not (new or gone):
-        story.add(Trial(Candidate(more[0], 0.0, {}), {}, found, story.current.chi2 - found.chi2, more))
+    if more and not (new or gone or less):
+        story.add(Trial(Candidate(more[0], 0.0, {}), {}, found, story.current.chi2 - found.chi2, more), rivals)
+    elif less and not (new or gone or more):
+        story.remove(less[0], found)
+    elif more or less:
+        raise InputError(_DAMAGED)
     elif len(gone) == 1 and not new:
         story.remove(gone[0], found)
     elif len(gone) == len(new) == 1:
@@ -71,10 +78,16 @@ def _take(story: Story, saved: SavedStep, tell: Tell) -> None:
         name = catalogue_name(new[0])
         trial = Trial(Candidate(name, 0.0, effects[new[0]]), effects, found, story.current.chi2 - found.chi2)
         check_value(trial)
-        rivals = [one for one in saved.same_as if one in CATALOGUE and one not in model.effects]
         story.add(trial, rivals)
     else:
         raise InputError(_DAMAGED)
+
+
+def _rivals(story: Story, before: Step, step: Step) -> tuple[str, ...]:
+    """What cannot be told from that which a step adds."""
+    effects = {name for one in step.added if one.key not in _keys(before) for name in one.same_as}
+    faults = {story.ties[name] for name in step.fit.faults if name not in before.fit.faults and name in story.ties}
+    return tuple(sorted(effects | faults))
 
 
 def _keys(step: Step) -> set[str]:

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from ema_model.discovery import Candidate, Story
+from ema_model.discovery.labels import effect_title
 from ema_model.discovery.refit import Trial
 from ema_model.discovery.snapshot import Assessment, Look, known_of
 from ema_model.discovery.step import Step
-from ema_model.effects import find
 from ema_model.errors import InputError
 from ema_model.quantities.titles import in_sentence
 from emaviz.session.job import Tell
@@ -52,7 +52,7 @@ class Trials:
 def check_value(trial: Trial) -> None:
     """Raises InputError for a refitted model that has no value somewhere: whatever failed stays out of the story."""
     if not all(np.all(np.isfinite(values)) for one in trial.fit.calibration.signals for values in one.values()):
-        title = in_sentence(find(trial.candidate.name).title)
+        title = in_sentence(effect_title(trial.candidate.name))
         raise InputError(
             f"with {title} the model has no value somewhere in these recordings, as in a division by zero; it was not "
             "added"

@@ -51,7 +51,7 @@ class SavedStep(msgspec.Struct, frozen=True):
     model: str  # as an actuator's file
     starts: dict[str, Annotated[float, msgspec.Meta(gt=-_FARTHEST, lt=_FARTHEST)]]  # σ, by path
     faults: tuple[str, ...] = ()
-    same_as: tuple[str, ...] = ()  # effects that cannot be told from the new one
+    same_as: tuple[str, ...] = ()  # effects and faults that cannot be told from the new one
 
     def __post_init__(self) -> None:
         if len(set(self.faults)) != len(self.faults) or not set(self.faults) <= set(NAMES):
@@ -72,7 +72,8 @@ class SavedStory(msgspec.Struct, frozen=True):
         if (one := self.experiment) is not None:
             command(one.command, one.settings)
             for name in one.separates:
-                find(name)
+                if name not in NAMES:
+                    find(name)
             if not all(map(math.isfinite, (one.duration_s, one.load_torque_Nm, one.expected_chi2))):
                 raise InputError("a suggested test has finite numbers")
 

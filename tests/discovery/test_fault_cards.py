@@ -114,7 +114,7 @@ def test_names_and_sizes():
     assert effect_title("k2") == "Backlash (fault k2)" and effect_title("k6") == "Rotor eccentricity (fault k6)"
     assert rung_title(Change("removed", ("k6", "k7")), ROTARY) == "− Rotor eccentricity (fault k6)"
     assert rung_title(Change("fault", ("k6", "k7")), ROTARY) == "Fault k6 eccentricity"
-    assert typical("k3", ACTUATOR) == "phase A: 75% of turns to 25% of turns (k3 0.25 to 0.75)"
+    assert typical("k3", ACTUATOR) == "phase A: 75 % of turns to 25 % of turns (k3 0.25 to 0.75)"
     assert size(Candidate("k1", 0.0, {"k1": 0.3}), ACTUATOR) == "friction × 1.60, k1 ≈ 0.30"
     turned = size(Candidate("k6", 0.0, {"k6": 0.3, "k7": 0.7}), ACTUATOR)
     assert turned == "eccentricity ζ = 0.30, thinnest gap at +72°, k6 ≈ 0.30"

@@ -202,10 +202,11 @@ def _little(data: Data, before: Fit, after: Fit) -> str:
 def _faint(data: Data, before: Fit, after: Fit) -> str:
     """Whether a model that may be true as it is would keep most of what it leaves beyond the floor."""
     first, last = (floor_ratio(data, one.plant, one.calibration.signals) for one in (before, after))
-    if not within_band(data, before) or last <= band(data.floor_spread)[1]:
+    if not within_band(data, before) or last <= 1.0:
         return ""
     kept = (last**2 - 1.0) / max(first**2 - 1.0, 1e-9)
-    return "" if kept < OF_FAINT else "a true model may leave as much, and most of it stays"
+    share = OF_FAINT if last > band(data.floor_spread)[1] else LEAST_SHARE
+    return "" if kept < 1.0 - share else "a true model may leave as much, and most of it stays"
 
 
 def _unsteady(data: Data, after: Fit, key: str) -> str:

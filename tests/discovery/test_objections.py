@@ -134,8 +134,15 @@ def test_the_share_that_counts_is_of_what_the_settled_models_leave(monkeypatch, 
 
 @pytest.mark.parametrize(
     ("before", "after", "kept"),
-    [(1.09, 1.07, True), (1.09, 1.03, False), (1.2, 1.06, False), (1.6, 1.5, False), (1.03, 1.03, False)],
-    ids=["hardly less", "in the band", "most of it", "far from true", "in the band before"],
+    [
+        (1.09, 1.07, True),
+        (1.09, 1.03, False),
+        (1.2, 1.06, False),
+        (1.6, 1.5, False),
+        (1.045, 1.036, True),
+        (1.0, 0.99, False),
+    ],
+    ids=["hardly less", "in the band", "most of it", "far from true", "hardly into the band", "at the floor before"],
 )
 def test_of_a_model_that_may_be_true_an_effect_takes_most_or_is_not_claimed(monkeypatch, before, after, kept):
     """Nine of ten true models leave up to 1.04 floors here, and one of a hundred up to 1.25."""

@@ -93,7 +93,7 @@ def _filtered(path, shape, uneven, k, variance, rate_sigma, passes):  # pragma: 
         for _ in range(passes):
             x, r = k[0], 0.0
             a, b, c = variance[0], 0.0, rate_sigma**2
-            fit = 0.0
+            squared, product, logarithm = 0.0, 1.0, 0.0  # of the likelihood; one logarithm for several flights
             for i in range(1, flights + 1):
                 d = walked[i] - walked[i - 1]
                 q = (uneven[way] * usual) ** 2 * (squares[i] - squares[i - 1])
@@ -104,13 +104,19 @@ def _filtered(path, shape, uneven, k, variance, rate_sigma, passes):  # pragma: 
                     break
                 s = a + variance[i]
                 gap = k[i] - x
-                fit -= 0.5 * (np.log(s) + gap * gap / s)
-                ga, gb = a / s, b / s
+                share = 1.0 / s
+                squared += gap * gap * share
+                product *= s
+                if i % 8 == 0:
+                    logarithm += np.log(product)
+                    product = 1.0
+                ga, gb = a * share, b * share
                 x += ga * gap
                 r += gb * gap
                 c -= gb * b
                 b -= gb * a
                 a -= ga * a
             usual = max(r, 1e-5)
+            fit = -0.5 * (squared + logarithm + np.log(product))
         found[way, 0], found[way, 1], found[way, 2], found[way, 3], found[way, 4], found[way, 5] = x, r, a, b, c, fit
     return found

@@ -39,6 +39,8 @@ NOTHING = Adds(np.zeros(0), np.zeros(0), np.zeros(0))
 
 def adds(k: Array, sigma: Array, common: Array) -> Adds:
     """Of the flights (n,), common (n, base parameters): the two numbers that matter most, straight over k."""
+    if not len(k):
+        return NOTHING
     _, _, ways = np.linalg.svd(common, full_matrices=False)
     common = common @ ways[:2].T
     grows = np.zeros(common.shape[1])

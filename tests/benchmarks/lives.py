@@ -76,14 +76,14 @@ def _oracles(
     first = life.repaired or 0
     since = [(number, flight) for number, flight in numbered if number > first]
     at = np.array([number for number, _ in since])
-    common = np.array([way @ flight.common for _, flight in since])
+    mean, covariance = _unit(life, numbered, ways).known(tuple(ways))
+    common = np.array([way @ flight.common for _, flight in since]).reshape(-1, len(mean))
     k = np.array([way @ flight.k for _, flight in since]) - healthy
     sigma = np.array([np.sqrt(way @ flight.own @ way) for _, flight in since])
     law = Law(life.power, max(0, life.onset - first), life.variation, 0.0 if life.fault == "k8" else 0.05)
-    mean, covariance = _unit(life, numbered, ways).known(tuple(ways))
     fair: Array = k - common @ mean
     unit = adds(fair, sigma, common @ np.linalg.cholesky(covariance))
-    true = k - common @ base_of(life, common.shape[1])
+    true = k - common @ base_of(life, len(mean))
     return {
         "oracle": oracle(at, fair, sigma, now, threshold, law, first + 1, unit),
         "bound": oracle(at, true, sigma, now, threshold, law, first + 1),

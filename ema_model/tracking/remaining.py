@@ -39,8 +39,9 @@ class Remaining:
 def remaining(worn: Wear, threshold: float, unit: Array, begun_sigma: float, bounded: bool, seed: int) -> Remaining:
     """threshold: in the coordinate in which k grows, healthy at 0.
 
-    unit: (2, 2), covariance of what the unit's base parameters add to k̂ at the first flight and today.  That is not
-    known, but k had begun little worn, and where `bounded` not below 0; as it may grow with k, it changes the rate too.
+    unit: (2, 2), covariance of what the unit's base parameters may still add to k at the first flight and today.  That
+    is not known, but k had begun little worn (1 σ: begun_sigma), and where `bounded` not below 0; as it may grow with
+    k, it changes the rate too.
     The rest of the way is a first passage: with today's rate and shape it would take D flights, and as flights wear
     unevenly (coefficient of variation v), it takes inverse Gaussian many, of mean D and shape (D/v)².
     """

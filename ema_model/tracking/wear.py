@@ -2,7 +2,7 @@
 
 A way is an onset, a shape of the rate of wear since (constant, growing as a power of the time since the onset,
 growing by a constant share a flight), and how unevenly flights wear.  For each, level and today's rate are the state
-of a Kalman filter, and the flights' likelihood is its weight: the maximum over the process noise has the most of it.
+of a Kalman filter, and the flights' likelihood makes its weight: the maximum over the process noise has the most of it.
 """
 
 from __future__ import annotations

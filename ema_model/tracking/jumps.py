@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,12 +10,13 @@ from ema_model.tracking.criteria import JUMP_AFTER, JUMP_BACK, JUMP_LEAST, JUMP_
 Array = NDArray[np.float64]
 
 
-def jump(k: Array, variance: Array, common: Sequence[Array], healthy: float) -> int | None:
+def jump(k: Array, variance: Array, common: Array, healthy: float) -> int | None:
     """The place of the first flight after a step, of the flights (n,) of one k; None where there is none.
 
     Only one that JUMP_AFTER flights follow is looked for, so that it is found as soon as it can be.  Medians of three
-    flights on either side tell its size, the differences of the flights beside it how large it must be; what the base
-    parameters (common: flights, parameters) add in other commands is no step.
+    flights on either side tell its size, the differences of the flights beside it how large it must be.  What the base
+    parameters may add in other commands is no step: k is without what is known of it, common (flights, parameters) is
+    what is not.
     """
     at = len(k) - JUMP_AFTER
     if at < JUMP_AFTER + 1:

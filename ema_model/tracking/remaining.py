@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
-from ema_model.tracking.criteria import AHEAD, LONGEST, SAMPLES, WORN_BEFORE
+from ema_model.tracking.criteria import AHEAD, LONGEST, SAMPLES
 from ema_model.tracking.wear import Wear
 
 Array = NDArray[np.float64]
@@ -36,11 +36,12 @@ class Remaining:
         return float(np.searchsorted(self.samples, flights, side="right") / len(self.samples))
 
 
-def remaining(worn: Wear, threshold: float, unit: Array, bounded: bool, seed: int) -> Remaining:
+def remaining(worn: Wear, threshold: float, unit: Array, begun_sigma: float, bounded: bool, seed: int) -> Remaining:
     """threshold: in the coordinate in which k grows, healthy at 0.
 
-    unit: (2, 2), covariance of what the unit's base parameters add to k̂ at the first flight and today.  That is not
-    known, but k had begun little worn, and where `bounded` not below 0; as it may grow with k, it changes the rate too.
+    unit: (2, 2), covariance of what the unit's base parameters may still add to k at the first flight and today.  That
+    is not known, but k had begun little worn (1 σ: begun_sigma), and where `bounded` not below 0; as it may grow with
+    k, it changes the rate too.
     The rest of the way is a first passage: with today's rate and shape it would take D flights, and as flights wear
     unevenly (coefficient of variation v), it takes inverse Gaussian many, of mean D and shape (D/v)².
     """
@@ -59,7 +60,7 @@ def remaining(worn: Wear, threshold: float, unit: Array, bounded: bool, seed: in
     level = worn.level[way] + b / sigma**2 * (rate - worn.rate[way])
     level += np.sqrt(np.maximum(a - (b / sigma) ** 2, 0.0)) * random.standard_normal(SAMPLES)
     begun = level - rate * worn.worn[way]
-    added = begun - _truly_begun(begun, unit[0, 0], bounded, random)
+    added = begun - _truly_begun(begun, unit[0, 0], begun_sigma, bounded, random)
     slope = unit[0, 1] / max(unit[0, 0], 1e-12)
     rest = np.sqrt(max(unit[1, 1] - slope * unit[0, 1], 0.0))
     true_level = level - slope * added - rest * random.standard_normal(SAMPLES)
@@ -82,9 +83,9 @@ def remaining(worn: Wear, threshold: float, unit: Array, bounded: bool, seed: in
     return Remaining(float(p05), float(p50), float(p95), samples)
 
 
-def _truly_begun(begun: Array, variance: float, bounded: bool, random: np.random.Generator) -> Array:
+def _truly_begun(begun: Array, variance: float, sigma: float, bounded: bool, random: np.random.Generator) -> Array:
     """k at the first flight, of what was measured of it."""
-    share = WORN_BEFORE**2 / (WORN_BEFORE**2 + variance)
+    share = sigma**2 / (sigma**2 + variance)
     spread = max(np.sqrt(share * variance), 1e-9)
     normal = _above(-begun * share / spread, random) if bounded else random.standard_normal(len(begun))
     return begun * share + spread * normal

@@ -27,12 +27,12 @@ class Jump:
 
 @dataclass(frozen=True, eq=False)
 class FaultTrack:
-    """One k over the flights; every interval holds 90 %."""
+    """One k over the flights, less what the unit's base parameters are found to add; every interval holds 90 %."""
 
     name: str
     trend: bool
-    level: float  # today, as measured, within k's range
-    level90: Interval  # with what the unit's base parameters may add
+    level: float  # today, within k's range
+    level90: Interval  # with what the unit's base parameters may add more or less
     drift: float  # of k in a flight; 0 without a trend
     drift90: Interval
     since: str  # the flight after which the evidence for a trend sufficed; empty without one
@@ -41,7 +41,7 @@ class FaultTrack:
     reason: str  # why nothing is said of the remaining life; empty where it is
     jumps: tuple[Jump, ...]
     evidence: float  # natural logarithm, of a trend against none
-    k: Array  # (usable flights,), as measured
+    k: Array  # (usable flights,), as measured but for the unit
     sigma: Array  # (usable flights,), of their own noise
 
 

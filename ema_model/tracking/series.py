@@ -12,6 +12,7 @@ from ema_model.tracking.evidence import Evidence
 from ema_model.tracking.flight import Flight
 from ema_model.tracking.jumps import jump
 from ema_model.tracking.sensitivity import growth
+from ema_model.tracking.unit import Unit
 
 Array = NDArray[np.float64]
 
@@ -23,6 +24,8 @@ class Series:
         """one_sided, healthy (8,): whether each only grows, and where it begins."""
         self._healthy, count = healthy, len(healthy)
         self._evidence = Evidence(base, one_sided)
+        self.unit = Unit(base, one_sided, healthy)
+        self._units: dict[int, Unit] = {}  # before each of the last flights
         self.at: list[float] = []
         self.flights: list[Flight] = []
         self.jumps: list[list[int]] = [[] for _ in range(count)]  # places of the first flight after each
@@ -34,8 +37,12 @@ class Series:
         self.at.append(at)
         self.flights.append(flight)
         self._weigh(len(self.at) - 1, np.arange(len(self._healthy)))
-        for i in range(len(self._healthy)):
-            self._jump(i)
+        self._follow(len(self.at) - 1)
+        found = [place for i in range(len(self._healthy)) if (place := self._jump(i)) is not None]
+        if found:  # some flights after it came
+            self.unit = self._units[min(found)].copy()
+            for place in range(min(found), len(self.at)):
+                self._follow(place)
 
     def start(self, i: int) -> int:
         """Place of the first flight since the last jump of a component."""
@@ -46,24 +53,38 @@ class Series:
         """(8,), seen over stated variance."""
         return self._evidence.noise_factor
 
-    def _jump(self, i: int) -> None:
+    def _follow(self, place: int) -> None:
+        """What the flight tells of the unit."""
+        self._units[place] = self.unit.copy()
+        self._units.pop(place - JUMP_WINDOW - JUMP_AFTER, None)
+        for i, jumps in enumerate(self.jumps):
+            if place in jumps:
+                self.unit.replaced(i)
+        flight, spread = self.flights[place], np.sqrt(self.noise_factor)
+        self.unit.add(self.at[place], flight.k, spread[:, None] * flight.own * spread, flight.common)
+
+    def _jump(self, i: int) -> int | None:
+        """The place of a jump that is found now."""
         if not self._may_have_jumped(i):
-            return
+            return None
         first = max(self.start(i), len(self.at) - JUMP_WINDOW - JUMP_AFTER)
         last = self.flights[first:]
+        base, covariance = self.unit.known()
+        common: Array = np.array([one.common[i] for one in last])
         found = jump(
-            np.array([one.k[i] for one in last]),
+            np.array([one.k[i] for one in last]) - common @ base,
             np.array([one.own[i, i] for one in last]),
-            [one.common[i] for one in last],
+            common @ np.linalg.cholesky(covariance),
             float(self._healthy[i]),
         )
         if found is None:
-            return
+            return None
         self.jumps[i].append(first + found)
         self.trend_at[i], self.log_evidence[i] = None, 0.0
         self._evidence.forget(i)
         for place in range(self.start(i), len(self.at)):
             self._weigh(place, np.array([i]))
+        return self.start(i)
 
     def _at_begin(self, place: int) -> Array:
         """(8,), the share of a flight's sensitivities that was there in each k's first flight since its last jump.

@@ -12,7 +12,7 @@ from ema_model import faults
 from ema_model.errors import InputError, quoted
 from ema_model.estimation.unknowns import ECCENTRICITY
 from ema_model.quantities.interval import HALF_90
-from ema_model.tracking.criteria import LEAST_FLIGHTS, LONGEST, MISFIT_SHARE, MISFIT_WINDOW
+from ema_model.tracking.criteria import LEAST_FLIGHTS, LONGEST, MISFIT_SHARE, MISFIT_WINDOW, WORN_BEFORE
 from ema_model.tracking.flight import Flight
 from ema_model.tracking.remaining import remaining
 from ema_model.tracking.result import FaultTrack, Jump, Tracked
@@ -112,9 +112,11 @@ class Tracker:
         begin = max(known.start(i) for i in _places(name))
         healthy = faults.BY_NAME[name].healthy
         now = float(len(self._flights))
-        way, sign = self._direction(name, begin, threshold)
-        k, own = whole.k @ way, (whole.own @ way) @ way
-        common = np.tensordot(whole.common, way, (1, 0))
+        base, spread = known.unit.known(_places(name))
+        added = whole.common @ base
+        way, sign = self._direction(name, (whole.k - added)[begin:], threshold)
+        k, own = (whole.k - added) @ way, (whole.own @ way) @ way
+        common = np.tensordot(whole.common, way, (1, 0)) @ np.linalg.cholesky(spread)
         factor = float(max(known.noise_factor[list(_places(name))]))
         unit = _unit(common[begin:])
         reason, left, drift, drift90 = "", None, 0.0, (0.0, 0.0)
@@ -162,16 +164,17 @@ class Tracker:
             return "no threshold was given", None
         if drift * sign <= 0.0:
             return "it moves away from its threshold", None
-        left = remaining(worn, threshold, unit, TRACKED.index(name) < _ONE_SIDED, self._seed)
+        begun = WORN_BEFORE * (1.0 - faults.BY_NAME[name].healthy)
+        left = remaining(worn, threshold, unit, begun, TRACKED.index(name) < _ONE_SIDED, self._seed)
         if left.p50 >= LONGEST:
             return f"more than {LONGEST:g} flights remain", None
         return "", left
 
-    def _direction(self, name: str, begin: int, threshold: float | None) -> tuple[Array, float]:
-        """By which a vector of k becomes this k, (8,), and the sign with which it grows."""
+    def _direction(self, name: str, k: Array, threshold: float | None) -> tuple[Array, float]:
+        """By which a vector of k becomes this k, (8,), and the sign with which it grows; k (n, 8) since the jump."""
         way = np.zeros(COMPONENTS)
         if name == "k6":
-            recent = np.mean([one.k[list(ECCENTRICITY)] for one in self._usable[begin:][-_RECENT:]], axis=0)
+            recent = k[-_RECENT:, list(ECCENTRICITY)].mean(axis=0)
             way[list(ECCENTRICITY)] = recent / max(float(np.hypot(*recent)), 1e-12)
             return way, 1.0
         place = faults.NAMES.index(name)
@@ -180,14 +183,14 @@ class Tracker:
             return way, 1.0
         if threshold is not None:
             return way, float(np.sign(threshold - faults.HEALTHY[_GAIN]))
-        gain = [one.k[_GAIN] for one in self._usable[begin:]]
+        gain = k[:, _GAIN]
         half = max(1, len(gain) // 2)
         return way, 1.0 if np.mean(gain[-half:]) >= np.mean(gain[:half]) else -1.0
 
     def _jumps(self, name: str, known: Series) -> tuple[Jump, ...]:
         found, healthy = [], 0.0 if name == "k6" else faults.BY_NAME[name].healthy
         for i in _places(name):
-            k = [one.k[i] for one in self._usable]
+            k = [one.k[i] for one in self._usable] if known.jumps[i] else []
             for place in known.jumps[i]:
                 before, after = float(np.median(k[max(0, place - 3) : place])), float(np.median(k[place : place + 3]))
                 back = abs(after - healthy) < abs(before - healthy)

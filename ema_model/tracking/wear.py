@@ -2,7 +2,7 @@
 
 A way is an onset, a shape of the rate of wear since (constant, growing as a power of the time since the onset,
 growing by a constant share a flight), and how unevenly flights wear.  For each, level and today's rate are the state
-of a Kalman filter, and the flights' likelihood is its weight: the maximum over the process noise has the most of it.
+of a Kalman filter, and the flights' likelihood makes its weight: the maximum over the process noise has the most of it.
 """
 
 from __future__ import annotations
@@ -17,13 +17,16 @@ from ema_model.physics.jit import recursion
 
 Array = NDArray[np.float64]
 
-POWERS = (1.0, 1.5, 2.0, 3.0)  # k ∝ (flights since the onset)ᵖ
+POWERS = (1.0, 1.5, 2.0, 2.5, 3.0)  # k ∝ (flights since the onset)ᵖ
 GROWTHS = (1.0 / 150.0, 1.0 / 75.0, 1.0 / 40.0)  # the rate's share a flight
 UNEVEN = (0.3, 0.7, 1.2)  # coefficient of variation of a flight's wear
-_ONSETS = 10  # that are tried
-_SHAPE_PRIOR = (0.4, *[0.1] * 6)
+_ONSETS = 14  # that are tried
+_STEADY = 0.4  # prior of a constant rate; the shapes that grow share the rest
+_AT_ONCE = 0.4  # of wear that began with the first flight, if the rate is constant; the later onsets share the rest
+_GROWING_AT_ONCE = 0.8  # the same if it grows: a wear that departs from the simplest in two ways is rarer
 _RATE = 0.03  # of k in a flight, 1 σ of the prior of today's rate
 _PASSES = 2
+_COUNTS = 0.75  # of the likelihood, between ways: it takes what flights wear as normal, and that is skewed
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,14 +65,17 @@ def wear(at: Array, k: Array, variance: Array, now: float) -> Wear:
     kind = shape % shapes
     power, growth = np.array([*POWERS, *[0.0] * len(GROWTHS)])[kind], np.array([*[0.0] * len(POWERS), *GROWTHS])[kind]
     uneven = np.tile(np.array(UNEVEN), count // len(UNEVEN))
-    prior = np.log(np.array(_SHAPE_PRIOR))[kind]
+    at_once = np.where(kind > 0, _GROWING_AT_ONCE, _AT_ONCE)
+    later = np.repeat(onsets >= first, shapes * len(UNEVEN))
+    prior = np.log(np.where(kind > 0, (1.0 - _STEADY) / (shapes - 1), _STEADY))
+    prior += np.log(np.where(later, (1.0 - at_once) / max(len(onsets) - 1, 1), at_once))
     places = (at - first).astype(np.int64)
     last = np.append(places, int(now - first))  # the state is today's, whether today's flight is usable or not
     path = table[:, :, last]
     found = _filtered(path, shape, uneven, k, variance, _RATE, _PASSES)
     level, rate, a, b, c, fit = found.T
     sigma = np.sqrt(np.maximum(c, 1e-18))
-    weight = fit + prior + log_ndtr(rate / sigma)
+    weight = _COUNTS * fit + prior + log_ndtr(rate / sigma)
     weight = np.exp(weight - weight.max())
     worn = table[:, 0, -1][shape]
     return Wear(weight / weight.sum(), level, rate, np.stack([a, b, c], axis=1), age, power, growth, uneven, worn)
@@ -87,7 +93,7 @@ def _filtered(path, shape, uneven, k, variance, rate_sigma, passes):  # pragma: 
         for _ in range(passes):
             x, r = k[0], 0.0
             a, b, c = variance[0], 0.0, rate_sigma**2
-            fit = 0.0
+            squared, product, logarithm = 0.0, 1.0, 0.0  # of the likelihood; one logarithm for several flights
             for i in range(1, flights + 1):
                 d = walked[i] - walked[i - 1]
                 q = (uneven[way] * usual) ** 2 * (squares[i] - squares[i - 1])
@@ -98,13 +104,19 @@ def _filtered(path, shape, uneven, k, variance, rate_sigma, passes):  # pragma: 
                     break
                 s = a + variance[i]
                 gap = k[i] - x
-                fit -= 0.5 * (np.log(s) + gap * gap / s)
-                ga, gb = a / s, b / s
+                share = 1.0 / s
+                squared += gap * gap * share
+                product *= s
+                if i % 8 == 0:
+                    logarithm += np.log(product)
+                    product = 1.0
+                ga, gb = a * share, b * share
                 x += ga * gap
                 r += gb * gap
                 c -= gb * b
                 b -= gb * a
                 a -= ga * a
             usual = max(r, 1e-5)
+            fit = -0.5 * (squared + logarithm + np.log(product))
         found[way, 0], found[way, 1], found[way, 2], found[way, 3], found[way, 4], found[way, 5] = x, r, a, b, c, fit
     return found

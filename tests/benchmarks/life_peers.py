@@ -5,8 +5,6 @@ at (n,): the numbers of the usable flights since the part was new; k (n,) and it
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
@@ -16,8 +14,8 @@ Quantiles = tuple[float, float, float]
 
 UNDEFINED = (np.nan, np.nan, np.nan)
 LONGEST = 100_000.0  # flights; a median beyond it is no answer
-_QUANTILES = (0.05, 0.5, 0.95)
-_DRAWN = 2000
+QUANTILES = (0.05, 0.5, 0.95)
+DRAWN = 2000
 
 
 def exponential_fit(at: Array, k: Array, sigma: Array, now: float, threshold: float) -> Quantiles:
@@ -41,17 +39,17 @@ def exponential_fit(at: Array, k: Array, sigma: Array, now: float, threshold: fl
     scale = max(1.0, 2.0 * best.cost / max(len(k) - 3, 1))
     covariance = scale * np.linalg.pinv(best.jac.T @ best.jac + 1e-9 * np.eye(3))
     random = np.random.default_rng(0)
-    drawn = random.multivariate_normal(best.x, covariance, _DRAWN, method="eigh")
+    drawn = random.multivariate_normal(best.x, covariance, DRAWN, method="eigh")
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
         reached = np.log1p((threshold - drawn[:, 0]) / np.exp(drawn[:, 1])) / np.exp(drawn[:, 2]) + at[0] - now
     reached = np.clip(np.nan_to_num(reached, nan=0.0, posinf=LONGEST), 0.0, LONGEST)
-    return _told(np.quantile(reached, _QUANTILES))
+    return told(np.quantile(reached, QUANTILES))
 
 
 def particle_filter(at: Array, k: Array, sigma: Array, now: float, threshold: float, seed: int = 0) -> Quantiles:
     """A bootstrap filter: level and the logarithm of its growth in a flight, which walks; each particle goes on."""
     random = np.random.default_rng(seed)
-    count, walk, uneven = _DRAWN, 0.03, 0.7
+    count, walk, uneven = DRAWN, 0.03, 0.7
     level = random.uniform(0.0, 0.05, count)
     rate = np.log(10.0) * random.uniform(-5.0, -1.5, count)
     last = at[0]
@@ -74,53 +72,10 @@ def particle_filter(at: Array, k: Array, sigma: Array, now: float, threshold: fl
         left[new], reached = ahead, reached | new
         if reached.all():
             break
-    return _told(np.quantile(left, _QUANTILES))
+    return told(np.quantile(left, QUANTILES))
 
 
-@dataclass(frozen=True)
-class Law:
-    """What an oracle knows: k = s + (threshold − s) (w/W)ᵖ, w the wear since the onset, of 1 a flight on average."""
-
-    power: float
-    onset: int  # flights since the part was new, before which nothing wears
-    variation: float  # of a flight's wear
-    most_begun: float  # s is below it
-
-
-def oracle(at: Array, k: Array, sigma: Array, now: float, threshold: float, law: Law, first: int) -> Quantiles:
-    """Knows the law; learns s and W, over a grid of which w is followed by an extended Kalman filter.
-
-    first: the number of the part's first flight.  k is without what the unit's base parameters add, which it knows.
-    """
-    begun = np.linspace(0.0, law.most_begun, 12) if law.most_begun else np.zeros(1)
-    lengths = np.geomspace(20.0, 450.0, 120)
-    s, length = (grid.ravel() for grid in np.meshgrid(begun, lengths))
-    w, variance, fit = np.zeros(len(s)), np.zeros(len(s)), np.zeros(len(s))
-    seen = dict(zip(at.astype(int), zip(k, sigma)))
-    for flight in range(first, int(now) + 1):
-        if flight - first >= law.onset:
-            w, variance = w + 1.0, variance + law.variation**2
-        if flight not in seen:
-            continue
-        value, spread = seen[flight]
-        share = np.maximum(w, 0.0) / length
-        slope = (threshold - s) * law.power * share ** (law.power - 1.0) / length
-        gap = value - s - (threshold - s) * share**law.power
-        total = slope**2 * variance + spread**2
-        fit -= 0.5 * (np.log(total) + gap**2 / total)
-        gain = variance * slope / total
-        w, variance = w + gain * gap, np.maximum(variance - gain * slope * variance, 0.0)
-    weight = np.exp(fit - fit.max())
-    edges = np.cumsum(weight / weight.sum())
-    random = np.random.default_rng(0)
-    chosen = np.searchsorted(edges, (np.arange(_DRAWN) + 0.5) / _DRAWN * (1.0 - 1e-12))
-    wait = max(0, first + law.onset - 1 - int(now))
-    there = length[chosen] - w[chosen] - np.sqrt(variance[chosen]) * random.standard_normal(_DRAWN)
-    there = np.maximum(there, 1e-3)
-    passed = random.wald(there, (there / law.variation) ** 2) + 0.5 * (1.0 + law.variation**2)
-    return _told(np.quantile(wait + passed, _QUANTILES))
-
-
-def _told(quantiles: Array) -> Quantiles:
+def told(quantiles: Array) -> Quantiles:
+    """Of the flights that remain; no answer where their median has no end."""
     low, middle, high = (float(one) for one in quantiles)
     return (low, middle, high) if middle < LONGEST else UNDEFINED

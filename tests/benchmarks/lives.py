@@ -1,11 +1,12 @@
-"""The life that remains as the tracking tells it, beside an exponential fit, a particle filter, and an oracle.
+"""The life that remains as the tracking tells it, beside an exponential fit, a particle filter, and two oracles.
 
     python tests/benchmarks/lives.py [--seeds 30] [--first 60000]
 
 Lives are drawn as in the plan `lives`; all are asked after the same flights: those at λ between the one in which the
-tracking declares a trend and the end.  The peers are given the same k since the last jump that the tracking found; the
-oracle k without what the unit's base parameters add, since the last repair, and the law with its exponent, its onset
-and how unevenly flights wear.
+tracking declares a trend and the end.  The peers are given the same k since the last jump that the tracking found,
+without what it found the unit's base parameters to add.  Both oracles are given k since the last repair, and the law
+with its exponent, its onset and how unevenly flights wear.  "oracle" has of the unit's base parameters what all eight
+k of its flights tell, as the tracking has; "bound" has k without what these add, which nobody can know.
 """
 
 from __future__ import annotations
@@ -14,7 +15,8 @@ import argparse
 from collections import defaultdict
 
 import numpy as np
-from life_peers import Law, exponential_fit, oracle, particle_filter
+from life_oracles import Law, adds, oracle
+from life_peers import Array, Quantiles, exponential_fit, particle_filter
 
 from ema_model import faults
 from ema_model.campaign.kinds.track import ALPHA, LAMBDA, LAMBDAS, Told, places
@@ -23,8 +25,9 @@ from ema_model.lives import LAWS, Life, drawn, worn_life
 from ema_model.lives.recorded import base_of
 from ema_model.tracking.flight import Flight
 from ema_model.tracking.track import Tracker
+from ema_model.tracking.unit import Unit
 
-WAYS = ("emaviz", "exponential fit", "particle filter", "oracle")
+WAYS = ("emaviz", "exponential fit", "particle filter", "oracle", "bound")
 VARIATIONS = (0.5, 1.0)
 
 
@@ -44,7 +47,7 @@ def answers(life: Life) -> dict[str, list[Told]]:
     return told
 
 
-def after(life: Life, flights: list[Flight], tracker: Tracker) -> dict[str, tuple[float, float, float]]:
+def after(life: Life, flights: list[Flight], tracker: Tracker) -> dict[str, Quantiles]:
     """By way, 5, 50 and 95 % of the flights that remain."""
     one = tracker.look().faults[life.fault]
     healthy = faults.BY_NAME[life.fault].healthy
@@ -59,28 +62,46 @@ def after(life: Life, flights: list[Flight], tracker: Tracker) -> dict[str, tupl
         "emaviz": (np.nan,) * 3 if left is None else (left.p05, left.p50, left.p95),
         "exponential fit": exponential_fit(*given, now, threshold),
         "particle filter": particle_filter(*given, now, threshold, life.seed),
-        "oracle": _oracle(life, numbered, now, threshold, sign * healthy, sign),
+        **_oracles(life, numbered, now, threshold, sign * healthy, sign),
     }
 
 
-def _oracle(life: Life, numbered: list, now: float, threshold: float, healthy: float, sign: float):
-    place = faults.NAMES.index(life.fault)
+def _oracles(
+    life: Life, numbered: list, now: float, threshold: float, healthy: float, sign: float
+) -> dict[str, Quantiles]:
+    ways: list[int] = [*ECCENTRICITY] if life.fault == "k6" else [faults.NAMES.index(life.fault)]
+    end = to_vector(life.k[-1])[ways]
     way = np.zeros(len(faults.NAMES))
-    way[place] = sign
-    if life.fault == "k6":
-        places_of = list(ECCENTRICITY)
-        vector = to_vector(life.k[-1])[places_of]
-        way[:] = 0.0
-        way[places_of] = vector / np.hypot(*vector)
+    way[ways] = end / np.hypot(*end) if life.fault == "k6" else sign
     first = life.repaired or 0
     since = [(number, flight) for number, flight in numbered if number > first]
-    base = base_of(life, since[0][1].common.shape[1])
     at = np.array([number for number, _ in since])
-    k = np.array([way @ (flight.k - flight.common @ base) - healthy for _, flight in since])
+    mean, covariance = _unit(life, numbered, ways).known(tuple(ways))
+    common = np.array([way @ flight.common for _, flight in since]).reshape(-1, len(mean))
+    k = np.array([way @ flight.k for _, flight in since]) - healthy
     sigma = np.array([np.sqrt(way @ flight.own @ way) for _, flight in since])
-    begun = 0.0 if life.fault == "k8" else 0.05
-    law = Law(life.power, max(0, life.onset - first), life.variation, begun)
-    return oracle(at, k, sigma, now, threshold, law, first + 1)
+    law = Law(life.power, max(0, life.onset - first), life.variation, 0.0 if life.fault == "k8" else 0.05)
+    fair: Array = k - common @ mean
+    unit = adds(fair, sigma, common @ np.linalg.cholesky(covariance))
+    true = k - common @ base_of(life, len(mean))
+    return {
+        "oracle": oracle(at, fair, sigma, now, threshold, law, first + 1, unit),
+        "bound": oracle(at, true, sigma, now, threshold, law, first + 1),
+    }
+
+
+def _unit(life: Life, numbered: list, ways: list[int]) -> Unit:
+    """What all k of all flights tell of the unit, the repair being known."""
+    place = np.arange(len(faults.NAMES))
+    unit = Unit(numbered[0][1].common.shape[1], place < 5, np.where(place == 7, faults.HEALTHY[7], 0.0))
+    waiting = life.repaired is not None
+    for number, flight in numbered:
+        if waiting and number > (life.repaired or 0):
+            waiting = False
+            for i in ways:
+                unit.replaced(i)
+        unit.add(number, flight.k, flight.own, flight.common)
+    return unit
 
 
 def main() -> None:

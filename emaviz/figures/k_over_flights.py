@@ -26,7 +26,7 @@ def figure(
     levels: Mapping[int, tuple[float, float, float]] | None = None,
     dark: bool = False,
 ) -> go.Figure:
-    """k by flight; a flight that was left out is a gap.
+    """k by flight, as identified but for what the unit's base parameters add; a flight that was left out is a gap.
 
     last: what is known after all flights, of which those since `result` are drawn pale; levels: by flight, the level as
     it was known then, and the ends of its 90 % interval.
@@ -46,8 +46,8 @@ def figure(
     error = {"type": "data", "array": HALF_90 * one.sigma, "thickness": 0.7, "width": 0}
     dots = {"size": 4, "color": REFERENCE}
     said = "%{text}: %{y:.4f} ± %{error_y.array:.2g}<extra></extra>"
-    measured = {"x": at, "y": one.k, "error_y": error, "text": names, "hovertemplate": said}
-    chart.add_trace(go.Scatter(**measured, mode="markers", marker=dots, name="measured"))
+    identified = {"x": at, "y": one.k, "error_y": error, "text": names, "hovertemplate": said}
+    chart.add_trace(go.Scatter(**identified, mode="markers", marker=dots, name="identified"))
     now = len(result.flights)
     if last is not None and len(last.flights) > now:
         since = [(i, flight.name) for i, flight in enumerate(last.flights, 1) if not flight.excluded]

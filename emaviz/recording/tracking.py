@@ -61,7 +61,7 @@ class TrackingWriter(RecordingWriter):
     def fault(self, name: str) -> None:
         """One k."""
         one, colours = self._result.faults[name], GROUP_COLOURS
-        self._line(f"{name}/k", f"{name} measured", colours["reference"], self._at, one.k)
+        self._line(f"{name}/k", f"{name} identified", colours["reference"], self._at, one.k)
         for side, sign in (("low", -1.0), ("high", 1.0)):
             band = one.k + sign * HALF_90 * one.sigma
             self._line(f"{name}/{side}", f"{name} 90 % {side}", colours["floor_low"], self._at, band)

@@ -6,6 +6,7 @@ import pytest
 from support.foreign_rigs import actuator_of, measured, recorded
 from support.representative import first_of
 
+from ema_model.comparison import compare
 from ema_model.comparison.criteria import BAND
 from ema_model.discovery import discover
 
@@ -20,3 +21,10 @@ def test_a_healthy_rig_is_adequate_or_unknown_and_nothing_is_named(rig, tmp_path
     assert found.verdict in ("adequate", "unknown_effect") and not found.effects
     assert found.ladder[-1].rmse <= BAND or found.verdict == "unknown_effect"
     assert not any(one.at_bound for one in found.calibration.parameters.values())
+
+
+def test_what_a_coarse_position_sensor_holds_is_no_missing_physics(tmp_path):
+    """Twelve bits of a turn: between moves the reading stays the same for hundreds of samples."""
+    recorded("hobby", 19, tmp_path, programmes=["random"])
+    actuator = actuator_of("hobby")
+    assert compare(measured(tmp_path, actuator, ["random"]), actuator).adequate

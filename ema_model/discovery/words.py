@@ -25,6 +25,7 @@ VERDICTS = {
     "not_converged": "the calibration has not converged; what looks like missing physics may be an unfinished fit",
     "not_repeatable": "the run does not repeat itself, so that a comparison over time means nothing",
 }
+_MOVED, _MOST_MOVED = 0.5, 3  # σ of a tolerance, from which on a parameter's own value is worth a word; of those
 FLOOR_NOTE = (
     "Errors are rms over all fitted signals in units of the floor: 1 is what noise and the model's own limits leave. "
     "A little below 1 is usual, as the floor is measured on the safe side."
@@ -132,12 +133,35 @@ def sentences(found: Discovery) -> list[str]:
         outside = all_of([on_axes(path, found.actuator.axes).title for path in found.parameters_outside_tolerance])
         whose = "its" if len(found.parameters_outside_tolerance) == 1 else "their"
         told.append(f"Outside {whose} tolerance: {outside}.")
+    told += moved(found)
     if found.unknown is not None:
         told.append(("Something else is left. " if found.effects else "") + found.unknown.sentence)
     told += not_claimed(found)
     if found.curve is not None:
         told.append(f"A torque curve stands in for it, with which the error falls from {_times(first, last)}.")
     return told + repeatability(found)
+
+
+def moved(found: Discovery) -> list[str]:
+    """['Within tolerance, but not as the file has it: motor viscous friction 21.3 ± 0.35 mN·m·s/rad (8.00).']"""
+    if found.verdict not in ("adequate", "effects_found"):
+        return []  # what is left may have moved them
+    sure = {
+        path: one
+        for path, one in found.calibration.parameters.items()
+        if path not in found.parameters_outside_tolerance
+        and "." in path
+        and not path.startswith(("effects.", "sensors."))
+        and abs(one.z) > _MOVED
+        and abs(one.value - one.initial) > one.interval90[1] - one.interval90[0]
+    }
+    most = sorted(sure, key=lambda path: -abs(sure[path].z))[:_MOST_MOVED]
+    named = [
+        f"{in_sentence(on_axes(path, found.actuator.axes).title)} {value(sure[path])} "
+        f"({amount(sure[path].initial, sure[path].unit)})"
+        for path in most
+    ]
+    return [f"Within tolerance, but not as the file has it: {all_of(named)}."] if named else []
 
 
 def verification(found: Discovery, saved: Verified) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
+import pytest
 from support.discovered import with_cogging
 
 from ema_model.discovery import tables
@@ -12,6 +13,8 @@ from ema_model.discovery.labels import effect_title, rung_label
 from ema_model.discovery.result import Change, StoodIn
 from ema_model.discovery.sentences import NOT_REPEATABLE, masked, untold
 from ema_model.discovery.summary import as_dict
+from ema_model.discovery.words import moved
+from ema_model.estimation import Calibrated
 from ema_model.quantities.axes import ROTARY, Axes
 from emaviz.report import write_discovery_report
 
@@ -63,3 +66,23 @@ def test_a_refit_that_diverged_is_called_so_and_a_poor_one_has_its_number():
     assert table is not None
     refitted = {row[0]: row[2] for row in table.rows}
     assert refitted[effect_title(one.name)] == "refit diverged" and refitted[effect_title(other.name)] == "−3"
+
+
+@pytest.mark.parametrize(
+    ("value", "half", "verdict", "said"),
+    [
+        (0.0213, 0.0002, "adequate", True),
+        (0.0213, 0.0002, "partly_explained", False),
+        (0.0213, 0.02, "adequate", False),
+        (0.0085, 0.0001, "adequate", False),
+    ],
+    ids=["surely moved", "what is left may have moved it", "not known so well", "hardly moved"],
+)
+def test_a_parameter_that_is_surely_another_than_the_files_is_told(value, half, verdict, said):
+    """Within its tolerance of 0.008 ± 0.008 it is not missing physics, and yet what one wants to know."""
+    one = Calibrated(value, 0.008, (value - half, value + half), "N·m·s/rad", (value - 0.008) / 0.008, False)
+    found = with_cogging()
+    calibration = replace(found.calibration, parameters={"motor.viscous_friction_Nms_rad": one})
+    told = moved(replace(found, verdict=verdict, calibration=calibration, parameters_outside_tolerance=[]))
+    line = "Within tolerance, but not as the file has it: motor viscous friction 0.02130 ± 0.00020 N·m·s/rad"
+    assert [text.startswith(line) for text in told] == [True] * said

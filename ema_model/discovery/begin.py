@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 from ema_model.actuator import Actuator
 from ema_model.comparison.compare import weights_of
-from ema_model.discovery.model_fit import Data, fit, gather, in_floors_of
+from ema_model.discovery.criteria import FAR
+from ema_model.discovery.model_fit import Data, fit, floor_ratio, gather, in_floors_of
 from ema_model.discovery.path import Story
 from ema_model.discovery.repeatability import by_inverse_dynamics, is_lost, with_divergence
 from ema_model.discovery.result import Change
@@ -59,9 +61,13 @@ def calibrated_story(
     data, held = (_data(recordings, actuator, signals, guarded) for recordings in (measurements, holdout))
     assert data is not None
     tell("calibrating")
+    near, data = data, replace(data, floors=[replace(one, even=True) for one in data.floors])
     base = fit(data, actuator, tell=tell)
     # How the two models differ depends on their parameters: on where the motor comes to stand above all.
-    bare, (data, lost) = data, with_divergence(data.beside(base), base)
+    bare = data
+    if floor_ratio(data, base.plant, base.calibration.signals) <= FAR:
+        data = near
+    data, lost = with_divergence(data.beside(base), base)
     held = None if held is None else held.beside(base)
     if not data.weighs_as(bare):
         base = fit(data, actuator, base.starts, tell)

@@ -45,6 +45,7 @@ class Floor:
     beating: Mapping[str, Array] = field(default_factory=dict)  # of quantisation, (blocks,); told once it was fitted
     held_s: Mapping[str, Array] = field(default_factory=dict)  # how long a reading stays the same, (blocks,)
     samples: int = 1  # in a block
+    even: bool = False  # a fit counts the noise of all blocks alike: far from the floor it is no reading's error
 
     def sigma(self, signal: str) -> Array:
         """Both together, (blocks,); once fitted, what a true model leaves: `left` in place of `model`."""
@@ -61,11 +62,11 @@ class Floor:
         return np.hypot(self.fit_noise(signal), np.sqrt(repeats) * self.model[signal])
 
     def fit_noise(self, signal: str) -> Array:
-        """The noise as a fit counts it: a reading that is held is one, however many samples repeat it, (blocks,)."""
-        white = self.white_part(signal)
-        if signal not in self.held_s:
-            return white
-        return np.hypot(white, np.sqrt(np.maximum(1.0, self.held_s[signal] / self.block_s)) * self._held(signal))
+        """The noise as a fit counts it: a reading that is held is one in 25 ms, not one a sample, (blocks,)."""
+        if self.even or signal not in self.held_s:
+            return np.full(len(self.repeats), self.noise[signal])
+        lasts = np.minimum(self.held_s[signal], CORRELATED_S) / self.block_s
+        return np.hypot(self.white_part(signal), np.sqrt(np.maximum(1.0, lasts)) * self._held(signal))
 
     def white_part(self, signal: str) -> Array:
         """Of the noise, what a mean over 25 ms takes away, (blocks,)."""

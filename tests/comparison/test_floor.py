@@ -135,14 +135,17 @@ def test_a_coarse_grid_that_is_crossed_slowly_is_off_by_as_much_as_its_floor_say
         assert np.sqrt(np.mean(blocks) / np.mean(told)) == pytest.approx(1.0, rel=0.02)
 
 
-def test_a_reading_that_is_held_counts_once_in_a_fit():
-    """However often it was sampled: over a standstill, quantisation is one error."""
-    for samples in (40, 400):
+def test_a_reading_that_is_held_counts_once_in_25_ms_of_a_fit():
+    """However often it was sampled; one that is not held, or far from the floor, counts in every sample."""
+    for period in (0.5e-3, 2.5e-3):
+        count = round(0.25 / period)
         own = Floor(
             {"user_position_rad": 1.0},
-            {"user_position_rad": np.zeros(samples)},
-            np.ones(samples),
-            1e-2 / samples,
-            held_s={"user_position_rad": np.full(samples, 10.0)},
+            {"user_position_rad": np.zeros(count)},
+            np.ones(count),
+            period,
+            held_s={"user_position_rad": np.full(count, 1e6)},
         )
-        assert np.sum(own.fit_sigma("user_position_rad") ** -2.0) < 0.01
+        moves = replace(own, held_s={"user_position_rad": np.full(count, period)})
+        for one, values in ((own, 10.0), (moves, count), (replace(own, even=True), count)):
+            assert np.sum(one.fit_sigma("user_position_rad") ** -2.0) == pytest.approx(values)

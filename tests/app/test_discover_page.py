@@ -146,6 +146,7 @@ def worn(app):
     return "Worn"
 
 
+@pytest.mark.long
 def test_a_fault_is_a_card_among_the_effects_and_is_added_and_removed(discover, worn, app):
     page = discover
     begin(page, app, worn)

@@ -77,6 +77,7 @@ def test_a_fault_is_a_card_that_is_added_taken_out_and_taken_back(faults):
     assert story.undo() and not story.current.faults and story.ladder[-1].rmse == healthy
 
 
+@pytest.mark.long
 def test_a_step_after_a_fault_is_beside_it_and_the_fault_may_go_first():
     story = worn({"k2": 0.3})
     story.add(story.trial(card(assessed(story), "k2")))
@@ -89,6 +90,7 @@ def test_a_step_after_a_fault_is_beside_it_and_the_fault_may_go_first():
     assert labels == ["calibrated", "fault k2 backlash", "+ viscous_friction", "− fault k2 backlash"]
 
 
+@pytest.mark.long
 def test_the_command_line_ranks_faults_beside_effects():
     recordings = [recorded(run, {"k2": 0.3}, seed) for seed, run in enumerate((CHIRP, SINE))]
     found = discover(recordings, ACTUATOR, holdout=[recorded(UNSEEN, {"k2": 0.3}, 9)])

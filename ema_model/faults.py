@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from types import SimpleNamespace
 
@@ -49,6 +50,11 @@ HEALTHY.setflags(write=False)
 def cause_of(name: str) -> tuple[str, ...]:
     """The faults that one stands for together with, the first of which names them."""
     return next(names for names in CAUSES if name in names)
+
+
+def causes(names: Collection[str]) -> list[str]:
+    """Of these faults, the one that names each cause: k6 without its k7."""
+    return [one[0] for one in CAUSES if one[0] in names]
 
 
 class PhysicalFaults(SimpleNamespace):

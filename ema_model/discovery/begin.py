@@ -61,15 +61,13 @@ def calibrated_story(
     data, held = (_data(recordings, actuator, signals, guarded) for recordings in (measurements, holdout))
     assert data is not None
     tell("calibrating")
-    near, data = data, replace(data, floors=[replace(one, even=True) for one in data.floors])
-    base = fit(data, actuator, tell=tell)
+    far = replace(data, floors=[replace(one, even=True) for one in data.floors])
+    base = fit(far, actuator, tell=tell)
+    is_far = floor_ratio(far, base.plant, base.calibration.signals) > FAR
     # How the two models differ depends on their parameters: on where the motor comes to stand above all.
-    bare = data
-    if floor_ratio(data, base.plant, base.calibration.signals) <= FAR:
-        data = near
-    data, lost = with_divergence(data.beside(base), base)
+    data, lost = with_divergence((far if is_far else data).beside(base), base)
     held = None if held is None else held.beside(base)
-    if not data.weighs_as(bare):
+    if not data.weighs_as(far):
         base = fit(data, actuator, base.starts, tell)
     data, held = in_floors_of(base, data, held)
     return Story(data, held, [Step(base, rung_of(Change(), base, data, held), ())], not is_lost(lost))

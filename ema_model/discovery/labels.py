@@ -9,7 +9,7 @@ from ema_model.discovery.result import Added, Change, Discovery
 from ema_model.effects import CATALOGUE, find
 from ema_model.errors import InputError
 from ema_model.estimation import Calibrated
-from ema_model.faults import BY_NAME, cause_of
+from ema_model.faults import BY_NAME, cause_of, causes
 from ema_model.quantities.axes import Axes
 from ema_model.quantities.numbers import amount, with_uncertainty
 from ema_model.quantities.titles import all_of, in_sentence
@@ -42,7 +42,7 @@ def rung_title(one: Change, axes: Axes) -> str:
         before, after = (effect_title(name) for name in one.names)
         return f"{after} in place of {in_sentence(before)}"
     if one.kind == "fault":  # a phase belongs to its modulus
-        return f"Fault {all_of([BY_NAME[name].label for name in one.names if name == cause_of(name)[0]])}"
+        return f"Fault {all_of([BY_NAME[name].label for name in causes(one.names)])}"
     label = rung_label(one, axes)
     return label[:1].upper() + label[1:]
 

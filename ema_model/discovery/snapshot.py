@@ -21,7 +21,7 @@ from ema_model.discovery.result import Added
 from ema_model.discovery.step import Step
 from ema_model.discovery.tracks import primary
 from ema_model.effects import find
-from ema_model.faults import BY_NAME, CAUSES
+from ema_model.faults import BY_NAME, causes
 from ema_model.quantities.interval import HALF_90
 
 Array = NDArray[np.float64]
@@ -111,7 +111,7 @@ class Look:
     @property
     def removable(self) -> list[str]:
         """Keys of what was added, which can be taken out again: of the effects, then the first of each fault's."""
-        return [one.key for one in self.added] + [one[0] for one in CAUSES if one[0] in self.found.faults]
+        return [*(one.key for one in self.added), *causes(self.found.faults)]
 
     @property
     def primary(self) -> str:

@@ -9,7 +9,7 @@ from ema_model.discovery.labels import effect_title, value
 from ema_model.discovery.result import Discovery, Rung
 from ema_model.discovery.tables import added, candidates, ladder, per_recording
 from ema_model.discovery.verify import Verified
-from ema_model.faults import BY_NAME, CAUSES, FAULTS, NAMES
+from ema_model.faults import BY_NAME, FAULTS, NAMES, causes
 from ema_model.quantities.numbers import amount, number
 from ema_model.quantities.shown import of_signal
 from ema_model.quantities.sides import USER
@@ -113,7 +113,7 @@ def sentences(found: Discovery) -> list[str]:
     """What follows the headline: how far the error falls, what cannot be told apart, what is left."""
     told = []
     first, last = found.ladder[0], found.ladder[-1]
-    added = len(found.effects) + sum(names[0] in found.faults for names in CAUSES)
+    added = len(found.effects) + len(causes(found.faults))
     if added:
         told.append(f"With {'it' if added == 1 else 'them'} the error falls from {_times(first, last)}.")
     else:

@@ -12,7 +12,7 @@ from ema_model.discovery.result import Added
 from ema_model.discovery.words import faults
 from ema_model.effects import Effect, find
 from ema_model.effects.effect import STAGES
-from ema_model.faults import CAUSES
+from ema_model.faults import cause_of, causes
 from emaviz.text.html import Html, html, joined
 from emaviz.text.mathml import mathml
 
@@ -52,11 +52,11 @@ def equation(found: Discovery, added: Sequence[Added]) -> Html:
         if len(effect.parameters) > 6:
             values = f"{len(effect.parameters)} knots, fitted"
         by_line.setdefault(_line(effect), []).append(_term(effect_title(one.name), effect.equation, values))
-    for names in CAUSES:
-        if names[0] in found.faults:
-            page, told = page_of(names[0]), faults(found)
-            term = _term(effect_title(names[0]), page.equation, ", ".join(told[name] for name in names))
-            by_line.setdefault(page.line, []).append(term)
+    told = faults(found)
+    for fault in causes(found.faults):
+        page = page_of(fault)
+        term = _term(effect_title(fault), page.equation, ", ".join(told[name] for name in cause_of(fault)))
+        by_line.setdefault(page.line, []).append(term)
     rows = []
     for line, base in _LINES.items():
         if line in by_line or line == "motion":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator
 from typing import Any
 
@@ -11,6 +12,7 @@ from support.on_page import wait_until
 from support.one_tab import Tab
 
 from emaviz.page.app import App
+from emaviz.session.compare import comparing
 from emaviz.session.worker import Worker
 
 
@@ -92,3 +94,12 @@ def worker(errors: list[Any]) -> Iterator[Worker]:
     worker = Worker("test-compute", errors.append)
     yield worker
     worker.close()
+
+
+@pytest.fixture
+def reads(monkeypatch: pytest.MonkeyPatch) -> Iterator[threading.Event]:
+    """Compare reads no file before this is set."""
+    go_on, plain = threading.Event(), comparing.read_opened
+    monkeypatch.setattr(comparing, "read_opened", lambda *asked: go_on.wait(30.0) and plain(*asked))
+    yield go_on
+    go_on.set()

@@ -11,7 +11,6 @@ from ema_model.actuator import load_actuator
 from ema_model.commands import command
 from ema_model.recordings import write_measurement
 from ema_model.simulation.run import Run, simulate_reference
-from emaviz.session.compare import comparing as module
 from emaviz.session.compare.comparing import Comparing
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.session import Session
@@ -46,15 +45,6 @@ def heard(comparing):
     return missing, waits, compared
 
 
-@pytest.fixture
-def slow(monkeypatch):
-    """Files are read only once this is set."""
-    go_on, plain = threading.Event(), module.read_opened
-    monkeypatch.setattr(module, "read_opened", lambda *asked: go_on.wait(30.0) and plain(*asked))
-    yield go_on
-    go_on.set()
-
-
 def another_run(comparing, title):
     """A long run beside it; returns what ends it."""
     over = threading.Event()
@@ -67,18 +57,18 @@ def another_run(comparing, title):
     return over.set
 
 
-def test_asked_while_the_file_is_being_read_it_waits_for_it(comparing, heard, slow):
+def test_asked_while_the_file_is_being_read_it_waits_for_it(comparing, heard, reads):
     missing, waits, compared = heard
     comparing.add("uploads/first.csv")
     comparing.asking.ask(by_hand=True)
     wait_until(lambda: waits)
     assert waits[0] == "Comparing: waiting for uploads/first.csv to be read …" and not comparing.running
-    slow.set()
+    reads.set()
     wait_until(lambda: compared)
     assert compared == [1] and not missing and not comparing.job.waiting
 
 
-def test_all_files_on_their_way_are_in_one_comparison(comparing, heard, slow):
+def test_all_files_on_their_way_are_in_one_comparison(comparing, heard, reads):
     missing, waits, compared = heard
     for name in ("first", "second"):
         comparing.add(f"uploads/{name}.csv")
@@ -86,18 +76,18 @@ def test_all_files_on_their_way_are_in_one_comparison(comparing, heard, slow):
     comparing.asking.ask(by_hand=True)
     wait_until(lambda: waits)
     assert waits[0].endswith("uploads/first.csv and 1 more to be read …")
-    slow.set()
+    reads.set()
     wait_until(lambda: compared and not comparing.running and not comparing.job.waiting)
     assert compared == [2] and not missing
 
 
-def test_a_file_that_cannot_be_read_ends_the_wait_in_words(comparing, heard, slow):
+def test_a_file_that_cannot_be_read_ends_the_wait_in_words(comparing, heard, reads):
     missing, waits, compared = heard
     (comparing.folder.uploads / "bad.csv").write_bytes(b"\x00\x01\x02" * 20)
     comparing.add("uploads/bad.csv")
     comparing.asking.ask(by_hand=True)
     wait_until(lambda: waits)
-    slow.set()
+    reads.set()
     wait_until(lambda: missing)
     assert missing[0][1] and not comparing.job.waiting and not compared
 

@@ -25,7 +25,6 @@ from emaviz.page.compare.tab import CompareTab
 from emaviz.page.explore.tab import ExploreTab
 from emaviz.page.identify.tab import IdentifyTab
 from emaviz.page.track.tab import TrackTab
-from emaviz.session.compare import comparing as comparing_module
 
 pytestmark = pytest.mark.browser
 
@@ -325,15 +324,6 @@ def test_compare_pressed_while_the_upload_is_still_being_read_is_carried_out(com
     wait_until(lambda: app.comparing.comparison is not before, 60.0)
     compare.get_by_text("Compared in").wait_for()
     assert compare.locator(".emaviz-beside").count() == 0
-
-
-@pytest.fixture
-def reads(monkeypatch):
-    """No file is read before this is set."""
-    go_on, plain = threading.Event(), comparing_module.read_opened
-    monkeypatch.setattr(comparing_module, "read_opened", lambda *asked: go_on.wait(30.0) and plain(*asked))
-    yield go_on
-    go_on.set()
 
 
 def test_a_comparison_that_must_wait_says_for_what_and_can_be_stopped(compare, app, recording):

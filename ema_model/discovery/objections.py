@@ -50,6 +50,7 @@ def against(data: Data, before: Fit, after: Fit, keys: Sequence[str], settled: C
         or _worse(data, before, after)
         or _little(data, before, after)
         or _faint(data, before, after)
+        or _strained(data, before, after)
         or outdone(data, before, after)
         or _dated(data, before, after)
         or _against_settled(data, before, after, keys, settled)
@@ -146,7 +147,7 @@ def _bent(before: Fit, after: Fit, key: str) -> str:
             continue
         if path.startswith(f"effects.{key}."):
             return f"its {_title(after, path)} would stand at the bound"
-        if "." not in path or path.startswith("effects."):
+        if not _is_base(path):
             continue
         if before is after or abs(one.z) - abs(before.calibration.parameters[path].z) > DRIVEN:
             return f"it drives the {_title(after, path)} to its bound"
@@ -207,6 +208,20 @@ def _faint(data: Data, before: Fit, after: Fit) -> str:
     kept = (last**2 - 1.0) / max(first**2 - 1.0, 1e-9)
     share = OF_FAINT if last > band(data.floor_spread)[1] else LEAST_SHARE
     return "" if kept < 1.0 - share else "a true model may leave as much, and most of it stays"
+
+
+def _strained(data: Data, before: Fit, after: Fit) -> str:
+    """Whether beside a model that may be true as it is, the effect needs a parameter of the actuator at its bound."""
+    if not within_band(data, before):
+        return ""
+    bent = (path for path, one in after.calibration.parameters.items() if one.at_bound and _is_base(path))
+    path = next(bent, "")
+    return path and f"a true model may leave as much, and with it the {_title(after, path)} stands at its bound"
+
+
+def _is_base(path: str) -> bool:
+    """Whether it is a parameter of the actuator itself: of no effect, and no fault."""
+    return "." in path and not path.startswith("effects.") and not path.endswith(ANGLES)
 
 
 def _unsteady(data: Data, after: Fit, key: str) -> str:

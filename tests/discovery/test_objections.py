@@ -151,3 +151,24 @@ def test_of_a_model_that_may_be_true_an_effect_takes_most_or_is_not_claimed(monk
     fits = [SimpleNamespace(plant=error, calibration=SimpleNamespace(signals=[])) for error in (before, after)]
     said = objections._faint(SimpleNamespace(floor_spread=0.04 / 1.645), *fits)
     assert said == ("a true model may leave as much, and most of it stays" if kept else "")
+
+
+@pytest.mark.parametrize(
+    ("path", "at_bound", "may_be_true", "said"),
+    [
+        ("motor.viscous_friction_Nms_rad", True, True, "stands at its bound"),
+        ("motor.viscous_friction_Nms_rad", True, False, ""),
+        ("motor.viscous_friction_Nms_rad", False, True, ""),
+        (PATH, True, True, ""),
+        ("k2", True, True, ""),
+    ],
+    ids=["at its bound", "far from true before", "free", "an effect's own", "a fault"],
+)
+def test_beside_a_model_that_may_be_true_no_effect_needs_a_parameter_at_its_bound(
+    monkeypatch, path, at_bound, may_be_true, said
+):
+    monkeypatch.setattr(objections, "within_band", lambda data, fit: may_be_true)
+    found = fitted([1.0, 1.0])
+    found.calibration.parameters = {path: Calibrated(1.0, 0.5, (0.9, 1.1), "", 1.0, at_bound)}
+    reason = objections._strained(DATA, found, found)
+    assert (said in reason) if said else not reason

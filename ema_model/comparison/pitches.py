@@ -68,5 +68,6 @@ def _explained(x: Array, y: Array, orders: Array) -> Array:
 
     size = max(1, _AT_ONCE // x.size)
     parts = [orders[first : first + size] for first in range(0, orders.size, size)]
-    power = np.concatenate([lombscargle(x, y, part, normalize=True, floating_mean=True) for part in parts])
+    told = [lombscargle(x, y, part, normalize=True, floating_mean=True) for part in parts]
+    power = np.hstack(told)  # of one order it is a number
     return x.size * power / np.maximum(1.0 - power, 1e-9)

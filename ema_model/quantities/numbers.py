@@ -14,6 +14,7 @@ from ema_model.quantities.si import BY_SHOWN
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _SMALLEST = 0.09995  # reads as 0.1, and is shown as it is; what is smaller gets the next prefix
 _FINE = 1e-3  # an error that takes the next prefix
+_EXPONENT = 1e-4  # what is smaller is told by a power of ten
 _FINE_AT = 0.1  # from which on its value keeps three digits
 _LARGEST = 9995.0  # likewise, from which on a kilo is taken
 _PREFIXES = {-6: "µ", -3: "m", 3: "k", 6: "M"}  # by the power of ten
@@ -33,7 +34,7 @@ def number(value: float, digits: int = 3) -> str:
     if not math.isfinite(value):
         return "–"
     size = abs(value)
-    if size != 0.0 and not 1e-4 <= size < 1e6:
+    if size != 0.0 and not _EXPONENT <= size < 1e6:
         mantissa, _, exponent = f"{value:.{digits - 1}e}".partition("e")
         return f"{mantissa}·10{str(int(exponent)).translate(_RAISED)}".replace("-", "−")
     decimals = max(0, digits - 1 - (math.floor(math.log10(size)) if size else 0))
@@ -97,10 +98,15 @@ class Quantity:
 
 
 def with_uncertainty(value: float, half: float, unit: str) -> str:
-    """'12.2 ± 0.70 mN·m': half the width of an interval with two digits."""
+    """'12.2 ± 0.70 mN·m', '(13.90 ± 0.32)·10⁻⁶ kg·m²': half the width of an interval with two digits."""
     shown = Quantity("", unit).scaled(value)
     if 0.0 < shown.factor * half < _FINE:  # 703.000 ± 0.087 µrad, not 0.703 ± 8.7·10⁻⁵ mrad
         shown = Quantity("", unit).scaled(1e-3 * value)
+    if any(0.0 < shown.factor * abs(one) < _EXPONENT for one in (value, half)):
+        shown = Quantity("", unit).powered([value])
+        power, _, bare = shown.unit.partition(" ")
+        if power.startswith("10"):
+            return f"({with_uncertainty(shown.factor * value, shown.factor * half, '')})·{power} {bare}".rstrip()
     error = number(shown.factor * half, 2)
     decimals = len(error.partition(".")[2])
     digits = 3 if "·" in error or shown.factor * half >= _FINE_AT else decimals + _before(shown.factor * value)

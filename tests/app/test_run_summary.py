@@ -64,6 +64,8 @@ def test_the_guide_does_not_go_back_while_the_next_step_is_looked_for():
         ((0.0201, 0.00085, "N·m"), "20.1 ± 0.85 mN·m"),
         ((0.146, 0.012, ""), "0.146 ± 0.012"),
         ((1.25, 0.0004, ""), "1.25000 ± 0.00040"),
+        ((1.39e-5, 3.2e-7, "kg·m²"), "(13.9 ± 0.32)·10⁻⁶ kg·m²"),
+        ((1.39e-5, 3.2e-7, "N·m·s/rad"), "13.9 ± 0.32 µN·m·s/rad"),
     ],
 )
 def test_a_value_has_the_digits_that_its_error_leaves(given, told):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from ema_model.comparison import pitches as of_pitches
 from ema_model.comparison.pitches import HIGHEST, pitches
 
 X = 0.1 * np.sin(np.linspace(0.0, 20.0, 3000)) + 0.02  # m, not evenly
@@ -28,6 +29,16 @@ def test_a_pitch_that_blocks_pass_over_is_not_looked_for():
     fast = np.full(X.size, 2e-3)  # m a block
     assert all(one.order < 0.61 * 2.0 * np.pi / 2e-3 for one in pitches(X, NOISE, fast))
     assert max(one.order for one in pitches(X, NOISE)) <= HIGHEST * 1.01
+
+
+def test_as_many_at_once_as_memory_lets_tell_the_same(monkeypatch):
+    """The last part may be one order alone, and of a long recording each is."""
+    x = X[::10]
+    values = np.sin(2.0 * np.pi * 40.0 * x) + NOISE[::10]
+    at_once = pitches(x, values)
+    for size in (x.size, 7 * x.size):
+        monkeypatch.setattr(of_pitches, "_AT_ONCE", size)
+        assert [one.order for one in pitches(x, values)] == pytest.approx([one.order for one in at_once])
 
 
 @pytest.mark.parametrize("x", [np.zeros(100), np.full(100, np.nan), np.zeros(0)])

@@ -21,7 +21,7 @@ from ema_model.estimation.floor import twin_error
 from ema_model.estimation.floor_band import band, spread
 from ema_model.estimation.problem import SIGNALS
 from ema_model.faults import named
-from ema_model.models import Model, model_for
+from ema_model.models import Model, Window, model_for
 from ema_model.models.delay_of_drive import with_delay_of_drive
 from ema_model.models.stretches import evaluation_stretches, fit_stretches
 from ema_model.recordings import Measurement
@@ -198,17 +198,14 @@ def _everywhere(
         ):
             one = plant.signals(place, model, faults, *start)
             target.append({name: values[0] for name, values in one.items()})
-        whole.append(
-            _typical_floor(
-                [f for w, f in zip(fitted.windows, floors) if w.recording == window.recording], window.blocks
-            )
-        )
+        parts = [one for its, one in zip(fitted.windows, floors) if its.recording == window.recording]
+        whole.append(_typical_floor(parts, window))
     return plant, whole, before, after
 
 
-def _typical_floor(floors: list[Floor], blocks: int) -> Floor:
-    """One for the whole recording, from those of its parts."""
-    names = floors[0].noise
+def _typical_floor(floors: list[Floor], window: Window) -> Floor:
+    """One for the whole recording, from those of its parts; what a grid holds where is the recording's own."""
+    names, blocks = floors[0].noise, window.blocks
 
     def level(parts: Sequence[Mapping[str, Array]]) -> dict[str, Array]:
         return {
@@ -221,6 +218,9 @@ def _typical_floor(floors: list[Floor], blocks: int) -> Floor:
         left=level([one.left for one in floors]),
         repeats=np.full(blocks, np.median([np.median(one.repeats) for one in floors])),
         block_s=floors[0].block_s,
+        held_s=window.held_s,
+        samples=window.samples_per_block,
+        even=floors[0].even,
     )
 
 

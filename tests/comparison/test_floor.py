@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ from ema_model.actuator import load_actuator
 from ema_model.campaign.draws import base_parameters
 from ema_model.commands import command
 from ema_model.comparison import compare
+from ema_model.comparison.compare import _typical_floor
 from ema_model.estimation import Floor, after_fit, calibrate, floor
 from ema_model.estimation.floor import twin_error
 from ema_model.estimation.floor_band import spread
@@ -149,3 +152,13 @@ def test_a_reading_that_is_held_counts_once_in_25_ms_of_a_fit():
         moves = replace(own, held_s={"user_position_rad": np.full(count, period)})
         for one, values in ((own, 10.0), (moves, count), (replace(own, even=True), count)):
             assert np.sum(one.fit_sigma("user_position_rad") ** -2.0) == pytest.approx(values)
+
+
+def test_a_long_recording_of_which_parts_are_fitted_knows_what_its_grid_holds():
+    """Where it is held, not where it was fitted."""
+    name, moving, held_there = "user_position_rad", np.full(50, 1e-3), np.repeat([1e-3, 1.0], 100)
+    part = Floor({name: 1.0}, {name: np.zeros(50)}, np.ones(50), 1e-3, left={name: np.zeros(50)}, held_s={name: moving})
+    whole: Any = SimpleNamespace(blocks=200, held_s={name: held_there}, samples_per_block=1)
+    told = _typical_floor([part, part], whole)
+    assert told.sigma(name) == pytest.approx(np.ones(200))
+    assert told.white_part(name)[:100] == pytest.approx(np.ones(100)) and np.max(told.white_part(name)[100:]) < 0.3

@@ -7,6 +7,7 @@ each recording and play that the file states, is the transmission's or an encode
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -29,8 +30,15 @@ _MOST_OF_IT = 0.5  # of the squared error, that a cause must explain to be told
 _SLIDES = 0.02  # of the highest speed, below which a direction is not known
 _ROUNDS = 3  # in which a delay between the two is found
 _LEAST_SAMPLES, _MOST_SAMPLES = 100, 5000
+_SHORT = {
+    "acceleration": "the shaft between motor and user gives",
+    "bandwidth": "the two position sensors differ in bandwidth",
+    "direction": "there is play between motor and user",
+    "position": "an error between motor and user repeats with the position",
+    "": "the user's position leaves the motor's, and why is not known",
+}
 _CAUSES = {
-    "acceleration": "It follows the acceleration, as the twist of a shaft that gives does.",
+    "bandwidth": "It follows the acceleration, ahead of it, as two sensors that differ in bandwidth do.",
     "direction": "It turns over with the direction, as play does.",
 }
 
@@ -41,9 +49,15 @@ class TransmissionSeen:
 
     error: float
     noise: float
-    cause: str  # "position", "acceleration", "direction", or "" where none explains most of it
+    cause: str  # of _SHORT; "" where none explains most of it
     period: float | None = None  # at the motor, rad or m, where it repeats with the position
     amplitude: float | None = None
+    frequency_Hz: float | None = None  # of the user's inertia on a shaft that gives, with the motor held
+
+    @property
+    def short(self) -> str:
+        """What a headline says of it."""
+        return _SHORT[self.cause]
 
     def sentence(self, actuator: Actuator) -> str:
         """What is seen, in the axes' units."""
@@ -54,6 +68,11 @@ class TransmissionSeen:
             f"The user's position leaves the motor's by {error} rms, {times} times the noise of the two; "
             "the model without a controller stops at the motor."
         )
+        if self.frequency_Hz is not None:
+            return (
+                f"{said} It follows the acceleration, as the twist of a shaft does on which the user would swing at "
+                f"{number(self.frequency_Hz, 2)} Hz with the motor held (torsional compliance)."
+            )
         if self.period is None or self.amplitude is None:
             return f"{said} {_CAUSES.get(self.cause, '')}".rstrip()
         period, amplitude = amount(self.period, motor), amount(self.amplitude, user)
@@ -67,7 +86,7 @@ def transmission_seen(measurements: Sequence[Measurement], actuator: Actuator) -
     known = [part for part in parts if part is not None]
     if not known:
         return None
-    position, left, accelerations, directions, noises = (np.concatenate(each) for each in zip(*known))
+    position, left, smooth, accelerations, directions, noises = (np.concatenate(each) for each in zip(*known))
     error, noise = (float(np.sqrt(np.mean(each**2))) for each in (left, noises))
     if error < _BEYOND * noise:
         return None
@@ -80,9 +99,18 @@ def transmission_seen(measurements: Sequence[Measurement], actuator: Actuator) -
     cause = max(shares, key=lambda name: shares[name], default="")
     if not cause or shares[cause] < _MOST_OF_IT * float(left @ left):
         return TransmissionSeen(error, noise, "")
+    if cause == "acceleration":
+        return _swinging(error, noise, float(smooth @ accelerations) / float(accelerations @ accelerations))
     if cause != "position" or strongest is None:
         return TransmissionSeen(error, noise, cause)
     return TransmissionSeen(error, noise, cause, 2.0 * np.pi / strongest.order, strongest.amplitude)
+
+
+def _swinging(error: float, noise: float, slope: float) -> TransmissionSeen:
+    """Of what follows the acceleration, s² (of the user's position): J_u α_user = K (τ θ_motor − θ_user) has −J_u/K."""
+    if slope >= 0.0:
+        return TransmissionSeen(error, noise, "bandwidth")
+    return TransmissionSeen(error, noise, "acceleration", frequency_Hz=1.0 / (2.0 * math.pi * math.sqrt(-slope)))
 
 
 def _strongest(position: Array, left: Array, actuator: Actuator) -> Order | None:
@@ -99,7 +127,9 @@ def _has_both(one: Measurement) -> bool:
 
 
 def _left(one: Measurement, run: slice, actuator: Actuator) -> tuple[Array, ...] | None:
-    """Of a run: motor's position, what is left at the user, acceleration and direction beside a zero, and the noise."""
+    """Of a run: motor's position, what is left at the user beside a zero and a delay, the same filtered as what follows
+    is, acceleration at the user, direction, and the noise.
+    """
     motor, user = one["motor_position_rad"][run], one["user_position_rad"][run]
     if motor.size < _LEAST_SAMPLES or np.ptp(motor) == 0.0:
         return None
@@ -111,13 +141,13 @@ def _left(one: Measurement, run: slice, actuator: Actuator) -> tuple[Array, ...]
     for _ in range(_ROUNDS):
         shifted = user - tau * np.interp(time - late, time, motor)
         late -= float(np.linalg.lstsq(allowed, shifted, rcond=None)[0][1]) / tau
-    left, accelerations, directions = (
+    left, smooth, accelerations, directions = (
         each - allowed @ np.linalg.lstsq(allowed, each, rcond=None)[0]
-        for each in (shifted, motion.acceleration, direction)
+        for each in (shifted, motion.filtered(shifted), tau * motion.acceleration, direction)
     )
     play = 0.5 * actuator.transmission.backlash_rad
     if play > 0.0 and np.any(directions):
         slope = float(np.clip(left @ directions / (directions @ directions), -play, play))
         left = left - slope * directions
     noise = np.hypot(sample_noise(user, "user_position_rad"), tau * sample_noise(motor, "motor_position_rad"))
-    return motor, left, accelerations, directions, np.full(motor.size, noise)
+    return motor, left, smooth, accelerations, directions, np.full(motor.size, noise)

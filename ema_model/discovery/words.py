@@ -57,7 +57,7 @@ def _answer(found: Discovery) -> str:
     if found.verdict == "partly_explained":
         return f"Found in part: {_named(found) or 'a curve'}{f', and {faulty}' if faulty else ''}; {remains(found)}."
     if found.verdict == "unknown_effect" and found.at_floor and found.transmission_seen is not None:
-        return "Motion and current are explained; the user's position beyond the motor's is not."
+        return f"Motion and current are explained; {found.transmission_seen.short}."
     if found.verdict == "unknown_effect" and found.curve is None:
         return f"Something is missing that none of the known effects explains: {remains(found)}."
     text = VERDICTS.get(found.verdict, verdict_name(found))
@@ -83,11 +83,12 @@ def _named(found: Discovery) -> str:
 def remains(found: Discovery) -> str:
     """'4.0 times the floor remains, cause unknown, varies with the load'."""
     if found.at_floor and found.transmission_seen is not None:
-        return "motion and current are explained, the user's position beyond the motor's is not"
+        return f"motion and current are explained, {found.transmission_seen.short}"
     if found.at_floor and found.unknown is None:
         return "what remains is as small as the floor, but lasts longer than noise"
     goes = "" if found.unknown is None else f", varies with {cause_of(found.unknown.variable, found.unknown.modulator)}"
-    return f"{number(found.ladder[-1].rmse, 2)} times the floor remains, cause unknown{goes}"
+    shaft = "" if found.transmission_seen is None else f"; and {found.transmission_seen.short}"
+    return f"{number(found.ladder[-1].rmse, 2)} times the floor remains, cause unknown{goes}{shaft}"
 
 
 def repeatability(found: Discovery) -> list[str]:

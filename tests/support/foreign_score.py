@@ -26,6 +26,8 @@ _SINCE = {
     "warmup": ("friction_drift", "resistance_drift"),
     "screw_friction": ("position_dependent_friction",),
 }
+# What the two positions show by themselves, by its cause; a model without a controller stops at the motor.
+_BEYOND_THE_MOTOR = {"acceleration": "torsional_compliance", "position": "screw_lead_error"}
 _RUNOUT_SHARE = 0.5  # of the encoder's true runout, which every rig but a tidy one has, that a named one may be off by
 _BIAS_SHARE = 0.5  # of the current sensor's true bias, which every rig has, that a named one may be off by
 COLUMNS = ("right", "false", "silent", "hardly showable", "unknown with its variable", "contradicts", "at bound",
@@ -55,7 +57,8 @@ def tally(row: Mapping[str, Any], truth: Mapping[str, Any]) -> Counter[str]:
     named = bool(groups) and bool(groups[0] & right) and len(groups[0]) <= _LARGEST_GROUP
     curve = bool(right & {"curve", "unknown"}) and not groups and bool(row["unknown"])
     above = row["ladder"][-1] is None or row["ladder"][-1] > BAND
-    correct = (named or outside) and not wrong
+    shaft = _BEYOND_THE_MOTOR.get(row.get("transmission") or "") in right
+    correct = (named or outside or shaft) and not wrong
     drive = bool(row.get("controller_mismatch")) or any(map(_drives, row["effects"]))
     return Counter(
         {
@@ -80,6 +83,7 @@ def line(row: Mapping[str, Any]) -> str:
     bound = f" | at bound {', '.join(row['at_bound'])}" if row["at_bound"] else ""
     outside = f" | outside {', '.join(row['outside'])}" if row["outside"] else ""
     goes = f" | goes with {row['unknown']}" if row["unknown"] else ""
+    goes += f" | user and motor: {row['transmission']}" if row.get("transmission") else ""
     drive = " | not the controller of the file" if row.get("controller_mismatch") else ""
     return f"{row['verdict']:16} {names or '-'} | {ladder}{goes}{outside}{bound}{drive}"
 

@@ -57,6 +57,7 @@ def _run(given: Given, settings: Settings, seed: int) -> dict[str, Any]:
         "outside": found["parameters_outside_tolerance"],
         "at_bound": [name for name, one in found["calibration"]["parameters"].items() if one["at_bound"]],
         "controller_mismatch": found["controller_mismatch"],
+        "transmission": None if found["transmission_seen"] is None else found["transmission_seen"]["cause"],
         "unknown": None if unknown is None else f"{unknown['variable']} × {unknown['modulator']}",
         "rungs": [rung["label"] for rung in ladder],
         "ladder": [rung["rmse"] for rung in ladder],
@@ -116,6 +117,7 @@ KIND = Kind(
             ("outside", TEXTS),
             ("at_bound", TEXTS),  # calibrated parameters
             ("controller_mismatch", FLAG),
+            ("transmission", TEXT),  # what the user's position leaves the motor's by; null where it does not
             ("unknown", TEXT),  # what the rest goes with: variable × modulator
             ("rungs", TEXTS),
             ("ladder", NUMBERS),  # in units of the floor

@@ -228,6 +228,7 @@ def test_regions_in_time_end_with_their_run(comparison):
     assert len(time_ranges(comparison, everything, 0)) == 1
 
 
+@pytest.mark.long
 @pytest.mark.browser
 def test_a_figure_with_its_legend_fits_a_panel_that_is_narrow_for_a_moment(browser):
     """Plotly fails where margins leave nothing, and takes the whole page with it."""

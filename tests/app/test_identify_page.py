@@ -117,6 +117,7 @@ def test_a_pause_stops_the_search_while_sliders_are_answered(session):
         session.events.simulated.disconnect(drawn.append)
 
 
+@pytest.mark.long
 def test_a_file_is_identified_without_a_truth(session, tmp_path):
     plant = simulate_reference(Run(command("chirp", {}), 0.5, 10_000.0), load_actuator(), vector({"k1": 0.4}))
     path = tmp_path / "bench.csv"

@@ -162,6 +162,7 @@ def test_discover_has_a_lower_inset_than_compare(page):
     assert heights["Discover"] < heights["Compare"] - 60.0
 
 
+@pytest.mark.long
 def test_a_scene_that_cannot_be_written_is_told_beside_its_button_and_stays(page, app, monkeypatch):
     monkeypatch.setattr(app.comparing.folder, "scenes", app.comparing.folder.folder / "absent")
     go(page, "Explore")

@@ -136,6 +136,7 @@ def test_stop_is_quick_and_keeps_the_result(page, app):
     wait_until(lambda: app.session.settings.iterations == 150)
 
 
+@pytest.mark.long
 def test_sliders_answer_while_an_identification_runs(page, app):
     page.get_by_role("tab", name="Identify").click()
     page.get_by_label("Iterations", exact=True).fill("2000")

@@ -50,6 +50,7 @@ def test_every_shipped_actuator_can_be_described_by_options_alone(name, tmp_path
     assert sorted(WORKED) == sorted(file.stem for file in SHIPPED.glob("*.toml")), "a shipped one without its options"
 
 
+@pytest.mark.long
 def test_described_axis_simulates_as_the_shipped_one(tmp_path, capsys):
     path = tmp_path / "mine.toml"
     new(path, *BALL_SCREW)

@@ -67,6 +67,7 @@ def test_what_all_units_lack_is_one_statement_and_what_differs_stands_beside(tmp
     assert load_actuator(kept).effects["cogging_torque"]["amplitude_Nm"] == pytest.approx(COGGING_Nm, rel=0.15)
 
 
+@pytest.mark.long
 def test_what_one_unit_alone_lacks_is_said_of_it(tmp_path, actuator, capsys):
     folder = write(tmp_path / "units", {"left": 0.0, "middle": COGGING_Nm, "right": 0.0})
     found = discovered(folder, actuator)

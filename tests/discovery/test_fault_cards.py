@@ -42,6 +42,7 @@ def card(assessment, name):
     return next(one for one in assessment.candidates if one.name == name)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "faults", first_of([{"k1": 0.3}, {"k2": 0.3}, {"k3": 0.25}, {"k6": 0.3, "k7": 0.7}, {"k8": 0.8}])
 )

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import pytest
 from support.foreign_rigs import actuator_of, measured, recorded
-from support.representative import first_of
 
 from ema_model.comparison import compare
 from ema_model.comparison.criteria import BAND
 from ema_model.discovery import discover
 
 
-@pytest.mark.parametrize("rig", first_of(["hobby", "gearservo"]))
+@pytest.mark.long
+@pytest.mark.parametrize("rig", ["hobby", "gearservo"])
 def test_a_healthy_rig_is_adequate_or_unknown_and_nothing_is_named(rig, tmp_path):
     recorded(rig, 2, tmp_path, programmes=["chirp"])
     actuator = actuator_of(rig)

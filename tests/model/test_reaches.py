@@ -17,7 +17,7 @@ from ema_model.simulation.run import Run, simulate_monitor, simulate_reference
 
 ACTUATOR = load_actuator()
 FAULTY = vector({"k3": 0.3, "k6": 0.2})  # so that the rotor's angle matters
-CHIRP = Run(command("chirp"), 0.3, load_torque_Nm=10.0)
+CHIRP = Run(command("chirp"), 0.1, load_torque_Nm=10.0)
 SATURATING = Run(command("step"), 0.2)
 BACK = Run(command("step", {"final_rad": -1.0}), 0.1)
 SMALL = Run(command("step", {"final_rad": 1e-3}), 0.1, load_torque_Nm=40.0)

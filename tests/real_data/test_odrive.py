@@ -38,6 +38,7 @@ def test_hold_map_orders(data_folder, actuator, name):
         assert one.amplitude == pytest.approx(known[one.order], abs=0.02)
 
 
+@pytest.mark.long
 def test_slow_sweeps_show_the_same_orders(data_folder, actuator):
     recordings = [read(file, actuator) for file in sorted((data_folder / "odrive").glob("slow2_*.csv"))]
     found = compare([recording.selected((1.0, 1e9)) for recording in recordings], actuator)

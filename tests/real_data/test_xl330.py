@@ -18,6 +18,7 @@ def compared(data_folder, actuators):
     return compare([read(file, actuator) for file in files], actuator)
 
 
+@pytest.mark.long
 def test_calibration_converges_on_all_twelve(compared):
     assert len(compared.recordings) == 12
     assert compared.calibration.converged

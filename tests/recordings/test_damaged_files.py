@@ -62,7 +62,7 @@ def fuzzed(process, reader, count, folder):
 
 @pytest.mark.parametrize("reader", [reader for reader in READERS if reader not in BY_A_PROGRAM])
 def test_damaged_files(process, reader, tmp_path):
-    kinds, bad, _, largest = fuzzed(process, reader, 100, tmp_path)
+    kinds, bad, _, largest = fuzzed(process, reader, 70, tmp_path)
     assert not bad and largest < MOST_GROWN
     assert kinds["refused"] and (kinds["read"] or reader in ("packed mat", "gzip", "robot dataset"))
 

@@ -134,12 +134,18 @@ def _ahead(mean, covariance, count, ahead):  # pragma: no cover (compiled)
 
 @recursion
 def _see(mean, covariance, rows, seen):  # pragma: no cover (compiled)
-    """In place: what is seen (k,), of unit variance, by rows (k, state)."""
-    size = len(mean)
+    """In place: what is seen (k,), of unit variance, by rows (k, state); the covariance is symmetric."""
+    size, to = len(mean), np.empty(len(mean))
     for row in range(len(seen)):
-        to = covariance @ rows[row]
-        total = 1.0 + rows[row] @ to
-        gap = (seen[row] - rows[row] @ mean) / total
+        to[:] = 0.0
+        for i in range(size):
+            for j in range(size):
+                to[j] += covariance[i, j] * rows[row, i]
+        total, gap = 1.0, seen[row]
+        for i in range(size):
+            total += rows[row, i] * to[i]
+            gap -= rows[row, i] * mean[i]
+        gap /= total
         for i in range(size):
             mean[i] += to[i] * gap
             for j in range(size):

@@ -71,9 +71,9 @@ def wear(at: Array, k: Array, variance: Array, now: float) -> Wear:
     prior += np.log(np.where(later, (1.0 - at_once) / max(len(onsets) - 1, 1), at_once))
     places = (at - first).astype(np.int64)
     last = np.append(places, int(now - first))  # the state is today's, whether today's flight is usable or not
-    path = table[:, :, last]
-    found = _filtered(path, shape, uneven, k, variance, _RATE, _PASSES)
-    level, rate, a, b, c, fit = found.T
+    path = np.ascontiguousarray(table[:, :, last].transpose(1, 2, 0))
+    found = _filtered(path, np.array(UNEVEN), k, variance, _RATE, _PASSES)
+    level, rate, a, b, c, fit = found.reshape(-1, 6).T
     sigma = np.sqrt(np.maximum(c, 1e-18))
     weight = _COUNTS * fit + prior + log_ndtr(rate / sigma)
     weight = np.exp(weight - weight.max())
@@ -82,41 +82,49 @@ def wear(at: Array, k: Array, variance: Array, now: float) -> Wear:
 
 
 @recursion
-def _filtered(path, shape, uneven, k, variance, rate_sigma, passes):  # pragma: no cover (compiled)
-    """(ways, 6): level, rate, their (co)variances, log likelihood."""
-    ways, flights = len(shape), len(k)
-    found = np.zeros((ways, 6))
-    for way in range(ways):
-        walked = path[shape[way], 0]
-        squares = path[shape[way], 1]
-        usual = max((k[flights - 1] - k[0]) / max(walked[flights] - walked[0], 1.0), 1e-5)
+def _filtered(path, uneven, k, variance, rate_sigma, passes):  # pragma: no cover (compiled)
+    """(shapes, uneven, 6): level, rate, their (co)variances, log likelihood; path (2, flights + 1, shapes).
+
+    All shapes stand side by side in each step, which a processor takes several of at once.
+    """
+    shapes, flights = path.shape[2], len(k)
+    found = np.zeros((shapes, len(uneven), 6))
+    usual, spread, x, r = np.empty(shapes), np.empty(shapes), np.empty(shapes), np.empty(shapes)
+    a, b, c = np.empty(shapes), np.empty(shapes), np.empty(shapes)
+    squared, product, logarithm = np.empty(shapes), np.empty(shapes), np.empty(shapes)
+    for way in range(len(uneven)):
+        for j in range(shapes):
+            usual[j] = max((k[flights - 1] - k[0]) / max(path[0, flights, j] - path[0, 0, j], 1.0), 1e-5)
         for _ in range(passes):
-            x, r = k[0], 0.0
-            a, b, c = variance[0], 0.0, rate_sigma**2
-            squared, product, logarithm = 0.0, 1.0, 0.0  # of the likelihood; one logarithm for several flights
-            for i in range(1, flights + 1):
-                d = walked[i] - walked[i - 1]
-                q = (uneven[way] * usual) ** 2 * (squares[i] - squares[i - 1])
-                x += d * r
-                a += 2.0 * d * b + d * d * c + q
-                b += d * c
-                if i == flights:
-                    break
-                s = a + variance[i]
-                gap = k[i] - x
-                share = 1.0 / s
-                squared += gap * gap * share
-                product *= s
-                if i % 8 == 0:
-                    logarithm += np.log(product)
-                    product = 1.0
-                ga, gb = a * share, b * share
-                x += ga * gap
-                r += gb * gap
-                c -= gb * b
-                b -= gb * a
-                a -= ga * a
-            usual = max(r, 1e-5)
-            fit = -0.5 * (squared + logarithm + np.log(product))
-        found[way, 0], found[way, 1], found[way, 2], found[way, 3], found[way, 4], found[way, 5] = x, r, a, b, c, fit
+            for j in range(shapes):
+                x[j], r[j] = k[0], 0.0
+                a[j], b[j], c[j] = variance[0], 0.0, rate_sigma**2
+                squared[j], product[j], logarithm[j] = 0.0, 1.0, 0.0
+                usual[j] = (uneven[way] * usual[j]) ** 2
+            for i in range(1, flights):
+                for j in range(shapes):
+                    d = path[0, i, j] - path[0, i - 1, j]
+                    level, both = x[j] + d * r[j], b[j] + d * c[j]
+                    known = a[j] + d * (b[j] + both) + usual[j] * (path[1, i, j] - path[1, i - 1, j])
+                    s = known + variance[i]
+                    gap = k[i] - level
+                    share = 1.0 / s
+                    squared[j] += gap * gap * share
+                    product[j] *= s
+                    ga, gb = known * share, both * share
+                    x[j], r[j] = level + ga * gap, r[j] + gb * gap
+                    a[j], b[j], c[j] = known - ga * known, both - gb * known, c[j] - gb * both
+                if i % 8 == 0:  # one logarithm for several flights
+                    for j in range(shapes):
+                        logarithm[j] += np.log(product[j])
+                        product[j] = 1.0
+            for j in range(shapes):
+                spread[j], usual[j] = usual[j], max(r[j], 1e-5)
+        for j in range(shapes):
+            d = path[0, flights, j] - path[0, flights - 1, j]
+            both = b[j] + d * c[j]
+            q = spread[j] * (path[1, flights, j] - path[1, flights - 1, j])
+            found[j, way, 0], found[j, way, 1] = x[j] + d * r[j], r[j]
+            found[j, way, 2], found[j, way, 3], found[j, way, 4] = a[j] + d * (b[j] + both) + q, both, c[j]
+            found[j, way, 5] = -0.5 * (squared[j] + logarithm[j] + np.log(product[j]))
     return found

@@ -19,9 +19,9 @@ def figure(before: Sequence[Explanation], now: Sequence[Explanation], *, dark: b
 
     One bar where nothing has changed yet.
     """
-    runs = {"without the added effects": _best(before), "with them": _best(now)}
+    runs = {"calibrated model": _best(before), "improved model": _best(now)}
     if before is now:
-        runs = {"calibrated": _best(now)}
+        runs = {"calibrated model": _best(now)}
     order = {variable: one.r2 for found in reversed(runs.values()) for variable, one in found.items()}
     if not order:
         return theme.missing(_TITLE, "no variable to explain it with is known", dark=dark)

@@ -337,7 +337,7 @@ def test_the_play_head_is_the_same_moment_everywhere(page, app):
     assert all(left / width == pytest.approx(0.4, abs=0.005) for width, _, left in heads)
     page.get_by_role("tab", name="Identify").click()
     page.get_by_text("Nothing is identified yet").wait_for()
-    app.tab(IdentifyTab).result._convergence.handle.visible = True
+    app.tab(IdentifyTab).result._show_search()
     page.get_by_text("Convergence").wait_for()
     page.wait_for_timeout(300)
     assert not [line for line in page.evaluate(read) if line[0] and line[1] != "none"], "not over iterations"

@@ -159,6 +159,12 @@ class IdentifyResult:
             self._page.notify("Explore has the command", "On Identify, press Identify again.", "green")
             self._page.workspaces.go("explore", client)
 
+    def _show_search(self) -> None:
+        """From the first race on, in place of what to do."""
+        if self._empty.visible:
+            self._empty.visible, self._convergence.handle.visible = False, True
+            self._swarm.appear()
+
     def _draw(self, race: Race, soon: bool) -> None:
         begun = race is not self._begun
         if not (begun or soon or time.monotonic() - self._drawn_at > _LEAST_S):
@@ -167,7 +173,7 @@ class IdentifyResult:
         self._race = self._begun = race
         longest = max(track.iterations for track in race.tracks.values())
         with self._page.server.atomic():
-            self._empty.visible, self._convergence.handle.visible = False, True
+            self._show_search()
             self._convergence.begin(tuple(race.tracks), longest)
             self._convergence.show({name: track.errors for name, track in race.tracks.items()})
             self._swarm.show(race, begun)

@@ -17,7 +17,7 @@ _NAMES = tuple(fault.label for fault in FAULTS)
 
 
 class SwarmView:
-    """The picture and its controls, from the first race on."""
+    """The picture and its controls, which `appear` with the first race."""
 
     def __init__(self, page: Page) -> None:
         self._page = page
@@ -39,13 +39,15 @@ class SwarmView:
         for entry in (self._x, self._y):
             entry.on_update(lambda event: event.client and page.screen.post("swarm axes", self._choose))
 
+    def appear(self) -> None:
+        """There is something to look at."""
+        for one in (self._folder, self._kind, self._iteration):
+            one.visible = True
+        self._show_axes()
+
     def show(self, race: Race, begun: bool) -> None:
         """Draws a race as it stands; on the screen's thread."""
         self._race = race
-        if not self._folder.visible:
-            for one in (self._folder, self._kind, self._iteration):
-                one.visible = True
-            self._show_axes()
         over = all(track.answer is not None for track in race.tracks.values())
         last = max((len(track.rmse) - 1 for track in race.tracks.values()), default=1)
         last = max(last, 1)

@@ -119,5 +119,10 @@ def _before(value: float) -> int:
 
 
 def amount(value: float, unit: str) -> str:
-    """A size with its unit, prefixed so that it reads well: 0.0352 N·m → '35.2 mN·m'."""
-    return Quantity("", unit).scaled(value).text(value)
+    """A size with its unit, prefixed so that it reads well: '35.2 mN·m', and where none is, '13.0·10⁻⁶ kg·m²'."""
+    shown = Quantity("", unit).scaled(value)
+    if 0.0 < shown.factor * abs(value) < _EXPONENT:  # the power that an uncertainty has
+        shown = shown.powered([value])
+        if shown.unit.startswith("10"):
+            return f"{number(shown.factor * value)}·{shown.unit}"
+    return shown.text(value)

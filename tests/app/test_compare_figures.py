@@ -234,7 +234,7 @@ def test_regions_in_time_end_with_their_run(comparison):
 def test_a_figure_with_its_legend_fits_a_panel_that_is_narrow_for_a_moment(browser):
     """Plotly fails where margins leave nothing, and takes the whole page with it."""
     figure = theme.new("Equivalent current", "Time [s]", "I [A]")
-    for name in ("floor ±2σ", "before calibration", "measured", "calibrated"):
+    for name in ("floor ±2σ", "uncalibrated", "measured", "calibrated"):
         figure.add_scatter(x=[0.0, 1.0], y=[0.0, 1.0], name=name)
     page = browser.new_page()
     page.set_content("<div id=a></div>")

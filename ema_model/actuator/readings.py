@@ -64,6 +64,12 @@ def _play(value: float, unit: str) -> str:
     return (Quantity("", unit).scaled(1e-3 * value) if shown.factor * value < 1.0 else shown).text(value)
 
 
+def _direction(phase_rad: float) -> str:
+    """'+72', '0'."""
+    degrees = round(np.degrees(phase_rad))
+    return f"{degrees:+d}".replace("-", "−") if degrees else "0"
+
+
 def sentences(k: ArrayLike, actuator: Actuator) -> tuple[str, ...]:
     """The same as eight short phrases, one for each k."""
     r = readings(k, actuator)
@@ -74,6 +80,6 @@ def sentences(k: ArrayLike, actuator: Actuator) -> tuple[str, ...]:
         f"phase B: {100.0 * r['turns_b']:.0f} % of turns",
         f"phase C: {100.0 * r['turns_c']:.0f} % of turns",
         f"eccentricity ζ = {r['eccentricity']:.2f}",
-        f"thinnest gap at {round(np.degrees(r['eccentricity_phase_rad'])):+d}°".replace("-", "−"),
+        f"thinnest gap at {_direction(r['eccentricity_phase_rad'])}°",
         f"gain × {physical(k).gain_factor:.2f}",
     )

@@ -39,10 +39,10 @@ def verdict(result: Comparison) -> str:
 
 
 def of_floor(result: Comparison) -> str:
-    """'All signals together, the error is 1.02 times the floor; nine of ten true models would leave 0.97 to 1.03.'"""
+    """'All signals together, the error is 1.02 times the floor; a true model's is 0.97 to 1.03 (90 % interval).'"""
     low, high = result.floor_band
     error = f"All signals together, the error is {number(result.over_floor)} times the floor"
-    return f"{error}; nine of ten true models would leave {low:.2f} to {high:.2f}."
+    return f"{error}; a true model's is {low:.2f} to {high:.2f} (90 % interval)."
 
 
 def document_of(result: Comparison) -> Document:

@@ -123,7 +123,7 @@ def sentences(found: Discovery) -> list[str]:
         told.append(f"The calibrated model's error is {number(bare.rmse)} times the floor{held}.")
     if found.floor_believable:
         low, high = found.floor_band
-        told.append(f"Nine of ten true models would leave {low:.2f} to {high:.2f} times the floor.")
+        told.append(f"A true model's error is {low:.2f} to {high:.2f} times the floor (90 % interval).")
     if found.faults:
         told.append(f"{'; '.join(faults(found).values())}. Effects and faults are estimated together.")
     for one in found.effects:
@@ -131,7 +131,7 @@ def sentences(found: Discovery) -> list[str]:
             rivals = all_of([in_sentence(effect_title(name)) for name in one.same_as])
             told.append(f"These recordings cannot tell {in_sentence(effect_title(one.name))} from {rivals}.")
     if found.parameters_outside_tolerance:
-        outside = all_of([on_axes(path, found.actuator.axes).title for path in found.parameters_outside_tolerance])
+        outside = all_of([_parameter(found, path) for path in found.parameters_outside_tolerance])
         whose = "its" if len(found.parameters_outside_tolerance) == 1 else "their"
         told.append(f"Outside {whose} tolerance: {outside}.")
     told += moved(found)
@@ -158,11 +158,15 @@ def moved(found: Discovery) -> list[str]:
     }
     most = sorted(sure, key=lambda path: -abs(sure[path].z))[:_MOST_MOVED]
     named = [
-        f"{in_sentence(on_axes(path, found.actuator.axes).title)} {value(sure[path])} "
-        f"({amount(sure[path].initial, sure[path].unit)})"
+        f"{_parameter(found, path)} {value(sure[path])} ({amount(sure[path].initial, sure[path].unit)})"
         for path in most
     ]
     return [f"Within tolerance, but not as the file has it: {all_of(named)}."] if named else []
+
+
+def _parameter(found: Discovery, path: str) -> str:
+    """'motor inertia'."""
+    return in_sentence(on_axes(path, found.actuator.axes).title)
 
 
 def verification(found: Discovery, saved: Verified) -> str:

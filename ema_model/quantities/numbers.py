@@ -15,6 +15,7 @@ _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _SMALLEST = 0.09995  # reads as 0.1, and is shown as it is; what is smaller gets the next prefix
 _FINE = 1e-3  # an error that takes the next prefix
 _EXPONENT = 1e-4  # what is smaller is told by a power of ten
+_LONGEST = 1e6  # likewise, from which on
 _FINE_AT = 0.1  # from which on its value keeps three digits
 _LARGEST = 9995.0  # likewise, from which on a kilo is taken
 _PREFIXES = {-6: "µ", -3: "m", 3: "k", 6: "M"}  # by the power of ten
@@ -34,7 +35,7 @@ def number(value: float, digits: int = 3) -> str:
     if not math.isfinite(value):
         return "–"
     size = abs(value)
-    if size != 0.0 and not _EXPONENT <= size < 1e6:
+    if size != 0.0 and not _EXPONENT <= size < _LONGEST:
         mantissa, _, exponent = f"{value:.{digits - 1}e}".partition("e")
         return f"{mantissa}·10{str(int(exponent)).translate(_RAISED)}".replace("-", "−")
     decimals = max(0, digits - 1 - (math.floor(math.log10(size)) if size else 0))
@@ -102,7 +103,7 @@ def with_uncertainty(value: float, half: float, unit: str) -> str:
     shown = Quantity("", unit).scaled(value)
     if 0.0 < shown.factor * half < _FINE:  # 703.000 ± 0.087 µrad, not 0.703 ± 8.7·10⁻⁵ mrad
         shown = Quantity("", unit).scaled(1e-3 * value)
-    if any(0.0 < shown.factor * abs(one) < _EXPONENT for one in (value, half)):
+    if shown.factor * abs(value) >= _LONGEST or any(0.0 < shown.factor * abs(one) < _EXPONENT for one in (value, half)):
         shown = Quantity("", unit).powered([value])
         power, _, bare = shown.unit.partition(" ")
         if power.startswith("10"):
@@ -119,5 +120,10 @@ def _before(value: float) -> int:
 
 
 def amount(value: float, unit: str) -> str:
-    """A size with its unit, prefixed so that it reads well: 0.0352 N·m → '35.2 mN·m'."""
-    return Quantity("", unit).scaled(value).text(value)
+    """A size with its unit, prefixed so that it reads well: '35.2 mN·m', and where none is, '13.0·10⁻⁶ kg·m²'."""
+    shown = Quantity("", unit).scaled(value)
+    if 0.0 < shown.factor * abs(value) < _EXPONENT:  # the power that an uncertainty has
+        shown = shown.powered([value])
+        if shown.unit.startswith("10"):
+            return f"{number(shown.factor * value)}·{shown.unit}"
+    return shown.text(value)

@@ -173,7 +173,7 @@ def _title(result: UnitsCompared, path: str) -> str:
 def _signed(change: float, half: float, shared: float | None, unit: str) -> str:
     """'+38 ± 6 %', or in the parameter's unit where there is nothing to count it by; half 0: nobody knows how sure."""
     if shared:
-        sure = f" ± {100.0 * half / abs(shared):.2g}" if half else ""
+        sure = f" ± {number(100.0 * half / abs(shared), 2)}" if half else ""
         return f"{100.0 * change / abs(shared):+.3g}{sure} %".replace("-", "−")
     return ("+" if change > 0.0 else "") + (with_uncertainty(change, half, unit) if half else amount(change, unit))
 

@@ -14,7 +14,8 @@ from emaviz.figures import theme
 
 _WIDE = 15.0  # times the floor, from which on the scale is logarithmic
 _TOP = 1.2  # of a straight scale, times the largest error
-_LABEL = 0.14  # height of a number and its distance from its point, of the chart's height
+# of the chart's height: the marker, where nothing of its number is, and the far end of a number above or below it
+_MARKER, _LABEL = 0.04, 0.14
 
 
 def figure(found: Discovery, *, dark: bool = False) -> go.Figure:
@@ -28,6 +29,12 @@ def figure(found: Discovery, *, dark: bool = False) -> go.Figure:
     if any(value is not None for value in held):
         lines.append(("held out", HELD_OUT, "diamond", [float("nan") if v is None else v for v in held]))
     shown = [1.0, *(value for *_, values in lines for value in values if math.isfinite(value) and value > 0.0)]
+    wide = max(shown) > _WIDE  # on a straight scale all else would lie on the axis
+    low, high = (math.log10(0.4 * min(shown)), math.log10(2.0 * max(shown))) if wide else (0.0, _TOP * max(shown))
+
+    def height(value: float) -> float:
+        return ((math.log10(value) if wide else value) - low) / (high - low)
+
     for name, colour, symbol, values in lines:
         other = next((line[3] for line in lines if line[0] != name), values)
         chart.add_trace(
@@ -41,7 +48,9 @@ def figure(found: Discovery, *, dark: bool = False) -> go.Figure:
                 text=[number(value) for value in values],
                 # The number of the upper line above it, of the lower one below.
                 textposition=[
-                    _beside(value, value > its or (value == its and name == "fitted"), max(shown))
+                    _beside(height(value), height(1.0), value > its or (value == its and name == "fitted"))
+                    if value > 0.0
+                    else "top center"
                     for value, its in zip(values, other)
                 ],
                 textfont={"color": colour, "size": 12},
@@ -50,17 +59,17 @@ def figure(found: Discovery, *, dark: bool = False) -> go.Figure:
                 cliponaxis=False,
             )
         )
-    low, high = found.floor_band
+    least, most = found.floor_band
     ends = [-0.5, len(places) - 0.5]
     chart.add_trace(
         go.Scatter(
             x=[*ends, *ends[::-1]],
-            y=[low, low, high, high],
+            y=[least, least, most, most],
             fill="toself",
             fillcolor=theme.FLOOR,
             line={"width": 0},
             mode="lines",
-            name="a true model, 90 %",
+            name="floor, 90 % interval",
             hoverinfo="skip",
         )
     )
@@ -77,16 +86,17 @@ def figure(found: Discovery, *, dark: bool = False) -> go.Figure:
     chart.update_xaxes(
         tickvals=places, ticktext=titles, range=[-0.5, len(places) - 0.5], showgrid=False, zeroline=False, nticks=0
     )
-    if max(shown) > _WIDE:  # on a straight scale all else would lie on the axis
-        low, high = math.log10(0.4 * min(shown)), math.log10(2.0 * max(shown))
+    if wide:
         chart.update_yaxes(type="log", range=[low, high], dtick=1)
     else:
-        chart.update_yaxes(range=[0.0, _TOP * max(shown)], rangemode="tozero")
+        chart.update_yaxes(range=[low, high], rangemode="tozero")
     return chart
 
 
-def _beside(value: float, above: bool, largest: float) -> str:
-    """Where the number of a point stands: above or below it, but not on the line of the floor."""
-    label = _LABEL * _TOP * largest
-    over_floor = largest <= _WIDE and (value < 1.0 < value + label if above else value - label < 1.0 < value)
-    return "middle right" if over_floor else "top center" if above else "bottom center"
+def _beside(at: float, floor: float, above: bool) -> str:
+    """Where the number of a point stands, by heights in the chart: above or below it, or beside it on the floor's line.
+
+    A floor that runs through the marker is clear of the numbers above and below.
+    """
+    away = floor - at if above else at - floor
+    return "middle right" if _MARKER < away < _LABEL else "top center" if above else "bottom center"

@@ -19,9 +19,9 @@ def figure(before: Sequence[Explanation], now: Sequence[Explanation], *, dark: b
 
     One bar where nothing has changed yet.
     """
-    runs = {"without the added effects": _best(before), "with them": _best(now)}
+    runs = {"calibrated model": _best(before), "improved model": _best(now)}
     if before is now:
-        runs = {"calibrated": _best(now)}
+        runs = {"calibrated model": _best(now)}
     order = {variable: one.r2 for found in reversed(runs.values()) for variable, one in found.items()}
     if not order:
         return theme.missing(_TITLE, "no variable to explain it with is known", dark=dark)
@@ -30,12 +30,13 @@ def figure(before: Sequence[Explanation], now: Sequence[Explanation], *, dark: b
     chart = theme.new(_TITLE, "Explained variance, cross-validated [%]", "", dark=dark)
     for (name, found), colour in zip(reversed(runs.items()), (theme.RESIDUAL, theme.INITIAL)):
         known = [found.get(variable) for variable in variables]
+        nothing = not any(one is not None and one.r2 > 0.0 for one in known)
         chart.add_trace(
             go.Bar(
                 y=titles,
                 x=[0.0 if one is None else 100.0 * max(one.r2, 0.0) for one in known],
                 orientation="h",
-                name=name,
+                name=f"{name} (nothing explained)" if nothing else name,
                 legendrank=list(runs).index(name),
                 marker={
                     "color": colour,

@@ -39,7 +39,7 @@ def figure(
         x, (middle, low, high) = [*levels], zip(*levels.values())
         edge = {"line": {"width": 0}, "mode": "lines", "hoverinfo": "skip"}
         band = {"x": [*x, *x[::-1]], "y": [*low, *high[::-1]], "fill": "toself", "fillcolor": _BAND}
-        chart.add_trace(go.Scatter(**band, **edge, name="level"))
+        chart.add_trace(go.Scatter(**band, **edge, name="level, 90 %"))
         line = {"color": MONITOR, "width": 1}
         chart.add_trace(go.Scatter(x=x, y=middle, mode="lines", line=line, name="level then", showlegend=False))
     names = [theme.plain(flight.name) for flight in result.usable]
@@ -54,7 +54,7 @@ def figure(
         later = [(i, theme.plain(called), k) for (i, called), k in zip(since, last.faults[name].k) if i > now]
         x, called, k = zip(*later) if later else ((), (), ())
         pale = {"size": 4, "color": COMMAND, "opacity": 0.5}
-        chart.add_trace(go.Scatter(x=x, y=k, mode="markers", marker=pale, text=called, name="what came",
+        chart.add_trace(go.Scatter(x=x, y=k, mode="markers", marker=pale, text=called, name="later flights",
                                    hovertemplate="%{text}: %{y:.4f}<extra></extra>"))  # fmt: skip
         theme.moment(chart, now + 0.5)
     if one.trend:
@@ -85,7 +85,7 @@ def figure(
         chart.add_trace(fan)
         middle = {"color": MONITOR, "width": 1.5, "dash": "dash"}
         x, y = [now, now + left.p50], [one.level, end]
-        chart.add_trace(go.Scatter(x=x, y=y, mode="lines", line=middle, name="to threshold"))
+        chart.add_trace(go.Scatter(x=x, y=y, mode="lines", line=middle, name="forecast"))
     return chart
 
 

@@ -48,14 +48,16 @@ def equation(found: Discovery, added: Sequence[Added]) -> Html:
     by_line: dict[str, list[Html]] = {}
     for one in added:
         effect = find(one.key)
-        values = ", ".join(f"{_symbol(effect, name)}{text}" for name, text in settings(found, one).items())
+        values = joined(
+            (html("{} = {}", _symbol(effect, name), text) for name, text in settings(found, one).items()), ", "
+        )
         if len(effect.parameters) > 6:
-            values = f"{len(effect.parameters)} knots, fitted"
+            values = html("{} knots, fitted", len(effect.parameters))
         by_line.setdefault(_line(effect), []).append(_term(effect_title(one.name), effect.equation, values))
     told = faults(found)
     for fault in causes(found.faults):
         page = page_of(fault)
-        term = _term(effect_title(fault), page.equation, ", ".join(told[name] for name in cause_of(fault)))
+        term = _term(effect_title(fault), page.equation, html("{}", ", ".join(told[name] for name in cause_of(fault))))
         by_line.setdefault(page.line, []).append(term)
     rows = []
     for line, base in _LINES.items():
@@ -67,7 +69,7 @@ def equation(found: Discovery, added: Sequence[Added]) -> Html:
     return joined(rows if by_line else [])
 
 
-def _term(title: str, equation: str, values: str) -> Html:
+def _term(title: str, equation: str, values: Html) -> Html:
     return html(
         '<div style="margin:2px 0 4px 6px;padding-left:8px;border-left:3px solid rgba(134,142,150,.55)">'
         "<b>{}:</b> "
@@ -83,9 +85,9 @@ def _line(effect: Effect) -> str:
     return next((_OF_PLACE[place.__name__] for place in effect.places if place.__name__ in _OF_PLACE), "motion")
 
 
-def _symbol(effect: Effect, name: str) -> str:
-    """'A = ' where the parameter's meaning names a symbol of the equation; else its own name."""
+def _symbol(effect: Effect, name: str) -> str | Html:
+    """'A', typeset, where the parameter's meaning names a symbol of the equation; else its own name."""
     meaning = next((p.meaning for p in effect.parameters if p.name == name), "")
     symbols = set(re.split(r"[^\w]+", effect.equation))
     symbol = next((word for word in re.split(r"[^\w]+", meaning)[1:] if word and word in symbols), "")
-    return f"{symbol or name.rpartition('_')[0].replace('_', ' ') or name} = "
+    return mathml(symbol, "inline") if symbol else name.rpartition("_")[0].replace("_", " ") or name

@@ -53,7 +53,7 @@ def figure(
     calibrated = comparison.calibration is not None
     if calibrated:
         initial = shown.factor * one.initial[signal][inside]
-        _add(chart, time, initial, "initial", theme.INITIAL, 1.3, "dot")
+        _add(chart, time, initial, "uncalibrated", theme.INITIAL, 1.3, "dot")
     _add(chart, time, measured, "measured", theme.MEASURED, 1.5)
     _add(chart, time, model, "calibrated" if calibrated else "model", theme.MODEL, 1.5)
     if highlight is not None:

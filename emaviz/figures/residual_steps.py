@@ -27,8 +27,8 @@ def figure(track: Track, signal: str, first: int = 0, last: int = -1, *, dark: b
     sigma = BAND_SIGMAS * shown.factor * track.sigma[signal]
     floor_band.below(chart, track.time_s, sigma)
     changed = len(track.models) > 1
-    drawn = [(before, "without the added effects", BEFORE)] if changed else []
-    drawn.append((after, "with them" if changed else "residual", AFTER))
+    drawn = [(before, "calibrated model", BEFORE)] if changed else []
+    drawn.append((after, "improved model" if changed else "residual", AFTER))
     for values, name, colour in drawn:
         x, y = line(track.time_s, shown.factor * values, theme.POINTS)
         style = {"width": 1, "color": colour}

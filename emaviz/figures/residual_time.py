@@ -43,7 +43,7 @@ def figure(
         x, y = line(time, shown.factor * (measured - one.initial[signal][inside]), theme.POINTS)
         before = {"width": 1, "color": theme.INITIAL}
         hidden = {"visible": "legendonly", "hovertemplate": "%{y:.4g}"}  # it would dwarf what is left
-        chart.add_trace(go.Scatter(x=x, y=y, mode="lines", name="before calibration", line=before, **hidden))
+        chart.add_trace(go.Scatter(x=x, y=y, mode="lines", name="uncalibrated", line=before, **hidden))
     x, y = line(time, shown.factor * left, theme.POINTS)
     drawn = {"width": 1, "color": theme.RESIDUAL}
     chart.add_trace(go.Scatter(x=x, y=y, mode="lines", name="residual", line=drawn, hovertemplate="%{y:.4g}"))

@@ -14,6 +14,8 @@ NEXT_COLUMN = Html('<div class="emaviz-next-column"></div>')  # stands in the fo
 ALL_COLUMNS = Html('<div class="emaviz-all-columns"></div>')  # stands in a folder that is as wide as both
 # Stands before what gives way to the second column where there is one only.
 PLOTS_EARLY = Html('<div class="emaviz-early"></div>')
+ROOM = Html('<div class="emaviz-room"></div>')  # stands in a folder that only a large window has room for
+_ROOM_PX = 1700, 940  # of such a window, width and height
 _LEAST_WIDTH_PX = 900  # of a window
 _CLICK_PX = 4  # a pointer that moves further turns the actuator
 
@@ -74,7 +76,9 @@ def script() -> str:
 def style() -> Html:
     """The inset at the lower left, the controls above it, the results to the right of both."""
     inset, right = "body.emaviz-inset", "body.emaviz-inset [data-dock-region=right]"
-    columns = f"{right} div:has(> div > .emaviz-columns)"
+    any_columns = "div:has(> div > .emaviz-columns)"
+    columns, room = f"{right} {any_columns}", "> div:has(.emaviz-room)"
+    wide, high = _ROOM_PX
     return unescaped(
         "<style>"
         ":root{--emaviz-inset:clamp(150px,calc(46vh - 138px),330px)}"
@@ -96,6 +100,8 @@ def style() -> Html:
         f"{columns} > div{{break-inside:avoid}}"
         f"{columns} > div:has(.emaviz-next-column){{break-before:column}}"
         f"{columns} > div:has(.emaviz-all-columns){{column-span:all}}}}"
+        f"{any_columns} {room}{{display:none}}"
+        f"@media (min-width:{wide}px) and (min-height:{high}px){{{columns} {room}{{display:block}}}}"
         f"@media (max-width:{TWO_COLUMNS_PX - 1}px){{{columns}:has(> div > .emaviz-early)"
         "{display:flex;flex-direction:column}"
         f"{columns} > div:has(> .emaviz-early) ~ div{{order:2}}"

@@ -11,6 +11,7 @@ import viser
 
 from emaviz.page.identify.controls import recording_link
 from emaviz.page.page import Page
+from emaviz.page.style import IN_ROW
 from emaviz.recording.viewer import ViewerHost
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.signal import Signal
@@ -55,6 +56,7 @@ class KeepButtons:
         self._folder, self._viewer, self._save = folder, viewer, save
         self._asked: viser.ClientHandle | None = None  # who is sent the file
         gui = page.server.gui
+        add_html(gui, IN_ROW)
         for one in buttons:
             button = gui.add_button(one.label, icon=one.icon, hint=one.hint)
             button.on_click(lambda event, suffix=one.suffix, button=button: self._ask(event.client, suffix, button))

@@ -17,12 +17,13 @@ STRIP = Html('<div class="emaviz-strip"></div>')  # stands in the panel that bec
 TIME_CHARTS = Html('<div class="emaviz-time"></div>')  # stands beside charts over time
 LONG_LABELS = Html('<div class="emaviz-long"></div>')  # stands beside controls with long labels
 IN_PAIRS = Html('<div class="emaviz-pairs"></div>')  # stands before short controls, two of which share a line
-IN_ROW = Html('<div class="emaviz-row"></div>')  # stands before buttons, four of which share a line
+IN_ROW = Html('<div class="emaviz-row"></div>')  # stands before buttons that share a line
 # stands before the upload button that takes dropped files, which is not to be seen
 WIDE_MODAL = Html("<style>.mantine-Modal-root{--modal-size:min(960px,92vw)!important}</style>")
 STRIP_HEIGHT_PX = 68
 _HELD_OUT_ON_DARK, _LIMIT_ON_DARK = "#d17ee3", "#f06595"  # of numbers and notes, which are thin
 _ROW_PX = 48
+_BUTTON_PX = 90  # that a button in a row needs at least
 _LABEL = "> div > .mantine-Flex-root > div:first-child"
 
 
@@ -51,11 +52,12 @@ def page() -> Html:
         f"div:has(> div > .emaviz-long) {_LABEL}{{width:11.6em!important}}"
         "div:has(> div > .emaviz-pairs){display:grid;grid-template-columns:1fr 1fr}"
         "div:has(> .emaviz-pairs){display:none!important}"
-        "div:has(> div > .emaviz-row){display:grid;grid-template-columns:repeat(4,1fr);padding:0 6px}"
+        "div:has(> div > .emaviz-row){display:flex;flex-wrap:wrap;padding:0 6px}"
         "div:has(> .emaviz-row){display:none!important}div:has(> div > .emaviz-row) > div:not(:has(button))"
-        "{grid-column:1/-1;order:1}div:has(> div > .emaviz-row) > div:has(button){margin-inline:3px!important}"
+        "{flex:0 0 100%;order:1}div:has(> div > .emaviz-row) > div:has(button)"
+        f"{{flex:1 1 {_BUTTON_PX}px;margin-inline:3px!important;container-type:inline-size}}"
         "div:has(> div > .emaviz-row) button{padding:0 4px;font-size:12.5px}"
-        "@media (max-width:1700px){div:has(> div > .emaviz-row) .mantine-Button-section{display:none}}"
+        "@container (max-width:149px){div:has(> div > .emaviz-row) .mantine-Button-section{display:none}}"
         f"div:has(> div > .emaviz-pairs) {_LABEL}{{width:5.6em!important}}"
         f"div:has(> div > .emaviz-pairs) > div:has(input[type=checkbox]) > .mantine-Flex-root > div:first-child"
         "{width:8.4em!important}"

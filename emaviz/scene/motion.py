@@ -97,7 +97,7 @@ class Motion:
         """What is not to scale."""
         return (
             f"Not to scale: surface motion × {self.enlarged:g}, play × {self.play_enlarged:g}, "
-            f"air gap and rotor offset × {_GAP_ENLARGED:g}. Full glow: {self.full_A:g} A. {self.says}"
+            f"air gap and rotor offset × {_GAP_ENLARGED:g}. Coils brightest at {self.full_A:g} A. {self.says}"
         ).rstrip()
 
 

@@ -25,6 +25,7 @@ _POSES_WHILE_CHANGING_PER_S = 15.0
 _POSES_WHILE_BEHIND_PER_S = 0.2
 _IN_TIME_S = 0.057  # between two runs of a browser that is not behind
 _CHANGING_S = 0.6  # a run that comes so soon after another one is one of many
+_CHARTS_FIRST_S = 0.25  # after any run, in which a browser draws its charts
 _TOLD_PER_S = 8.0  # play-heads are redrawn at this pace
 SPEEDS = {"1 : 1": 1.0, "1 : 5": 0.2, "1 : 10": 0.1, "1 : 20": 0.05, "1 : 50": 0.02, "1 : 200": 0.005}
 
@@ -131,9 +132,11 @@ class Playback:
         self._thread.join(timeout=2.0)
 
     def _run(self) -> None:
-        last, told = time.monotonic(), 0.0
+        last, told, posed = time.monotonic(), 0.0, 0.0
         while not self._closing:
-            now = time.monotonic()
+            while not self._closing and (left := 1.0 / self._pace - (time.monotonic() - posed)) > 0.0:
+                time.sleep(min(left, 1.0 / _POSES_PER_S))  # the pace may change meanwhile
+            now = posed = time.monotonic()
             passed, last = now - last, now
             with self._posing:
                 shown, reel = self.motion, self._reel
@@ -152,21 +155,24 @@ class Playback:
             if shown is not None and moves and (stale or now - told >= 1.0 / _TOLD_PER_S):
                 told = now
                 self._moved(reel.clock_s, shown.duration_s)
-            if self.playing or self._pace < _POSES_PER_S:
-                while not self._closing and (left := 1.0 / self._pace - (time.monotonic() - now)) > 0.0:
-                    time.sleep(min(left, 1.0 / _POSES_PER_S))  # the pace may change meanwhile
-            elif not self._stale:
+            if not (self.playing or self._stale):
                 self._wake.wait()
                 last = time.monotonic()
             self._wake.clear()
 
     @property
     def _pace(self) -> float:
-        """Poses per second: fewer while one run follows the other, as while a slider is dragged."""
+        """Poses per second: fewer while one run follows the other, as while a slider is dragged.
+
+        None is due until the first one's charts are drawn: else a slow browser's runs would never follow so closely.
+        """
         came = tuple(self._came_s)
         gaps = tuple(takewhile(lambda gap: gap < _CHANGING_S, np.diff(came)[::-1]))
-        if not gaps or time.monotonic() - came[-1] >= _CHANGING_S:
+        since = time.monotonic() - came[-1]
+        if since >= (_CHANGING_S if gaps else _CHARTS_FIRST_S):
             return _POSES_PER_S
+        if not gaps:
+            return _POSES_WHILE_BEHIND_PER_S
         in_time = np.median(gaps) <= _IN_TIME_S  # of this change alone: a quick one before says nothing of it
         return _POSES_WHILE_CHANGING_PER_S if in_time else _POSES_WHILE_BEHIND_PER_S
 

@@ -153,7 +153,7 @@ class Session:
             raise InputError(str(error)) from None
         elapsed = time.perf_counter() - started
         if compiling:
-            self.events.status(f"Ready ({elapsed:.1f} s).")
+            self.events.status(f"Ready: models compiled in {elapsed:.1f} s.")
         reference = settings.sensors.record(reference, settings.seed)
         model = self.model_in_words(settings.monitor)
         self.simulation = Simulation(
@@ -177,7 +177,7 @@ class Session:
         self.events.status("Compiling the identification…")
         warm_up(Objective([reference], self.actuator))
         plant.compile_behind(self.actuator)
-        self.events.status(f"Ready ({time.perf_counter() - started:.1f} s).")
+        self.events.status(f"Ready: models compiled in {time.perf_counter() - started:.1f} s.")
 
     # --- identification ---------------------------------------------------------------------------------------------
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from plotly.offline import get_plotlyjs
 from support.comparison_by_hand import comparison as by_hand
 
-from ema_model.quantities.numbers import number
+from ema_model.quantities.numbers import amount, number
 from ema_model.quantities.variables import MODULATORS, variable_title
 from emaviz.figures import (
     calibration_scores,
@@ -221,6 +221,8 @@ def test_units_suit_the_size():
     assert inertia.powered([1.38e-5, 1.2e-5]).text(1.38e-5) == "13.8 10⁻⁶ kg·m²"
     assert stiffness.powered([100_750.0]).label == "Stiffness [kN·m/rad]"
     assert torque.powered([0.035]).unit == "mN·m" and torque.powered([0.0]).unit == "N·m"
+    assert amount(1.3e-5, "kg·m²") == "13.0·10⁻⁶ kg·m²", "the power that an interval beside it has"
+    assert amount(0.035, "N·m") == "35.0 mN·m"
 
 
 def test_regions_in_time_end_with_their_run(comparison):
@@ -233,7 +235,7 @@ def test_regions_in_time_end_with_their_run(comparison):
 def test_a_figure_with_its_legend_fits_a_panel_that_is_narrow_for_a_moment(browser):
     """Plotly fails where margins leave nothing, and takes the whole page with it."""
     figure = theme.new("Equivalent current", "Time [s]", "I [A]")
-    for name in ("floor ±2σ", "initial", "measured", "calibrated"):
+    for name in ("floor ±2σ", "uncalibrated", "measured", "calibrated"):
         figure.add_scatter(x=[0.0, 1.0], y=[0.0, 1.0], name=name)
     page = browser.new_page()
     page.set_content("<div id=a></div>")

@@ -28,7 +28,7 @@ from emaviz.page.track.tab import TrackTab
 
 pytestmark = pytest.mark.browser
 
-SHAPES = """() => Array.from(document.querySelectorAll('.js-plotly-plot'), plot => ({
+SHAPES = """() => [...document.querySelectorAll('.js-plotly-plot')].filter(plot => plot.offsetParent).map(plot => ({
   title: plot.layout?.title?.text ?? '', shapes: (plot.layout?.shapes ?? []).length,
   traces: (plot.data ?? []).length }))"""
 DROP = """([name, text]) => {
@@ -101,7 +101,7 @@ def upload(page, path):
 
 
 def figures(page):
-    """(title, shapes) of every figure that is drawn."""
+    """(title, shapes) of every figure that is seen."""
     return [(one["title"], one["shapes"]) for one in page.evaluate(SHAPES) if one["traces"]]
 
 
@@ -164,6 +164,11 @@ def test_from_a_file_to_the_region_where_the_model_fails(compare, app, rig_file)
         wait_until(lambda: chart.bounding_box()["y"] + chart.bounding_box()["height"] < 700.0 - 68.0, 10.0)
         assert verdict.bounding_box()["y"] < chart.bounding_box()["y"]
         assert chart.bounding_box()["height"] > 150.0
+        evidence = page.get_by_text("What the residual depends on", exact=True)
+        assert not evidence.is_visible()
+        page.set_viewport_size({"width": 1920, "height": 1080})
+        wait_until(evidence.is_visible)  # there is room for it below the regions
+        assert evidence.bounding_box()["x"] < chart.bounding_box()["x"]
     finally:
         page.set_viewport_size({"width": 1400, "height": 900})
 

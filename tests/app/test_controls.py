@@ -224,8 +224,8 @@ def test_the_search_is_looked_at_from_all_sides_and_its_landscape_drawn(page, ap
     page.locator("[role=tab][aria-selected=true]", has_text="Answer").wait_for(timeout=20_000)  # it comes forward
     show(page, "Search")
     choose(page, "Population view", "points over two k")
-    choose(page, "Across", "k2 backlash")
-    choose(page, "Upwards", "k8 proportional gain")
+    choose(page, "Horizontal axis", "k2 backlash")
+    choose(page, "Vertical axis", "k8 proportional gain")
     page.locator("svg text", has_text="k8 proportional gain").first.wait_for()
 
     show(page, "Answer")

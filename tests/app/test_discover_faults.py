@@ -56,7 +56,7 @@ def test_start_offers_the_fault_beside_the_effects(rig):
     best = look.promising[0]
     assert best.name == "k2" and look.share(best) > 0.5
     text = cards.label(look, best)
-    assert text.startswith("Backlash (fault k2)\nremoves about") and "backlash " in text and "µrad, k2 ≈ 0." in text
+    assert text.startswith("Backlash (fault k2)\nerror ") and "backlash " in text and "µrad, k2 ≈ 0." in text
     assert "strong evidence" in text
     assert "Physics is missing, or the actuator has a fault." in answer(look)
     shown = signature.figure(look, best)

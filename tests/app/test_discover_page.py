@@ -188,7 +188,7 @@ def test_two_effects_undo_and_a_wrong_answer(discover, app):
     page.get_by_text("Your answer agrees").wait_for()
     measured = app.playback.motion
     page.get_by_label("3D actuator", exact=True).click()
-    page.get_by_role("option", name="model with them").click()
+    page.get_by_role("option", name="improved model").click()
     wait_until(lambda: app.playback.motion is not measured)
     page.get_by_label("3D actuator", exact=True).click()
     page.get_by_role("option", name="as measured").click()

@@ -22,6 +22,7 @@ from emaviz.figures.run_metrics import differences, metrics, rise_time_s, table
 from emaviz.figures.signals import _within, at, beneath
 from emaviz.page.explore.presets import CUSTOM, PRESETS, name_of
 from emaviz.page.explore.tab import ExploreTab
+from emaviz.page.identify.tab import IdentifyTab
 from emaviz.session.session import Session
 from emaviz.session.settings import Settings
 
@@ -335,6 +336,8 @@ def test_the_play_head_is_the_same_moment_everywhere(page, app):
     assert len(heads) == 4, json.dumps(heads)
     assert all(left / width == pytest.approx(0.4, abs=0.005) for width, _, left in heads)
     page.get_by_role("tab", name="Identify").click()
+    page.get_by_text("Nothing is identified yet").wait_for()
+    app.tab(IdentifyTab).result._show_search()
     page.get_by_text("Convergence").wait_for()
     page.wait_for_timeout(300)
     assert not [line for line in page.evaluate(read) if line[0] and line[1] != "none"], "not over iterations"

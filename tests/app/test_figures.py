@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 from ema_model.actuator import load_actuator
+from ema_model.effects import find
 from emaviz import figures
 from emaviz.figures.decimate import envelope
 from emaviz.figures.fault_bars import fault_bars
+from emaviz.figures.model_equation import _symbol
 
 
 @pytest.mark.parametrize("n", [10, 999, 1000, 1001, 5001, 123_457])
@@ -43,3 +45,7 @@ def test_titles_of_axes_begin_with_a_capital():
         for text in axis.findall(path.read_text())
     }
     assert not found
+
+
+def test_symbols_of_fitted_values_are_set_as_in_their_equation():
+    assert "<msub>" in _symbol(find("hinge_moment"), "offset_Nm"), "no H_0 beside an equation that is typeset"

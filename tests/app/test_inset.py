@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from support.on_page import wait_until
 
+from emaviz.page.identify.tab import IdentifyTab
 from emaviz.recording.writer import RecordingWriter
 
 pytestmark = pytest.mark.browser
@@ -137,8 +138,10 @@ def test_explore_does_not_scroll_in_a_small_window(page):
     assert max(within) - min(within) <= 4.0, "the last chart has its time axis besides"
 
 
-def test_the_population_is_framed_beside_the_convergence_and_an_empty_history_says_what_it_will_hold(page):
+def test_the_population_is_framed_beside_the_convergence_and_an_empty_history_says_what_it_will_hold(page, app):
     go(page, "Identify")
+    page.get_by_text("Nothing is identified yet").wait_for(timeout=20_000)
+    app.tab(IdentifyTab).result._show_search()
     page.get_by_text("severities, 0 … 1").wait_for(timeout=20_000)
     assert "k1 friction [–]" in page.locator(".emaviz-picture:visible").inner_text()
     picture = page.locator(".emaviz-picture:visible").bounding_box()

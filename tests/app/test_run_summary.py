@@ -66,6 +66,7 @@ def test_the_guide_does_not_go_back_while_the_next_step_is_looked_for():
         ((1.25, 0.0004, ""), "1.25000 ± 0.00040"),
         ((1.39e-5, 3.2e-7, "kg·m²"), "(13.9 ± 0.32)·10⁻⁶ kg·m²"),
         ((1.39e-5, 3.2e-7, "N·m·s/rad"), "13.9 ± 0.32 µN·m·s/rad"),
+        ((1.42e6, 18365.0, "N·m/rad³"), "1.420 ± 0.018 MN·m/rad³"),
     ],
 )
 def test_a_value_has_the_digits_that_its_error_leaves(given, told):

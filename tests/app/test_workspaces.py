@@ -131,7 +131,7 @@ def test_compare_leads_on_to_identify_and_discover(tab, app, compared):
     go(tab, "Compare")
     tab.get_by_role("button", name="Find what is missing").click()
     tab.get_by_role("tab", name="Discovery", exact=True).wait_for()
-    tab.get_by_text("The measurements and the actuator that Compare has.").wait_for()
+    tab.get_by_text("The measurements and the actuator of Compare.").wait_for()
     assert tab.url.endswith("?view=discover")
 
 

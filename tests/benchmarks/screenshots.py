@@ -15,6 +15,7 @@ from typing import Any
 from playwright.sync_api import sync_playwright
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # a script finds what tests share
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the app has it, before numpy is there: else other digits
 from support.browser import SOFTWARE_GL
 
 from ema_model.faults import vector

@@ -62,7 +62,7 @@ def test_verdict_stands_first_in_plain_words(report, found):
     )
     first, last = found.ladder[0], found.ladder[-1]
     assert f"from {number(first.rmse)} to {number(last.rmse)} times the floor" in text
-    assert "cannot tell cogging torque from torque ripple" in text and "Motor inertia" in text
+    assert "cannot tell cogging torque from torque ripple" in text and "motor inertia" in text
 
 
 def test_each_effect_has_equation_cause_parameters_and_rivals(report, found):
@@ -74,10 +74,11 @@ def test_each_effect_has_equation_cause_parameters_and_rivals(report, found):
 
 
 def test_no_number_of_the_ladder_lies_on_the_floor(found):
-    rungs = [replace(found.ladder[0], rmse=rmse, holdout_rmse=held) for rmse, held in ((3.0, 2.0), (0.9, 0.3))]
+    steps = ((3.0, 2.0), (0.7, 0.3), (1.05, 1.02))
+    rungs = [replace(found.ladder[0], rmse=rmse, holdout_rmse=held) for rmse, held in steps]
     fitted, held_out, *_ = error_ladder.figure(replace(found, ladder=rungs)).data
-    assert fitted.textposition == ("top center", "middle right"), "0.9 with a number above it would reach over 1"
-    assert held_out.textposition == ("bottom center", "bottom center")
+    assert fitted.textposition == ("top center", "middle right", "top center"), "above 0.7 it would reach over 1"
+    assert held_out.textposition == ("bottom center",) * 3, "the floor runs through the marker of 1.02"
 
 
 def test_ladder_tells_every_signal_in_its_unit(report, found):

@@ -39,4 +39,4 @@ def motion_of(comparison: Comparison, compared: Compared, actuator: Actuator) ->
         return shown
     error = np.abs(compared.measured[name] - compared.model[name]) / compared.sigma[name]
     glow = np.clip((error - 1.0) / (_FULL - 1.0), 0.0, 1.0)
-    return replace(shown, heat=glow, says=f"Screw: the residual (full at {_FULL:g} times its floor).")
+    return replace(shown, heat=glow, says=f"Screw red where the model fails (full from {_FULL:g} × floor).")

@@ -88,6 +88,10 @@ class ComparePlots:
         self._signal.on_update(lambda event: event.client and self._post([*self._time, *self._against, *self._turn]))
         self._variable.on_update(lambda event: event.client and self._post(self._against))
 
+    def add_against(self) -> None:
+        """The figure of `Against` a second time, at this place of the page."""
+        self._against.append(self._add(self._draw_against, 0.36))
+
     def begin(self, view: View) -> None:
         """A new comparison: its signals and variables to choose from, the telling ones first."""
         self._view = view

@@ -17,7 +17,7 @@ from emaviz.page.compare import WORKSPACE
 from emaviz.page.compare.moment import motion_of
 from emaviz.page.compare.plots import ComparePlots, View
 from emaviz.page.compare.raw_lines import RawLines
-from emaviz.page.inset import ALL_COLUMNS, COLUMNS, NEXT_COLUMN, PLOTS_EARLY
+from emaviz.page.inset import ALL_COLUMNS, COLUMNS, NEXT_COLUMN, PLOTS_EARLY, ROOM
 from emaviz.page.kept import Cleared
 from emaviz.page.page import Page
 from emaviz.page.playback import PlaybackStrip
@@ -82,11 +82,15 @@ class ResultPanel:
         with self._answer:
             self._hint = add_html(gui)
             self._style = add_html(gui)
+        self._evidence = gui.add_folder("What the residual depends on", visible=False)
         self._plots_folder = gui.add_folder("Plots", visible=False)
         with self._plots_folder:
             add_html(gui, NEXT_COLUMN)
             self._recording = gui.add_dropdown("Measurement", ["–"], visible=False)
             self._plots = ComparePlots(page)
+        with self._evidence:  # below the sentences that it shows, where that would stay empty
+            add_html(gui, ROOM)
+            self._plots.add_against()
         self._next = gui.add_folder("Next", visible=False)
         with self._next:
             add_html(gui, IN_PAIRS)
@@ -127,7 +131,14 @@ class ResultPanel:
             self._show_answer(True)
 
     def _show_answer(self, visible: bool) -> None:
-        for folder in (self._numbers, self._answer, self._next, self._plots_folder, self._save):
+        for folder in (
+            self._numbers,
+            self._answer,
+            self._evidence,
+            self._next,
+            self._plots_folder,
+            self._save,
+        ):
             folder.visible = visible
 
     # --- the comparison ---------------------------------------------------------------------------------------------

@@ -17,7 +17,7 @@ from emaviz.page.playback import PlaybackStrip
 from emaviz.scene.motion import motion
 from emaviz.session.discover.discovering import Discovering
 
-_SHOWN = ("as measured", "model without the added effects", "model with them")
+_SHOWN = ("as measured", "calibrated model", "improved model")
 
 
 class ActuatorSwitch:

@@ -34,8 +34,8 @@ def label(look: Look, one: Candidate) -> str:
         if look.share(one) < _LITTLE:
             lines.append("explains a part, but hardly reduces the error by itself")
         else:
-            lines.append(f"removes about {100.0 * look.share(one):.0f} % of the error: {before} → ≈ {after} × floor")
-        lines.append(f"{strength(look, one)} · {confidence(one)}")
+            lines.append(f"error {before} → ≈ {after} × floor (−{100.0 * look.share(one):.0f} %)")
+        lines += [strength(look, one), confidence(one)]
         same = look.assessment.alike.get(one.name, ()) if look.assessment else ()
         if same:
             lines.append("≈ same as " + ", ".join(in_sentence(effect_title(name)) for name in same))

@@ -42,6 +42,12 @@ class DiscoverPanel:
         self._guide = Guide(page, discovering, lambda: self.source.choose_first())
         self.source = SourceControls(page, discovering, uploads, self._chosen, self._source_shown)
         self._start = gui.add_button("Start", icon=viser.Icon.PLAYER_PLAY)
+        self._all = gui.add_button(
+            "Find all",
+            icon=viser.Icon.WAND,
+            visible=False,
+            hint="Adds, step by step, every effect and fault that the data support",
+        )
         self._line = JobLine(page, discovering.job)
         self._cards_folder = gui.add_folder("What may be missing", visible=False)
         with self._cards_folder:
@@ -55,7 +61,6 @@ class DiscoverPanel:
                 gui.add_button("Remove", icon=viser.Icon.X, color="gray", visible=False) for _ in range(_MOST_ADDED)
             ]
             self._undo = gui.add_button("Undo the last step", icon=viser.Icon.ARROW_BACK_UP, color="gray")
-            self._all = gui.add_button("Find all", icon=viser.Icon.WAND, hint="Adds what pays, step by step")
         self._little_folder = gui.add_folder("Little effect on the error", visible=False, expand_by_default=False)
         with self._little_folder:
             self._little = [self._slot() for _ in (*CATALOGUE, *CAUSES)]
@@ -132,8 +137,8 @@ class DiscoverPanel:
         if look is None or (self._opened is not None and look.candidate(self._opened) is None):
             self._opened = None
         with self._page.server.atomic():
-            for folder in (self._steps, self._cards_folder):
-                folder.visible = look is not None
+            for one in (self._all, self._steps, self._cards_folder):
+                one.visible = look is not None
             self._draw_model(look)
             self._draw_cards(look)
             self._own.show(look)

@@ -24,7 +24,6 @@ from emaviz.page.inset import COLUMNS, NEXT_COLUMN
 from emaviz.page.kept import Cleared
 from emaviz.page.page import Page
 from emaviz.page.playback import PlaybackStrip
-from emaviz.page.style import IN_ROW
 from emaviz.session.discover import beside_truth
 from emaviz.session.discover.discovering import Discovering
 from emaviz.text.html import Html, add_html, html, joined
@@ -64,7 +63,6 @@ class DiscoveryPanel:
         self._headline = add_html(gui, begin("No discovery yet", _STEPS))
         self._keep_folder = gui.add_folder("Keep it", visible=False)
         with self._keep_folder:  # where it is seen without scrolling
-            add_html(gui, IN_ROW)
             self._kept = keep()
             leads()
         self._ladder: Any = gui.add_plotly(go.Figure(), config=CONFIG, visible=False)

@@ -114,7 +114,7 @@ class SourceControls:
             self._about.content = about(challenge, folded=look is not None)
         else:
             self._about.content = note(
-                "The measurements and the actuator that Compare has."
+                "The measurements and the actuator of Compare."
                 if opened
                 else "Open measurements on Compare first, or choose a challenge."
             )

@@ -25,10 +25,16 @@ from emaviz.page.playback import PlaybackStrip
 from emaviz.scene.motion import PLAYED, motion
 from emaviz.session.identify.race import Race, Track
 from emaviz.session.worker import Worker
-from emaviz.text.html import add_html
+from emaviz.text.html import Html, add_html
 from emaviz.text.identification import sure_words
+from emaviz.text.notes import begin
 
 _BEST = "the best"
+_STEPS = (
+    "Set faults on Explore, or choose a measurement of the data folder on the left.",
+    Html("Press <b>Identify</b>: the search runs the model for a population of faults until its current fits."),
+    "You get k1 … k8 in physical units, each with its 90 % interval, and which of them are faults.",
+)
 _SEARCH, _ANSWER = "Search", "Answer"  # tabs: the second comes forward once it is there
 _LEAST_S = 0.1  # between two pictures of a swarm, which browsers in software draw slowly
 _MOST_ROWS = 200
@@ -55,7 +61,9 @@ class IdentifyResult:
         gui = page.server.gui
         with panel.add_tab(_SEARCH, viser.Icon.CHART_DOTS):
             add_html(gui, COLUMNS)
+            self._empty: Any = add_html(gui, begin("Nothing is identified yet", _STEPS))
             self._convergence = LiveConvergence(gui)
+            self._convergence.handle.visible = False
             page.workspaces.heights.add([self._convergence.handle], spare_px=160, beside_px=332)
             self._swarm = SwarmView(page)
         with panel.add_tab(_ANSWER, viser.Icon.TARGET_ARROW):
@@ -151,6 +159,12 @@ class IdentifyResult:
             self._page.notify("Explore has the command", "On Identify, press Identify again.", "green")
             self._page.workspaces.go("explore", client)
 
+    def _show_search(self) -> None:
+        """From the first race on, in place of what to do."""
+        if self._empty.visible:
+            self._empty.visible, self._convergence.handle.visible = False, True
+            self._swarm.appear()
+
     def _draw(self, race: Race, soon: bool) -> None:
         begun = race is not self._begun
         if not (begun or soon or time.monotonic() - self._drawn_at > _LEAST_S):
@@ -159,6 +173,7 @@ class IdentifyResult:
         self._race = self._begun = race
         longest = max(track.iterations for track in race.tracks.values())
         with self._page.server.atomic():
+            self._show_search()
             self._convergence.begin(tuple(race.tracks), longest)
             self._convergence.show({name: track.errors for name, track in race.tracks.items()})
             self._swarm.show(race, begun)

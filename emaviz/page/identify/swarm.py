@@ -17,24 +17,33 @@ _NAMES = tuple(fault.label for fault in FAULTS)
 
 
 class SwarmView:
-    """The picture and its controls."""
+    """The picture and its controls, which `appear` with the first race."""
 
     def __init__(self, page: Page) -> None:
         self._page = page
         self._race: Race | None = None
         self._chosen = False  # by hand, which two k
         gui = page.server.gui
-        with gui.add_folder("Population"):
+        self._folder = gui.add_folder("Population", visible=False)
+        with self._folder:
             add_html(gui, NEXT_COLUMN)
             self._picture = add_html(gui, swarm.plane([], 0, 5))
-        self._kind = gui.add_dropdown("Population view", (_PLANE, _LINES))
-        self._x = gui.add_dropdown("Across", _NAMES, initial_value=_NAMES[0])
-        self._y = gui.add_dropdown("Upwards", _NAMES, initial_value=_NAMES[5])
-        self._iteration = gui.add_slider("Iteration", 0, 150, 1, 150, disabled=True, hint="Looks back once it is over")
+        self._kind = gui.add_dropdown("Population view", (_PLANE, _LINES), visible=False)
+        self._x = gui.add_dropdown("Horizontal axis", _NAMES, initial_value=_NAMES[0], visible=False)
+        self._y = gui.add_dropdown("Vertical axis", _NAMES, initial_value=_NAMES[5], visible=False)
+        self._iteration = gui.add_slider(
+            "Iteration", 0, 150, 1, 150, disabled=True, visible=False, hint="Looks back once it is over"
+        )
         for entry in (self._kind, self._iteration):
             entry.on_update(lambda event: event.client and page.screen.post("swarm view", self._changed))
         for entry in (self._x, self._y):
             entry.on_update(lambda event: event.client and page.screen.post("swarm axes", self._choose))
+
+    def appear(self) -> None:
+        """There is something to look at."""
+        for one in (self._folder, self._kind, self._iteration):
+            one.visible = True
+        self._show_axes()
 
     def show(self, race: Race, begun: bool) -> None:
         """Draws a race as it stands; on the screen's thread."""
@@ -59,9 +68,11 @@ class SwarmView:
         self._changed()
 
     def _changed(self) -> None:
-        lines = self._kind.value == _LINES
-        self._x.visible = self._y.visible = not lines
+        self._show_axes()
         self._draw(int(self._iteration.value) if not self._iteration.disabled else 10**9)
+
+    def _show_axes(self) -> None:
+        self._x.visible = self._y.visible = self._kind.value != _LINES
 
     def _draw(self, iteration: int) -> None:
         race = self._race

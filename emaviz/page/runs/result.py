@@ -14,11 +14,15 @@ from emaviz.page.page import Page
 from emaviz.recording.entry import Entry
 from emaviz.recording.read import Recording
 from emaviz.text.html import Html, add_html, html
+from emaviz.text.notes import begin
 
 _CONFIG = {"displayModeBar": False}
-_NOTHING = (
-    "Nothing is recorded yet. Identify something, or press Record below a comparison or a discovery: it is listed here."
+_STEPS = (
+    Html("Identify something, or press <b>Record</b> below a comparison or a discovery."),
+    "Choose the run on the left: you see what it found, and its current.",
+    "Open it in Rerun, on this page or in a tab of its own, or lay two runs over each other.",
 )
+_NOTHING = begin("Nothing is recorded yet", _STEPS)
 
 
 class RunsResult:
@@ -28,12 +32,12 @@ class RunsResult:
         self._page = page
         self._pair: tuple[tuple[Entry, Any], tuple[Entry, Any]] | None = None
         self._plot: Any = None
-        self._told, self._drawn = _hint(_NOTHING), False  # of the chosen run
+        self._told, self._drawn = _NOTHING, False  # of the chosen run
         self._opened, self._dark = ("", ""), False  # the viewer's address and recording; whether the page is dark
         self._tab = panel.add_tab("Rerun", viser.Icon.PLAYER_PLAY)
         gui = page.server.gui
         with self._tab:
-            self._frame = add_html(gui, _hint(_NOTHING))
+            self._frame = add_html(gui, _NOTHING)
             self._glance: Any = gui.add_plotly(go.Figure(), config=_CONFIG, aspect=0.5, visible=False)
             self._close = gui.add_button("Close the viewer", icon=viser.Icon.X, color="gray", visible=False)
         with panel.add_tab("Two runs", viser.Icon.ARROWS_DIFF):
@@ -70,7 +74,7 @@ class RunsResult:
     def show(self, told: Html, recording: Recording | None) -> None:
         """The chosen run, where the viewer is not open: what is said of it, and its current; None for none."""
         figure = one_recording.figure(recording) if recording is not None else None
-        self._told, self._drawn = told or _hint(_NOTHING), figure is not None
+        self._told, self._drawn = told or _NOTHING, figure is not None
         if figure is not None:
             self._glance.figure = figure
         if not self._close.visible:

@@ -22,7 +22,7 @@ from emaviz.text.told import warned
 
 _HALFWAY = 0.5  # from healthy to the end of a k's range, where a threshold begins
 _ABOUT = (
-    "A folder of recordings of one unit, a flight each, whose names tell their order (flight_0001, 2026-05-03 …), "
+    "A folder of recordings of one unit, one for each flight, named in their order (flight_0001, 2026-05-03 …), "
     "inside the data folder."
 )
 

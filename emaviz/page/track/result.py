@@ -31,9 +31,9 @@ from emaviz.text.told import whole
 _CONFIG = {"displayModeBar": False}
 _NONE = "–"
 _STEPS = (
-    "Choose a folder of flights on the left, or a challenge to practise on; set the value at which the life ends.",
+    "Choose a folder of flights on the left, or a challenge to practise on; set the threshold that ends the life.",
     Html("Press <b>Track</b>: the faults of each flight are identified."),
-    "You see which fault drifts and how many flights remain, as a distribution; drag the day back along the life.",
+    "You see which fault drifts and how many flights remain, as a distribution, today and at any earlier flight.",
 )
 _ASPECTS = (0.66, 0.42, 0.48)  # of the figures, height over width: the first stands beside the others
 

@@ -16,7 +16,7 @@ from emaviz.text.notes import note
 
 _ABOUT = (
     "A folder inside the data folder with a folder for each unit of one type, each with recordings of the same "
-    "commands. What differs is freed where the data pay for it, and confirmed by what is held out."
+    "commands. One model is fitted to all; where a unit differs, and held-out recordings agree, a parameter is its own."
 )
 
 
@@ -31,7 +31,9 @@ class UnitsPanel:
         self._folder = FolderChoice(page, "Units", hint, self._listed, lambda: comparing.chosen, self._take_folder)
         self._practice = PracticeButtons(page, comparing.practice, self.choose)
         self._rule = gui.add_text(
-            "Hold out", comparing.rule, hint="Recordings of such a name judge what was found: *unseen*; empty for none"
+            "Hold out",
+            comparing.rule,
+            hint="Recordings of such a name are not fitted, but check the result: *unseen*; empty for none",
         )
         self._actuator: Any = gui.add_dropdown("Actuator", (comparing.actuator_name,), hint="The units' type")
         self._start = gui.add_button("Compare units", icon=WORKSPACE.icon, disabled=True)

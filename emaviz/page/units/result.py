@@ -23,8 +23,8 @@ from emaviz.text.verdict import MEANINGS, of_units
 _CONFIG = {"displayModeBar": False}
 _STEPS = (
     "Choose a folder of units on the left, or a challenge to practise on.",
-    Html("Press <b>Compare units</b>: the type is calibrated on all, and what differs is freed for each unit."),
-    "You see which unit differs from the rest, in which parameter and by how much, checked by what is held out.",
+    Html("Press <b>Compare units</b>: one model is fitted to all units; where a unit differs, a parameter is its own."),
+    "You see which unit differs from the rest, in which parameter and by how much, checked on held-out recordings.",
 )
 _BESIDE_PX = 200  # of a window, what stands above and below the parameters
 _WIDTH_PX = 540  # of a figure on a usual panel, by which its share of height is made

@@ -14,7 +14,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ema_model.estimation import Calibration, calibrate
+from ema_model.estimation import Calibration, Floor, after_fit, calibrate
+from ema_model.estimation.floor import twin_error
 from ema_model.identification.model_bias import TWINS
 from ema_model.units.block import WIDER, Linearised, Unit, colour_of, linearised, pooled
 from ema_model.units.pool import Pool
@@ -55,10 +56,28 @@ class Fitted:
         """The colour of what its own calibration leaves, (values,): a difference to other units is none of it."""
         return colour_of(self.unit, self.calibration.residual)
 
-    @property
+    @cached_property
     def error(self) -> float:
         """What it leaves, in floors."""
-        return float(np.sqrt(self.calibration.chi2_per_value))
+        return float(self.over_floor(self.calibration.residual))
+
+    @cached_property
+    def floors(self) -> list[Floor]:
+        """What a true model leaves once it is fitted."""
+        model, found = self.unit.model, self.calibration
+        twins = [twin_error(model, place, found.actuator, found.k) for place in range(len(model.windows))]
+        return after_fit(self.unit.floors, found, twins)
+
+    def over_floor(self, residuals: Array) -> Array:
+        """rms of what models leave of the unit's recordings, (…, values) as fits weigh it, in its floors, (…,)."""
+        problem = self.unit.problem
+        problem.reweighted(self.unit.floors)
+        squared, counts = [], []
+        for window, name, rows in problem.parts():
+            floor = self.floors[window]
+            squared.append((residuals[..., rows] / problem.over_sigma(window, name, floor.sigma(name))) ** 2)
+            counts.append(floor.counts)
+        return np.sqrt(np.average(np.concatenate(squared, axis=-1), axis=-1, weights=np.concatenate(counts)))
 
 
 def fit(unit: Unit, before: Sequence[Fitted] = ()) -> Fitted:

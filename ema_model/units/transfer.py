@@ -23,12 +23,12 @@ def transfer(fits: Sequence[Fitted]) -> Transfer:
         parameters = len(one.unit.parameters)
         at[:, :parameters] = [other.calibration.x[:parameters] for other in fits]
         residuals = problem.residuals(problem.clip(at))[:, : problem.values]
-        floors[:, place] = np.sqrt(np.mean(residuals**2, axis=1))
+        floors[:, place] = one.over_floor(residuals)
         parts = [part for part in problem.parts() if part[1] == signal]
         size = [problem.over_sigma(i, name, np.ones(rows.stop - rows.start)) for i, name, rows in parts]
         squares = [np.sum((residuals[:, rows] / over) ** 2, axis=1) for (_, _, rows), over in zip(parts, size)]
         values = sum(len(over) for over in size)
         error[:, place] = np.sqrt(np.sum(squares, axis=0) / values)
-        own = [one.unit.floors[i].sigma(signal) ** 2 for i, _, _ in parts]
+        own = [one.floors[i].sigma(signal) ** 2 for i, _, _ in parts]
         floor[place] = np.sqrt(np.sum(np.concatenate(own)) / values)
     return Transfer(signal, error, floor, floors)

@@ -64,6 +64,8 @@ def test_what_differs_is_found(differing):
 
 def test_the_transfer_matrix_shows_it(differing):
     floors = differing.transfer.floors
+    assert np.diag(floors) == pytest.approx(np.ones(3), abs=0.15), "a unit's own model is at its floor"
+    assert np.diag(floors) == pytest.approx(differing.errors)
     assert floors.shape == (3, 3) and np.all(np.diag(floors) <= floors.min(axis=0) + 0.02)
     assert differing.transfer.error.shape == (3, 3) and np.all(differing.transfer.floor > 0.0)
 

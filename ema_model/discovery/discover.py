@@ -18,7 +18,7 @@ from ema_model.discovery.remaining import left_by, within_band
 from ema_model.discovery.repeated import repeated
 from ema_model.discovery.result import Candidate, Discovery, Experiment
 from ema_model.discovery.second_opinion import support_of
-from ema_model.discovery.sentences import as_well, held_back, masked, mismatch, untold
+from ema_model.discovery.sentences import as_well, held_back, mismatch, untold
 from ema_model.discovery.step import refreshed
 from ema_model.discovery.uncertainty import with_intervals
 from ema_model.discovery.verdict import verdict_of
@@ -100,7 +100,6 @@ def result_of(
             *([story.transmission_seen.sentence(calibration.actuator)] if story.transmission_seen else ()),
             *(one.sentence for one in story.disagreements),
             *held_back(story.current.held, calibration.actuator.axes),
-            *masked(story.added, calibration.actuator.axes),
             *as_well(story.ties, story.added, story.current.faults),
         ],
         controller_seen=story.controller_seen,

@@ -1,4 +1,4 @@
-"""A discovery's warnings in plain words, as the page, the reports and the recordings show them."""
+"""Further sentences of a discovery, as page, reports and recordings show them: its warnings, what had been masked."""
 
 from __future__ import annotations
 

@@ -12,6 +12,7 @@ from ema_model.comparison.summary import calibration_dict, event_dict, parameter
 from ema_model.discovery.controller_seen import ControllerSeen
 from ema_model.discovery.labels import rung_label
 from ema_model.discovery.result import Added, Candidate, Discovery, Experiment, Rung
+from ema_model.discovery.sentences import masked
 from ema_model.effects import find
 from ema_model.faults import BY_NAME
 from ema_model.quantities.axes import Axes
@@ -69,7 +70,7 @@ def as_dict(found: Discovery) -> dict[str, Any]:
                 for one in found.disagreements
             ],
             "events": [event_dict(one) for one in found.events],
-            "warnings": list(found.warnings),
+            "warnings": [*found.warnings, *masked(found.effects, found.actuator.axes)],
         }
     )
 

@@ -7,6 +7,7 @@ from ema_model.actuator.readings import sentences as phrases_of
 from ema_model.comparison.sentences import cause_of
 from ema_model.discovery.labels import effect_title, value
 from ema_model.discovery.result import Discovery, Rung
+from ema_model.discovery.sentences import masked
 from ema_model.discovery.tables import added, candidates, ladder, per_recording
 from ema_model.discovery.verify import Verified
 from ema_model.faults import BY_NAME, FAULTS, NAMES, causes
@@ -117,6 +118,7 @@ def sentences(found: Discovery) -> list[str]:
     added = len(found.effects) + len(causes(found.faults))
     if added:
         told.append(f"With {'it' if added == 1 else 'them'} the error falls from {_times(first, last)}.")
+        told += masked(found.effects, found.actuator.axes)
     else:
         bare = found.ladder[-2] if found.curve is not None else last  # a curve is no part of the calibrated model
         held = "" if bare.holdout_rmse is None else f" ({number(bare.holdout_rmse)} times on what was not fitted)"

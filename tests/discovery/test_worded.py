@@ -13,7 +13,7 @@ from ema_model.discovery.labels import effect_title, rung_label
 from ema_model.discovery.result import Change, StoodIn
 from ema_model.discovery.sentences import NOT_REPEATABLE, masked, untold
 from ema_model.discovery.summary import as_dict
-from ema_model.discovery.words import moved
+from ema_model.discovery.words import moved, sentences
 from ema_model.estimation import Calibrated
 from ema_model.quantities.axes import ROTARY, Axes
 from emaviz.report import write_discovery_report
@@ -31,7 +31,12 @@ def test_parameters_that_masked_an_effect_are_named_as_on_the_page(tmp_path):
         "Cogging torque had been masked by motor torque constant (−2.5 → +0.0 σ) and friction dynamic (+2.0 → +0.1 σ), "
         "now nearer to their nominal values."
     ]
-    told = replace(found, warnings=[*lines, untold("cogging_torque", "torque_ripple"), NOT_REPEATABLE])
+    told = replace(
+        found,
+        effects=[replace(one, stood_in=moved), later],
+        warnings=[untold("cogging_torque", "torque_ripple"), NOT_REPEATABLE],
+    )
+    assert lines[0] in as_dict(told)["warnings"] and lines[0] in sentences(told)
     assert not any(RAW.search(line) for line in as_dict(told)["warnings"])
     write_discovery_report(told, tmp_path / "report.html")
     page = (tmp_path / "report.html").read_text(encoding="utf-8")

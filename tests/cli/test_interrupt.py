@@ -27,6 +27,12 @@ MOMENTS = {
     "gui": ("emaviz.cli.interrupt", "argparse", "numpy", "numba", "scipy", "pyarrow", "viser", "emaviz.page.app"),
     "compare": ("emaviz.cli.interrupt", "argparse", "numpy", "numba", "ema_model.comparison", "pyarrow"),
 }
+QUICK = (
+    ("gui", "emaviz.cli.interrupt"),
+    ("gui", "numba"),
+    ("gui", "emaviz.page.app"),
+    ("compare", "ema_model.comparison"),
+)
 
 
 @pytest.fixture(scope="module")
@@ -92,7 +98,14 @@ def interrupted(process, times=1):
     return out, "".join(line for line in said.splitlines(keepends=True) if not line.startswith("import time:"))
 
 
-@pytest.mark.parametrize("command, moment", [(command, moment) for command in MOMENTS for moment in MOMENTS[command]])
+@pytest.mark.parametrize(
+    "command, moment",
+    [
+        pytest.param(command, moment, marks=() if (command, moment) in QUICK else pytest.mark.long)
+        for command, moments in MOMENTS.items()
+        for moment in moments
+    ],
+)
 def test_an_interrupt_while_importing_ends_it(start, command, moment):
     process = start(command, "-X", "importtime")
     for line in process.stderr:

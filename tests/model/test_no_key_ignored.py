@@ -72,6 +72,7 @@ KINDS = [
     and (controller not in WITHOUT_DRIVE or inverter == "current")
 ]
 CIRCUITS = [(c, i, circuit) for c, i in KINDS for circuit in (("reduced", "thesis") if i == "hysteresis" else ("",))]
+COMPILED = ("cascade", "hysteresis"), ("cascade", "current"), ("unknown", "current")  # for other tests as well
 WALK = [
     (*kinds, f"{section}.{name}")
     for kinds in CIRCUITS
@@ -158,7 +159,7 @@ def sensible_step(path: str) -> float:
 
 @pytest.mark.parametrize(
     ("controller", "inverter", "circuit", "path"),
-    [pytest.param(*one, marks=pytest.mark.long if "thesis" in one else ()) for one in WALK],
+    [pytest.param(*one, marks=() if one[:2] in COMPILED and "thesis" not in one else pytest.mark.long) for one in WALK],
     ids=["-".join(one) for one in WALK],
 )
 def test_key_changes_the_fitted_model_or_is_refused(load, controller, inverter, circuit, path):

@@ -10,6 +10,7 @@ import pytest
 from support.damaged import damage, whole
 from support.foreign_files import FILES
 from support.reading_process import READERS, ReadingProcess
+from support.representative import first_of
 
 MOST_BYTES = 10_000_000  # that a measurement may take
 MOST_GROWN = 300e6  # bytes by which the process may grow at its peak; three times the page's limit would be 750e6
@@ -74,7 +75,7 @@ def test_damaged_recordings(process, reader, tmp_path):
     assert not bad
 
 
-@pytest.mark.parametrize("reader", BY_A_PROGRAM)
+@pytest.mark.parametrize("reader", first_of(BY_A_PROGRAM))
 def test_a_name_with_a_nul_ends_no_process(process, reader, tmp_path):
     """Rerun's program finds no fault with it, and its native reader aborts."""
     [whole_one] = whole("rrd", tmp_path)

@@ -97,14 +97,14 @@ def test_json_has_the_same(differing):
 
 
 def test_equal_units_are_equal_and_a_missing_recording_is_named():
-    fitted, _ = units_of(3, {}, seed=2)
-    fitted["unit_03"] = fitted["unit_03"][:1]  # the chirp: no step, which tells the resistance
+    fitted, _ = units_of(2, {}, seed=2)
+    fitted["unit_02"] = fitted["unit_02"][:1]  # the chirp: no step, which tells the resistance
     found = compare_units(fitted, ACTUATOR)
     assert not found.differences and not found.scattering
-    assert sentences(found) == ["the 3 units do not differ in anything that their recordings tell"]
+    assert sentences(found) == ["the 2 units do not differ in anything that their recordings tell"]
     needed = {(one.unit, one.parameter): one.recording for one in found.needs}
-    assert needed["unit_03", "motor.resistance_Ohm"] == "step"
-    assert re.search("unit_03 tells nothing of motor .*resistance: a recording like step would", str(found))
+    assert needed["unit_02", "motor.resistance_Ohm"] == "step"
+    assert re.search("unit_02 tells nothing of motor .*resistance: a recording like step would", str(found))
 
 
 def test_two_units_with_one_recording_each_say_what_cannot_be_known():

@@ -147,7 +147,7 @@ def _bent(before: Fit, after: Fit, key: str) -> str:
             continue
         if path.startswith(f"effects.{key}."):
             return f"its {_title(after, path)} would stand at the bound"
-        if not _is_base(path):
+        if "." not in path or path.startswith("effects."):
             continue
         if before is after or abs(one.z) - abs(before.calibration.parameters[path].z) > DRIVEN:
             return f"it drives the {_title(after, path)} to its bound"
@@ -211,17 +211,13 @@ def _faint(data: Data, before: Fit, after: Fit) -> str:
 
 
 def _strained(data: Data, before: Fit, after: Fit) -> str:
-    """Whether beside a model that may be true as it is, the effect needs a parameter of the actuator at its bound."""
+    """Whether beside a model that may be true as it is, the effect needs a parameter that this has at its bound."""
     if not within_band(data, before):
         return ""
-    bent = (path for path, one in after.calibration.parameters.items() if one.at_bound and _is_base(path))
-    path = next(bent, "")
+    known = before.calibration.parameters
+    bent = [path for path, one in after.calibration.parameters.items() if one.at_bound and path in known]
+    path = next((path for path in bent if "." in path and not path.endswith(ANGLES)), "")
     return path and f"a true model may leave as much, and with it the {_title(after, path)} stands at its bound"
-
-
-def _is_base(path: str) -> bool:
-    """Whether it is a parameter of the actuator itself: of no effect, and no fault."""
-    return "." in path and not path.startswith("effects.") and not path.endswith(ANGLES)
 
 
 def _unsteady(data: Data, after: Fit, key: str) -> str:

@@ -47,7 +47,7 @@ def test_missing_physics_blames_no_part_until_it_is_added(cogging, tmp_path, cap
     assert main(["identify", str(cogging), "--json", str(out)]) == 0
     result = json.loads(out.read_text())
     assert result["adequate"] is False and result["alarms"] == [] and result["healthy"] is False
-    assert "emaviz discover" in result["warnings"][0]
+    assert "Discover, on the same recordings, looks for it" in result["warnings"][0]
     assert "the model does not fit" in capsys.readouterr().out
 
     assert main(["identify", str(cogging), "--effect", EFFECT, "--json", str(out)]) == 0

@@ -154,21 +154,23 @@ def test_of_a_model_that_may_be_true_an_effect_takes_most_or_is_not_claimed(monk
 
 
 @pytest.mark.parametrize(
-    ("path", "at_bound", "may_be_true", "said"),
+    ("path", "at_bound", "may_be_true", "is_new", "said"),
     [
-        ("motor.viscous_friction_Nms_rad", True, True, "stands at its bound"),
-        ("motor.viscous_friction_Nms_rad", True, False, ""),
-        ("motor.viscous_friction_Nms_rad", False, True, ""),
-        (PATH, True, True, ""),
-        ("k2", True, True, ""),
+        ("motor.viscous_friction_Nms_rad", True, True, False, "stands at its bound"),
+        ("motor.viscous_friction_Nms_rad", True, False, False, ""),
+        ("motor.viscous_friction_Nms_rad", False, True, False, ""),
+        ("effects.pendulum_load.moment_Nm", True, True, False, "stands at its bound"),
+        (PATH, True, True, True, ""),
+        ("k2", True, True, False, ""),
     ],
-    ids=["at its bound", "far from true before", "free", "an effect's own", "a fault"],
+    ids=["at its bound", "far from true before", "free", "of an effect of the file", "the effect's own", "a fault"],
 )
 def test_beside_a_model_that_may_be_true_no_effect_needs_a_parameter_at_its_bound(
-    monkeypatch, path, at_bound, may_be_true, said
+    monkeypatch, path, at_bound, may_be_true, is_new, said
 ):
     monkeypatch.setattr(objections, "within_band", lambda data, fit: may_be_true)
-    found = fitted([1.0, 1.0])
-    found.calibration.parameters = {path: Calibrated(1.0, 0.5, (0.9, 1.1), "", 1.0, at_bound)}
-    reason = objections._strained(DATA, found, found)
+    before, after = fitted([1.0, 1.0]), fitted([1.0, 1.0])
+    after.calibration.parameters = {path: Calibrated(1.0, 0.5, (0.9, 1.1), "", 1.0, at_bound)}
+    before.calibration.parameters = {} if is_new else after.calibration.parameters
+    reason = objections._strained(DATA, before, after)
     assert (said in reason) if said else not reason

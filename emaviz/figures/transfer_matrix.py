@@ -25,7 +25,7 @@ def figure(result: UnitsCompared, *, dark: bool = False) -> go.Figure:
     chart = theme.new(f"Error, × floor{beside}", "Recordings of", "Model of", dark=dark)
     names = [theme.plain(name) for name in result.units]
     errors = [[amount(value, shown.unit) for value in row] for row in moved.error]
-    worse = moved.error / np.maximum(np.diag(moved.error), 1e-300)
+    worse = moved.floors / np.maximum(np.diag(moved.floors), 1e-300)
     text = None
     if len(names) <= _IN_SHORT:
         text = [

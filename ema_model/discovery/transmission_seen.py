@@ -31,11 +31,11 @@ _SLIDES = 0.02  # of the highest speed, below which a direction is not known
 _ROUNDS = 3  # in which a delay between the two is found
 _LEAST_SAMPLES, _MOST_SAMPLES = 100, 5000
 _SHORT = {
-    "acceleration": "the shaft between motor and user gives",
-    "bandwidth": "the two position sensors differ in bandwidth",
-    "direction": "there is play between motor and user",
-    "position": "an error between motor and user repeats with the position",
-    "": "the user's position leaves the motor's, and why is not known",
+    "acceleration": "the user's position leaves the motor's as by the twist of a shaft",
+    "bandwidth": "the user's position leaves the motor's as by sensors that differ in bandwidth",
+    "direction": "the user's position leaves the motor's as by play",
+    "position": "the user's position leaves the motor's, repeating with its position",
+    "": "the user's position leaves the motor's, cause unknown",
 }
 _CAUSES = {
     "bandwidth": "It follows the acceleration, ahead of it, as two sensors that differ in bandwidth do.",

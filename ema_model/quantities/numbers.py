@@ -99,7 +99,7 @@ class Quantity:
 
 
 def with_uncertainty(value: float, half: float, unit: str) -> str:
-    """'12.2 ± 0.70 mN·m', '(13.90 ± 0.32)·10⁻⁶ kg·m²': half the width of an interval with two digits."""
+    """'12.2 ± 0.70 mN·m', '(13.9 ± 0.32)·10⁻⁶ kg·m²': half the width of an interval with two digits."""
     shown = Quantity("", unit).scaled(value)
     if 0.0 < shown.factor * half < _FINE:  # 703.000 ± 0.087 µrad, not 0.703 ± 8.7·10⁻⁵ mrad
         shown = Quantity("", unit).scaled(1e-3 * value)

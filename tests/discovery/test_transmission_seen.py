@@ -65,7 +65,7 @@ def test_a_shaft_that_gives_is_told_by_the_frequency_of_the_user_on_it(healthy, 
     seen = transmission_seen([twisted], ACTUATOR)
     assert seen is not None and seen.cause == "acceleration" and "torsional compliance" in seen.sentence(ACTUATOR)
     assert seen.frequency_Hz == pytest.approx(swings_at, rel=0.06)
-    assert seen.short == "the shaft between motor and user gives"
+    assert seen.short == "the user's position leaves the motor's as by the twist of a shaft"
 
 
 def test_a_user_that_runs_ahead_of_its_acceleration_is_no_shaft(healthy):
@@ -105,18 +105,18 @@ def test_nothing_is_adequate_beside_it(monkeypatch):
         (
             TransmissionSeen(1e-4, 1e-5, "direction"),
             True,
-            "Motion and current are explained; there is play between motor and user.",
+            "Motion and current are explained; the user's position leaves the motor's as by play.",
         ),
         (
             TransmissionSeen(1e-4, 1e-5, "acceleration", frequency_Hz=32.0),
             True,
-            "Motion and current are explained; the shaft between motor and user gives.",
+            "Motion and current are explained; the user's position leaves the motor's as by the twist of a shaft.",
         ),
         (
             TransmissionSeen(1e-4, 1e-5, "acceleration", frequency_Hz=32.0),
             False,
             "Something is missing that none of the known effects explains: 1.4 times the floor remains, cause unknown; "
-            "and the shaft between motor and user gives.",
+            "and the user's position leaves the motor's as by the twist of a shaft.",
         ),
     ],
 )

@@ -11,6 +11,8 @@ import pytest
 from hypothesis import settings
 from support.browser import Browser
 
+# Files that begin: by one process, what most kernels are compiled for; by the other, what needs none meanwhile.
+FIRST = ("test_discover.py", "test_bombs.py", "test_saved_model.py", "test_damaged_files.py")
 LONGEST = ("real_data", "units", "discovery")  # folders
 
 # As `emaviz` says it, before any test imports numpy: two processes' threads would wait for each other.
@@ -32,7 +34,13 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Files that take a minute begin first: a process that is given one last would keep the other waiting."""
-    items.sort(key=lambda item: item.path.parent.name not in LONGEST)
+
+    def turn(item: pytest.Item) -> int:
+        if item.path.name in FIRST:
+            return FIRST.index(item.path.name)
+        return len(FIRST) + (item.path.parent.name not in LONGEST)
+
+    items.sort(key=turn)
 
 
 def pytest_collection_finish() -> None:

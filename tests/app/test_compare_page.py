@@ -317,6 +317,7 @@ def test_a_file_that_cannot_be_read_is_told_beside_the_button_that_sent_it_as_of
     assert not compare.get_by_text("The comparison has failed").count()
 
 
+@pytest.mark.long
 def test_compare_pressed_while_the_upload_is_still_being_read_is_carried_out(compare, app, recording, tmp_path, reads):
     path = tmp_path / "at_once.csv"
     write_measurement(recording, path)
@@ -354,6 +355,7 @@ def test_a_comparison_that_must_wait_says_for_what_and_can_be_stopped(compare, a
     wait_until(lambda: app.comparing.comparison is not before, 60.0)
 
 
+@pytest.mark.long
 def test_a_kind_of_file_that_is_none_of_ours_is_refused(compare, app, tmp_path):
     strange = tmp_path / "run.exe"
     strange.write_bytes(b"MZ" * 100)

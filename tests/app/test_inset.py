@@ -153,6 +153,7 @@ def test_the_population_is_framed_beside_the_convergence_and_an_empty_history_sa
     page.get_by_role("tab", name="Search", exact=True).click()
 
 
+@pytest.mark.long
 def test_discover_has_a_lower_inset_than_compare(page):
     heights = {}
     for name in ("Compare", "Discover"):

@@ -73,6 +73,7 @@ def test_a_value_has_the_digits_that_its_error_leaves(given, told):
     assert with_uncertainty(*given) == told
 
 
+@pytest.mark.long
 @pytest.mark.browser
 def test_a_workspace_with_nothing_to_play_shows_a_whole_actuator(shared_page, app):
     page, settings = shared_page, app.session.settings

@@ -39,6 +39,7 @@ def test_units_are_green_where_their_models_miss_nothing():
         assert of_units(found) == meaning
 
 
+@pytest.mark.long
 def test_a_discovery_is_green_where_nothing_is_missing():
     found = with_cogging()
     nothing = replace(found, verdict="adequate", effects=[], faults={}, parameters_outside_tolerance=())

@@ -42,6 +42,7 @@ def test_effect_is_found_and_the_model_saved(rig, tmp_path, capsys):
     assert json.loads(out.read_text())["adequate"] is True
 
 
+@pytest.mark.long
 def test_recording_and_report_tell_the_same(rig, tmp_path):
     record, report, out = tmp_path / "d.rrd", tmp_path / "d.html", tmp_path / "d.json"
     arguments = ["--max-effects", "1", "--record", str(record), "--report", str(report), "--json", str(out)]

@@ -174,6 +174,7 @@ def test_the_whole_library_solves_it(name):
     assert found.ladder[-1].rmse < 1.1 < found.ladder[0].rmse
 
 
+@pytest.mark.long
 def test_where_nothing_is_hidden_the_model_is_adequate():
     found = solved("acceptance_test")
     assert found.verdict == "adequate" and not found.effects and not found.parameters_outside_tolerance

@@ -23,6 +23,7 @@ def test_a_healthy_rig_is_adequate_or_unknown_and_nothing_is_named(rig, tmp_path
     assert not any(one.at_bound for one in found.calibration.parameters.values())
 
 
+@pytest.mark.long
 def test_what_a_coarse_position_sensor_holds_is_no_missing_physics(tmp_path):
     """Twelve bits of a turn: between moves the reading stays the same for hundreds of samples."""
     recorded("hobby", 19, tmp_path, programmes=["random"])

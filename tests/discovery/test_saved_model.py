@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from dataclasses import replace
 from functools import cache
@@ -11,7 +12,7 @@ import pytest
 from ema_model.actuator import load_actuator, save_actuator
 from ema_model.commands import command
 from ema_model.comparison import compare
-from ema_model.discovery import discover, verified
+from ema_model.discovery import as_dict, discover, verified
 from ema_model.discovery.words import verification
 from ema_model.faults import vector
 from ema_model.simulation.run import Run, simulate_reference
@@ -75,6 +76,20 @@ def test_the_saved_model_is_verified_in_units_of_the_floor(saved):
     assert told.holdout_rmse == pytest.approx(found.ladder[-1].holdout_rmse, rel=0.01)
     said = verification(found, told)
     assert re.fullmatch(r"verified: [\d.]+ × the floor, [\d.]+ × on what was not fitted", said)
+
+
+def test_json_is_whole_and_plain():
+    document = json.loads(json.dumps(as_dict(improved()), allow_nan=False))
+    assert document["verdict"] == "effects_found"
+    assert {"name", "parameters", "rmse_before", "rmse_after", "holdout_rmse_after", "same_as"} <= set(
+        document["effects"][0]
+    )
+    assert {(rung["label"], rung["kind"], *rung["names"]) for rung in document["ladder"]} == {
+        ("calibrated", "calibrated"),
+        ("fault k1 friction", "fault", "k1"),
+        ("+ cogging_torque", "effect", "cogging_torque"),
+    }
+    assert document["candidates"][0]["tested"] is True
 
 
 def test_a_file_that_lost_a_part_of_the_model_is_told(tmp_path):

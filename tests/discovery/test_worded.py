@@ -21,6 +21,7 @@ from emaviz.report import write_discovery_report
 RAW = re.compile(r"[a-z]+\.[a-z_]+_|cogging_torque|torque_ripple|_Nm|_A\b")
 
 
+@pytest.mark.long
 def test_parameters_that_masked_an_effect_are_named_as_on_the_page(tmp_path):
     found = with_cogging()
     (one,) = found.effects
@@ -45,6 +46,7 @@ def test_parameters_that_masked_an_effect_are_named_as_on_the_page(tmp_path):
     assert "motor.torque_constant" not in shown and "friction.dynamic" not in shown
 
 
+@pytest.mark.long
 def test_an_effect_that_is_a_parameter_does_not_mask_itself():
     found = with_cogging()
     (one,) = found.effects

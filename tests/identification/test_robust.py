@@ -122,6 +122,7 @@ def test_hidden_effect_raises_no_alarm_and_is_identified_once_added():
     assert answer.error_percent is not None and answer.error_percent <= 2.0
 
 
+@pytest.mark.long
 def test_unrecorded_load_and_two_recordings():
     truth = faults.vector({"k3": 0.3})
     recordings = []

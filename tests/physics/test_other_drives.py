@@ -59,6 +59,7 @@ def run_of(command, seconds: float) -> Run:
     return Run(command, seconds, 1000.0)
 
 
+@pytest.mark.long
 def test_voltage_drive_reaches_the_no_load_speed_in_its_time_constant(tmp_path):
     actuator = servo(tmp_path)
     run = simulate_monitor(run_of(held(1e6, 2.0), 2.0), actuator, start_rad=0.0)

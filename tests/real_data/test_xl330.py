@@ -25,6 +25,7 @@ def test_calibration_converges_on_all_twelve(compared):
     assert not compared.calibration.outside_tolerance
 
 
+@pytest.mark.long
 def test_coulomb_viscous_error_is_what_is_known_of_it(compared):
     errors = {one.name: one.errors["user_position_rad"].mean_absolute for one in compared.recordings}
     print()
@@ -36,6 +37,7 @@ def test_coulomb_viscous_error_is_what_is_known_of_it(compared):
     assert mean == pytest.approx(0.058, abs=0.002)
 
 
+@pytest.mark.long
 def test_the_load_is_named_first(compared):
     assert not compared.adequate
     assert "load" in compared.sentences[0]

@@ -65,6 +65,7 @@ def test_a_killed_run_is_recovered_and_a_living_one_left_alone(tmp_path, running
     assert recover(tmp_path) == []
 
 
+@pytest.mark.long
 def test_a_new_run_keeps_what_a_killed_one_left(tmp_path, running):
     running.kill()
     running.wait()

@@ -18,6 +18,7 @@ import viser
 from emaviz.page import chart_heights, docked, inset
 from emaviz.page.chart_heights import ChartHeights
 from emaviz.page.docked import Docked
+from emaviz.page.in_front import InFront
 from emaviz.page.style import unseen
 from emaviz.server.viser_private import Inside, id_of
 from emaviz.session.signal import Signal
@@ -99,6 +100,7 @@ class Workspace:
     share: float = 0.58  # of what the left panel leaves of a window, that its results have beside the actuator
     inset: bool = True  # whether the actuator is small there until it is clicked, and results have the width
     lower: bool = False  # whether the small actuator leaves more of the height to the controls above it
+    waiting: tuple[str, ...] = ()  # tabs on its right whose content is drawn when a window has them in front
 
 
 class Workspaces:
@@ -107,6 +109,7 @@ class Workspaces:
     def __init__(self, server: viser.ViserServer, screen: Worker, panels: Docked, first: str) -> None:
         self._server, self._inside, self._screen, self._docked = server, Inside(server), screen, panels
         self.heights = ChartHeights(self._inside)
+        self.in_front = InFront(server, screen)
         self.first = first  # where a window without a place in its address begins
         self.entered: Signal[[str]] = Signal()
         self._members: dict[str, Workspace] = {}
@@ -117,6 +120,7 @@ class Workspaces:
     def add(self, one: Workspace) -> viser.PanelHandle:
         """A workspace; returns its panel on the right."""
         self._members[one.name] = one
+        self.in_front.add(*one.waiting)
         return self._docked.add(one.name, one.share, in_front=one.name == self.first)
 
     def connect(self) -> None:
@@ -147,6 +151,7 @@ class Workspaces:
         self._inside.run(inset.script())
         script = _SCRIPT.replace("VIEWS", json.dumps(views)).replace("SIZES", json.dumps(sizes))
         self._inside.run(script.replace("FIRST", json.dumps(self.first)))
+        self.in_front.connect()
 
     def go(self, name: str, client: viser.ClientHandle | None) -> None:
         """Takes one window there, as a click on the tab would; without a window, nothing happens."""

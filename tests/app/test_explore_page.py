@@ -246,6 +246,23 @@ def test_a_frozen_run_stays_while_the_plant_changes(page, app):
 
 
 @pytest.mark.browser
+def test_phases_are_drawn_where_they_are_in_front(page, app):
+    """Nobody sees them behind the signals, and while a slider is dragged they would take most of the time."""
+    charts, panel = app.tab(ExploreTab).charts, app.tab(ExploreTab).panel
+    wait_until(lambda: not app.page.workspaces.in_front.anywhere("Phases"))
+    healthy = charts._phases.handles[0].data[1].copy()
+    panel.set_faults([*HEALTHY[:2], 0.5, *HEALTHY[3:]])
+    wait_until(lambda: app.session.simulation.k[2] == 0.5)
+    page.wait_for_timeout(500)
+    assert np.array_equal(charts._phases.handles[0].data[1], healthy)
+    page.get_by_role("tab", name="Phases").click()
+    wait_until(lambda: np.nanmax(np.abs(chart(page, "Phase currents")[1])) > 1.05 * np.nanmax(np.abs(healthy)))
+    page.get_by_role("tab", name="Signals").click()
+    wait_until(lambda: not app.page.workspaces.in_front.anywhere("Phases"))
+    panel.set_faults(HEALTHY)
+
+
+@pytest.mark.browser
 def test_an_effect_is_hidden_and_taken_out(page, app):
     page.get_by_role("button", name="Hidden effects").or_(page.get_by_text("Hidden effects")).first.click()
     title = CATALOGUE["viscous_friction"].title

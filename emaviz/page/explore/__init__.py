@@ -4,4 +4,7 @@ import viser
 
 from emaviz.page.workspaces import Workspace
 
-WORKSPACE = Workspace("explore", "Explore", viser.Icon.ADJUSTMENTS, 1, share=0.4, inset=False)
+PHASES, METRICS = "Phases", "Metrics"
+WORKSPACE = Workspace(
+    "explore", "Explore", viser.Icon.ADJUSTMENTS, 1, share=0.4, inset=False, waiting=(PHASES, METRICS)
+)

@@ -10,6 +10,7 @@ import viser
 from emaviz.colours import GHOST, MONITOR, REFERENCE
 from emaviz.figures.run_metrics import differences, metrics, table
 from emaviz.figures.signals import PHASE_SIGNALS, LivePhases, LiveSignals
+from emaviz.page.explore import METRICS, PHASES
 from emaviz.page.explore.fan import FanView
 from emaviz.page.page import Page
 from emaviz.page.playback import PlaybackStrip
@@ -21,7 +22,7 @@ from emaviz.text.html import add_html
 
 
 class ChartsPanel:
-    """Draws runs.  The signals are drawn at once, the rest, which nobody watches while dragging, a little later."""
+    """Draws runs: the signals at once, phases and metrics a little later and where a window has them in front."""
 
     def __init__(
         self,
@@ -36,6 +37,8 @@ class ChartsPanel:
         self._simulation: Simulation | None = None
         self.ghost: Simulation | None = None
         self._window = (0.0, 1.0)  # shares of the run
+        self._shown = 0  # how often a run or a part of it was to be shown
+        self._drawn: dict[str, int] = {}  # which of them each of the other tabs holds
         gui = page.server.gui
         with panel.add_tab("Signals", viser.Icon.CHART_LINE):
             add_html(gui, TIME_CHARTS)
@@ -50,16 +53,17 @@ class ChartsPanel:
             self._range = gui.add_multi_slider(
                 "Shown [%]", 0, 100, 1, (0, 100), min_range=1, hint="Of the run; zooms all charts, in full resolution"
             )
-        with panel.add_tab("Phases", viser.Icon.WAVE_SINE):
+        with panel.add_tab(PHASES, viser.Icon.WAVE_SINE):
             add_html(gui, TIME_CHARTS)
             self._phases = LivePhases(gui)
             page.workspaces.heights.add(self._phases.handles)
         self.fan = FanView(page, panel)
-        with panel.add_tab("Metrics", viser.Icon.TABLE):
+        with panel.add_tab(METRICS, viser.Icon.TABLE):
             self._table: Any = add_html(gui)
         with panel.add_tab("Export", viser.Icon.DOWNLOAD):
             export(self)
         strip.moves.connect(self._moved)
+        page.workspaces.in_front.came.connect(lambda _: slow.post("phases", self._draw_rest))
         self._range.on_update(lambda _: page.screen.post("window", self._zoom))
         self._freeze.on_click(lambda _: page.screen.post("freeze", lambda: self._set_ghost(self._simulation)))
         self._melt.on_click(lambda _: page.screen.post("freeze", lambda: self._set_ghost(None)))
@@ -67,6 +71,7 @@ class ChartsPanel:
     def show(self, simulation: Simulation) -> None:
         """Draws a run; on the screen's thread."""
         self._simulation = simulation
+        self._shown += 1
         self._draw_signals(simulation)
         self._slow.post("phases", self._draw_rest)
 
@@ -90,10 +95,22 @@ class ChartsPanel:
             self.signals.show(simulation.reference, simulation.monitor, ghost, self.window_s)
 
     def _draw_rest(self) -> None:
-        simulation, ghost = self._simulation, self.ghost
-        if simulation is None:
-            return
-        frozen, axes = ghost.reference if ghost is not None else None, self._page.session.actuator.axes
+        """What is in front somewhere and not of what is shown."""
+        for tab, draw in ((PHASES, self._draw_phases), (METRICS, self._draw_metrics)):
+            shown, simulation = self._shown, self._simulation  # in this order: what came between is drawn again
+            if simulation is None or self._drawn.get(tab) == shown or not self._page.workspaces.in_front.anywhere(tab):
+                continue
+            self._drawn[tab] = shown
+            with self._page.server.atomic():
+                draw(simulation, self.ghost)
+
+    def _draw_phases(self, simulation: Simulation, ghost: Simulation | None) -> None:
+        frozen = ghost.reference if ghost is not None else None
+        if all(name in simulation.reference for name in PHASE_SIGNALS):
+            self._phases.show(simulation.reference, simulation.monitor, frozen, self.window_s)
+
+    def _draw_metrics(self, simulation: Simulation, ghost: Simulation | None) -> None:
+        axes = self._page.session.actuator.axes
         runs = {
             "plant": metrics(simulation.reference, simulation.command),
             "monitor": metrics(simulation.monitor, simulation.command),
@@ -102,10 +119,7 @@ class ChartsPanel:
         if ghost is not None:
             runs["frozen plant"] = metrics(ghost.reference, ghost.command)
             errors["frozen run's"] = differences(ghost.reference, ghost.monitor, axes)
-        with self._page.server.atomic():
-            if all(name in simulation.reference for name in PHASE_SIGNALS):
-                self._phases.show(simulation.reference, simulation.monitor, frozen, self.window_s)
-            self._table.content = table(runs, errors, [REFERENCE, MONITOR, GHOST], axes)
+        self._table.content = table(runs, errors, [REFERENCE, MONITOR, GHOST], axes)
 
     def _zoom(self) -> None:
         low, high = (min(max(float(value), 0.0), 100.0) / 100.0 for value in self._range.value)

@@ -83,7 +83,7 @@ def slices(
     Raises InputError unless x and y are two different k of 0 … 7.
     """
     if x == y or not {x, y} <= set(range(8)):
-        raise InputError("a landscape needs two different k; choose another one across or upwards")
+        raise InputError("a landscape needs two different k; choose another for one axis")
     xs, ys = np.linspace(*across, points), np.linspace(*upwards, points)
     rmse = np.full((points, points), np.nan)
     for first in range(0, points, _ROWS):

@@ -52,6 +52,7 @@ def elsewhere():
 
 
 @pytest.mark.long
+@pytest.mark.page_errors
 def test_the_page_works_under_its_policy_and_reaches_no_other_port(browser, app, elsewhere):
     port, asked = elsewhere
     app.session.refresh()

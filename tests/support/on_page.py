@@ -1,6 +1,9 @@
 """What tests of the page do again and again: wait, and find, fill and choose in its controls."""
 
+import contextlib
 import time
+
+from playwright.sync_api import Error
 
 
 def wait_until(condition, seconds=240.0):
@@ -25,5 +28,11 @@ def fill(page, label, value):
 
 
 def choose(page, label, option):
-    page.get_by_label(label, exact=True).click()
-    page.get_by_role("option", name=option, exact=True).click()
+    """Opens the list again where the page has drawn it anew meanwhile."""
+    wanted = page.get_by_role("option", name=option, exact=True)
+    for _ in range(5):
+        page.get_by_label(label, exact=True).click()
+        with contextlib.suppress(Error):
+            return wanted.click(timeout=4_000)
+        page.keyboard.press("Escape")
+    raise AssertionError(f"{label} does not offer {option}")

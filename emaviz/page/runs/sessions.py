@@ -56,13 +56,13 @@ class SessionControls:
 
     def uploaded(self, path: Path) -> None:
         """A session came from the browser; on any thread."""
-        self._page.screen.post("load session", lambda: self._read(path))
+        self._post_load(lambda: path)
 
     def _load_named(self, name: str) -> None:
-        def read() -> None:
-            self._read(self._comparing.folder.session(name))
+        self._post_load(lambda: self._comparing.folder.session(name))
 
-        self._page.ask("load session", read, self._load)
+    def _post_load(self, found: Callable[[], Path]) -> None:
+        self._page.screen.post("load session", lambda: self._read(found))
 
     def _save(self, client: viser.ClientHandle | None) -> None:
         folder = self._comparing.folder
@@ -81,12 +81,13 @@ class SessionControls:
         names += [name for part in self._kept().values() for name in part.files()]
         return [name for name in names if name]
 
-    def _read(self, path: Path) -> None:
+    def _read(self, found: Callable[[], Path]) -> None:
         def take() -> None:
+            path = found()
             session_file.read(path, self._kept(), self._comparing.folder)
-
-        if self._page.checked(take, self._load):
             self._page.notify("Session loaded", path.name, "green")
+
+        self._page.checked(take, self._load)
         self.refresh()
 
     def _post(self, kind: str, job: Callable[[], None]) -> None:

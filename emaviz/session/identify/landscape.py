@@ -33,7 +33,7 @@ class Landscapes:
         close: a few intervals wide, else all of 0 … 1.  InputError unless the two differ.
         """
         if x == y:
-            raise InputError("a landscape needs two different k; choose another one across or upwards")
+            raise InputError("a landscape needs two different k; choose another for one axis")
         best = race.best
         assert best is not None and best.k is not None, "the race is over"
         answer = best.k

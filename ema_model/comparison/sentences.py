@@ -10,7 +10,7 @@ from ema_model.quantities.variables import MODULATORS, VARIABLES, is_turn, of_va
 from ema_model.recordings import SIGNALS
 
 
-def cause_of(variable: str, modulator: str) -> str:
+def dependence(variable: str, modulator: str) -> str:
     """'motor speed and direction'."""
     return f"{VARIABLES[variable].noun}{MODULATORS[modulator].noun}"
 
@@ -18,7 +18,7 @@ def cause_of(variable: str, modulator: str) -> str:
 def explanation_sentence(signal: str, variable: str, modulator: str, r2: float) -> str:
     """One line on what explains a residual, and how much of it."""
     share = f"{100.0 * max(0.0, r2):.0f} % of the residual {in_sentence(SIGNALS[signal].title)} variance"
-    return f"{share} is explained by {cause_of(variable, modulator)} (cross-validated)."
+    return f"{share} is explained by {dependence(variable, modulator)} (cross-validated)."
 
 
 def order_sentence(order: float, amplitude: float, of: Quantity) -> str:

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ema_model.comparison.result import Compared, Comparison, Region, SignalError
-from ema_model.comparison.sentences import cause_of
+from ema_model.comparison.sentences import dependence
 from ema_model.estimation.words import calibration_table
 from ema_model.quantities.axes import ROTARY
 from ema_model.quantities.numbers import number
@@ -121,7 +121,7 @@ def _why(result: Comparison) -> Iterator[Table | Lines]:
     if result.explained_by:
         rows, remarks = [], []
         for one in result.explained_by[:6]:
-            rows.append([cause_of(one.variable, one.modulator), f"{100.0 * one.r2:.1f} %"])
+            rows.append([dependence(one.variable, one.modulator), f"{100.0 * one.r2:.1f} %"])
             remarks.append("" if one.significant else "within noise")
         yield Table(("cross-validated",), rows, "what explains the residual", remarks, "share of its variance")
     if result.orders:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ema_model.actuator.naming import on_axes
 from ema_model.actuator.readings import sentences as phrases_of
-from ema_model.comparison.sentences import cause_of
+from ema_model.comparison.sentences import dependence
 from ema_model.discovery.labels import effect_title, value
 from ema_model.discovery.result import Discovery, Rung
 from ema_model.discovery.sentences import masked
@@ -87,7 +87,8 @@ def remains(found: Discovery) -> str:
         return f"motion and current are explained, {found.transmission_seen.short}"
     if found.at_floor and found.unknown is None:
         return "what remains is as small as the floor, but lasts longer than noise"
-    goes = "" if found.unknown is None else f", varies with {cause_of(found.unknown.variable, found.unknown.modulator)}"
+    left = found.unknown
+    goes = "" if left is None else f", varies with {dependence(left.variable, left.modulator)}"
     shaft = "" if found.transmission_seen is None else f"; and {found.transmission_seen.short}"
     return f"{number(found.ladder[-1].rmse, 2)} times the floor remains, cause unknown{goes}{shaft}"
 

@@ -115,6 +115,8 @@ def test_what_is_missing_is_said_in_one_line(page, app):
     write_flights(lonely, 1)
     page.get_by_role("tab", name="Track", exact=True).click()
     choose(page, "Flights", "lonely (1)")
+    wait_until(lambda: app.tab(TrackTab).following.chosen == "lonely")  # which moves what stands below
+    page.wait_for_timeout(300)
     page.get_by_label("Add new flights", exact=True).uncheck()
     page.get_by_role("button", name="Track", exact=True).click()
     page.get_by_text("1 flight tells no trend").wait_for()

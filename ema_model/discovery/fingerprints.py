@@ -6,7 +6,7 @@ They share one stack, in which every lane has one of them on and all others do n
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,13 +31,14 @@ _DIVERGED = 1e100  # floors, from which on a change has no meaning: its square w
 class Fingerprint:
     """What an effect with these settings changes, over the floor: (values, columns).
 
-    Two columns are the two phases of a periodic effect.  Of an effect that the file has they are what its own
-    parameters do beyond their tolerances.
+    Two columns are the two phases of a periodic effect, or those after the first what other linear parameters do at
+    these values, `beside`.  Of an effect that the file has they are what its own parameters do beyond their tolerances.
     """
 
     name: str
     settings: dict[str, float]
     columns: Array
+    beside: dict[str, float] = field(default_factory=dict)
     frees: tuple[str, ...] = ()  # the calibrated parameters of the file's effect, whose columns they are
 
 
@@ -70,7 +71,14 @@ def variants(
         return [[{first: middle, **place}] for place in within] if high > low else []
     low, high = effect.parameters[0].low, effect.parameters[0].high
     speeds = [share * top_rad_s for share in effect.at_speeds]
-    return [[{first: one}] for one in (*effect.severities, *(speed for speed in speeds if low <= speed <= high))]
+    beside = [{first: effect.nothing, name: value} for name, value in _beside(effect).items()]
+    usual = (*effect.severities, *(speed for speed in speeds if low <= speed <= high))
+    return [[{first: one}, *beside] for one in usual]
+
+
+def _beside(effect: Effect) -> dict[str, float]:
+    """Values at which one looks at what an effect's other linear parameters do."""
+    return {one.name: effect.beside[one.name] * one.high for one in effect.parameters if one.name in effect.beside}
 
 
 def fingerprints(data: Data, found: Fit, names: Iterable[str], orders: Sequence[float]) -> list[Fingerprint]:
@@ -97,7 +105,9 @@ def fingerprints(data: Data, found: Fit, names: Iterable[str], orders: Sequence[
     for effect, settings in tried:
         columns = change[lane : lane + len(settings)].T
         columns = np.where(np.abs(columns) < _DIVERGED, columns, 0.0)  # also NaN
-        prints.append(Fingerprint(effect.name, dict(lanes[lane][1]), columns))
+        own = [one for _, one in lanes[lane : lane + len(settings)]]
+        beside = {name: one[name] for one in own[1:] for name in effect.beside if name in one}
+        prints.append(Fingerprint(effect.name, dict(own[0]), columns, beside))
         lane += len(settings)
     return prints
 
@@ -111,7 +121,7 @@ def of_the_file(found: Fit, names: Iterable[str]) -> list[Fingerprint]:
         own = tuple(path for path in calibration.parameters if path.startswith(f"effects.{name}."))
         if own:
             jacobian = calibration.weighted_jacobian[:, [columns.index(path) for path in own]]
-            prints.append(Fingerprint(name, dict(calibration.actuator.effects[name]), jacobian, own))
+            prints.append(Fingerprint(name, dict(calibration.actuator.effects[name]), jacobian, frees=own))
     return prints
 
 
@@ -182,8 +192,9 @@ def _gentler(effect: Effect, settings: dict[str, float], size: float, error: flo
     first = effect.parameters[0]
     if size <= _FAR * max(1.0, error) or first.low > 0.0:
         return None
-    share = 2.0 * max(1.0, error) / size if np.isfinite(size) else 1e-3
-    return {**settings, first.name: max(share, 1e-4) * settings[first.name]}
+    share = max(2.0 * max(1.0, error) / size, 1e-4) if np.isfinite(size) else 1e-3
+    amounts = {first.name, *effect.beside}
+    return {name: share * value if name in amounts else value for name, value in settings.items()}
 
 
 def may_act(name: str, actuator: Actuator) -> bool:

@@ -158,7 +158,9 @@ def with_effect(actuator: Actuator, name: str, settings: Mapping[str, float]) ->
         if not parameter.integer:
             value = full[parameter.name]
             share = _ORDER_SHARE if parameter.name == "order" else _SHARE
-            sigma = _ANGLE_SIGMA if parameter.name in ANGLES else share * abs(value)
+            # beside a part of another kind, the first one's may have gone to a parameter that does the same
+            least = parameter.plausible[1] or 0.0 if effect.beside else 0.0
+            sigma = _ANGLE_SIGMA if parameter.name in ANGLES else share * max(abs(value), least)
             sigma = sigma or _SHARE * abs(parameter.default) or 0.01 * (parameter.high - parameter.low) * strength
             tolerances[f"effects.{name}.{parameter.name}"] = Tolerance(sigma, True)
     return replace(actuator, effects={**actuator.effects, name: full}, tolerances=tolerances)

@@ -153,6 +153,11 @@ def _scored(found: Fit, one: Fingerprint, jacobian: Array, gram: Array, beyond: 
             settings[first.name] *= amount
         elif amount < 0.0:
             drop = 0.0
+    elif one.beside:
+        drop = float(toward @ amounts)
+        own = {parameter.name: parameter for parameter in effect.parameters}
+        for (name, value), amount in zip(({first.name: settings[first.name]} | one.beside).items(), amounts):
+            settings[name] = float(np.clip(value * amount, own[name].low, own[name].high))
     else:
         drop = float(toward @ amounts)
         settings[first.name] = float(np.clip(settings[first.name] * math.hypot(*amounts), first.low, first.high))

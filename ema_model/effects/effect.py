@@ -133,6 +133,8 @@ class Effect:
     the places and their arguments); each takes the effect's parameters, in order, as its last arguments.
     `placed`: parameters that are places along `against`, each with the shares of its range in the recordings at which
     one begins to look for it; all have as many.
+    `beside`: linear parameters that do nothing by default, each with the share of its range at which one looks at what
+    it does beside the first.
     """
 
     title: str
@@ -151,6 +153,7 @@ class Effect:
     is_load: bool = False  # pulls at the user from outside, so that its torque counts as the load
     at_speeds: tuple[float, ...] = ()  # of a first parameter that is a speed: shares of the top speed to look for it at
     placed: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    beside: Mapping[str, float] = field(default_factory=dict)
     by_direction: bool = False  # told from what does not turn over with the direction: needs motion both ways
     turns: Side | None = None  # of a part that turns on that side: there is none on a linear axis
     against: str = "time"  # of `quantities.variables`: what its residual follows; time where it follows nothing else

@@ -1,4 +1,4 @@
-"""Sensors that are off, friction by place and time, saturation, springs that are not linear: named, at their values."""
+"""Sensors that are off, friction by place, time, direction, saturation, bent springs: named, at their values."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ CASES = {
     "position_sensor_gain": ({"ratio": 2e-3}, "position_sensor_eccentricity", "position_sensor_bias"),
     "position_sensor_nonlinearity": ({"curvature_1_rad": 0.1}, "position_sensor_gain", "position_sensor_bias"),
     "position_dependent_friction": ({"ratio": 0.4, "order": 2.0, "phase_rad": 0.5}, "cogging_torque", "torque_ripple"),
+    "asymmetric_friction": ({"ratio": 0.0, "viscous_Nms_rad": 2e-5}, "current_sensor_bias", "viscous_friction"),
     "friction_drift": ({"rate_1_s": 0.8}, "viscous_friction", "stribeck_friction"),
     "torque_saturation": ({"saturation_1_A": 0.015}, "demagnetisation", "current_sensor_gain"),
     "cubic_spring": ({"stiffness_Nm_rad3": 2e6}, "hinge_moment", "one_sided_spring"),

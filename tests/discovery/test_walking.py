@@ -7,10 +7,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from ema_model.actuator import load_actuator
 from ema_model.discovery import walking
 from ema_model.discovery.fingerprints import Fingerprint, variants
 from ema_model.discovery.path import Story
 from ema_model.discovery.result import Candidate
+from ema_model.discovery.score import scored_all
 from ema_model.effects import find
 
 
@@ -81,6 +83,24 @@ def test_speeds_are_looked_for_at_shares_of_the_recordings_top_speed():
     assert [one["torque_Nm"] for [one] in variants(find("constant_load"), [], 3.0)] == list(
         find("constant_load").severities
     )
+
+
+def test_a_part_of_another_kind_is_a_column_of_its_own():
+    """Friction may differ by direction in its viscous part alone."""
+    effect = find("asymmetric_friction")
+    assert variants(effect, [])[1] == [{"ratio": 0.12}, {"ratio": 0.0, "viscous_Nms_rad": pytest.approx(5e-5)}]
+    random = np.random.default_rng(0)
+    columns, own = random.normal(size=(400, 2)), random.normal(size=(400, 1))
+    found = SimpleNamespace(
+        residual=-(columns @ [0.5, 3.0]),
+        actuator=load_actuator(),
+        calibration=SimpleNamespace(
+            room=np.array([[-9.0], [9.0]]), parameters=["p"], starts=[], weighted_jacobian=own
+        ),
+    )
+    [candidate] = scored_all(found, [Fingerprint(effect.name, {"ratio": 0.12}, columns, {"viscous_Nms_rad": 5e-5})])
+    assert candidate.settings == pytest.approx({"ratio": 0.06, "viscous_Nms_rad": 1.5e-4}, rel=1e-3)
+    assert candidate.predicted_drop == pytest.approx(float(found.residual @ found.residual), rel=0.02)
 
 
 def test_friction_that_falls_is_tried_from_where_its_whole_change_comes_nearest():

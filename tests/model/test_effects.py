@@ -215,10 +215,12 @@ def test_presliding_friction_of_steady_sliding_is_dynamic_friction():
 
 
 def test_asymmetric_friction_takes_its_share_each_way():
-    law = CATALOGUE["asymmetric_friction"].places[0]
-    assert [law(0.05, 0.1, omega, 0.0, 0.0, GEAR, 0.0, 0.0, 0.0, 0.2) for omega in (3.0, -3.0)] == pytest.approx(
-        [0.06, 0.04]
-    )
+    sliding, viscous = CATALOGUE["asymmetric_friction"].places
+    speeds, given = (3.0, -3.0), (0.2, 1e-3)
+    found = [sliding(0.05, 0.1, omega, 0.0, 0.0, GEAR, 0.0, 0.0, 0.0, *given) for omega in speeds]
+    assert found == pytest.approx([0.06, 0.04])
+    found = [viscous(0.5, 0.0, omega, 0.0, 0.0, GEAR, 0.0, 0.0, *given) for omega in speeds]
+    assert found == pytest.approx([0.497, 0.497]), "it brakes one way and helps the other, in proportion to speed"
 
 
 def test_bus_voltage_never_turns_round():

@@ -94,9 +94,7 @@ def test_a_part_of_another_kind_is_a_column_of_its_own():
     found = SimpleNamespace(
         residual=-(columns @ [0.5, 3.0]),
         actuator=load_actuator(),
-        calibration=SimpleNamespace(
-            room=np.array([[-9.0], [9.0]]), parameters=["p"], starts=[], weighted_jacobian=own
-        ),
+        calibration=SimpleNamespace(room=np.array([[-9.0], [9.0]]), parameters=["p"], starts=[], weighted_jacobian=own),
     )
     [candidate] = scored_all(found, [Fingerprint(effect.name, {"ratio": 0.12}, columns, {"viscous_Nms_rad": 5e-5})])
     assert candidate.settings == pytest.approx({"ratio": 0.06, "viscous_Nms_rad": 1.5e-4}, rel=1e-3)

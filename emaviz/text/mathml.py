@@ -78,6 +78,10 @@ def _bare(tokens: list[str], at: int) -> tuple[str, int]:
             closing = f"<mo>{_OPEN[token]}</mo>" if end < len(tokens) else ""
             shown = f"<mo>{token}</mo>{shown}{closing}"
         return f"<mrow>{shown}</mrow>", end + 1
+    if token == "|" and "|" in tokens[at + 1 :]:
+        inside, end = _row(tokens, at + 1, "|")
+        first, last = (f'<mo form="{form}" fence="true" stretchy="false">|</mo>' for form in ("prefix", "postfix"))
+        return f"<mrow>{first}{''.join(inside)}{last}</mrow>", end + 1
     if token[0].isdigit():
         return f"<mn>{token}</mn>", at + 1
     if token[0].isalpha():

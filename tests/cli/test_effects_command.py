@@ -46,6 +46,11 @@ def test_an_equation_is_well_formed_and_loses_no_letter(name):
     assert re.sub(r"[\s/]", "", shown) == plain
 
 
+def test_bars_enclose_what_they_are_around():
+    text = mathml("T = c |ω| + a | b")
+    assert '>|</mo><mi>ω</mi><mo form="postfix"' in text and "<mo>|</mo><mi>b</mi>" in text
+
+
 def test_marks_are_set_below_above_and_over():
     text = mathml("T_f = σ_0 z e^{−s T} (1 − s T/2)")
     assert "<msub><mi>T</mi><mi>f</mi></msub>" in text and "<msub><mi>σ</mi><mn>0</mn></msub>" in text

@@ -159,7 +159,7 @@ def with_effect(actuator: Actuator, name: str, settings: Mapping[str, float]) ->
             value = full[parameter.name]
             share = _ORDER_SHARE if parameter.name == "order" else _SHARE
             # beside a part of another kind, the first one's may have gone to a parameter that does the same
-            least = parameter.plausible[1] or 0.0 if effect.beside else 0.0
+            least = parameter.plausible[1] or 0.0 if effect.beside and parameter is first else 0.0
             sigma = _ANGLE_SIGMA if parameter.name in ANGLES else share * max(abs(value), least)
             sigma = sigma or _SHARE * abs(parameter.default) or 0.01 * (parameter.high - parameter.low) * strength
             tolerances[f"effects.{name}.{parameter.name}"] = Tolerance(sigma, True)

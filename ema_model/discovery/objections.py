@@ -159,10 +159,18 @@ def _implausible(after: Fit, key: str) -> str:
     values = after.calibration.actuator.effects[key]
     for parameter in find(catalogue_name(key)).parameters:
         value, low, high = values[parameter.name], *parameter.plausible
-        size = _greatest(after, parameter.plausible_at) if parameter.plausible_at else 1.0
+        size, beside = 1.0, ""
+        if parameter.plausible_at:
+            size = _greatest(after, parameter.plausible_at)
+            beside = f" at {number(size)} {SIGNALS[parameter.plausible_at].unit}"
+        elif parameter.plausible_of:
+            whole = abs(after.calibration.actuator.value(parameter.plausible_of))
+            size, beside = (
+                1.0 / max(whole, 1e-300),
+                f" beside a {_title(after, parameter.plausible_of)} of {number(whole)}",
+            )
         if (low is not None and value * size < low) or (high is not None and value * size > high):
-            at = f" at {number(size)} {SIGNALS[parameter.plausible_at].unit}" if parameter.plausible_at else ""
-            return f"its {_title(after, f'effects.{key}.{parameter.name}')} of {number(value)} is not plausible{at}"
+            return f"its {_title(after, f'effects.{key}.{parameter.name}')} of {number(value)} is not plausible{beside}"
         if parameter.name == "period_rad" and value > _travel(after):
             return "its period is longer than the travel"
     return ""

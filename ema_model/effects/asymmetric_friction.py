@@ -35,13 +35,15 @@ EFFECT = Effect(
             "ratio", "share a more in positive motion, and less in negative", 0.12, -0.9, 0.9, plausible=(-0.6, 0.6)
         ),
         Parameter(
-            "viscous_Nms_rad",
+            "viscous_part_Nms_rad",
             "viscous friction c more in positive motion, and less in negative",
             0.0,
             -5e-3,
             5e-3,
             side=MOTOR,
             linear=(0.0, -1e5, 1e5),
+            plausible=(-1.0, 1.0),  # beyond, one direction would be driven by its friction
+            plausible_of="motor.viscous_friction_Nms_rad",
         ),
     ),
     severities=(0.06, 0.12, 0.25),
@@ -49,6 +51,6 @@ EFFECT = Effect(
     shows="as an offset of the current in motion, in either direction alike",
     against="motor_speed",
     mistaken_for="current sensor bias",
-    beside={"viscous_Nms_rad": 0.01},
+    beside={"viscous_part_Nms_rad": 0.01},
     family="mechanics",
 )

@@ -68,7 +68,8 @@ class Parameter:
 
     What a linear axis measures in other units says where it sits; ValueError where that is left open.
     A fitted value outside of `plausible` is no such part's: something else is bent into its place.  Where the value
-    counts by how far a signal goes, it is the product of the two that must be plausible.
+    counts by how far a signal goes, it is the product of the two that must be plausible; where it is a part of a base
+    parameter, its share.
     """
 
     name: str
@@ -84,6 +85,7 @@ class Parameter:
     shown: str = ""  # the name in files; `on` fills it in
     plausible: tuple[float | None, float | None] = (None, None)  # low and high, None where there is no end
     plausible_at: str = ""  # the signal by whose greatest size the value counts
+    plausible_of: str = ""  # path of the base parameter of which the value is a part
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "unit", self.unit or unit_of(self.name))

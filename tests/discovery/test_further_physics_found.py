@@ -5,9 +5,12 @@ from __future__ import annotations
 import pytest
 from support.hidden_effects import ACTUATOR, recorded
 
+from ema_model.commands import command
 from ema_model.discovery import discover
 from ema_model.discovery.fingerprints import variants
 from ema_model.effects import CATALOGUE, find
+from ema_model.simulation.run import Run, simulate_reference
+from ema_model.simulation.sensors import Sensors
 
 CHIRP = ("chirp", {}, 0.5)
 SINE = ("sine", {"amplitude_rad": 0.03, "frequency_Hz": 3.0}, 1.0)
@@ -18,7 +21,6 @@ CASES = {
     "position_sensor_gain": ({"ratio": 2e-3}, "position_sensor_eccentricity", "position_sensor_bias"),
     "position_sensor_nonlinearity": ({"curvature_1_rad": 0.1}, "position_sensor_gain", "position_sensor_bias"),
     "position_dependent_friction": ({"ratio": 0.4, "order": 2.0, "phase_rad": 0.5}, "cogging_torque", "torque_ripple"),
-    "asymmetric_friction": ({"ratio": 0.0, "viscous_Nms_rad": 2e-5}, "current_sensor_bias", "viscous_friction"),
     "friction_drift": ({"rate_1_s": 0.8}, "viscous_friction", "stribeck_friction"),
     "torque_saturation": ({"saturation_1_A": 0.015}, "demagnetisation", "current_sensor_gain"),
     "cubic_spring": ({"stiffness_Nm_rad3": 2e6}, "hinge_moment", "one_sided_spring"),
@@ -57,6 +59,22 @@ def test_a_place_is_looked_for_along_the_recordings():
     zone = find("friction_zone")
     for [one] in variants(zone, [], ranges={"user_position": (0.0, 1.0)}):
         assert 0.0 <= one["begin_rad"] < one["end_rad"] <= 1.0
+
+
+@pytest.mark.long
+def test_viscous_friction_that_differs_by_direction_is_asymmetric():
+    """Its Coulomb part alone would be a current sensor's bias; thick grease shows the other."""
+    thick = ACTUATOR.with_values({"motor.viscous_friction_Nms_rad": 1e-4})
+    hidden = {"asymmetric_friction": {"ratio": 0.0, "viscous_part_Nms_rad": 2.5e-5}}
+    runs = [Run(command("chirp"), 0.5), Run(command("sine", SINE[1]), 1.0)]
+    seen = [
+        Sensors(0.45, 12).record(simulate_reference(run, thick, effects=hidden), 7 + i) for i, run in enumerate(runs)
+    ]
+    found = discover(seen, thick, candidates=["asymmetric_friction", "current_sensor_bias", "friction_drift"])
+    [one] = found.effects
+    assert one.name == "asymmetric_friction" and found.ladder[-1].rmse < 1.1 < found.ladder[0].rmse
+    low, high = one.parameters["viscous_part_Nms_rad"].interval90
+    assert low <= 2.5e-5 <= high
 
 
 def test_an_order_beyond_an_effects_own_is_not_tried():

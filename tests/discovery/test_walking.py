@@ -88,7 +88,7 @@ def test_speeds_are_looked_for_at_shares_of_the_recordings_top_speed():
 def test_a_part_of_another_kind_is_a_column_of_its_own():
     """Friction may differ by direction in its viscous part alone."""
     effect = find("asymmetric_friction")
-    assert variants(effect, [])[1] == [{"ratio": 0.12}, {"ratio": 0.0, "viscous_Nms_rad": pytest.approx(5e-5)}]
+    assert variants(effect, [])[1] == [{"ratio": 0.12}, {"ratio": 0.0, "viscous_part_Nms_rad": pytest.approx(5e-5)}]
     random = np.random.default_rng(0)
     columns, own = random.normal(size=(400, 2)), random.normal(size=(400, 1))
     found = SimpleNamespace(
@@ -96,8 +96,10 @@ def test_a_part_of_another_kind_is_a_column_of_its_own():
         actuator=load_actuator(),
         calibration=SimpleNamespace(room=np.array([[-9.0], [9.0]]), parameters=["p"], starts=[], weighted_jacobian=own),
     )
-    [candidate] = scored_all(found, [Fingerprint(effect.name, {"ratio": 0.12}, columns, {"viscous_Nms_rad": 5e-5})])
-    assert candidate.settings == pytest.approx({"ratio": 0.06, "viscous_Nms_rad": 1.5e-4}, rel=1e-3)
+    [candidate] = scored_all(
+        found, [Fingerprint(effect.name, {"ratio": 0.12}, columns, {"viscous_part_Nms_rad": 5e-5})]
+    )
+    assert candidate.settings == pytest.approx({"ratio": 0.06, "viscous_part_Nms_rad": 1.5e-4}, rel=1e-3)
     assert candidate.predicted_drop == pytest.approx(float(found.residual @ found.residual), rel=0.02)
 
 

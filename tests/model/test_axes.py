@@ -61,7 +61,7 @@ AT_MOTOR = {
     "motor.torque_limit_Nm": "torque",
     "motor.rotor_offset_rad": "angle",
     "transmission.viscous_friction_Nms_rad": "damping",
-    "effects.asymmetric_friction.viscous_Nms_rad": "damping",
+    "effects.asymmetric_friction.viscous_part_Nms_rad": "damping",
     "effects.cogging_torque.amplitude_Nm": "torque",
     "effects.encoder_eccentricity.amplitude_rad": "angle",
     "effects.presliding_friction.stiffness_Nm_rad": "stiffness",

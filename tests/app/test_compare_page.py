@@ -302,6 +302,7 @@ def test_too_large_an_upload_is_refused(compare, app, tmp_path, monkeypatch):
     wait_until(lambda: not beside.is_visible())
 
 
+@pytest.mark.long
 def test_a_file_that_cannot_be_read_is_told_beside_the_button_that_sent_it_as_often_as_it_is_chosen(compare, tmp_path):
     path = tmp_path / "photo.csv"
     path.write_bytes(b"\xff\xd8\xff\xe0" + bytes(range(256)) * 10)

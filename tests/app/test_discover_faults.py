@@ -24,6 +24,8 @@ from emaviz.session.discover.beside_truth import agrees, document_of
 from emaviz.session.discover.saved_story import story_of
 from emaviz.text.verdict import MEANINGS
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(scope="module")
 def rig(tmp_path_factory):

@@ -45,6 +45,7 @@ def columns(page):
     return page.evaluate(f"{style}.parentElement.parentElement).columnCount")
 
 
+@pytest.mark.long
 def test_results_have_the_width_beside_an_inset_that_grows_at_a_click(page):
     go(page, "Compare")
     for width, height in ((1400, 900), (1920, 1080), (1100, 700)):

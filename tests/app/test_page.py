@@ -92,6 +92,7 @@ def test_a_bad_value_is_told_and_the_page_goes_on(page, app):
     wait_until(lambda: app.session.settings.k[1] == 0.0)
 
 
+@pytest.mark.long
 def test_identify_runs_ends_and_is_recorded(new_page, app):
     page = new_page
     set_slider(page, "k1", 0.25)

@@ -35,6 +35,7 @@ def test_the_thesis_actuator_is_its_reference_model():
     assert np.array_equal(shown["current_A"], simulate_reference(run, ours, k, start_rad=0.001)["current_A"])
 
 
+@pytest.mark.long
 def test_a_servo_is_explored_as_its_monitor_model():
     servo, k = actuator(SERVO), vector({"k1": 0.8})
     run = Run(duration_s=0.2)

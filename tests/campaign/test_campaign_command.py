@@ -121,6 +121,7 @@ def test_folders_that_are_none(tmp_path, capsys):
     assert "campaign.json: cannot be read" in told(["campaign", "status", tmp_path], capsys)
 
 
+@pytest.mark.long
 def test_a_folder_of_another_version_stays_as_it_is(made, folder, capsys):
     header = json.loads((folder / "campaign.json").read_text())
     header["version"]["emaviz"] = "0.0.9"

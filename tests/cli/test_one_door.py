@@ -247,6 +247,7 @@ def test_identify_takes_what_compare_takes_and_shares_its_options(rig, tmp_path,
     assert all(told in text for told in ("Faults", "friction factor", "Convergence", *numbers))
 
 
+@pytest.mark.long
 def test_a_simulated_linear_axis_is_read_again(rig, tmp_path):
     """What `simulate` writes has the names of the axis, and --command and `compare` take it back."""
     asked = ["--actuator", str(rig / "linear_actuator.toml")]

@@ -69,6 +69,7 @@ def test_the_saved_model_reaches_the_last_rung_of_the_ladder(saved):
     assert unseen.signals["current_A"].rmse == pytest.approx(last.holdout_signals["current_A"], rel=0.02)
 
 
+@pytest.mark.long
 def test_the_saved_model_is_verified_in_units_of_the_floor(saved):
     found = improved()
     told = verified(found, saved)
@@ -78,6 +79,7 @@ def test_the_saved_model_is_verified_in_units_of_the_floor(saved):
     assert re.fullmatch(r"verified: [\d.]+ × the floor, [\d.]+ × on what was not fitted", said)
 
 
+@pytest.mark.long
 def test_json_is_whole_and_plain():
     document = json.loads(json.dumps(as_dict(improved()), allow_nan=False))
     assert document["verdict"] == "effects_found"

@@ -132,6 +132,7 @@ def _draw_all(tab: Any) -> None:
         place.locator("svg.main-svg").first.wait_for(timeout=20_000)
 
 
+@pytest.mark.long
 @pytest.mark.browser
 def test_all_figures_are_drawn_without_network(report, tab):
     tab.goto(report.as_uri())

@@ -165,10 +165,8 @@ def _implausible(after: Fit, key: str) -> str:
             beside = f" at {number(size)} {SIGNALS[parameter.plausible_at].unit}"
         elif parameter.plausible_of:
             whole = abs(after.calibration.actuator.value(parameter.plausible_of))
-            size, beside = (
-                1.0 / max(whole, 1e-300),
-                f" beside a {_title(after, parameter.plausible_of)} of {number(whole)}",
-            )
+            size = 1.0 / max(whole, 1e-300)
+            beside = f" beside a {_title(after, parameter.plausible_of)} of {number(whole)}"
         if (low is not None and value * size < low) or (high is not None and value * size > high):
             return f"its {_title(after, f'effects.{key}.{parameter.name}')} of {number(value)} is not plausible{beside}"
         if parameter.name == "period_rad" and value > _travel(after):

@@ -40,7 +40,7 @@ def fitted(amplitudes, noise=1.0, settings=None, at_bound=False, path=PATH):
         x=np.ones(1),
         residual=residual,
         weighted_jacobian=np.tile(0.5 * shape, count)[:, None],
-        actuator=SimpleNamespace(effects={key: find(key).settings(settings or {})}),
+        actuator=SimpleNamespace(effects={key: find(key).settings(settings or {})}, value=lambda path: 9.5e-6),
         converged=True,
         signals=[{"motor_position_rad": np.linspace(0.0, 3.0, N), "current_A": np.linspace(0.0, -15.0, N)}],
     )
@@ -86,6 +86,12 @@ def test_a_single_recording_is_judged_by_its_halves():
         ("screw_lead_error", {"amplitude_rad": 1e-3, "period_rad": 40.0}, "longer than the travel"),
         ("torque_saturation", {"saturation_1_A": 0.06}, "not plausible at 15.0 A"),
         ("torque_saturation", {"saturation_1_A": 0.02}, ""),
+        (
+            "asymmetric_friction",
+            {"ratio": 0.1, "viscous_part_Nms_rad": 5.6e-4},
+            "beside a motor viscous friction of 9.5",
+        ),
+        ("asymmetric_friction", {"ratio": 0.1, "viscous_part_Nms_rad": -5e-6}, ""),
         ("hinge_moment", {"stiffness_Nm_rad": 500.0}, ""),
         ("current_sensor_gain", {"ratio": -0.06}, ""),
     ],

@@ -9,6 +9,7 @@ import pytest
 from support.on_page import wait_until
 
 from emaviz.page.docked import LEFT_PX
+from emaviz.page.identify.tab import IdentifyTab
 from emaviz.recording import read
 
 pytestmark = pytest.mark.browser
@@ -121,6 +122,8 @@ def test_identify_runs_ends_and_is_recorded(new_page, app):
 
 
 def test_stop_is_quick_and_keeps_the_result(page, app):
+    app.session.settings.set("algorithms", ["do"])  # as its iterations are many
+    app.tab(IdentifyTab).panel.show_settings()
     page.get_by_role("tab", name="Identify").click()
     page.get_by_label("Iterations", exact=True).fill("5000")
     page.get_by_label("Iterations", exact=True).press("Enter")

@@ -238,8 +238,8 @@ def test_the_search_is_looked_at_from_all_sides_and_its_landscape_drawn(page, ap
     page.get_by_text("90 % interval").wait_for()
 
     show(page, "Landscape")
-    choose(page, "Map horizontal axis", "k1 friction")
-    choose(page, "Map vertical axis", "k6 eccentricity")
+    choose(page, "Horizontal k", "k1 friction")
+    choose(page, "Vertical k", "k6 eccentricity")
     page.get_by_role("button", name="Draw the landscape").click()
     page.get_by_text("Held: k2").wait_for(timeout=30_000)
     wait_until(lambda: page.evaluate(MAPS) is not None and page.evaluate(MAPS)["z"].startswith("41"))
@@ -251,7 +251,7 @@ def test_the_search_is_looked_at_from_all_sides_and_its_landscape_drawn(page, ap
     page.get_by_role("button", name="Draw the landscape").click()
     held = f"k2 {race.tracks['do'].last.k[1]:.3f}"
     page.get_by_text(f"Held: {held}").wait_for(timeout=30_000)
-    choose(page, "Map vertical axis", "k1 friction")
+    choose(page, "Vertical k", "k1 friction")
     page.get_by_role("button", name="Draw the landscape").click()
     page.get_by_text("needs two different k").wait_for()
 
@@ -267,7 +267,7 @@ def test_a_landscape_is_stopped(page, app, monkeypatch):
     monkeypatch.setattr(type(race.objective), "__call__", slow)
     show(page, "Identify")
     show(page, "Landscape")
-    choose(page, "Map vertical axis", "k2 backlash")
+    choose(page, "Vertical k", "k2 backlash")
     page.get_by_role("button", name="Draw the landscape").click()
     page.get_by_role("button", name="Stop drawing").click()
     page.get_by_text("Stopped at").wait_for()

@@ -44,8 +44,8 @@ class LandscapeView:
         self._plot: Any = None
         gui = page.server.gui
         add_html(gui, COLUMNS)
-        self._x: Any = gui.add_dropdown("Map horizontal axis", _NAMES, initial_value=_NAMES[0])
-        self._y: Any = gui.add_dropdown("Map vertical axis", _NAMES, initial_value=_NAMES[5])
+        self._x: Any = gui.add_dropdown("Horizontal k", _NAMES, initial_value=_NAMES[0])
+        self._y: Any = gui.add_dropdown("Vertical k", _NAMES, initial_value=_NAMES[5])
         self._through: Any = gui.add_dropdown("Through", (_BEST,), hint="The other six k are held at this place's")
         self._extent: Any = gui.add_dropdown("Shown", (_WHOLE, _CLOSE))
         self._draw = gui.add_button("Draw the landscape", icon=viser.Icon.MAP_2, disabled=True)

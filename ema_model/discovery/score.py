@@ -144,20 +144,16 @@ def _scored(found: Fit, one: Fingerprint, jacobian: Array, gram: Array, beyond: 
     strong = effect.severities[2] / one.settings[first.name]
     reason = unseen(energy, strong)
     settings = dict(one.settings)
-    if len(amounts) == 1:
-        amount = float(amounts[0])
-        low, high = first.low / settings[first.name], first.high / settings[first.name]
-        amount = float(np.clip(amount, low, high))
-        drop = float(2.0 * amount * toward[0] - amount**2 * energy[0, 0])
-        if first.low <= 0.0:  # otherwise the parameter is no amplitude
-            settings[first.name] *= amount
-        elif amount < 0.0:
-            drop = 0.0
-    elif one.beside:
-        drop = float(toward @ amounts)
+    linear = {first.name: settings[first.name]} | one.beside
+    if len(amounts) == len(linear):
         own = {parameter.name: parameter for parameter in effect.parameters}
-        for (name, value), amount in zip(({first.name: settings[first.name]} | one.beside).items(), amounts):
-            settings[name] = float(np.clip(value * amount, own[name].low, own[name].high))
+        ranges = [(own[name].low / value, own[name].high / value) for name, value in linear.items()]
+        amounts = np.clip(amounts, *np.transpose(ranges))
+        drop = float(2.0 * amounts @ toward - amounts @ energy @ amounts)
+        if first.low <= 0.0:  # otherwise the parameter is no amplitude
+            settings |= {name: value * float(amount) for (name, value), amount in zip(linear.items(), amounts)}
+        elif amounts[0] < 0.0:
+            drop = 0.0
     else:
         drop = float(toward @ amounts)
         settings[first.name] = float(np.clip(settings[first.name] * math.hypot(*amounts), first.low, first.high))

@@ -56,13 +56,10 @@ class SessionControls:
 
     def uploaded(self, path: Path) -> None:
         """A session came from the browser; on any thread."""
-        self._post_load(lambda: path)
+        self._page.ask("load session", lambda: self._read(path), self._load)
 
     def _load_named(self, name: str) -> None:
-        self._post_load(lambda: self._comparing.folder.session(name))
-
-    def _post_load(self, found: Callable[[], Path]) -> None:
-        self._page.screen.post("load session", lambda: self._read(found))
+        self._page.ask("load session", lambda: self._read(self._comparing.folder.session(name)), self._load)
 
     def _save(self, client: viser.ClientHandle | None) -> None:
         folder = self._comparing.folder
@@ -81,14 +78,12 @@ class SessionControls:
         names += [name for part in self._kept().values() for name in part.files()]
         return [name for name in names if name]
 
-    def _read(self, found: Callable[[], Path]) -> None:
-        def take() -> None:
-            path = found()
+    def _read(self, path: Path) -> None:
+        try:
             session_file.read(path, self._kept(), self._comparing.folder)
-            self._page.notify("Session loaded", path.name, "green")
-
-        self._page.checked(take, self._load)
-        self.refresh()
+        finally:
+            self.refresh()
+        self._page.notify("Session loaded", path.name, "green")
 
     def _post(self, kind: str, job: Callable[[], None]) -> None:
         def checked() -> None:

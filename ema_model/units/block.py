@@ -25,6 +25,7 @@ from ema_model.identification.model_bias import TWINS, Twins, twins
 from ema_model.models import Model, model_for
 from ema_model.models.stretches import fit_stretches
 from ema_model.recordings import Measurement
+from ema_model.units.candidates import Candidate, candidates_of
 
 Array = NDArray[np.float64]
 
@@ -43,16 +44,26 @@ class Block:
 
 @dataclass(frozen=True, eq=False)
 class Linearised:
-    """The parts of a block, before the ripple is pooled with that of other units."""
+    """The normal equations of a unit, before the ripple is pooled with that of other units.
 
-    curvature: Array  # A, (parameters, parameters)
-    gradient: Array  # A x̂, (parameters,)
-    noise: Array  # of the gradient, by the sensors: (parameters, parameters)
-    ripple: Array  # (twins, parameters): each twin's gradient from their mean
+    Their columns: the parameters in σ of the file's tolerances, the starts, and in what a recording may disagree.
+    """
+
+    parameters: int  # number of them
+    candidates: tuple[Candidate, ...]  # the last columns
+    curvature: Array  # A, (columns, columns)
+    gradient: Array  # A x̂, (columns,)
+    noise: Array  # of the gradient, by the sensors: (columns, columns)
+    ripple: Array  # (twins, columns): each twin's gradient from their mean
     rounds: int  # of twins, each with a mean of its own
     by_recording: Array  # (recordings, parameters): the curvature's diagonal, of each recording alone
     twins: Twins | None
-    starts_slope: Array  # (values, starts): what the starts do to the residual
+    slope: Array  # (values, columns): what they do to the residual
+
+    def nuisances(self, freed: Sequence[int]) -> list[int]:
+        """The columns that are integrated out: the starts, and the candidates that are freed, by their places."""
+        first = len(self.curvature) - len(self.candidates)
+        return [*range(self.parameters, first), *(first + place for place in freed)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,12 +131,16 @@ def linearised(
             break
         problem.reweighted(found.floors(unit.floors), found.added)
     residuals, slopes = problem.jacobians(at[None, :])
-    residual, slope = residuals[0][: problem.values], slopes[0][: problem.values]
-    is_start = np.arange(problem.count) >= count
-    curvature = slope.T @ slope + np.diag(is_start * 1.0)  # a start's own prior is as good as a measurement of it
-    gradient = curvature @ at - slope.T @ residual - is_start * at
+    residual = residuals[0][: problem.values]
+    candidates, columns = candidates_of(problem, residual)
+    slope = np.concatenate([slopes[0][: problem.values], columns], axis=1)
+    slope[:, :count] /= WIDER
+    at = np.concatenate([WIDER * at[:count], at[count:], np.zeros(len(candidates))])
+    known = np.zeros((len(at), len(at)))
+    known[range(count, problem.count), range(count, problem.count)] = 1.0  # a start's own prior is as a measurement
+    curvature = slope.T @ slope + known
     lasting = colour_of(unit, residual) if lasting is None else lasting
-    noise, ripple = np.diag(is_start * 1.0), np.zeros((0, problem.count))
+    noise, ripple = known, np.zeros((0, len(at)))
     by_recording = np.zeros((len(unit.model.recorded), count))
     for window, name, rows in problem.parts():
         share = lasting[rows].copy()
@@ -134,20 +149,19 @@ def linearised(
             share *= problem.over_sigma(window, name, floors.fit_noise(name)) ** 2
             moved = problem.over_sigma(window, name, found.deviations[window][name]) @ slope[rows]
             ripple = moved if not len(ripple) else ripple + moved
-        by_recording[unit.model.windows[window].recording] += np.sum(slope[rows, :count] ** 2, axis=0) / WIDER**2
+        by_recording[unit.model.windows[window].recording] += np.sum(slope[rows, :count] ** 2, axis=0)
         noise = noise + (slope[rows] * share[:, None]).T @ slope[rows]
-    # Starts are integrated out: what is left of each parameter's effect once they have taken theirs.
-    taken = np.linalg.solve(curvature[count:, count:], curvature[count:, :count]).T
-    without = np.concatenate([np.eye(count), -taken], axis=1) / WIDER
     return Linearised(
-        curvature=without @ curvature @ without.T,
-        gradient=without @ gradient,
-        noise=without @ noise @ without.T,
-        ripple=ripple @ without.T,
+        parameters=count,
+        candidates=candidates,
+        curvature=curvature,
+        gradient=curvature @ at - slope.T @ residual - known @ at,
+        noise=noise,
+        ripple=ripple,
         rounds=len(ripple) // TWINS,
         by_recording=by_recording,
         twins=found,
-        starts_slope=slope[:, count:],
+        slope=slope,
     )
 
 
@@ -168,20 +182,41 @@ def starts_at(unit: Unit, x: Array) -> Array:
     return calibrate(there, unit.floors, free=()).x
 
 
-def pooled(parts: Sequence[Linearised]) -> list[Block]:
-    """The blocks of all units, whose ripple is taken to be alike relative to what their recordings tell."""
-    roots = [_root(one.curvature) for one in parts]
+def pooled(parts: Sequence[Linearised], freed: Sequence[Sequence[int]] | None = None) -> list[Block]:
+    """The blocks of all units, whose ripple is taken to be alike relative to what their recordings tell.
+
+    freed: of each unit, the places of candidates in which its recordings disagree.
+    """
+    alone = [_without(one, which) for one, which in zip(parts, freed or [()] * len(parts))]
+    roots = [_root(curvature) for curvature, _, _, _ in alone]
     freedom = sum(one.rounds * (TWINS - 1) for one in parts)
     ripple = np.zeros_like(roots[0])
     if freedom:
-        over = np.concatenate([one.ripple @ np.linalg.inv(root) for one, root in zip(parts, roots)])
+        over = np.concatenate([one @ np.linalg.inv(root) for (_, _, _, one), root in zip(alone, roots)])
         ripple = (1.0 + 1.0 / TWINS) * over.T @ over / freedom  # of the recording itself, and of the twins' mean
     blocks = []
-    for one, root in zip(parts, roots):
-        scatter = one.noise + root @ ripple @ root
-        weighed = np.asarray(np.linalg.solve(scatter + _NOTHING * np.eye(len(root)), one.curvature), dtype=float)
-        blocks.append(Block(_symmetric(one.curvature @ weighed), weighed.T @ one.gradient))
+    for (curvature, gradient, noise, _), root in zip(alone, roots):
+        scatter = noise + root @ ripple @ root
+        weighed = np.asarray(np.linalg.solve(scatter + _NOTHING * np.eye(len(root)), curvature), dtype=float)
+        blocks.append(Block(_symmetric(curvature @ weighed), weighed.T @ gradient))
     return blocks
+
+
+def _without(part: Linearised, freed: Sequence[int]) -> tuple[Array, Array, Array, Array]:
+    """Curvature, gradient, noise and ripple of the parameters, once all else has taken what it can of their effect."""
+    count, others = part.parameters, part.nuisances(freed)
+    known = np.zeros(len(part.curvature))
+    known[others[len(others) - len(freed) :]] = 1.0  # as a start's prior
+    curvature, noise = part.curvature + np.diag(known), part.noise + np.diag(known)
+    taken = np.linalg.solve(curvature[np.ix_(others, others)], curvature[np.ix_(others, range(count))]).T
+    without = np.zeros((count, len(known)))
+    without[:, :count], without[:, others] = np.eye(count), -taken
+    return (
+        without @ curvature @ without.T,
+        without @ part.gradient,
+        without @ noise @ without.T,
+        part.ripple @ without.T,
+    )
 
 
 def _root(matrix: Array) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -22,7 +22,7 @@ from ema_model.units.block import linearised as linearised_at
 from ema_model.units.criteria import MISFIT, REFUSED, REFUSED_SHARE, SLOPE, TOLD, UNTOLD
 from ema_model.units.fit import Fitted, Together, fit, together
 from ema_model.units.pool import Pair, Pool
-from ema_model.units.result import Alone, Difference, Need, OfType, UnitsCompared
+from ema_model.units.result import Alone, Difference, Need, OfRecording, OfType, UnitsCompared
 from ema_model.units.select import alike
 from ema_model.units.transfer import transfer
 
@@ -30,6 +30,7 @@ Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 
 _HELD = 7_000_000  # of seeds, from fitted to held-out recordings' twins
+_BESIDE = 4  # units that do not differ, beside which those that do are held out
 
 
 def compare_units(
@@ -61,8 +62,9 @@ def compare_units(
         tell(f"calibrating {name} ({number + 1} of {len(units)})")
         fits.append(fit(unit_of(name, [prepared(one, actuator) for one in recordings], actuator, paths), fits))
     found = together(fits, seed, tell)
-    held = _held_blocks(holdout or {}, names, actuator, paths, found, seed, tell)
+    held = _held_blocks(holdout or {}, names, actuator, paths, found.pool, seed, tell)
     pool, dropped = _confirmed(found.pool, held, actuator, names, paths)
+    told = [pair for pair in pool.pairs if all(one.is_allowed_for for one in found.disagreements[pair[0]])]
     tell("holding each model against each unit")
     moved = transfer(fits)
     of_type = _of_type(pool, actuator, paths)
@@ -71,8 +73,9 @@ def compare_units(
         units=names,
         recordings=tuple(tuple(one.name for one in recordings) for recordings in units.values()),
         held_out=tuple(tuple(one.name for one in (holdout or {}).get(name, ())) for name in names),
-        differences=tuple(_difference(pool, pair, actuator, names, paths, held) for pair in pool.pairs),
+        differences=tuple(_difference(pool, pair, actuator, names, paths, held) for pair in told),
         dropped=dropped,
+        of_recordings=tuple(_of_recordings(found, units)),
         of_type=of_type,
         alone=_alone(pool, actuator, paths),
         transfer=moved,
@@ -99,18 +102,21 @@ def _held_blocks(
     names: Sequence[str],
     actuator: Actuator,
     paths: tuple[str, ...],
-    found: Together,
+    pool: Pool,
     seed: int,
     tell: Progress,
 ) -> dict[int, Block]:
-    """Blocks of what was not fitted, at the answer, by the unit's place; only of units that differ."""
+    """Blocks of what was not fitted, at the answer, by the unit's place: of units that differ, and a few others."""
+    differing = {unit for unit, _ in pool.pairs}
+    given = [i for i, name in enumerate(names) if holdout.get(name)]
+    wanted = [i for i in given if i in differing]
+    wanted += [i for i in given if i not in differing][:_BESIDE] if wanted else []
     parts = {}
-    for i, name in enumerate(names):
-        if holdout.get(name) and any(unit == i for unit, _ in found.pool.pairs):
-            tell(f"holding what was found against what was not fitted of {name}")
-            unit = unit_of(name, [prepared(one, actuator) for one in holdout[name]], actuator, paths)
-            x = found.pool.unit(i)
-            parts[i] = linearised_at(unit, x, seed + _HELD + i, 2, starts_at(unit, x))
+    for i in sorted(wanted):
+        tell(f"holding what was found against what was not fitted of {names[i]}")
+        unit = unit_of(names[i], [prepared(one, actuator) for one in holdout[names[i]]], actuator, paths)
+        x = pool.unit(i)
+        parts[i] = linearised_at(unit, x, seed + _HELD + i, 2, starts_at(unit, x))
     return dict(zip(parts, pooled(list(parts.values())))) if parts else {}
 
 
@@ -131,16 +137,27 @@ def _confirmed(
 
 
 def _held_out(pool: Pool, pair: Pair, held: Mapping[int, Block]) -> float | None:
-    """By how much more the held-out recordings of its unit are missed where a pair is shared again."""
-    block = held.get(pair[0])
-    if block is None:
+    """By how much more the held-out recordings are missed where a pair is shared again."""
+    if pair[0] not in held:
         return None
     without = pool.with_pairs([one for one in pool.pairs if one != pair])
-    return _missed(block, without.unit(pair[0])) - _missed(block, pool.unit(pair[0]))
+    return _missed(held, without) - _missed(held, pool)
 
 
-def _missed(block: Block, x: Array) -> float:
-    return float(x @ block.information @ x - 2.0 * block.pull @ x)
+def _missed(held: Mapping[int, Block], pool: Pool) -> float:
+    """How far held-out recordings are from a pool's units, in −2 log likelihood but for a constant.
+
+    The model's bias in another command is common to all units: what they share is what suits them all best there.
+    """
+    information, pull, cost = np.zeros((pool.parameters, pool.parameters)), np.zeros(pool.parameters), 0.0
+    for unit, block in held.items():
+        x = pool.unit(unit)
+        left = block.pull - block.information @ x
+        information, pull = information + block.information, pull + left
+        cost -= float(x @ (block.pull + left))
+    if len(held) > 1:
+        cost -= float(pull @ np.linalg.solve(information + np.eye(len(pull)), pull))
+    return cost
 
 
 def _difference(
@@ -162,6 +179,15 @@ def _difference(
         evidence=pool.loss(pair),
         held_out=_held_out(pool, pair, held),
     )
+
+
+def _of_recordings(found: Together, units: Mapping[str, Sequence[Measurement]]) -> Iterator[OfRecording]:
+    for (name, recordings), paid in zip(units.items(), found.disagreements):
+        for one in paid:
+            half = HALF_90 * one.sigma
+            interval = (one.value - half, one.value + half)
+            recording = recordings[one.of.recording].name
+            yield OfRecording(name, recording, one.of.name, one.value, interval, one.of.unit, one.is_allowed_for)
 
 
 def _in_unit(pool: Pool, place: int, actuator: Actuator, paths: Sequence[str]) -> tuple[float, float]:

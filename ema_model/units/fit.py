@@ -18,8 +18,9 @@ from ema_model.estimation import Calibration, Floor, after_fit, calibrate
 from ema_model.estimation.floor import twin_error
 from ema_model.identification.model_bias import TWINS
 from ema_model.units.block import WIDER, Linearised, Unit, colour_of, linearised, pooled
+from ema_model.units.disagreement import Paid, disagreements
 from ema_model.units.pool import Pool
-from ema_model.units.select import Price, price_of, select
+from ema_model.units.select import price_of, select
 from ema_model.units.step import At, step
 
 Array = NDArray[np.float64]
@@ -98,6 +99,7 @@ class Together:
     parts: list[Linearised]
     pool: Pool
     freedom: int  # independent values that the ripple's spread is known by, 0 where there is none
+    disagreements: list[list[Paid]]  # of each unit
 
 
 def together(fits: Sequence[Fitted], seed: int = 0, tell: Callable[[str], None] = lambda text: None) -> Together:
@@ -116,28 +118,28 @@ def together(fits: Sequence[Fitted], seed: int = 0, tell: Callable[[str], None] 
             tell(f"linearising {one.unit.name}, pass {number + 1} of {PASSES}")
             place = seed + _NEXT * number + _NEXT_UNIT * i
             last = before[i].twins if before else None
-            parts.append(
-                linearised(one.unit, points[i], place, 1 if settling else rounds, one.starts, last, about, one.lasting)
-            )
+            again = 1 if settling else rounds
+            parts.append(linearised(one.unit, points[i], place, again, one.starts, last, about, one.lasting))
         freedom = sum((TWINS - 1) * one.rounds for one in parts)
-        blocks, price = pooled(parts), price_of(count, len(middle), freedom)
-        found = Together(parts, select(blocks, price), freedom)
+        paid = disagreements(parts)
+        freed = [[each.place for each in of_unit] for of_unit in paid]
+        blocks = pooled(parts, freed)
+        price = price_of(count, len(middle), freedom)
+        found = Together(parts, select(blocks, price), freedom, paid)
         # What just pays may be how curved the model is: it leads the point astray along what is hardly told.
-        sure = select(blocks, Price(_SURE * price.pair, _SURE * price.scatter))
-        common, points = _next_points(fits, parts, sure, common, points)
+        sure = select(blocks, price.times(_SURE))
+        units = [At(one.unit, one.starts, part, which) for one, part, which in zip(fits, parts, freed)]
+        common, points = _next_points(units, sure, common, points)
         about = sure.shared_root
     assert found is not None
     return found
 
 
-def _next_points(
-    fits: Sequence[Fitted], parts: Sequence[Linearised], pool: Pool, common: Array, points: Sequence[Array]
-) -> tuple[Array, list[Array]]:
+def _next_points(units: Sequence[At], pool: Pool, common: Array, points: Sequence[Array]) -> tuple[Array, list[Array]]:
     """Where to linearise next: the units that do not differ at one point, as how curved the model is differs nowhere.
 
     common: that point before; points: of each unit.
     """
-    units = [At(one.unit, one.starts, part) for one, part in zip(fits, parts)]
     apart = {*range(len(units))} if pool.tau.any() else {unit for unit, _ in pool.pairs}
     alike = [one for i, one in enumerate(units) if i not in apart]
     if alike:

@@ -48,6 +48,19 @@ class OfType:
     told: bool  # whether the recordings tell it at all: else it is as the file says
 
 
+@dataclass(frozen=True)
+class OfRecording:
+    """In what one recording disagrees with the others of its unit: freed for it, and no difference between units."""
+
+    unit: str
+    recording: str
+    quantity: str  # "current_zero" or "current_delay"
+    value: float
+    value90: Interval
+    in_unit: str  # "A" or "s"
+    allowed_for: bool  # else nothing is told of what the unit differs in
+
+
 @dataclass(frozen=True, eq=False)
 class Alone:
     """A parameter of each unit as its own recordings tell it, the others' values aside."""
@@ -90,6 +103,7 @@ class UnitsCompared(InWords):
     held_out: tuple[tuple[str, ...], ...]
     differences: tuple[Difference, ...]
     dropped: tuple[Difference, ...]  # that held-out recordings contradict
+    of_recordings: tuple[OfRecording, ...]
     of_type: dict[str, OfType]
     alone: dict[str, Alone]  # by parameter, as `of_type`
     transfer: Transfer

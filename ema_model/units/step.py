@@ -26,6 +26,7 @@ class At:
     unit: Unit
     starts: Array
     part: Linearised
+    freed: Sequence[int]  # of its candidates
 
 
 def step(units: Sequence[At], x: Array, goals: Sequence[Array]) -> Array:
@@ -48,7 +49,7 @@ def _cost(one: At, points: Array) -> Array:
         problem.reweighted(part.twins.floors(one.unit.floors), part.twins.added)
     whole = np.concatenate([points / WIDER, np.repeat(one.starts[None, :], len(points), axis=0)], axis=1)
     residuals = problem.residuals(problem.clip(whole))[:, : problem.values]
-    slope = part.starts_slope
+    slope = part.slope[:, part.nuisances(one.freed)]
     curvature = slope.T @ slope + np.eye(slope.shape[1])
-    pull = residuals @ slope + one.starts
+    pull = residuals @ slope + np.concatenate([one.starts, np.zeros(len(one.freed))])
     return np.sum(residuals**2, axis=1) - np.sum(pull * np.linalg.solve(curvature, pull.T).T, axis=1)

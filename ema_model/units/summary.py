@@ -55,6 +55,18 @@ def as_dict(result: UnitsCompared) -> dict[str, Any]:
         ],
         "differences": [difference(one) for one in result.differences],
         "contradicted": [difference(one) for one in result.dropped],
+        "of_recordings": [
+            {
+                "unit": one.unit,
+                "recording": one.recording,
+                "quantity": one.quantity,
+                "value": one.value,
+                "interval90": list(one.value90),
+                "in": one.in_unit,
+                "allowed_for": one.allowed_for,
+            }
+            for one in result.of_recordings
+        ],
         "scattering": [shown(path) for path in result.scattering],
         "type": {shown(path): asdict(one) | {"mean90": list(one.mean90)} for path, one in result.of_type.items()},
         "transfer": {

@@ -12,7 +12,7 @@ from ema_model.quantities.shown import of_signal
 from ema_model.quantities.titles import in_sentence
 from ema_model.text import Document, Lines, Note, Table
 from ema_model.text.document import Block
-from ema_model.units.result import Difference, UnitsCompared
+from ema_model.units.result import Difference, OfRecording, UnitsCompared
 
 _WIDEST = 10  # units, up to which the matrix stands in a terminal
 _MOST_NAMED = 6
@@ -38,8 +38,9 @@ def headline(result: UnitsCompared) -> str:
 
 
 def notes(result: UnitsCompared) -> list[str]:
-    """What to mind: warnings, and differences that were taken back."""
-    return [*result.warnings, *(_dropped(result, one) for one in result.dropped)]
+    """What to mind: warnings, in what a unit's recordings disagree, and differences that were taken back."""
+    taken_back = [_dropped(result, one) for one in result.dropped]
+    return [*result.warnings, *map(_of_recording, result.of_recordings), *taken_back]
 
 
 def rests_on(result: UnitsCompared) -> str:
@@ -164,6 +165,22 @@ def _needed(result: UnitsCompared) -> Iterator[str]:
 def _dropped(result: UnitsCompared, one: Difference) -> str:
     names = " or ".join(_title(result, path) for path in one.together)
     return f"{one.unit} seemed to differ in {names}, but its held-out recordings contradict that: it is not said"
+
+
+def _of_recording(one: OfRecording) -> str:
+    half = 0.5 * (one.value90[1] - one.value90[0])
+    off = {
+        "current_zero": f"the zero of its current is off by {_plus_minus(one.value, half, 'A', 1.0)}",
+        "current_delay": f"its current comes {_plus_minus(one.value, half, 'ms', 1e3)} later than its positions",
+    }[one.quantity]
+    then = (
+        "this is allowed for" if one.allowed_for else "undo that delay; before, it is not told what the unit differs in"
+    )
+    return f"{one.unit}: recording {one.recording} disagrees with the unit's others: {off}; {then}"
+
+
+def _plus_minus(value: float, half: float, unit: str, factor: float) -> str:
+    return with_uncertainty(factor * value, factor * half, unit)
 
 
 def _title(result: UnitsCompared, path: str) -> str:

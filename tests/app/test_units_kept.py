@@ -10,7 +10,7 @@ import pytest
 
 from ema_model.actuator import load_actuator
 from ema_model.errors import InputError
-from ema_model.units.result import Alone, Difference, Need, OfType, Transfer, UnitsCompared
+from ema_model.units.result import Alone, Difference, Need, OfRecording, OfType, Transfer, UnitsCompared
 from ema_model.units.summary import as_dict
 from emaviz.session.units.kept import read, saved
 
@@ -24,6 +24,7 @@ FOUND = UnitsCompared(
     held_out=(("unseen",), ()),
     differences=(DIFFERENCE,),
     dropped=(replace(DIFFERENCE, parameter=GAIN, alike=(), held_out=-12.5, share=None, share90=None),),
+    of_recordings=(OfRecording("a", "chirp", "current_zero", 0.1, (0.05, 0.15), "A", True),),
     of_type={path: OfType(1e-5, (0.9e-5, 1.1e-5), 0.0, 1e-6, "rad", True) for path in (PLAY, GAIN)},
     alone={path: Alone(np.array([1e-5, 0.1]), np.array([1e-6, 2e-6])) for path in (PLAY, GAIN)},
     transfer=Transfer("current_A", np.array([[0.1, 0.2], [0.3, 0.4]]), np.array([0.1, 0.1]), np.full((2, 2), 1.5)),

@@ -28,7 +28,7 @@ def found(units: int, *differences: Difference) -> UnitsCompared:
     of_type = {PLAY: OfType(1e-5, (0.9e-5, 1.1e-5), 0.0, 1e-6, "rad", True)}
     transfer = Transfer("current_A", square, square[0], square)
     return UnitsCompared(
-        ACTUATOR, names, nothing, nothing, differences, (), of_type, {}, transfer, (), square[0], ACTUATOR, ()
+        ACTUATOR, names, nothing, nothing, differences, (), (), of_type, {}, transfer, (), square[0], ACTUATOR, ()
     )
 
 

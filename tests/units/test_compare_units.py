@@ -11,12 +11,13 @@ import pytest
 from ema_model.actuator import load_actuator, save_actuator
 from ema_model.estimation import calibrate
 from ema_model.fleets import draw, recorded
+from ema_model.recordings import Measurement
 from ema_model.units import fit as fitting
 from ema_model.units.block import unit_of, wider
 from ema_model.units.compare import compare_units
 from ema_model.units.fit import fit
 from ema_model.units.summary import as_dict
-from ema_model.units.words import sentences
+from ema_model.units.words import notes, sentences
 
 ACTUATOR = load_actuator()
 BACKLASH = "transmission.backlash_rad"
@@ -105,6 +106,37 @@ def test_equal_units_are_equal_and_a_missing_recording_is_named():
     needed = {(one.unit, one.parameter): one.recording for one in found.needs}
     assert needed["unit_02", "motor.resistance_Ohm"] == "step"
     assert re.search("unit_02 tells nothing of motor .*resistance: a recording like step would", str(found))
+
+
+@pytest.fixture(scope="module")
+def disagreeing():
+    """Three equal units; in one recording of the second the current's zero is off, one of the third has it late."""
+    fitted, _ = units_of(3, {}, seed=4)
+    chirp, step = fitted["unit_02"][0], fitted["unit_03"][1]
+    off, late = ({name: one[name] for name in one} for one in (chirp, step))
+    off["current_A"] = off["current_A"] + 0.12
+    late["current_A"] = np.interp(step["time_s"] - 4e-4, step["time_s"], step["current_A"])
+    fitted["unit_02"][0], fitted["unit_03"][1] = Measurement(off, name="chirp"), Measurement(late, name="step")
+    return compare_units(fitted, ACTUATOR)
+
+
+def test_recordings_of_a_unit_that_disagree_are_no_difference_between_units(disagreeing):
+    """Of two recordings it is only known that they disagree: either may be the one that is named."""
+    assert not disagreeing.differences
+    zero, delay = sorted(disagreeing.of_recordings, key=lambda one: one.unit)
+    assert (zero.unit, zero.quantity) == ("unit_02", "current_zero") and zero.allowed_for
+    assert (delay.unit, delay.quantity) == ("unit_03", "current_delay") and not delay.allowed_for
+    assert abs(zero.value) == pytest.approx(0.12, abs=0.05) and (zero.value > 0.0) == (zero.recording == "chirp")
+    assert abs(delay.value) == pytest.approx(4e-4, rel=0.5) and (delay.value > 0.0) == (delay.recording == "step")
+
+
+def test_what_recordings_disagree_in_is_said(disagreeing):
+    lines = notes(disagreeing)
+    assert any(
+        re.match(r"unit_02: recording \w+ disagrees .* zero of its current .* A; this is allowed", one) for one in lines
+    )
+    assert [one["unit"] for one in as_dict(disagreeing)["of_recordings"]] == ["unit_02", "unit_03"]
+    assert any(one.startswith("unit_03: ") and "undo that delay" in one for one in lines)
 
 
 def test_two_units_with_one_recording_each_say_what_cannot_be_known():

@@ -146,8 +146,23 @@ def test_what_is_only_known_together_is_named_as_one():
 
 
 def test_more_units_and_less_known_ripple_ask_more():
-    assert price_of(20, 13).pair > price_of(4, 13).pair > price_of(2, 13).pair
-    assert price_of(4, 13, 20).pair > price_of(4, 13, 90).pair > price_of(4, 13).pair
+    for price in ("first", "further"):
+        prices = [price_of(*given) for given in ((20, 13), (4, 13), (2, 13), (4, 13, 20), (4, 13, 90))]
+        twenty, four, two, hardly, better = (getattr(one, price) for one in prices)
+        assert twenty > four > two and hardly > better > four
+
+
+def test_a_further_difference_needs_less_than_the_first():
+    """One of 3.9 σ beside one that is sure is said, and is not where it is alone."""
+    g = 100.0 * np.eye(PARAMETERS)
+    price = price_of(6, PARAMETERS)
+    for sure, said in ((2.0, True), (0.0, False)):
+        x = np.zeros((6, PARAMETERS))
+        x[1, 2], x[4, 3] = sure, 0.41
+        pool = select([Block(g, g @ row) for row in x], price)
+        evidence = Pool(pool.blocks, ((4, 3),), NONE).loss((4, 3))
+        assert price.further < evidence < price.first
+        assert ((4, 3) in pool.pairs) == said and len(pool.pairs) == 2 * said
 
 
 def test_several_differences_of_a_unit_are_chosen_together():

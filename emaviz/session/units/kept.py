@@ -11,7 +11,7 @@ from ema_model.actuator import parse_actuator
 from ema_model.actuator.write import as_toml
 from ema_model.errors import InputError
 from ema_model.estimation.problem import SIGNALS
-from ema_model.units.result import Alone, Difference, Need, OfType, Transfer, UnitsCompared
+from ema_model.units.result import Alone, Difference, Need, OfRecording, OfType, Transfer, UnitsCompared
 from emaviz.session.described import taken
 
 _PART = "part of Units"
@@ -37,6 +37,7 @@ class SavedAnswer(msgspec.Struct, frozen=True):
     needs: tuple[Need, ...]
     errors: tuple[float, ...]
     warnings: tuple[str, ...]
+    of_recordings: tuple[OfRecording, ...] = ()
 
 
 class SavedUnits(msgspec.Struct, frozen=True):
@@ -68,6 +69,7 @@ def _answer(found: UnitsCompared) -> SavedAnswer:
         held_out=found.held_out,
         differences=found.differences,
         dropped=found.dropped,
+        of_recordings=found.of_recordings,
         of_type=found.of_type,
         alone={path: (_row(one.value), _row(one.sigma)) for path, one in found.alone.items()},
         signal=found.transfer.signal,
@@ -89,7 +91,7 @@ def _found(one: SavedAnswer) -> UnitsCompared:
         and len(one.recordings) == len(one.held_out) == count
         and named == {*one.of_type} == {*one.alone} <= {*actuator.tolerances}
         and {path for each in told for path in each.together} | {each.parameter for each in one.needs} <= named
-        and {each.unit for each in (*told, *one.needs)} <= {*one.units}
+        and {each.unit for each in (*told, *one.needs, *one.of_recordings)} <= {*one.units}
         and one.signal in SIGNALS
     )
     if not fits:
@@ -103,6 +105,7 @@ def _found(one: SavedAnswer) -> UnitsCompared:
         held_out=one.held_out,
         differences=one.differences,
         dropped=one.dropped,
+        of_recordings=one.of_recordings,
         of_type=one.of_type,
         alone=alone,
         transfer=Transfer(

@@ -10,6 +10,7 @@ JUMP_BACK = 6.0  # of the differences' spread: towards healthy, a part replaced
 JUMP_ON = 12.0  # the same away from healthy, where wear itself is uneven
 JUMP_LEAST = 0.02  # of k, and no less
 JUMP_AFTER = 3  # flights that must follow it
+JUMP_SURE = 6  # flights after which one towards healthy is looked for once more
 JUMP_WINDOW = 12  # flights beside it, by which its size is judged
 
 LEAST_FLIGHTS = 8  # usable ones, before which nothing is told

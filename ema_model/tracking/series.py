@@ -7,7 +7,7 @@ from math import log
 import numpy as np
 from numpy.typing import NDArray
 
-from ema_model.tracking.criteria import FALSE_TREND, GROWN_BY, JUMP_AFTER, JUMP_LEAST, JUMP_WINDOW
+from ema_model.tracking.criteria import FALSE_TREND, GROWN_BY, JUMP_AFTER, JUMP_LEAST, JUMP_SURE, JUMP_WINDOW
 from ema_model.tracking.evidence import Evidence
 from ema_model.tracking.flight import Flight
 from ema_model.tracking.jumps import jump
@@ -56,7 +56,7 @@ class Series:
     def _follow(self, place: int) -> None:
         """What the flight tells of the unit."""
         self._units[place] = self.unit.copy()
-        self._units.pop(place - JUMP_WINDOW - JUMP_AFTER, None)
+        self._units.pop(place - JUMP_WINDOW - JUMP_SURE, None)
         for i, jumps in enumerate(self.jumps):
             if place in jumps:
                 self.unit.replaced(i)
@@ -67,7 +67,7 @@ class Series:
         """The place of a jump that is found now."""
         if not self._may_have_jumped(i):
             return None
-        first = max(self.start(i), len(self.at) - JUMP_WINDOW - JUMP_AFTER)
+        first = max(self.start(i), len(self.at) - JUMP_WINDOW - JUMP_SURE)
         last = self.flights[first:]
         base, covariance = self.unit.known()
         common: Array = np.array([one.common[i] for one in last])
@@ -99,10 +99,12 @@ class Series:
 
     def _may_have_jumped(self, i: int) -> bool:
         """Whether the last flights stand far enough from those before them; asked of all, so it must be quick."""
-        last = [float(one.k[i]) for one in self.flights[-2 * JUMP_AFTER :]]
-        middle = JUMP_AFTER // 2
-        before, after = sorted(last[:JUMP_AFTER]), sorted(last[JUMP_AFTER:])
-        return len(last) == 2 * JUMP_AFTER and abs(after[middle] - before[middle]) > JUMP_LEAST
+        return any(self._stands_off(i, after) for after in (JUMP_AFTER, JUMP_SURE))
+
+    def _stands_off(self, i: int, after: int) -> bool:
+        last = [float(one.k[i]) for one in self.flights[-2 * after :]]
+        low, high = sorted(last[:after]), sorted(last[after:])
+        return len(last) == 2 * after and abs(high[after // 2] - low[after // 2]) > JUMP_LEAST
 
     def _weigh(self, place: int, which: NDArray[np.int64]) -> None:
         flight = self.flights[place]

@@ -189,8 +189,9 @@ class Tracker:
 
     def _jumps(self, name: str, known: Series) -> tuple[Jump, ...]:
         found, healthy = [], 0.0 if name == "k6" else faults.BY_NAME[name].healthy
+        base, _ = known.unit.known()
         for i in _places(name):
-            k = [one.k[i] for one in self._usable] if known.jumps[i] else []
+            k = [float(one.k[i] - one.common[i] @ base) for one in self._usable] if known.jumps[i] else []
             for place in known.jumps[i]:
                 before, after = float(np.median(k[max(0, place - 3) : place])), float(np.median(k[place : place + 3]))
                 back = abs(after - healthy) < abs(before - healthy)

@@ -88,6 +88,29 @@ def test_a_replaced_part_is_seen_and_judged_anew():
     assert not after.trend and after.level < 0.05
 
 
+def test_a_small_step_back_is_seen_once_more_flights_follow():
+    """Three flights on either side seldom tell a step of seven times the noise, six do; and none is where none was."""
+    soon, later = [], []
+    for seed in range(8):
+        k1 = np.concatenate([np.full(50, 0.105), np.zeros(30)])
+        life = flights(k1, sigma=0.015, seed=seed)
+        soon += track(life[:53]).faults["k1"].jumps
+        later += track(life[:57]).faults["k1"].jumps
+        assert not track(flights(np.full(57, 0.105), sigma=0.015, seed=seed)).faults["k1"].jumps
+    assert len(soon) < 4 and len(later) > 5
+    assert all(one.flight in ("f049", "f050", "f051") and one.towards_healthy for one in later)
+    assert np.mean([one.before - one.after for one in later]) == pytest.approx(0.105, abs=0.02)
+
+
+def test_a_jump_is_told_without_what_the_unit_adds():
+    """Measured, k4 stood below 0 before its part was replaced, and as far above it in truth."""
+    life = worn_life("onset", 63001, 0.5)
+    seen = track(drawn(life)[:130]).faults["k4"]
+    (one,) = seen.jumps
+    assert life.repaired == 103 and one.flight == "flight_0103"
+    assert one.towards_healthy and one.before > 0.06 and abs(one.after) < 0.03 and not seen.trend
+
+
 def test_flights_that_do_not_fit_are_left_out_and_many_of_them_end_the_trust():
     life = flights(0.003 * np.arange(80))
     bad = [Flight(one.name, np.full(8, 9.0), one.own, one.common, "does not fit") for one in life]

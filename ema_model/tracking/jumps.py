@@ -50,7 +50,7 @@ def _step(k: Array, variance: Array, common: Array, after: int, healthy: float) 
         float(np.sqrt(2.0 * np.median(variance[first:]))),
     )
     # The median of a few differences is no slope for long; the flights before a step tell one, it itself does not.
-    wear = float(np.median(beside) if after == JUMP_AFTER else theilslopes(k[first:at]).slope)
+    wear = float(np.median(beside) if after == JUMP_AFTER else theilslopes(k[first:at])[0])
     of_unit = np.linalg.norm(np.mean(common[at:], axis=0) - np.mean(common[at - after : at], axis=0))
     spread = float(np.hypot(spread * np.sqrt(JUMP_AFTER / after), of_unit))
     size = abs(high - low - after * wear)

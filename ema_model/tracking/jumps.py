@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import theilslopes
 
 from ema_model.tracking.criteria import JUMP_AFTER, JUMP_BACK, JUMP_LEAST, JUMP_ON, JUMP_SURE, JUMP_WINDOW
 
@@ -50,10 +49,16 @@ def _step(k: Array, variance: Array, common: Array, after: int, healthy: float) 
         float(np.sqrt(2.0 * np.median(variance[first:]))),
     )
     # The median of a few differences is no slope for long; the flights before a step tell one, it itself does not.
-    wear = float(np.median(beside) if after == JUMP_AFTER else theilslopes(k[first:at])[0])
+    wear = float(np.median(beside)) if after == JUMP_AFTER else _slope(k[first:at])
     of_unit = np.linalg.norm(np.mean(common[at:], axis=0) - np.mean(common[at - after : at], axis=0))
     spread = float(np.hypot(spread * np.sqrt(JUMP_AFTER / after), of_unit))
     size = abs(high - low - after * wear)
     near = k[at - 2 : at + 2]  # medians leave it open by one
     back = abs(high - healthy) < abs(low - healthy)
     return _Step(at - 1 + int(np.argmax(np.abs(np.diff(near)))), size / spread if size > JUMP_LEAST else 0.0, back)
+
+
+def _slope(k: Array) -> float:
+    """Of a flight, by Theil and Sen: the median of those between any two."""
+    sooner, later = np.triu_indices(len(k), 1)
+    return float(np.median((k[later] - k[sooner]) / (later - sooner)))

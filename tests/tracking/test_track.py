@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from support.flights import flights
@@ -109,6 +111,20 @@ def test_a_jump_is_told_without_what_the_unit_adds():
     (one,) = seen.jumps
     assert life.repaired == 103 and one.flight == "flight_0103"
     assert one.towards_healthy and one.before > 0.06 and abs(one.after) < 0.03 and not seen.trend
+
+
+def test_a_drift_that_may_be_none_has_no_end_but_a_least_life():
+    """After 64 of its flights this life's drift may be as good as none: no middle of what remains is told."""
+    life = worn_life("onset", 63025, 1.0)
+    tracker = Tracker({life.fault: life.threshold}, life.seed)
+    for flight in drawn(life)[:254]:
+        tracker.add(flight)
+    one = tracker.look().faults[life.fault]
+    assert one.trend and one.remaining is None
+    least = int(
+        re.fullmatch(r"more than (\d+) flights remain \(95 %\); it may never reach its threshold", one.reason)[1]
+    )
+    assert 10 < least < 1000
 
 
 def test_flights_that_do_not_fit_are_left_out_and_many_of_them_end_the_trust():

@@ -169,10 +169,7 @@ class Tracker:
         if left.p50 >= LONGEST:
             return f"more than {LONGEST:g} flights remain", None
         if left.p95 >= LONGEST:
-            return (
-                f"more than {left.p05:.0f} flights remain (95 %); it may never reach its threshold",
-                None,
-            )
+            return f"more than {left.p05:.0f} flights remain (95 %); it may never reach its threshold", None
         return "", left
 
     def _direction(self, name: str, k: Array, threshold: float | None) -> tuple[Array, float]:

@@ -7,7 +7,7 @@ from __future__ import annotations
 FALSE = 0.005
 
 # The same once units differ at all, that one more difference is said than there is.
-FURTHER = 0.03
+FURTHER = 0.01
 
 # Of −2 log likelihood, within which two parameters of a unit cannot be told apart: twenty to one (Kass and Raftery,
 # Bayes factors, J. Am. Stat. Assoc. 90, 1995: "strong").

@@ -21,7 +21,7 @@ from ema_model.units.block import WIDER, Linearised, Unit, colour_of, linearised
 from ema_model.units.disagreement import Paid, disagreements
 from ema_model.units.pool import Pool
 from ema_model.units.select import price_of, select
-from ema_model.units.step import At, step
+from ema_model.units.step import At, simpler, step
 
 Array = NDArray[np.float64]
 
@@ -31,6 +31,7 @@ _FIRST = 0.2  # tolerances, about the first point
 _WORSE = 1.5  # times the χ² of the best unit so far, from which on a unit is fitted from further starts
 _FREEDOM = 60  # independent values, over all units, that the ripple's spread is to be known by
 _SURE = 3.0  # times the price, which a difference must be worth before it moves the next pass's point
+_SEVERAL = 2  # differences of a unit, in whose place one alone is looked for
 _NEXT = 1000  # from one pass's seeds to the next one's, and
 _NEXT_UNIT = 50  # from one unit's
 
@@ -129,20 +130,27 @@ def together(fits: Sequence[Fitted], seed: int = 0, tell: Callable[[str], None] 
         # What just pays may be how curved the model is: it leads the point astray along what is hardly told.
         sure = select(blocks, price.times(_SURE))
         units = [At(one.unit, one.starts, part, which) for one, part, which in zip(fits, parts, freed)]
-        common, points = _next_points(units, sure, common, points)
+        common, points = _next_points(units, sure, found.pool, price.further, common, points)
         about = sure.shared_root
     assert found is not None
     return found
 
 
-def _next_points(units: Sequence[At], pool: Pool, common: Array, points: Sequence[Array]) -> tuple[Array, list[Array]]:
+def _next_points(
+    units: Sequence[At], pool: Pool, found: Pool, price: float, common: Array, points: Sequence[Array]
+) -> tuple[Array, list[Array]]:
     """Where to linearise next: the units that do not differ at one point, as how curved the model is differs nowhere.
 
-    common: that point before; points: of each unit.
+    pool: with the differences that are sure; found: with all that pay; price: of one; common: that point before;
+    points: of each unit.
     """
     apart = {*range(len(units))} if pool.tau.any() else {unit for unit, _ in pool.pairs}
     alike = [one for i, one in enumerate(units) if i not in apart]
     if alike:
         common = step(alike, common, (pool.shared,))
-    own = [step([one], points[i], (pool.unit(i), pool.shared)) if i in apart else common for i, one in enumerate(units)]
+    own = []
+    for i, one in enumerate(units):
+        x = step([one], points[i], (pool.unit(i), pool.shared)) if i in apart else common
+        several = sum(unit == i for unit, _ in found.pairs)
+        own.append(simpler(one, x, common, price * (several - 1)) if several >= _SEVERAL else x)
     return common, own

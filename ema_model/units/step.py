@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 
 _SHARES = (1.0, 0.5, 0.25, 0.1)  # of a step
 _AS_GOOD = 2.0  # of χ², within which the longer step is taken
+_FARTHEST, _GRID = 5.0, 41  # tolerances of one difference alone, and how many sizes of it are tried, twice
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +39,22 @@ def step(units: Sequence[At], x: Array, goals: Sequence[Array]) -> Array:
     cost = np.sum([_cost(one, np.array([x + each for each in steps])) for one in units], axis=0)
     good = [one for one, at in zip(steps, cost) if at <= cost.min() + _AS_GOOD]
     return x + max(good, key=lambda one: float(np.linalg.norm(one)))
+
+
+def simpler(one: At, x: Array, shared: Array, allowed: float) -> Array:
+    """Where a unit differs from what all share (parameters,) in one parameter alone, or x, where no such point will do.
+
+    One is as good as x if χ² is no more than `allowed` higher there.  What differs by much in one parameter may, from
+    where the others are, seem to differ in several.
+    """
+    sizes = np.linspace(-_FARTHEST, _FARTHEST, _GRID)
+    points = shared + (np.eye(len(x))[:, None, :] * sizes[None, :, None]).reshape(-1, len(x))
+    best = points[int(np.argmin(_cost(one, points)))]
+    place = int(np.argmax(np.abs(best - shared)))
+    near = np.tile(best, (_GRID, 1))
+    near[:, place] += np.linspace(-1.0, 1.0, _GRID) * (sizes[1] - sizes[0])
+    cost = _cost(one, np.concatenate([x[None, :], near]))
+    return near[int(np.argmin(cost[1:]))] if cost[1:].min() <= cost[0] + allowed else x
 
 
 def _cost(one: At, points: Array) -> Array:

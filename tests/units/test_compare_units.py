@@ -13,9 +13,10 @@ from ema_model.estimation import calibrate
 from ema_model.fleets import draw, recorded
 from ema_model.recordings import Measurement
 from ema_model.units import fit as fitting
-from ema_model.units.block import unit_of, wider
+from ema_model.units.block import linearised, unit_of, wider
 from ema_model.units.compare import compare_units
 from ema_model.units.fit import fit
+from ema_model.units.step import At, simpler
 from ema_model.units.summary import as_dict
 from ema_model.units.words import notes, sentences
 
@@ -155,6 +156,21 @@ def test_a_unit_alone_is_calibrated_as_it_would_be_without_others():
     assert found.x == pytest.approx(2.0 * alone.x[: len(unit.parameters)])
     path = unit.parameters[0]
     assert alone.parameters[path].initial == wider(ACTUATOR).value(path) == ACTUATOR.value(path)
+
+
+def test_a_unit_that_differs_by_much_in_one_parameter_is_not_left_where_several_would_do():
+    """Where the others are, a torque constant that is 2 tolerances off looks like a voltage, an inertia and friction."""
+    path = "motor.torque_constant_Nm_A"
+    fitted, _ = units_of(2, {(1, path): -2.0}, seed=5)
+    unit = unit_of("two", fitted["unit_02"], ACTUATOR)
+    begun, place = fit(unit), unit.parameters.index(path)
+    shared = np.concatenate([SHARED, np.zeros(len(unit.parameters) - len(SHARED))])
+    at = At(unit, begun.starts, linearised(unit, shared, starts=begun.starts), ())
+    several = shared.copy()
+    several[[unit.parameters.index(name) for name in ("inverter.bus_voltage_V", "motor.inertia_kgm2")]] += 0.4
+    found = simpler(at, several, shared, 30.0) - shared
+    assert -4.0 < found[place] < -1.0 and np.count_nonzero(found) == 1  # further passes begin from there
+    assert simpler(at, several, shared, -1e9) is several  # one alone is far from as good
 
 
 @pytest.mark.long

@@ -159,7 +159,7 @@ def test_a_unit_alone_is_calibrated_as_it_would_be_without_others():
 
 
 def test_a_unit_that_differs_by_much_in_one_parameter_is_not_left_where_several_would_do():
-    """Where the others are, a torque constant that is 2 tolerances off looks like a voltage, an inertia and friction."""
+    """Where the others are, a torque constant that is 2 tolerances off looks like voltage, inertia and friction."""
     path = "motor.torque_constant_Nm_A"
     fitted, _ = units_of(2, {(1, path): -2.0}, seed=5)
     unit = unit_of("two", fitted["unit_02"], ACTUATOR)

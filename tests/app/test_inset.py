@@ -85,12 +85,22 @@ def test_charts_are_as_high_as_the_window_lets_them_be(page):
     def bottom():
         return page.evaluate(f"{CHARTS}.at(-1)?.getBoundingClientRect().bottom ?? 0")
 
+    def settled(window):
+        """Heights that are the same half a second later."""
+        seen = [look(window)]
+        while True:
+            page.wait_for_timeout(500)
+            seen.append(look(window))
+            if seen[-1] == seen[-2]:
+                return seen[-1]
+            assert len(seen) < 60
+
     go(page, "Explore")
-    wait_until(lambda: 900 - 200.0 < bottom() < 900, 10.0)
-    usual = look(900)
-    wait_until(lambda: all(tall > low + 30.0 for low, tall in zip(usual, look(1080), strict=True)), 10.0)
-    wait_until(lambda: 1080 - 200.0 < bottom() < 1080, 10.0)
-    wait_until(lambda: look(900) == usual, 10.0)
+    wait_until(lambda: 900 - 200.0 < bottom() < 900, 30.0)
+    usual = settled(900)
+    wait_until(lambda: all(tall > low + 30.0 for low, tall in zip(usual, look(1080), strict=True)), 30.0)
+    wait_until(lambda: 1080 - 200.0 < bottom() < 1080, 30.0)
+    wait_until(lambda: look(900) == usual, 30.0)
 
 
 def test_a_tall_window_has_no_more_values_than_one_reads(page):

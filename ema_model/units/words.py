@@ -16,6 +16,7 @@ from ema_model.units.result import Difference, OfRecording, UnitsCompared
 
 _WIDEST = 10  # units, up to which the matrix stands in a terminal
 _MOST_NAMED = 6
+_MISSED = "the models miss something, which may stand behind what seems to differ"
 
 
 def sentences(result: UnitsCompared) -> list[str]:
@@ -24,10 +25,15 @@ def sentences(result: UnitsCompared) -> list[str]:
     for path in result.scattering:
         one = result.of_type[path]
         told.append(f"all units scatter in {_title(result, path)} (1 σ: {_amount(one.scatter, one.mean, one.unit)})")
+    untold = [*dict.fromkeys(one.unit for one in result.of_recordings if not one.allowed_for)]
+    if untold:  # what of the others is said, is not all
+        rest = f"in what {and_so_on(untold)} may differ is not told, as recordings of one unit disagree"
+        missed = [_MISSED] if told and result.is_missed else []
+        return [*(told or ["nothing is found in which the others differ"]), rest, *missed]
     if not told:
         return [f"the {len(result.units)} units do not differ in anything that their recordings tell"]
     if result.is_missed:  # how sure that is, nobody knows who does not have the physics
-        return [*told, "the models miss something, which may stand behind what seems to differ"]
+        return [*told, _MISSED]
     return [*told[:-1], f"{told[-1]}, nothing else"]
 
 
@@ -168,19 +174,16 @@ def _dropped(result: UnitsCompared, one: Difference) -> str:
 
 
 def _of_recording(one: OfRecording) -> str:
-    half = 0.5 * (one.value90[1] - one.value90[0])
+    factor, unit = (1e3, "ms") if one.in_unit == "s" else (1.0, one.in_unit)
+    size = with_uncertainty(factor * one.value, factor * 0.5 * (one.value90[1] - one.value90[0]), unit)
     off = {
-        "current_zero": f"the zero of its current is off by {_plus_minus(one.value, half, 'A', 1.0)}",
-        "current_delay": f"its current comes {_plus_minus(one.value, half, 'ms', 1e3)} later than its positions",
+        "current_zero": f"the zero of its current is off by {size}",
+        "current_delay": f"its current comes {size} later than its positions",
     }[one.quantity]
     then = (
         "this is allowed for" if one.allowed_for else "undo that delay; before, it is not told what the unit differs in"
     )
     return f"{one.unit}: recording {one.recording} disagrees with the unit's others: {off}; {then}"
-
-
-def _plus_minus(value: float, half: float, unit: str, factor: float) -> str:
-    return with_uncertainty(factor * value, factor * half, unit)
 
 
 def _title(result: UnitsCompared, path: str) -> str:

@@ -138,6 +138,10 @@ def test_what_recordings_disagree_in_is_said(disagreeing):
     )
     assert [one["unit"] for one in as_dict(disagreeing)["of_recordings"]] == ["unit_02", "unit_03"]
     assert any(one.startswith("unit_03: ") and "undo that delay" in one for one in lines)
+    assert sentences(disagreeing) == [
+        "nothing is found in which the others differ",
+        "in what unit_03 may differ is not told, as recordings of one unit disagree",
+    ]
 
 
 def test_two_units_with_one_recording_each_say_what_cannot_be_known():

@@ -132,8 +132,9 @@ def linearised(
         problem.reweighted(found.floors(unit.floors), found.added)
     residuals, slopes = problem.jacobians(at[None, :])
     residual = residuals[0][: problem.values]
-    candidates, columns = candidates_of(problem, residual)
-    slope = np.concatenate([slopes[0][: problem.values], columns], axis=1)
+    slope = slopes[0][: problem.values]
+    candidates, columns = candidates_of(problem, residual, slope)
+    slope = np.concatenate([slope, columns], axis=1)
     slope[:, :count] /= WIDER
     at = np.concatenate([WIDER * at[:count], at[count:], np.zeros(len(candidates))])
     known = np.zeros((len(at), len(at)))

@@ -15,10 +15,17 @@ Array = NDArray[np.float64]
 
 _CURRENT = "current_A"
 _BIAS = "sensors.current_bias_A"
+_RESISTANCE = "motor.resistance_Ohm"
+_COPPER_1_K = 0.0039  # of a winding's resistance, a kelvin: IEC 60034-1
+_WARM_K = 20.0  # 1 σ of how much warmer one recording's winding may be
 _WIDE = 3.0  # of the file's tolerances of a sensor's zero, 1 σ of what is known of one recording's
 # Of a sample, 1 σ of a delay that the model itself is off by in another command: in fleets without any (seeds 76000 to
 # 76003) a step's current seemed up to half a sample late in all units alike.
 _MODEL = 0.25
+_LATE_BENT = 0.3  # a sharp current that comes later is no multiple of its slope
+# Steps of a winding warmer by 10 to 60 K than in another step are told to be by −4 to +31 %; up to 45 K no difference
+# between units follows from it, at 60 K one does.
+_WARM_BENT, _WARMEST = 0.15, 2.25
 
 
 @dataclass(frozen=True)
@@ -26,10 +33,13 @@ class Candidate:
     """In what one recording may disagree with the others of its unit; counted in its σ."""
 
     recording: int  # its place
-    name: str  # "current_zero" or "current_delay"
+    name: str  # "current_zero", "current_delay" or "winding_temperature"
     sigma: float  # 1 σ of what is known beforehand
-    model: float  # of it, 1 σ of what the model is off by
     unit: str
+    model: float = 0.0  # of it, 1 σ of what the model is off by
+    bent: float = 0.0  # of its size, 1 σ of how far what it does is no multiple of that
+    farthest: float = np.inf  # up to which what is said of the unit does not suffer by it
+    parameter: int | None = None  # the one that does the same to all recordings, by its place
 
 
 def _currents(problem: Problem, recording: int) -> Iterator[tuple[int, slice]]:
@@ -39,14 +49,23 @@ def _currents(problem: Problem, recording: int) -> Iterator[tuple[int, slice]]:
             yield window, rows
 
 
-def candidates_of(problem: Problem, residual: Array) -> tuple[tuple[Candidate, ...], Array]:
-    """All of a unit, and what each does to the residual (values,): (values, so many)."""
+def candidates_of(problem: Problem, residual: Array, slope: Array) -> tuple[tuple[Candidate, ...], Array]:
+    """All of a unit, and what each does to the residual (values,): (values, so many).
+
+    slope (values, unknowns): what the problem's unknowns do to it.
+    """
     model = problem.model
     bias = model.actuator.tolerances.get(_BIAS)
+    warm = _warmth(problem, slope)
     found: list[Candidate] = []
     columns: list[Array] = []
     for place, recorded in enumerate(model.measurements):
-        if _CURRENT not in recorded or len(model.measurements) < 2:
+        if len(model.measurements) < 2:
+            continue
+        if warm is not None:
+            found.append(Candidate(place, "winding_temperature", _WARM_K, "K", 0.0, _WARM_BENT, _WARMEST, warm[0]))
+            columns.append(np.where(_of(problem, place), warm[1], 0.0))
+        if _CURRENT not in recorded:
             continue
         zero, late = np.zeros(problem.values), np.zeros(problem.values)
         period_s = recorded.sample_period_s
@@ -56,9 +75,27 @@ def candidates_of(problem: Problem, residual: Array) -> tuple[tuple[Candidate, .
             shown = at.measured[_CURRENT] + residual[rows] / one
             zero[rows], late[rows] = one, -period_s * np.gradient(shown, at.block_s) * one
         if bias is not None:
-            found.append(Candidate(place, "current_zero", _WIDE * bias.sigma, 0.0, "A"))
+            found.append(Candidate(place, "current_zero", _WIDE * bias.sigma, "A"))
             columns.append(zero * _WIDE * bias.sigma)
         if any(position in recorded for position in POSITIONS):
-            found.append(Candidate(place, "current_delay", period_s, _MODEL, "s"))
+            found.append(Candidate(place, "current_delay", period_s, "s", _MODEL, _LATE_BENT, 0.0))
             columns.append(late)
     return tuple(found), np.stack(columns, axis=1) if columns else np.zeros((problem.values, 0))
+
+
+def _warmth(problem: Problem, slope: Array) -> tuple[int, Array] | None:
+    """The resistance's place among the unknowns, and what a winding warmer by 1 σ does to all recordings."""
+    paths = [one.name for one in problem.unknowns]
+    if _RESISTANCE not in paths:
+        return None
+    place, actuator = paths.index(_RESISTANCE), problem.model.actuator
+    of_sigma = _COPPER_1_K * actuator.value(_RESISTANCE) / actuator.tolerances[_RESISTANCE].sigma
+    return place, slope[:, place] * _WARM_K * of_sigma
+
+
+def _of(problem: Problem, recording: int) -> NDArray[np.bool_]:
+    """Which values are a recording's, (values,)."""
+    its = np.zeros(problem.values, bool)
+    for window, _, rows in problem.parts():
+        its[rows] = problem.model.windows[window].recording == recording
+    return its

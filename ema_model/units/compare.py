@@ -64,7 +64,8 @@ def compare_units(
     found = together(fits, seed, tell)
     held = _held_blocks(holdout or {}, names, actuator, paths, found.pool, seed, tell)
     pool, dropped = _confirmed(found.pool, held, actuator, names, paths)
-    told = [pair for pair in pool.pairs if all(one.is_allowed_for for one in found.disagreements[pair[0]])]
+    sound = {i for i, paid in enumerate(found.disagreements) if all(one.is_allowed_for for one in paid)}
+    told = [pair for pair in pool.pairs if pair[0] in sound and len(sound) > 1]
     tell("holding each model against each unit")
     moved = transfer(fits)
     of_type = _of_type(pool, actuator, paths)

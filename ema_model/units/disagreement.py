@@ -1,6 +1,7 @@
-"""In what the recordings of one unit disagree: the zero of the current's sensor, and by how long the current is late.
+"""In what the recordings of one unit disagree: the zero of the current's sensor, by how long the current is late, and
+how warm the winding was.
 
-Neither is the unit's: a sensor's zero drifts from day to day, and a logger takes the signals a little apart.  They are
+None is the unit's: a sensor's zero drifts from day to day, and a logger takes the signals a little apart.  They are
 freed for a recording where the data pay for it, as differences between units are, and integrated out; of a unit with a
 recording whose current is late no difference is told before that is set right.
 """
@@ -21,7 +22,7 @@ from ema_model.units.criteria import FALSE
 
 Array = NDArray[np.float64]
 
-_STRAIGHT = 0.3  # of its size, 1 σ: a sharp current that comes later is no multiple of its slope
+_ANYWHERE = 1e-3  # σ⁻², of a parameter whose value the other recordings are to tell, not the file
 _WHITE = 1_000_000  # independent values where nothing but the sensors' noise scatters
 
 
@@ -36,8 +37,8 @@ class Paid:
 
     @property
     def is_allowed_for(self) -> bool:
-        """Whether what is said of the unit does not suffer by it: what a delay does is no multiple of its size."""
-        return self.of.name != "current_delay"
+        """Whether what is said of the unit does not suffer by it."""
+        return abs(self.value) <= self.of.farthest * self.of.sigma
 
 
 def disagreements(parts: Sequence[Linearised]) -> list[list[Paid]]:
@@ -69,29 +70,32 @@ def disagreements(parts: Sequence[Linearised]) -> list[list[Paid]]:
 
 def _paid(part: Linearised, place: int, value: float, sigma: float) -> Paid:
     one = part.candidates[place]
-    bent = _STRAIGHT * value if one.name == "current_delay" else 0.0
-    return Paid(place, one, one.sigma * value, one.sigma * float(np.hypot(sigma, bent)))
+    return Paid(place, one, one.sigma * value, one.sigma * float(np.hypot(sigma, one.bent * value)))
 
 
 def _score(part: Linearised, place: int, chosen: Sequence[int], ripple: dict[str, float]) -> tuple[float, float]:
     """How far one is off, once all else has taken what it can of it, and 1 σ, in its own σ."""
-    whole, information = _left(part, place, chosen)
-    variance = float(whole @ part.noise @ whole) + ripple[part.candidates[place].name] * information
+    whole, information, known = _left(part, place, chosen)
+    variance = float(whole @ part.noise @ whole + known @ whole**2) + ripple[part.candidates[place].name] * information
     sigma = np.hypot(np.sqrt(variance) / information, part.candidates[place].model)
     return float(whole @ part.gradient) / information, float(sigma)
 
 
-def _left(part: Linearised, place: int, chosen: Sequence[int]) -> tuple[Array, float]:
-    """The combination of columns (columns,) that is left of a candidate, and its curvature."""
+def _left(part: Linearised, place: int, chosen: Sequence[int]) -> tuple[Array, float, Array]:
+    """The combination of columns (columns,) that is left of a candidate, its curvature, and the priors (columns,)."""
     others = [*range(part.parameters), *part.nuisances(chosen)]
     column = part.nuisances([place])[-1]
     prior = np.zeros(len(others))
     prior[: part.parameters] = 1.0  # a tolerance
+    if (same := part.candidates[place].parameter) is not None:
+        prior[same] = _ANYWHERE
     prior[len(others) - len(chosen) :] = 1.0
     taken = np.linalg.solve(part.curvature[np.ix_(others, others)] + np.diag(prior), part.curvature[others, column])
     whole = np.zeros(len(part.curvature))
     whole[column], whole[others] = 1.0, -taken
-    return whole, max(float(part.curvature[column] @ whole), 1e-12)
+    known = np.zeros(len(whole))
+    known[others] = prior
+    return whole, max(float(part.curvature[column] @ whole), 1e-12), known
 
 
 def _ripple(parts: Sequence[Linearised], freedom: int) -> dict[str, float]:
@@ -99,7 +103,7 @@ def _ripple(parts: Sequence[Linearised], freedom: int) -> dict[str, float]:
     ratios: dict[str, list[float]] = {}
     for part in parts:
         for place, one in enumerate(part.candidates):
-            whole, information = _left(part, place, ())
+            whole, information, _ = _left(part, place, ())
             square = float(np.sum((part.ripple @ whole) ** 2)) / max(part.rounds * (TWINS - 1), 1)
             ratios.setdefault(one.name, []).append((1.0 + 1.0 / TWINS) * square / information if freedom else 0.0)
     return {name: float(np.mean(each)) for name, each in ratios.items()}

@@ -54,10 +54,10 @@ class OfRecording:
 
     unit: str
     recording: str
-    quantity: str  # "current_zero" or "current_delay"
+    quantity: str  # "current_zero", "current_delay" or "winding_temperature"
     value: float
     value90: Interval
-    in_unit: str  # "A" or "s"
+    in_unit: str  # "A", "s" or "K"
     allowed_for: bool  # else nothing is told of what the unit differs in
 
 

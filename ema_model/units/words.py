@@ -26,6 +26,10 @@ def sentences(result: UnitsCompared) -> list[str]:
         one = result.of_type[path]
         told.append(f"all units scatter in {_title(result, path)} (1 σ: {_amount(one.scatter, one.mean, one.unit)})")
     untold = [*dict.fromkeys(one.unit for one in result.of_recordings if not one.allowed_for)]
+    if untold and len(result.units) - len(untold) < 2:
+        return [
+            f"in what the {len(result.units)} units differ is not told, as recordings of {and_so_on(untold)} disagree"
+        ]
     if untold:  # what of the others is said, is not all
         rest = f"in what {and_so_on(untold)} may differ is not told, as recordings of one unit disagree"
         missed = [_MISSED] if told and result.is_missed else []
@@ -175,14 +179,15 @@ def _dropped(result: UnitsCompared, one: Difference) -> str:
 
 def _of_recording(one: OfRecording) -> str:
     factor, unit = (1e3, "ms") if one.in_unit == "s" else (1.0, one.in_unit)
-    size = with_uncertainty(factor * one.value, factor * 0.5 * (one.value90[1] - one.value90[0]), unit)
+    value = abs(one.value) if one.quantity == "winding_temperature" else one.value
+    size = with_uncertainty(factor * value, factor * 0.5 * (one.value90[1] - one.value90[0]), unit)
     off = {
         "current_zero": f"the zero of its current is off by {size}",
         "current_delay": f"its current comes {size} later than its positions",
+        "winding_temperature": f"its winding was {size} {'warmer' if one.value > 0.0 else 'colder'}",
     }[one.quantity]
-    then = (
-        "this is allowed for" if one.allowed_for else "undo that delay; before, it is not told what the unit differs in"
-    )
+    mend = "undo that delay" if one.quantity == "current_delay" else "leave that recording out"
+    then = "this is allowed for" if one.allowed_for else f"{mend}; before, it is not told what the unit differs in"
     return f"{one.unit}: recording {one.recording} disagrees with the unit's others: {off}; {then}"
 
 

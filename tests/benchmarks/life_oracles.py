@@ -1,10 +1,12 @@
-"""Oracles that know the law of a life, with its exponent, its onset and how unevenly flights wear.
+"""Oracles that know the law of a life and how unevenly flights wear: with its exponent and its onset, or without.
 
-They learn where k began, how fast it wears and, where they are told of it, what the unit's base parameters add.
+They learn where k began, how fast it wears and, where they are told of it, what the unit's base parameters add; one
+that is given several exponents or onsets learns which it is.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +25,8 @@ class Law:
     onset: int  # flights since the part was new, before which nothing wears
     variation: float  # of a flight's wear
     most_begun: float  # s is below it
+    shortest: float = 0.0  # W, in flights, and the longest
+    longest: float = np.inf
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,26 +57,37 @@ def adds(k: Array, sigma: Array, common: Array) -> Adds:
 
 
 def oracle(
-    at: Array, k: Array, sigma: Array, now: float, threshold: float, law: Law, first: int, unit: Adds = NOTHING
+    at: Array,
+    k: Array,
+    sigma: Array,
+    now: float,
+    threshold: float,
+    laws: Sequence[Law],
+    first: int,
+    unit: Adds = NOTHING,
 ) -> Quantiles:
     """5, 50 and 95 % of what remains; at, k, sigma (n,) and now as for `life_peers`; first: the part's first flight.
 
-    An iterated extended Kalman filter of w, s and c for each W of a grid.
+    An iterated extended Kalman filter of w, s and c for each law, all as likely at first, and each W of a grid.
     """
     numbers = len(unit.grows)
-    mean = np.zeros((len(_LENGTHS), 2 + numbers))
-    mean[:, 1] = law.most_begun / 2.0
-    covariance = np.tile(np.diag([0.0, law.most_begun**2 / 12.0, *np.ones(numbers)]), (len(_LENGTHS), 1, 1))
     variance = sigma**2 + (unit.strays if numbers else 0.0)
-    seen, fit = dict(zip(at.astype(int), zip(k, variance))), np.zeros(len(_LENGTHS))
-    for flight in range(first, int(now) + 1):
-        if flight - first >= law.onset:
-            mean[:, 0] += 1.0
-            covariance[:, 0, 0] += law.variation**2
-        if flight in seen:
-            mean, covariance, likelihood = _told_by(*seen[flight], mean, covariance, threshold, law, unit)
-            fit += likelihood
-    return _left(mean[:, 0], covariance[:, 0, 0], fit, max(0, first + law.onset - 1 - int(now)), law)
+    seen, drawn = dict(zip(at.astype(int), zip(k, variance))), []
+    for law in laws:
+        mean = np.zeros((len(_LENGTHS), 2 + numbers))
+        mean[:, 1] = law.most_begun / 2.0
+        covariance = np.tile(np.diag([0.0, law.most_begun**2 / 12.0, *np.ones(numbers)]), (len(_LENGTHS), 1, 1))
+        fit = np.where((_LENGTHS >= law.shortest) & (_LENGTHS <= law.longest), 0.0, -np.inf)
+        for flight in range(first, int(now) + 1):
+            if flight - first >= law.onset:
+                mean[:, 0] += 1.0
+                covariance[:, 0, 0] += law.variation**2
+            if flight in seen:
+                mean, covariance, likelihood = _told_by(*seen[flight], mean, covariance, threshold, law, unit)
+                fit += likelihood
+        wait = np.full(len(_LENGTHS), max(0, first + law.onset - 1 - int(now)))
+        drawn.append((_LENGTHS - mean[:, 0], covariance[:, 0, 0], wait, fit))
+    return _left(*(np.concatenate(part) for part in zip(*drawn)), laws[0].variation)
 
 
 def _told_by(value: float, variance: float, mean: Array, covariance: Array, threshold: float, law: Law, unit: Adds):
@@ -94,12 +109,12 @@ def _told_by(value: float, variance: float, mean: Array, covariance: Array, thre
     return x, covariance, -0.5 * (np.log(total) + gap**2 / total)
 
 
-def _left(w: Array, variance: Array, fit: Array, wait: int, law: Law) -> Quantiles:
+def _left(there: Array, variance: Array, wait: Array, fit: Array, variation: float) -> Quantiles:
     weight = np.exp(fit - fit.max())
     edges = np.cumsum(weight / weight.sum())
     random = np.random.default_rng(0)
     chosen = np.searchsorted(edges, (np.arange(DRAWN) + 0.5) / DRAWN * (1.0 - 1e-12))
     spread = np.sqrt(np.maximum(variance[chosen], 0.0))
-    there = np.maximum(_LENGTHS[chosen] - w[chosen] - spread * random.standard_normal(DRAWN), 1e-3)
-    passed = random.wald(there, (there / law.variation) ** 2) + 0.5 * (1.0 + law.variation**2)
-    return told(np.quantile(wait + passed, QUANTILES))
+    way = np.maximum(there[chosen] - spread * random.standard_normal(DRAWN), 1e-3)
+    passed = random.wald(way, (way / variation) ** 2) + 0.5 * (1.0 + variation**2)
+    return told(np.quantile(wait[chosen] + passed, QUANTILES))

@@ -4,15 +4,17 @@
 
 Lives are drawn as in the plan `lives`; all are asked after the same flights: those at λ between the one in which the
 tracking declares a trend and the end.  The peers are given the same k since the last jump that the tracking found,
-without what it found the unit's base parameters to add.  Both oracles are given k since the last repair, and the law
-with its exponent, its onset and how unevenly flights wear.  "oracle" has of the unit's base parameters what all eight
-k of its flights tell, as the tracking has; "bound" has k without what these add, which nobody can know.
+without what it found the unit's base parameters to add.  The oracles are given k since the last repair, the law and
+how unevenly flights wear; of the unit's base parameters they have what all eight k of its flights tell, as the tracking
+has.  "oracle" knows the law's exponent and its onset, too; "law alone" knows of what range they are drawn.  "bound" is
+"oracle" given k without what base parameters add, which nobody can know.
 """
 
 from __future__ import annotations
 
 import argparse
 from collections import defaultdict
+from dataclasses import replace
 
 import numpy as np
 from life_oracles import Law, adds, oracle
@@ -27,8 +29,11 @@ from ema_model.tracking.flight import Flight
 from ema_model.tracking.track import Tracker
 from ema_model.tracking.unit import Unit
 
-WAYS = ("emaviz", "exponential fit", "particle filter", "oracle", "bound")
+WAYS = ("emaviz", "exponential fit", "particle filter", "law alone", "oracle", "bound")
 VARIATIONS = (0.5, 1.0)
+POWERS = (1.5, 1.75, 2.0, 2.25, 2.5, 2.75, 3.0)  # of the accelerating law
+ONSETS = 0.2, 0.6  # share of a part's life before which nothing wears
+MOST_ONSETS = 24
 
 
 def answers(life: Life) -> dict[str, list[Told]]:
@@ -81,13 +86,29 @@ def _oracles(
     k = np.array([way @ flight.k for _, flight in since]) - healthy
     sigma = np.array([np.sqrt(way @ flight.own @ way) for _, flight in since])
     law = Law(life.power, max(0, life.onset - first), life.variation, 0.0 if life.fault == "k8" else 0.05)
+    laws = _all_of(life.law, law, int(now) - first)
     fair: Array = k - common @ mean
     unit = adds(fair, sigma, common @ np.linalg.cholesky(covariance))
     true = k - common @ base_of(life, len(mean))
     return {
-        "oracle": oracle(at, fair, sigma, now, threshold, law, first + 1, unit),
-        "bound": oracle(at, true, sigma, now, threshold, law, first + 1),
+        "law alone": oracle(at, fair, sigma, now, threshold, laws, first + 1, unit),
+        "oracle": oracle(at, fair, sigma, now, threshold, [law], first + 1, unit),
+        "bound": oracle(at, true, sigma, now, threshold, [law], first + 1),
     }
+
+
+def _all_of(name: str, law: Law, flown: int) -> list[Law]:
+    """What a life of a law may be, as `ema_model.lives` draws it, of which so many flights were seen."""
+    if name == "accelerating":
+        return [replace(law, power=power) for power in POWERS]
+    if name == "onset":
+        onsets = np.unique(np.linspace(8, max(flown, 8), MOST_ONSETS).astype(int))
+        (low, high) = ONSETS
+        return [
+            replace(law, onset=onset, shortest=onset * (1 - high) / high, longest=onset * (1 - low) / low)
+            for onset in onsets.tolist()
+        ]
+    return [law]
 
 
 def _unit(life: Life, numbered: list, ways: list[int]) -> Unit:

@@ -109,6 +109,29 @@ def test_equal_units_are_equal_and_a_missing_recording_is_named():
     assert re.search("unit_02 tells nothing of motor .*resistance: a recording like step would", str(found))
 
 
+@pytest.mark.parametrize(("warmer_K", "allowed"), [(30.0, True), (70.0, False)])
+def test_a_warmer_winding_is_the_recordings_and_not_the_units(warmer_K, allowed):
+    """Copper's 0.39 % a kelvin: of two steps at the voltage's limit one is driven by a warmer motor."""
+    fleet = draw(ACTUATOR, 5, units=2, differing=0)
+    fleet = replace(fleet, x=np.tile(SHARED, (2, 1)))
+    every = {
+        name: [recorded(fleet.unit(i), seed, i, (run,))[run] for seed, run in enumerate(("chirp", "step", "step"))]
+        for i, name in enumerate(fleet.names)
+    }
+    cold = fleet.unit(1)
+    warm = cold.with_values({"motor.resistance_Ohm": cold.motor.resistance_Ohm * (1.0 + 0.0039 * warmer_K)})
+    every["unit_02"][2] = recorded(warm, 2, 1, ("step",))["step"]
+    found = compare_units(every, ACTUATOR)
+    assert not found.differences and allowed == ("do not differ" in sentences(found)[0])
+    (one,) = found.of_recordings
+    assert (one.unit, one.quantity, one.in_unit) == ("unit_02", "winding_temperature", "K")
+    assert one.allowed_for is allowed
+    low, high = sorted(map(abs, one.value90))
+    assert low < warmer_K < high
+    said = "this is allowed for" if allowed else "leave that recording out"
+    assert re.search(rf"its winding was \S+ ± \S+ K (warmer|colder); {said}", " ".join(notes(found)))
+
+
 @pytest.fixture(scope="module")
 def disagreeing():
     """Three equal units; in one recording of the second the current's zero is off, one of the third has it late."""

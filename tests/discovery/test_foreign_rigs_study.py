@@ -10,10 +10,11 @@ import os
 import shutil
 from collections import Counter
 from pathlib import Path
+from statistics import median
 
 import pytest
 from support.foreign_rigs import RIGS, made, simulator_folder, truth_of
-from support.foreign_score import COLUMNS, line, tally
+from support.foreign_score import COLUMNS, covered, line, tally
 from support.studied import QUICK, folder, studied
 
 pytestmark = pytest.mark.study
@@ -22,6 +23,7 @@ PLAN = Path(__file__).parent / "plans" / "foreign_rigs.toml"
 UNITS = os.environ.get("EMAVIZ_STUDY_UNITS", "1" if QUICK else "1-30")
 EFFECTS = 2 if QUICK else 10
 MOST_UNITS_HIDDEN = 10
+FEWEST_INTERVALS = 300  # of which a share is told
 
 
 @pytest.fixture(scope="module")
@@ -35,12 +37,20 @@ def counts():
     found = {}
     for group, rows in studied(str(recordings / f"foreign_rigs_{UNITS}.toml")).items():
         total: Counter[str] = Counter()
+        widths: list[float] = []
         print(f"\n{group}")
         for row in rows:
-            total += tally(row, truth_of(row["files"][0]))
+            truth = truth_of(row["files"][0])
+            intervals = covered(row, truth)
+            total += tally(row, truth) + Counter(
+                intervals=len(intervals), held=sum(is_held for is_held, _ in intervals)
+            )
             print(f"  {Path(row['files'][0]).parent.name:18}{line(row)}")
+            widths += [width for _, width in intervals]
         told = ", ".join(f"{name} {total[name]}" for name in COLUMNS)
         print(f"  {told}; of {total['cases']}, {total['showable']} showable")
+        if widths:
+            print(f"  {total['held']} of {len(widths)} intervals hold, ± {100.0 * median(widths):.2g} % at the median")
         found[group] = total
     return found
 
@@ -77,3 +87,10 @@ def test_hidden_effects_are_named(counts):
 def test_a_mess_of_small_everything_names_nothing_that_is_not_there(counts):
     real = of(counts, "real")
     assert real["false"] <= 2 / 90 * real["cases"]
+
+
+def test_intervals_hold_what_is_true(counts):
+    total = sum(counts.values(), Counter())
+    if total["intervals"] < FEWEST_INTERVALS:
+        pytest.skip(f"{total['intervals']} intervals of models that reach the floor's band are too few")
+    assert 0.86 <= total["held"] / total["intervals"] <= 0.94

@@ -24,7 +24,8 @@ _PARAMETERS = {  # effects that are a wrong value of a parameter, by what the pa
 _SINCE = {
     "saturation": ("torque_saturation",),
     "warmup": ("friction_drift", "resistance_drift"),
-    "screw_friction": ("position_dependent_friction",),
+    # By the user's place, and the first is by the motor's angle: over little travel one ridge or trough is a zone.
+    "screw_friction": ("position_dependent_friction", "friction_zone"),
 }
 # What the two positions show by themselves, by its cause; a model without a controller stops at the motor.
 _BEYOND_THE_MOTOR = {"acceleration": "torsional_compliance", "position": "screw_lead_error"}
@@ -74,6 +75,21 @@ def tally(row: Mapping[str, Any], truth: Mapping[str, Any]) -> Counter[str]:
             "drive told": int(drive or row["verdict"] == "adequate"),
         }
     )
+
+
+def covered(row: Mapping[str, Any], truth: Mapping[str, Any]) -> list[tuple[bool, float]]:
+    """Of each interval of a parameter: whether it holds the true value, and its half width over that value.
+
+    None of a model that leaves more than a true one may, or more than a name for it: there nothing is promised.
+    """
+    if row["ladder"][-1] is None or row["ladder"][-1] > BAND or row["unknown"]:
+        return []
+    found = json.loads(row["calibrated"])
+    return [
+        (found[path][1] <= true <= found[path][2], 0.5 * (found[path][2] - found[path][1]) / abs(true))
+        for path, true in truth["actuator"].items()
+        if path in found and None not in found[path]
+    ]
 
 
 def line(row: Mapping[str, Any]) -> str:

@@ -46,7 +46,7 @@ def _run(given: Given, settings: Settings, seed: int) -> dict[str, Any]:
         discover(given.fitted, given.actuator, holdout=given.held, signals=signals, most_effects=settings.most_effects)
     )
     ladder, faults, experiment = found["ladder"], found["faults"], found["next_experiment"]
-    unknown = found["unknown"]
+    unknown, calibrated = found["unknown"], found["calibration"]["parameters"]
     return asked | {
         "verdict": found["verdict"],
         "effects": [one["name"] for one in found["effects"]],
@@ -55,7 +55,8 @@ def _run(given: Given, settings: Settings, seed: int) -> dict[str, Any]:
             {one["name"]: {name: p["value"] for name, p in one["parameters"].items()} for one in found["effects"]}
         ),
         "outside": found["parameters_outside_tolerance"],
-        "at_bound": [name for name, one in found["calibration"]["parameters"].items() if one["at_bound"]],
+        "at_bound": [name for name, one in calibrated.items() if one["at_bound"]],
+        "calibrated": json.dumps({name: [one["value"], *one["interval90"]] for name, one in calibrated.items()}),
         "controller_mismatch": found["controller_mismatch"],
         "transmission": None if found["transmission_seen"] is None else found["transmission_seen"]["cause"],
         "unknown": None if unknown is None else f"{unknown['variable']} × {unknown['modulator']}",
@@ -116,6 +117,7 @@ KIND = Kind(
             ("parameters", TEXT),  # of the effects, as JSON: their values by name
             ("outside", TEXTS),
             ("at_bound", TEXTS),  # calibrated parameters
+            ("calibrated", TEXT),  # parameters of the last model as JSON: value and 90 % interval by name
             ("controller_mismatch", FLAG),
             ("transmission", TEXT),  # what the user's position leaves the motor's by; null where it does not
             ("unknown", TEXT),  # what the rest goes with: variable × modulator

@@ -184,7 +184,8 @@ def _difference(
 
 def _of_recordings(found: Together, units: Mapping[str, Sequence[Measurement]]) -> Iterator[OfRecording]:
     for (name, recordings), paid in zip(units.items(), found.disagreements):
-        for one in paid:
+        first = [one for one in paid if not one.is_allowed_for]  # beside them nothing else of the unit is known
+        for one in first or paid:
             half = HALF_90 * one.sigma
             interval = (one.value - half, one.value + half)
             recording = recordings[one.of.recording].name

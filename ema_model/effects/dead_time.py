@@ -6,13 +6,15 @@ from ema_model.effects.effect import Effect, Parameter
 from ema_model.physics.elementary import clamp
 from ema_model.physics.jit import scalar
 
-_ZERO_A = 0.2  # current below which the pause costs less: a sign that jumps would chatter about zero
+_LEAST_A = 1e-12
+_ZERO = 0.01  # of the current at standstill, below which the pause costs less: it ripples through zero there
 
 
 @scalar
-def back_emf(emf, omega, current, voltage):
-    """+ V_dt sgn I."""
-    return emf + voltage * clamp(current * (1.0 / _ZERO_A), -1.0, 1.0)
+def back_emf(emf, omega, current, gain, most, voltage):
+    """+ V_dt sgn I, of the current that flows with it: within the zone it yields as a resistance does."""
+    zone = _ZERO * most + gain * voltage
+    return emf + voltage * clamp(current / (zone + _LEAST_A), -1.0, 1.0)
 
 
 EFFECT = Effect(

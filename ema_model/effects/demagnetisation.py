@@ -13,7 +13,7 @@ def electric_torque(torque, theta, omega, current, ratio):
 
 
 @scalar
-def back_emf(emf, omega, current, ratio):
+def back_emf(emf, omega, current, gain, most, ratio):
     """E (1 − d)."""
     return emf * (1.0 - ratio)
 

@@ -23,7 +23,9 @@ PLACES = {
     "friction": ("torque", "omega", "active", "static", "dynamic"),
     "electric_torque": ("torque", "theta", "omega", "current"),
     "shaft_torque": ("torque", "theta", "omega", "current", "user", "gear", "load", "time"),
-    "back_emf": ("emf", "omega", "current"),
+    # current: as it would flow with this EMF alone; gain: the A by which a volt changes it within the step (a phase's
+    # is the last step's, and its gain 0); most: A that the supply drives at standstill
+    "back_emf": ("emf", "omega", "current", "gain", "most"),
     "winding_resistance": ("resistance", "time"),
     "bus_voltage": ("volts", "current"),
     "inverse_inertia": ("inverse",),

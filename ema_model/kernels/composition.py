@@ -65,7 +65,7 @@ def shaft_torque(torque, theta, omega, current, user, gear, load, time, s, first
 
 
 @scalar
-def back_emf(emf, omega, current, s, first, p, i):
+def back_emf(emf, omega, current, gain, most, s, first, p, i):
     """The voltage against the drive, V, of the equivalent winding or of a phase."""
     return emf
 

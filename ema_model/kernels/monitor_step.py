@@ -130,15 +130,14 @@ def advance(s, p, i, command, load, supply, driven, dt):
         ),
     )
     bus = p[BUS_VOLTAGE * LANES + i]
-    driven = advance_current(
-        before,
-        demand,
-        back_emf(p[EMF_CONSTANT * LANES + i] * flux * omega, omega, before, s, FIRST, p, i),
-        p[VOLTAGE_RATIO * LANES + i] * bus_voltage(bus * supply, before, s, FIRST, p, i),
-        winding_resistance(p[RESISTANCE * LANES + i], time, s, FIRST, p, i),
-        p[INVERSE_INDUCTANCE * LANES + i],
-        dt,
-    )
+    volts = p[VOLTAGE_RATIO * LANES + i] * bus_voltage(bus * supply, before, s, FIRST, p, i)
+    winding = winding_resistance(p[RESISTANCE * LANES + i], time, s, FIRST, p, i)
+    inverse = p[INVERSE_INDUCTANCE * LANES + i]
+    emf = p[EMF_CONSTANT * LANES + i] * flux * omega
+    alone = advance_current(before, demand, emf, volts, winding, inverse, dt)
+    gain = dt * inverse / (1.0 + dt * inverse * winding)
+    against = back_emf(emf, omega, alone, gain, volts / winding, s, FIRST, p, i)
+    driven = advance_current(before, demand, against, volts, winding, inverse, dt)
     current = driven if supply > 0.0 else 0.0
     limit = p[TORQUE_LIMIT * LANES + i]
     developed = p[TORQUE_CONSTANT * LANES + i] * flux * current

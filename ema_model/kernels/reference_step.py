@@ -139,11 +139,12 @@ def advance(state, constant, s, p, i, demand, load, driven, dt):
     turns_a, turns_b, turns_c = p[TURNS_A * LANES + i], p[TURNS_B * LANES + i], p[TURNS_C * LANES + i]
     k_a, k_b, k_c = winding_coefficients(sin_e, cos_e, gap_a, gap_b, gap_c, turns_a, turns_b, turns_c)
     winding = winding_resistance(p[RESISTANCE * LANES + i], time, s, FIRST, p, i)  # R_i = N_i R
-    against_a = back_emf(emf * k_a * omega, omega, current_a, s, FIRST, p, i)
+    most = volts / winding
+    against_a = back_emf(emf * k_a * omega, omega, current_a, 0.0, most, s, FIRST, p, i)
     drive_a = leg_a * volts - winding * turns_a * current_a - against_a
-    against_b = back_emf(emf * k_b * omega, omega, current_b, s, FIRST, p, i)
+    against_b = back_emf(emf * k_b * omega, omega, current_b, 0.0, most, s, FIRST, p, i)
     drive_b = leg_b * volts - winding * turns_b * current_b - against_b
-    against_c = back_emf(emf * k_c * omega, omega, current_c, s, FIRST, p, i)
+    against_c = back_emf(emf * k_c * omega, omega, current_c, 0.0, most, s, FIRST, p, i)
     drive_c = leg_c * volts - winding * turns_c * current_c - against_c
     neutral = star * (drive_a * inverse_a + drive_b * inverse_b + drive_c * inverse_c)
     current_a += dt * inverse_a * (drive_a - neutral)

@@ -241,7 +241,8 @@ def promising(
 ) -> list[Candidate]:
     """Candidates worth a refit: near the best, and such that a refit might make the data pay for them.
 
-    expected: the evidence that is predicted for each; without it, the fall of χ².
+    expected: the evidence that is predicted for each; without it, the fall of χ².  What would be a parameter of the
+    actuator that stands at its bound is refitted whatever is predicted, as others have gone out of their way there.
     """
     told = {c.name: c.predicted_drop for c in ranked} | dict(expected or {})
     values = len(current.residual)
@@ -254,7 +255,10 @@ def promising(
         and c.predicted_drop > _SCORE * max(material, needed[c.name])
         and told[c.name] > _SCORE * needed[c.name]
     ]
-    return [c for c in chosen if c.predicted_drop >= share * chosen[0].predicted_drop][:most]
+    best = [c for c in chosen if c.predicted_drop >= share * chosen[0].predicted_drop][:most]
+    known = current.calibration.parameters
+    bent = [c for c in ranked if (path := find(c.name).duplicates) in known and known[path].at_bound]
+    return best + [c for c in bent if c not in best and not c.untestable_reason]
 
 
 def with_drops(ranked: Sequence[Candidate], trials: Sequence[Trial]) -> list[Candidate]:

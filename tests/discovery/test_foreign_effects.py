@@ -68,3 +68,19 @@ def test_a_load_that_moves_the_axis_is_no_bias_of_the_current_sensor(tmp_path):
     assert [one.name for one in found.effects] == ["constant_load"], found
     assert "sensors.current_bias_A" not in found.parameters_outside_tolerance
     assert found.ladder[-1].rmse <= BAND
+
+
+def test_a_dead_time_in_a_small_servo_is_no_dead_band(tmp_path):
+    """Of 1.35 A at standstill little more than a hundredth ripples through zero: 0.2 A would act as a resistance."""
+    found, truth = discovered(tmp_path, "dead_time")
+    assert [one.name for one in found.effects] == ["dead_time"], found
+    hidden = truth["hidden"]["dead_time"]["parameters"]
+    assert found.effects[0].parameters["voltage_V"].value == pytest.approx(hidden["dead_volts"], rel=0.1)
+    assert found.ladder[-1].rmse < 0.15 * found.ladder[0].rmse
+
+
+def test_a_resistance_beyond_its_bound_is_no_gain_of_the_current_sensor(tmp_path):
+    """At its bound, gain and arm go out of their way for it, and the score sees a third of what it is."""
+    found, _ = discovered(tmp_path, "resistance")
+    assert not found.effects, found
+    assert [*found.parameters_outside_tolerance] == ["motor.resistance_Ohm"] and found.ladder[-1].rmse <= BAND

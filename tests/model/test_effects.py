@@ -230,6 +230,17 @@ def test_bus_voltage_never_turns_round():
     assert math.isnan(law(math.nan, 1.0, 6.0, 0.0))
 
 
+@pytest.mark.parametrize("gain", [0.0, 0.05, 0.2])
+def test_dead_time_costs_its_voltage_of_the_current_that_flows_with_it(gain):
+    """I = I_0 − g V, V = V_dt sgn I but for a hundredth of the current at standstill: it never turns round."""
+    law, lost, most = CATALOGUE["dead_time"].places[0], 1.0, 20.0
+    alone = np.linspace(-2.0, 2.0, 401)  # A, without the loss
+    against = np.array([law(3.0, 0.0, current, gain, most, lost) - 3.0 for current in alone])
+    flows = alone - gain * against
+    assert np.all(flows * alone >= 0.0) and np.all(np.diff(flows) > 0.0)
+    assert against == pytest.approx(lost * np.clip(flows / (0.01 * most), -1.0, 1.0), abs=1e-9)
+
+
 def test_dead_time_looks_like_resistance():
     """Both take voltage with the current's sign: where a load keeps that, they can hardly be told apart."""
     plain = simulate_monitor(SATURATING, ACTUATOR)["motor_speed_rad_s"]

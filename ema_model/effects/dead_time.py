@@ -6,7 +6,7 @@ from ema_model.effects.effect import Effect, Parameter
 from ema_model.physics.elementary import clamp
 from ema_model.physics.jit import scalar
 
-_LEAST_A = 1e-12
+_LEAST_A = 1e-12  # of the zone, where there is no supply
 _ZERO = 0.01  # of the current at standstill, below which the pause costs less: it ripples through zero there
 
 

@@ -21,8 +21,8 @@ _WORN = ("k1", "k2", "k3", "k4", "k5", "k6", "k8")
 _THRESHOLDS = {"k1": (0.2, 0.6), "k2": (0.2, 0.6), "k6": (0.15, 0.5), "k8": (0.1, 0.3)}
 _SHORT = (0.1, 0.4)  # of k3, k4, k5
 _FLIGHTS = (100, 400)
-_POWER = (1.5, 3.0)  # of the accelerating law, k ∝ tᵖ
-_ONSET = (0.2, 0.6)  # share of a part's life before which nothing wears
+POWER = (1.5, 3.0)  # of the accelerating law, k ∝ tᵖ
+ONSET = (0.2, 0.6)  # share of a part's life before which nothing wears
 _START = 0.05  # most of a worn part's k at first
 _BAD = 0.03  # share of flights whose recording is of no use
 _REPAIRED = 0.25  # share of lives in which the part is replaced once
@@ -75,8 +75,8 @@ def worn_life(law: str, seed: int, variation: float = 0.5, fault: str | None = N
     phase = float(random.uniform(0.0, 1.0))  # of an eccentricity, wherever there is one
     start, threshold = _ends(random, name)
     length = float(random.uniform(*_FLIGHTS))
-    power = float(random.uniform(*_POWER)) if law == "accelerating" else 1.0
-    onset_share = float(random.uniform(*_ONSET)) if law == "onset" else 0.0
+    power = float(random.uniform(*POWER)) if law == "accelerating" else 1.0
+    onset_share = float(random.uniform(*ONSET)) if law == "onset" else 0.0
     parts = [1.0]
     if random.random() < _REPAIRED:
         first = float(random.uniform(*_REPAIRED_AT))

@@ -42,11 +42,11 @@ class Candidate:
     parameter: int | None = None  # the one that does the same to all recordings, by its place
 
 
-def _currents(problem: Problem, recording: int) -> Iterator[tuple[int, slice]]:
-    """Of a recording: each window, and where the residuals of its current stand."""
+def _parts_of(problem: Problem, recording: int) -> Iterator[tuple[int, str, slice]]:
+    """Of a recording: each window, the name of a signal in it, and where that one's residuals stand."""
     for window, name, rows in problem.parts():
-        if name == _CURRENT and problem.model.windows[window].recording == recording:
-            yield window, rows
+        if problem.model.windows[window].recording == recording:
+            yield window, name, rows
 
 
 def candidates_of(problem: Problem, residual: Array, slope: Array) -> tuple[tuple[Candidate, ...], Array]:
@@ -64,12 +64,17 @@ def candidates_of(problem: Problem, residual: Array, slope: Array) -> tuple[tupl
             continue
         if warm is not None:
             found.append(Candidate(place, "winding_temperature", _WARM_K, "K", 0.0, _WARM_BENT, _WARMEST, warm[0]))
-            columns.append(np.where(_of(problem, place), warm[1], 0.0))
+            warmer = np.zeros(problem.values)
+            for _, _, rows in _parts_of(problem, place):
+                warmer[rows] = warm[1][rows]
+            columns.append(warmer)
         if _CURRENT not in recorded:
             continue
         zero, late = np.zeros(problem.values), np.zeros(problem.values)
         period_s = recorded.sample_period_s
-        for window, rows in _currents(problem, place):
+        for window, name, rows in _parts_of(problem, place):
+            if name != _CURRENT:
+                continue
             at = model.windows[window]
             one = problem.over_sigma(window, _CURRENT, np.ones(rows.stop - rows.start))
             shown = at.measured[_CURRENT] + residual[rows] / one
@@ -91,11 +96,3 @@ def _warmth(problem: Problem, slope: Array) -> tuple[int, Array] | None:
     place, actuator = paths.index(_RESISTANCE), problem.model.actuator
     of_sigma = _COPPER_1_K * actuator.value(_RESISTANCE) / actuator.tolerances[_RESISTANCE].sigma
     return place, slope[:, place] * _WARM_K * of_sigma
-
-
-def _of(problem: Problem, recording: int) -> NDArray[np.bool_]:
-    """Which values are a recording's, (values,)."""
-    its = np.zeros(problem.values, bool)
-    for window, _, rows in problem.parts():
-        its[rows] = problem.model.windows[window].recording == recording
-    return its

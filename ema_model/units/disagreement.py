@@ -3,7 +3,7 @@ how warm the winding was.
 
 None is the unit's: a sensor's zero drifts from day to day, and a logger takes the signals a little apart.  They are
 freed for a recording where the data pay for it, as differences between units are, and integrated out; of a unit with a
-recording whose current is late no difference is told before that is set right.
+recording whose current is late, or whose winding was far warmer, no difference is told before that is set right.
 """
 
 from __future__ import annotations

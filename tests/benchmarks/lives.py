@@ -24,6 +24,7 @@ from ema_model import faults
 from ema_model.campaign.kinds.track import ALPHA, LAMBDA, LAMBDAS, Told, places
 from ema_model.estimation.unknowns import ECCENTRICITY, to_vector
 from ema_model.lives import LAWS, Life, drawn, worn_life
+from ema_model.lives.life import ONSET, POWER
 from ema_model.lives.recorded import base_of
 from ema_model.tracking.flight import Flight
 from ema_model.tracking.track import Tracker
@@ -31,9 +32,7 @@ from ema_model.tracking.unit import Unit
 
 WAYS = ("emaviz", "exponential fit", "particle filter", "law alone", "oracle", "bound")
 VARIATIONS = (0.5, 1.0)
-POWERS = (1.5, 1.75, 2.0, 2.25, 2.5, 2.75, 3.0)  # of the accelerating law
-ONSETS = 0.2, 0.6  # share of a part's life before which nothing wears
-MOST_ONSETS = 24
+POWERS, MOST_ONSETS = 7, 24  # that an oracle of the law alone tries
 
 
 def answers(life: Life) -> dict[str, list[Told]]:
@@ -100,10 +99,10 @@ def _oracles(
 def _all_of(name: str, law: Law, flown: int) -> list[Law]:
     """What a life of a law may be, as `ema_model.lives` draws it, of which so many flights were seen."""
     if name == "accelerating":
-        return [replace(law, power=power) for power in POWERS]
+        return [replace(law, power=power) for power in np.linspace(*POWER, POWERS).tolist()]
     if name == "onset":
         onsets = np.unique(np.linspace(8, max(flown, 8), MOST_ONSETS).astype(int))
-        (low, high) = ONSETS
+        low, high = ONSET
         return [
             replace(law, onset=onset, shortest=onset * (1 - high) / high, longest=onset * (1 - low) / low)
             for onset in onsets.tolist()

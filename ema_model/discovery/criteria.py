@@ -44,8 +44,8 @@ LEAST_SHARE = 0.25
 # that brings it into the band of true models (all right ones of the own study do; two false ones of servos took 0.2).
 OF_FAINT = 0.5
 
-# Of the floor, beyond which that share is asked of a settled model, too: nearer to it, two causes may share the error
-# (a shorted phase and cogging), and the own studies name no effect falsely.
+# Of the floor, beyond which that share is asked for: nearer to it, two causes may share the error (a shorted phase and
+# cogging), and the own studies name no effect falsely.
 FAR = 2.0
 
 # Of the error, that an effect must take away beside a model whose parameters keep to their tolerances (MODEL §6).

@@ -198,8 +198,8 @@ def _idle(data: Data, before: Fit, after: Fit) -> str:
 
 
 def _little(data: Data, before: Fit, after: Fit) -> str:
-    """Whether more is left than noise, and far more than the effects explain."""
-    if at_floor(data, after):
+    """Whether far more is left than the effects explain."""
+    if ratio(data, after) < FAR:
         return ""
     first, second = (float(one.residual @ one.residual) for one in (before, after))
     share = (first - second) / max(first - len(before.residual), len(before.residual))

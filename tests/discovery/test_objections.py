@@ -124,15 +124,6 @@ def test_what_takes_nothing_away_within_the_tolerances_is_not_claimed(monkeypatc
     assert not objections._idle(DATA, 4.07, 3.90)
 
 
-@pytest.mark.parametrize(("before", "after", "is_told"), [(2.0, 1.91, False), (2.0, 1.7, True), (1.3, 1.25, True)])
-def test_near_the_floor_too_an_effect_takes_its_share_unless_it_brings_the_error_there(
-    monkeypatch, before, after, is_told
-):
-    monkeypatch.setattr(objections, "at_floor", lambda _, found: np.sqrt(np.mean(found.residual**2)) <= 1.27)
-    first, last = (fitted([1.0, 1.0], noise=one) for one in (before, after))
-    assert bool(objections._little(DATA, first, last)) != is_told
-
-
 @pytest.mark.parametrize(
     ("bent", "calm", "said"),
     [((5.0, 4.0), (9.1, 8.8), "it explains"), ((5.0, 4.0), (9.1, 4.0), ""), ((1.8, 1.3), (2.8, 2.5), "")],

@@ -8,12 +8,12 @@ import os
 import re
 import subprocess
 import sys
-import time
 from urllib.parse import parse_qs, urlsplit
 
 import numpy as np
 import pytest
 from rerun.chunk import RrdReader
+from support.on_page import wait_until
 
 from emaviz.cli import main
 from emaviz.recording import RecordingError, RecordingWriter
@@ -90,11 +90,14 @@ def test_parts_without_use_are_reported(tmp_path):
         recover(tmp_path / "none")
 
 
-def test_iterations_reach_the_file_within_half_a_second(tmp_path):
+def test_iterations_reach_the_file_while_it_is_written(tmp_path):
+    def written():
+        traces = read(tmp_path / "a.rrd.part").identification
+        return "hba" in traces and len(traces["hba"].iteration) == 1
+
     with RecordingWriter(tmp_path / "a.rrd") as writer:
         writer.iteration("hba", 0, 1.0, np.zeros(8))
-        time.sleep(0.6)
-        assert len(read(tmp_path / "a.rrd.part").identification["hba"].iteration) == 1
+        wait_until(written, 30.0)
 
 
 def test_the_command_recovers_a_part_and_overwrites_nothing(tmp_path, running, capsys):

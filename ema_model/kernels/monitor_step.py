@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ema_model.physics.backlash import advance_play
 from ema_model.physics.elementary import clamp, rotate
-from ema_model.physics.friction import advance_rotor, borello_friction
+from ema_model.physics.friction import advance_reversing_rotor, borello_friction
 from ema_model.physics.jit import scalar
 from ema_model.physics.phases import flux_factor
 from ema_model.physics.rows import (
@@ -29,6 +29,7 @@ from ema_model.physics.rows import (
     INVERSE_INDUCTANCE,
     INVERSE_INERTIA,
     LANES,
+    LEFT,
     OMEGA,
     PLAY,
     POLE_PAIRS,
@@ -151,13 +152,14 @@ def advance(s, p, i, command, load, supply, driven, dt):
     resisting = friction(
         borello_friction(omega, active, static, dynamic), omega, active, static, dynamic, s, FIRST, p, i
     )
-    theta1, omega1 = advance_rotor(
+    theta1, omega1, left = advance_reversing_rotor(
         theta,
         omega,
         active - resisting,
         inverse_inertia(p[INVERSE_INERTIA * LANES + i], s, FIRST, p, i),
         p[STOP_LOW * LANES + i],
         p[STOP_HIGH * LANES + i],
+        s[LEFT * LANES + i],
         dt,
     )
     turned = theta1 - theta
@@ -167,6 +169,7 @@ def advance(s, p, i, command, load, supply, driven, dt):
 
     s[THETA * LANES + i] = theta1
     s[OMEGA * LANES + i] = omega1
+    s[LEFT * LANES + i] = left
     s[PLAY * LANES + i] = play1
     s[SIN_ROTOR * LANES + i] = sin_r1
     s[COS_ROTOR * LANES + i] = cos_r1

@@ -106,6 +106,7 @@ STATE_ROWS = (
     "begun",  # 0 before the drive's first step, then 1
     "time",  # since the recording's start, s
     "demand",  # what the drive asks for in this step, where more than the plain cascade acts: A, or a share of the bus
+    "left",  # of the step in which the rotor came to rest, s
 )
 (
     THETA,
@@ -123,6 +124,7 @@ STATE_ROWS = (
     BEGUN,
     TIME,
     DEMAND,
+    LEFT,
 ) = range(len(STATE_ROWS))
 
 REFERENCE_STATE_ROWS = (

@@ -97,7 +97,6 @@ def test_a_resistance_beyond_its_bound_is_no_gain_of_the_current_sensor(tmp_path
     assert [*found.parameters_outside_tolerance] == ["motor.resistance_Ohm"] and found.ladder[-1].rmse <= BAND
 
 
-@pytest.mark.xfail(reason="stick and slip jump with the steps of time; differences take jumps for slopes: 15 to 18")
 def test_no_derivative_tells_of_what_no_recording_can(tmp_path):
     """A voltage drive moves alike with inertia and torques times a number, resistance and current's gain over it."""
     recorded("hobby", 10, tmp_path, programmes=FITTED)

@@ -17,7 +17,7 @@ from ema_model.errors import InputError
 from ema_model.faults import vector
 from ema_model.physics import elementary
 from ema_model.physics.backlash import advance_play
-from ema_model.physics.friction import advance_rotor, borello_friction
+from ema_model.physics.friction import advance_reversing_rotor, advance_rotor, borello_friction
 from ema_model.physics.phases import (
     air_gap,
     equivalent_current,
@@ -66,6 +66,23 @@ def test_reversal_within_a_step_stops_the_rotor():
     assert omega == 0.0
     theta, omega = advance_rotor(0.0, 1.0, 0.0, 1.0 / 1.3e-5, -1.0, 1.0, 1e-5)
     assert omega == 1.0 and theta == pytest.approx(1e-5)
+
+
+@pytest.mark.parametrize("early", [False, True], ids=["at the end of a step", "at the beginning of the next"])
+def test_a_reversal_is_when_the_speed_is_zero(early):
+    """A rotor under a constant torque and Coulomb friction: the speed some steps after it, wherever the steps end."""
+    inverse, level, pushed, dt = 1.0 / 1.3e-5, 0.05, -0.2, 1e-5
+
+    def speed_after(start, steps):
+        theta, omega, left = 0.0, start, 0.0
+        for _ in range(steps):
+            net = pushed - borello_friction(omega, pushed, level, level)
+            theta, omega, left = advance_reversing_rotor(theta, omega, net, inverse, -9.0, 9.0, left, dt)
+        return omega
+
+    braking, away = (pushed - level) * inverse, (pushed + level) * inverse
+    start = -braking * dt * (3.0 + (1e-6 if early else -1e-6))  # at rest after three steps, and a millionth of one
+    assert speed_after(start, 8) == pytest.approx(away * (8 * dt + start / braking), rel=1e-9)
 
 
 # --- play -----------------------------------------------------------------------------------------------------------

@@ -161,6 +161,18 @@ def test_the_easy_one_is_solved():
     assert found.ladder[-1].rmse < 1.1 and found.ladder[-1].holdout_rmse < 1.1
 
 
+def test_the_readme_shows_what_discovery_says():
+    """The ladder and the names of its example, as somebody meets it who tries it."""
+    found = solved("after_the_overhaul", None)
+    readme = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+    [table] = re.findall(r"^error ladder.*\n((?:  .*\n)+)", readme, re.M)
+    shown = [re.split(r"\s{2,}", line.strip(" +")) for line in table.splitlines()]
+    titles = ["Calibrated", *(CATALOGUE[one.name].title for one in found.effects)]
+    assert [title for title, *_ in shown] == titles
+    for (title, *numbers), rung in zip(shown, found.ladder, strict=True):
+        assert [float(one) for one in numbers] == pytest.approx([rung.rmse, rung.holdout_rmse], rel=0.01), title
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("name", ["quiet_complaint", "after_the_overhaul", "two_suspects", "prototype"])
 def test_the_whole_library_solves_it(name):

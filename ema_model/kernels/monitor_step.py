@@ -149,14 +149,14 @@ def advance(s, p, i, command, load, supply, driven, dt):
     static = p[STATIC_FRICTION * LANES + i]
     level = p[DYNAMIC_FRICTION * LANES + i]
     dynamic = moving_friction(level, static, omega, motor_torque, load, gear, theta, user, time, s, FIRST, p, i)
-    resisting = friction(
-        borello_friction(omega, active, static, dynamic), omega, active, static, dynamic, s, FIRST, p, i
-    )
+    dry = borello_friction(omega, active, static, dynamic)
+    resisting = friction(dry, omega, active, static, dynamic, s, FIRST, p, i)
     theta1, omega1, left = advance_reversing_rotor(
         theta,
         omega,
         active - resisting,
         inverse_inertia(p[INVERSE_INERTIA * LANES + i], s, FIRST, p, i),
+        resisting == dry,
         p[STOP_LOW * LANES + i],
         p[STOP_HIGH * LANES + i],
         s[LEFT * LANES + i],

@@ -158,11 +158,17 @@ def advance(state, constant, s, p, i, demand, load, driven, dt):
     active = shaft_torque(passive, theta, omega, q, user, tau, load, time, s, FIRST, p, i)
     level = p[DYNAMIC_FRICTION * LANES + i]
     dynamic = moving_friction(level, static, omega, motor_torque, load, tau, theta, user, time, s, FIRST, p, i)
-    resisting = friction(
-        borello_friction(omega, active, static, dynamic), omega, active, static, dynamic, s, FIRST, p, i
-    )
+    dry = borello_friction(omega, active, static, dynamic)
+    resisting = friction(dry, omega, active, static, dynamic, s, FIRST, p, i)
     theta1, omega1 = advance_rotor(
-        theta, omega, active - resisting, inertia, p[STOP_LOW * LANES + i], p[STOP_HIGH * LANES + i], dt
+        theta,
+        omega,
+        active - resisting,
+        inertia,
+        resisting == dry,
+        p[STOP_LOW * LANES + i],
+        p[STOP_HIGH * LANES + i],
+        dt,
     )
     turned = theta1 - theta
     sin_r, cos_r = rotate(sin_r, cos_r, turned)

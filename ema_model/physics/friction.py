@@ -18,27 +18,27 @@ def borello_friction(omega, active_torque, static, dynamic):
 
 
 @scalar
-def advance_rotor(theta, omega, net_torque, inverse_inertia, stop_low, stop_high, dt):
+def advance_rotor(theta, omega, net_torque, inverse_inertia, sticks, stop_low, stop_high, dt):
     """New angle and speed (T 3.13, semi-implicit Euler).
 
-    A change of sign within the step stops the rotor (T 3.16), so that friction is asked again at rest;
-    an end stop holds the angle and stops the rotor inelastically.
+    sticks: whether friction is Borello's, of which a change of sign within the step stops the rotor (T 3.16), so that
+    it is asked again at rest.  An end stop holds the angle and stops the rotor inelastically.
     """
     theta1, omega1, _ = advance_reversing_rotor(
-        theta, omega, net_torque, inverse_inertia, stop_low, stop_high, 0.0, dt
+        theta, omega, net_torque, inverse_inertia, sticks, stop_low, stop_high, 0.0, dt
     )  # fmt: skip
     return theta1, omega1
 
 
 @scalar
-def advance_reversing_rotor(theta, omega, net_torque, inverse_inertia, stop_low, stop_high, left, dt):
+def advance_reversing_rotor(theta, omega, net_torque, inverse_inertia, sticks, stop_low, stop_high, left, dt):
     """The same, and what is left of the step after the rotor has come to rest in it, s, which acts with the next.
 
     So a reversal is when the speed is zero, and not at a step's end: signals do not jump where a parameter moves it
     from one step into another, which a derivative by differences would take for a slope.
     """
     accelerated = omega + (dt + left) * inverse_inertia * net_torque
-    stops = accelerated * omega < 0.0
+    stops = sticks & (accelerated * omega < 0.0)
     omega1 = 0.0 if stops else accelerated
     free = theta + (dt + 0.5 * left) * omega1
     theta1 = clamp(free, stop_low, stop_high)

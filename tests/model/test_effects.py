@@ -185,7 +185,7 @@ def pushed_rotor(torque_Nm, seconds: float, stiffness: float, dt: float = 1e-5) 
     for step in range(round(seconds / dt)):
         active = torque_Nm(step * dt)
         resisting = friction(0.0, omega, active, static, dynamic, stiffness, 0.01, bend)
-        theta1, omega1 = advance_rotor(theta, omega, active - resisting, inverse, -1e9, 1e9, dt)
+        theta1, omega1 = advance_rotor(theta, omega, active - resisting, inverse, False, -1e9, 1e9, dt)
         (bend,) = advance(
             dt, theta, omega, 0.0, 0.0, 0.0, GEAR, 0.0, active, static, dynamic, stiffness, 0.01, bend
         )  # fmt: skip

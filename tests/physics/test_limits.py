@@ -62,9 +62,9 @@ def test_borello_friction_balances_at_rest_and_opposes_motion():
 
 
 def test_reversal_within_a_step_stops_the_rotor():
-    _, omega = advance_rotor(0.0, 1e-3, -1.0, 1.0 / 1.3e-5, -1.0, 1.0, 1e-5)
+    _, omega = advance_rotor(0.0, 1e-3, -1.0, 1.0 / 1.3e-5, True, -1.0, 1.0, 1e-5)
     assert omega == 0.0
-    theta, omega = advance_rotor(0.0, 1.0, 0.0, 1.0 / 1.3e-5, -1.0, 1.0, 1e-5)
+    theta, omega = advance_rotor(0.0, 1.0, 0.0, 1.0 / 1.3e-5, True, -1.0, 1.0, 1e-5)
     assert omega == 1.0 and theta == pytest.approx(1e-5)
 
 
@@ -77,7 +77,7 @@ def test_a_reversal_is_when_the_speed_is_zero(early):
         theta, omega, left = 0.0, start, 0.0
         for _ in range(steps):
             net = pushed - borello_friction(omega, pushed, level, level)
-            theta, omega, left = advance_reversing_rotor(theta, omega, net, inverse, -9.0, 9.0, left, dt)
+            theta, omega, left = advance_reversing_rotor(theta, omega, net, inverse, True, -9.0, 9.0, left, dt)
         return omega
 
     braking, away = (pushed - level) * inverse, (pushed + level) * inverse

@@ -97,6 +97,13 @@ def test_a_resistance_beyond_its_bound_is_no_gain_of_the_current_sensor(tmp_path
     assert [*found.parameters_outside_tolerance] == ["motor.resistance_Ohm"] and found.ladder[-1].rmse <= BAND
 
 
+def test_drag_by_the_square_of_speed_is_no_fall_of_friction(tmp_path):
+    """Stribeck's law bends to it, with a breakaway and a speed of its own."""
+    found, _ = discovered(tmp_path, "drag", unit=1)
+    assert [one.name for one in found.effects] == ["quadratic_drag"], found
+    assert found.ladder[-1].rmse <= BAND < found.ladder[0].rmse
+
+
 def test_no_derivative_tells_of_what_no_recording_can(tmp_path):
     """A voltage drive moves alike with inertia and torques times a number, resistance and current's gain over it."""
     recorded("hobby", 10, tmp_path, programmes=FITTED)

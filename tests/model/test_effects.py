@@ -176,6 +176,17 @@ def test_delay_trails_a_ramp_by_speed_times_delay(delay, model):
 # --- friction and the drive -----------------------------------------------------------------------------------------
 
 
+def test_drag_grows_with_the_square_of_speed():
+    """To the dry friction at ω_q, whatever the direction; nothing at rest, and nothing at all where ω_q is endless."""
+    law = CATALOGUE["quadratic_drag"].places[0]
+
+    def drag(omega, speed=400.0):
+        return law(0.05, 0.1, omega, 0.0, 0.0, GEAR, 0.0, 0.0, 0.0, speed) - 0.05
+
+    assert drag(400.0) == drag(-400.0) == pytest.approx(0.05) and drag(0.0) == 0.0
+    assert drag(600.0) == pytest.approx(4.0 * drag(300.0)) and drag(800.0, np.inf) == 0.0
+
+
 def pushed_rotor(torque_Nm, seconds: float, stiffness: float, dt: float = 1e-5) -> tuple[float, float, float]:
     """Angle, speed and bristles' bend of the thesis's rotor after a torque (a function of time) against LuGre's law."""
     static, dynamic, inverse = 0.1013, 0.0507, 1.0 / 1.3e-5

@@ -24,6 +24,7 @@ _PARAMETERS = {  # effects that are a wrong value of a parameter, by what the pa
 _SINCE = {
     "saturation": ("torque_saturation",),
     "warmup": ("friction_drift", "resistance_drift"),
+    "drag": ("quadratic_drag",),
     # By the user's place, and the first is by the motor's angle: over little travel one ridge or trough is a zone.
     "screw_friction": ("position_dependent_friction", "friction_zone"),
 }

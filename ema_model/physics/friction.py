@@ -12,9 +12,11 @@ def borello_friction(omega, active_torque, static, dynamic):
 
     At rest it balances the active torque up to ±static; in motion it is dynamic·sgn ω.
     (The thesis prints "V = 0 or |F| ≤ FSJ"; only "and" gives a rotor that can stick and move.)
+    Where an effect takes the level in motion beyond static, so much holds at rest, too: else it would creep.
     """
     moving = dynamic if omega > 0.0 else -dynamic
-    return clamp(active_torque, -static, static) if omega == 0.0 else moving
+    holds = max(static, dynamic)
+    return clamp(active_torque, -holds, holds) if omega == 0.0 else moving
 
 
 @scalar

@@ -53,12 +53,27 @@ def test_rotor_sticks_below_static_friction_and_moves_above(model, sign):
     assert np.all(held["motor_position_rad"] == 0.0)
 
 
+@each_model
+@pytest.mark.parametrize(
+    "effect",
+    [{"gear_load_friction": {"ratio": 0.9}}, {"stribeck_friction": {"speed_rad_s": 10.0, "breakaway_ratio": 2.0}}],
+)
+def test_a_rotor_that_an_effects_friction_holds_does_not_creep(model, effect):
+    """A load of half as much again as the file's static friction, of which the effect holds 1.9 times and more."""
+    level = ACTUATOR.value("motor.dynamic_friction_Nm")
+    actuator = ACTUATOR.with_values({"motor.static_friction_Nm": level})
+    pulled = Run(HOLD, 0.05, load_torque_Nm=1.5 * level / actuator.transmission.gear_ratio)
+    assert np.ptp(model(pulled, actuator, effects=effect)["motor_position_rad"]) == 0.0
+    assert np.ptp(model(pulled, actuator)["motor_position_rad"]) > 1e-3, "alone it gives way"
+
+
 def test_borello_friction_balances_at_rest_and_opposes_motion():
     static, dynamic = 0.1, 0.05
     assert borello_friction(0.0, 0.08, static, dynamic) == 0.08
     assert borello_friction(0.0, -0.3, static, dynamic) == -static
     assert borello_friction(1e-9, 0.08, static, dynamic) == dynamic
     assert borello_friction(-1e-9, 0.08, static, dynamic) == -dynamic
+    assert borello_friction(0.0, 0.18, static, 0.2) == 0.18, "what an effect adds in motion holds at rest, too"
 
 
 def test_reversal_within_a_step_stops_the_rotor():

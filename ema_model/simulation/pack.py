@@ -205,7 +205,7 @@ def _shared_rows(actuator: Actuator, fault: faults.PhysicalFaults) -> dict[str, 
         "torque_limit": motor.torque_limit_Nm,
         "pole_pairs": motor.pole_pairs,
         "inverse_inertia": 1.0 / motor.inertia_kgm2,
-        # Less than in motion would let a rotor at rest start and stop without end.
+        # No less than in motion: the laws of bristles and of Stribeck fall from it to that level.
         "static_friction": np.maximum(motor.static_friction_Nm, motor.dynamic_friction_Nm) * fault.friction_factor,
         "dynamic_friction": motor.dynamic_friction_Nm * fault.friction_factor,
         "half_play": 0.5 * transmission.backlash_rad * fault.backlash_factor / tau,

@@ -16,7 +16,7 @@ from rerun.chunk import RrdReader
 from support.on_page import wait_until
 
 from emaviz.cli import main
-from emaviz.recording import RecordingError, RecordingWriter
+from emaviz.recording import RecordingError, RecordingWriter, writer
 from emaviz.recording.read import read
 from emaviz.recording.recover import recover
 
@@ -90,13 +90,16 @@ def test_parts_without_use_are_reported(tmp_path):
         recover(tmp_path / "none")
 
 
-def test_iterations_reach_the_file_while_it_is_written(tmp_path):
+def test_iterations_reach_the_file_within_half_a_second(tmp_path):
+    """Of a machine that has the time; a loaded one writes them, too."""
+    assert writer._FLUSH_EVERY_S <= 0.5
+
     def written():
         traces = read(tmp_path / "a.rrd.part").identification
         return "hba" in traces and len(traces["hba"].iteration) == 1
 
-    with RecordingWriter(tmp_path / "a.rrd") as writer:
-        writer.iteration("hba", 0, 1.0, np.zeros(8))
+    with RecordingWriter(tmp_path / "a.rrd") as recording:
+        recording.iteration("hba", 0, 1.0, np.zeros(8))
         wait_until(written, 30.0)
 
 

@@ -8,7 +8,7 @@ from ema_model.physics.jit import scalar
 
 
 @scalar
-def moving_friction(level, static, omega, motor_torque, load, gear, theta, user, time, ratio, viscous):
+def moving_friction(level, static, omega, motor_torque, drag, active, load, gear, theta, user, time, ratio, viscous):
     """T_d (1 + a sgn ω)."""
     return level * (1.0 + ratio * sign(omega))
 

@@ -19,7 +19,19 @@ __all__ = ["ADVANCE", "MOTOR", "NEITHER", "PLACES", "USER", "Effect", "Parameter
 # Where effects can act: the arguments of each place.  The first is the value that the base model, or the
 # effect before, has found there; an effect's function returns it changed.  time, s, counts from the recording's start.
 PLACES = {
-    "moving_friction": ("level", "static", "omega", "motor_torque", "load", "gear", "theta", "user", "time"),
+    "moving_friction": (
+        "level",
+        "static",
+        "omega",
+        "motor_torque",
+        "drag",
+        "active",
+        "load",
+        "gear",
+        "theta",
+        "user",
+        "time",
+    ),
     "friction": ("torque", "omega", "active", "static", "dynamic"),
     "electric_torque": ("torque", "theta", "omega", "current"),
     "shaft_torque": ("torque", "theta", "omega", "current", "user", "gear", "load", "time"),

@@ -7,7 +7,7 @@ from ema_model.physics.jit import scalar
 
 
 @scalar
-def moving_friction(level, static, omega, motor_torque, load, gear, theta, user, time, rate):
+def moving_friction(level, static, omega, motor_torque, drag, active, load, gear, theta, user, time, rate):
     """T_d (1 + r t), never below 0."""
     return level * max(1.0 + rate * time, 0.0)
 

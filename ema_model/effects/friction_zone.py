@@ -10,7 +10,7 @@ _LEAST = 1e-12  # rad², of a zone without width
 
 
 @scalar
-def moving_friction(level, static, omega, motor_torque, load, gear, theta, user, time, ratio, begin, end):
+def moving_friction(level, static, omega, motor_torque, drag, active, load, gear, theta, user, time, ratio, begin, end):
     """T_d (1 + a z), z a parabola that is 1 in the middle of the zone and 0 at its ends and beyond."""
     half = 0.5 * (end - begin)
     away = user - 0.5 * (begin + end)

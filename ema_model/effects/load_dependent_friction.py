@@ -7,7 +7,7 @@ from ema_model.physics.jit import scalar
 
 
 @scalar
-def moving_friction(level, static, omega, motor_torque, load, gear, theta, user, time, ratio):
+def moving_friction(level, static, omega, motor_torque, drag, active, load, gear, theta, user, time, ratio):
     """+ μ |T_m|."""
     return level + ratio * abs(motor_torque)
 

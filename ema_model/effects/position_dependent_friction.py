@@ -10,7 +10,9 @@ from ema_model.physics.jit import scalar
 
 
 @scalar
-def moving_friction(level, static, omega, motor_torque, load, gear, theta, user, time, ratio, order, phase):
+def moving_friction(
+    level, static, omega, motor_torque, drag, active, load, gear, theta, user, time, ratio, order, phase
+):
     """T_d [1 + a sin(h θ + φ)]."""
     return level * (1.0 + ratio * sine(order * theta + phase))
 

@@ -9,7 +9,7 @@ from ema_model.physics.jit import scalar
 
 
 @scalar
-def moving_friction(level, static, omega, motor_torque, load, gear, theta, user, time, speed):
+def moving_friction(level, static, omega, motor_torque, drag, active, load, gear, theta, user, time, speed):
     """+ T_d (ω/ω_q)²."""
     ratio = omega * (1.0 / speed)
     return level * (1.0 + ratio * ratio)

@@ -8,7 +8,7 @@ from ema_model.physics.jit import scalar
 
 
 @scalar
-def moving_friction(level, static, omega, motor_torque, load, gear, theta, user, time, speed, breakaway):
+def moving_friction(level, static, omega, motor_torque, drag, active, load, gear, theta, user, time, speed, breakaway):
     """T_d + (T_s − T_d) e^{−(ω/ω_s)²}, of which nothing is left beyond T_d where ω_s = 0.
 
     T_s is the actuator's static friction, or breakaway · T_d where that is more: few data sheets tell it.

@@ -41,7 +41,7 @@ __all__ = [
 
 
 @scalar
-def moving_friction(level, static, omega, motor_torque, load, gear, theta, user, time, s, first, p, i):
+def moving_friction(level, static, omega, motor_torque, drag, active, load, gear, theta, user, time, s, first, p, i):
     """Friction in motion, N·m, from its Coulomb level."""
     return level
 

@@ -35,16 +35,14 @@ def needed_current(s, p, i, theta, omega, acceleration, load, time, still):
     static = p[STATIC_FRICTION * LANES + i]
     dynamic = p[DYNAMIC_FRICTION * LANES + i]
     direction = clamp(omega / still, -1.0, 1.0)
-    base = (
-        acceleration / inverse_inertia(p[INVERSE_INERTIA * LANES + i], s, 0, p, i)
-        + p[VISCOUS * LANES + i] * omega
-        + gear * load
-    )
+    drag = p[VISCOUS * LANES + i] * omega
+    base = acceleration / inverse_inertia(p[INVERSE_INERTIA * LANES + i], s, 0, p, i) + drag + gear * load
     current = base / constant
     for _ in range(_ROUNDS):
         torque = electric_torque(constant * current, theta, omega, current, s, 0, p, i)
-        level = moving_friction(dynamic, static, omega, torque, load, gear, theta, user, time, s, 0, p, i)
         added = shaft_torque(0.0, theta, omega, current, user, gear, load, time, s, 0, p, i)
+        active = torque - drag - gear * load + added
+        level = moving_friction(dynamic, static, omega, torque, drag, active, load, gear, theta, user, time, s, 0, p, i)
         required = base + direction * level - added
         current += (required - torque) / constant
     return current_reading(current, s, 0, p, i)

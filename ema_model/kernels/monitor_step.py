@@ -144,11 +144,14 @@ def advance(s, p, i, command, load, supply, driven, dt):
     developed = p[TORQUE_CONSTANT * LANES + i] * flux * current
     motor_torque = clamp(electric_torque(developed, theta, omega, current, s, FIRST, p, i), -limit, limit)
 
-    passive = motor_torque - gear * load - p[VISCOUS * LANES + i] * omega
+    drag = p[VISCOUS * LANES + i] * omega
+    passive = motor_torque - gear * load - drag
     active = shaft_torque(passive, theta, omega, current, user, gear, load, time, s, FIRST, p, i)
     static = p[STATIC_FRICTION * LANES + i]
     level = p[DYNAMIC_FRICTION * LANES + i]
-    dynamic = moving_friction(level, static, omega, motor_torque, load, gear, theta, user, time, s, FIRST, p, i)
+    dynamic = moving_friction(
+        level, static, omega, motor_torque, drag, active, load, gear, theta, user, time, s, FIRST, p, i
+    )
     dry = borello_friction(omega, active, static, dynamic)
     resisting = friction(dry, omega, active, static, dynamic, s, FIRST, p, i)
     theta1, omega1, left = advance_reversing_rotor(

@@ -154,10 +154,13 @@ def advance(state, constant, s, p, i, demand, load, driven, dt):
     q = equivalent_current(current_a, current_b, current_c, sin_e, cos_e)
     developed = p[TORQUE_CONSTANT * LANES + i] * (k_a * current_a + k_b * current_b + k_c * current_c)
     motor_torque = clamp(electric_torque(developed, theta, omega, q, s, FIRST, p, i), -limit, limit)
-    passive = motor_torque - tau * load - p[VISCOUS * LANES + i] * omega
+    drag = p[VISCOUS * LANES + i] * omega
+    passive = motor_torque - tau * load - drag
     active = shaft_torque(passive, theta, omega, q, user, tau, load, time, s, FIRST, p, i)
     level = p[DYNAMIC_FRICTION * LANES + i]
-    dynamic = moving_friction(level, static, omega, motor_torque, load, tau, theta, user, time, s, FIRST, p, i)
+    dynamic = moving_friction(
+        level, static, omega, motor_torque, drag, active, load, tau, theta, user, time, s, FIRST, p, i
+    )
     dry = borello_friction(omega, active, static, dynamic)
     resisting = friction(dry, omega, active, static, dynamic, s, FIRST, p, i)
     theta1, omega1 = advance_rotor(

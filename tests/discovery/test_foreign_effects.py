@@ -22,10 +22,10 @@ SCALE = {  # powers of the number by which a voltage drive's parameters may be m
 }
 
 
-def discovered(tmp_path, effect, unit=5):
-    """A hobby servo's discovery with one effect hidden, and what the effect set."""
-    recorded("hobby", unit, tmp_path, hide=[effect])
-    actuator = actuator_of("hobby")
+def discovered(tmp_path, effect, unit=5, rig="hobby"):
+    """A discovery with one effect hidden, and what the effect set."""
+    recorded(rig, unit, tmp_path, hide=[effect])
+    actuator = actuator_of(rig)
     found = discover(
         measured(tmp_path, actuator, FITTED), actuator, holdout=measured(tmp_path, actuator, HELD), most_effects=1
     )
@@ -98,6 +98,13 @@ def test_drag_by_the_square_of_speed_is_no_fall_of_friction(tmp_path):
     found, _ = discovered(tmp_path, "drag", unit=1)
     assert [one.name for one in found.effects] == ["quadratic_drag"], found
     assert found.ladder[-1].rmse <= BAND < found.ladder[0].rmse
+
+
+def test_friction_of_a_screw_by_what_its_table_takes_is_not_by_the_motors_torque(tmp_path):
+    """Nor a torque constant that falls with current, which told more than that did."""
+    found, _ = discovered(tmp_path, "load_friction", unit=42, rig="ballscrew")
+    assert [one.name for one in found.effects] == ["mesh_friction"], found
+    assert found.ladder[-1].rmse <= BAND and (found.ladder[-1].holdout_rmse or 0.0) <= BAND < found.ladder[0].rmse
 
 
 def test_no_derivative_tells_of_what_no_recording_can(tmp_path):

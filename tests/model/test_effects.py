@@ -181,10 +181,32 @@ def test_drag_grows_with_the_square_of_speed():
     law = CATALOGUE["quadratic_drag"].places[0]
 
     def drag(omega, speed=400.0):
-        return law(0.05, 0.1, omega, 0.0, 0.0, GEAR, 0.0, 0.0, 0.0, speed) - 0.05
+        return law(0.05, 0.1, omega, 0.0, 0.0, 0.0, 0.0, GEAR, 0.0, 0.0, 0.0, speed) - 0.05
 
     assert drag(400.0) == drag(-400.0) == pytest.approx(0.05) and drag(0.0) == 0.0
     assert drag(600.0) == pytest.approx(4.0 * drag(300.0)) and drag(800.0, np.inf) == 0.0
+
+
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+def test_mesh_friction_is_of_what_the_motors_own_friction_leaves(direction):
+    """It grows with J dω/dt + τ T_load alike whether the motor drives or brakes it; turning steadily adds nothing."""
+    law, level, ratio, drag = CATALOGUE["mesh_friction"].places[0], 0.05, 0.2, 0.02
+
+    def friction(motor_torque, omega):
+        given = (0.1, omega, motor_torque, drag * np.sign(omega), 0.0, 0.0, GEAR, 0.0, 0.0, 0.0)
+        return law(level, *given, ratio)
+
+    for carried in (-0.4, 0.0, 0.4):
+        resists = level + ratio * abs(carried)
+        motor = direction * (carried + resists + drag)
+        assert friction(motor, 3.0 * direction) == pytest.approx(resists)
+
+
+def test_mesh_friction_holds_at_rest_what_it_takes_to_turn_that_way():
+    """A motor that holds a load in part is turned back by it: the load's torque is carried against what holds."""
+    law, level, ratio = CATALOGUE["mesh_friction"].places[0], 0.05, 0.2
+    starts, still = (law(level, 0.1, omega, 0.3, 0.0, -0.4, 0.7, GEAR, 0.0, 0.0, 0.0, ratio) for omega in (-1e-9, 0.0))
+    assert still == starts == pytest.approx((level + ratio * 0.3) / (1.0 - ratio))
 
 
 def pushed_rotor(torque_Nm, seconds: float, stiffness: float, dt: float = 1e-5) -> tuple[float, float, float]:
@@ -228,7 +250,7 @@ def test_presliding_friction_of_steady_sliding_is_dynamic_friction():
 def test_asymmetric_friction_takes_its_share_each_way():
     sliding, viscous = CATALOGUE["asymmetric_friction"].places
     speeds, given = (3.0, -3.0), (0.2, 1e-3)
-    found = [sliding(0.05, 0.1, omega, 0.0, 0.0, GEAR, 0.0, 0.0, 0.0, *given) for omega in speeds]
+    found = [sliding(0.05, 0.1, omega, 0.0, 0.0, 0.0, 0.0, GEAR, 0.0, 0.0, 0.0, *given) for omega in speeds]
     assert found == pytest.approx([0.06, 0.04])
     found = [viscous(0.5, 0.0, omega, 0.0, 0.0, GEAR, 0.0, 0.0, *given) for omega in speeds]
     assert found == pytest.approx([0.497, 0.497]), "it brakes one way and helps the other, in proportion to speed"

@@ -56,7 +56,11 @@ def test_rotor_sticks_below_static_friction_and_moves_above(model, sign):
 @each_model
 @pytest.mark.parametrize(
     "effect",
-    [{"gear_load_friction": {"ratio": 0.9}}, {"stribeck_friction": {"speed_rad_s": 10.0, "breakaway_ratio": 2.0}}],
+    [
+        {"gear_load_friction": {"ratio": 0.9}},
+        {"mesh_friction": {"ratio": 0.6}},
+        {"stribeck_friction": {"speed_rad_s": 10.0, "breakaway_ratio": 2.0}},
+    ],
 )
 def test_a_rotor_that_an_effects_friction_holds_does_not_creep(model, effect):
     """A load of half as much again as the file's static friction, of which the effect holds 1.9 times and more."""

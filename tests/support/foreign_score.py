@@ -25,6 +25,7 @@ _SINCE = {
     "saturation": ("torque_saturation",),
     "warmup": ("friction_drift", "resistance_drift"),
     "drag": ("quadratic_drag",),
+    "load_friction": ("mesh_friction",),
     # By the user's place, and the first is by the motor's angle: over little travel one ridge or trough is a zone.
     "screw_friction": ("position_dependent_friction", "friction_zone"),
 }

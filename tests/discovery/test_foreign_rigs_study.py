@@ -84,6 +84,14 @@ def test_hidden_effects_are_named(counts):
     assert hidden["silent"] <= 0.1 * hidden["showable"]
 
 
+def test_hidden_effects_that_the_file_rules_out_are_named(counts):
+    """Of the same those that no value within the tolerances of the actuator's file is."""
+    hidden = of(counts, "hidden")
+    told = hidden["showable"] - hidden["as the file allows"]
+    assert hidden["right"] >= 0.85 * (told - hidden["unknown with its variable"])
+    assert hidden["silent"] - hidden["as the file allows"] <= 0.1 * told
+
+
 def test_a_mess_of_small_everything_names_nothing_that_is_not_there(counts):
     real = of(counts, "real")
     assert real["false"] <= 2 / 90 * real["cases"]

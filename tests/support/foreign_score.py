@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
+from ema_model.actuator.naming import path_inside
 from ema_model.comparison.criteria import BAND
 from ema_model.effects import CATALOGUE
+from support.foreign_rigs import actuator_of
 
 SHOWABLE = 3.0  # `change_over_floor` of what a recording must tell; below 1 nobody can, between them hardly
 _HARDLY = 1.0
@@ -20,6 +22,14 @@ _PARAMETERS = {  # effects that are a wrong value of a parameter, by what the pa
     "demagnetisation": ("torque_constant", "force_constant"),
     "winding_resistance": ("resistance",),
 }
+_VALUES = {  # what the rig hides that is a value of the actuator, by what its path has
+    "viscous": ("viscous",),
+    "inertia": ("inertia", "mass"),
+    "weak_magnet": ("torque_constant", "force_constant"),
+    "current_gain": ("torque_constant", "force_constant"),
+    "resistance": ("resistance",),
+}
+_ARM = "effects.pendulum_load.angle_rad"
 # What the rig hides that the library holds under these names; its own truth, older than they are, has "curve" alone.
 _SINCE = {
     "saturation": ("torque_saturation",),
@@ -33,23 +43,25 @@ _SINCE = {
 _BEYOND_THE_MOTOR = {"acceleration": "torsional_compliance", "position": "screw_lead_error"}
 _RUNOUT_SHARE = 0.5  # of the encoder's true runout, which every rig but a tidy one has, that a named one may be off by
 _BIAS_SHARE = 0.5  # of the current sensor's true bias, which every rig has, that a named one may be off by
+_BY_TOLERANCE = 3.0  # σ of the file's, within which a value is ordinary
 COLUMNS = ("right", "false", "silent", "hardly showable", "unknown with its variable", "contradicts", "at bound",
-           "drive told")  # fmt: skip
+           "drive told", "as the file allows")  # fmt: skip
 
 
 def tally(row: Mapping[str, Any], truth: Mapping[str, Any]) -> Counter[str]:
     """Counts of one row of `discover`; `silent` is what could have been told, and was not."""
-    hidden = truth["hidden"].values()
-    told = [one for one in hidden if max(one["change_over_floor"].values()) > _HARDLY]
-    shown = any(max(one["change_over_floor"].values()) >= SHOWABLE for one in hidden)
-    right = {name for one in told for name in one["right"]}
-    right |= {new for name, one in truth["hidden"].items() if one in told for new in _SINCE.get(name, ())}
+    hidden = truth["hidden"]
+    told = [name for name, one in hidden.items() if max(one["change_over_floor"].values()) > _HARDLY]
+    shown = any(max(one["change_over_floor"].values()) >= SHOWABLE for one in hidden.values())
+    right = _names(truth, told)
+    # Alone it is false to name what nobody can tell; of a mess, what is not in it.
+    there = _names(truth, hidden) if len(hidden) > 1 else right
     groups = [{name, *filter(None, same.split("+"))} for name, same in zip(row["effects"], row["same_as"])]
     values = json.loads(row["parameters"])
     wrong = [
         name
         for name, group in zip(row["effects"], groups)
-        if not group & right
+        if not group & there
         and not _drives(name)
         and not _is_the_drives_delay(name, values, truth["drive"]["rate"])
         and not _is_the_sensors_bias(group, values, truth["drive"]["current_bias"])
@@ -75,8 +87,32 @@ def tally(row: Mapping[str, Any], truth: Mapping[str, Any]) -> Counter[str]:
             "contradicts": int(row["verdict"] in ("adequate", "effects_found") and above),
             "at bound": int(bool(row["at_bound"])),
             "drive told": int(drive or row["verdict"] == "adequate"),
+            "as the file allows": int(shown and allowed(truth)),
         }
     )
+
+
+def allowed(truth: Mapping[str, Any]) -> bool:
+    """Whether what is hidden is a value that its actuator's file calls ordinary: who trusts the file cannot tell it.
+
+    A gain of the current within the loop is one of the torque constant; a turned position, of the angle of an arm.
+    """
+    if len(truth["hidden"]) != 1:
+        return False
+    name, one = next(iter(truth["hidden"].items()))
+    parts, gain = _VALUES.get(name, ()), one["parameters"].get("current_gain", 1.0)
+    true = {path: value / gain for path, value in truth["actuator"].items() if any(part in path for part in parts)}
+    if name == "position_bias":
+        true[_ARM] = one["parameters"]["scale_bias"]
+    actuator = actuator_of(truth["rig"])
+    inside = {path_inside(path, actuator.tolerances, actuator.axes): value for path, value in true.items()}
+    far = [abs(value - actuator.value(path)) / actuator.tolerances[path].sigma for path, value in inside.items()]
+    return bool(far) and max(far) < _BY_TOLERANCE
+
+
+def _names(truth: Mapping[str, Any], hidden: Iterable[str]) -> set[str]:
+    """What these hidden effects may be called."""
+    return {name for one in hidden for name in (*truth["hidden"][one]["right"], *_SINCE.get(one, ()))}
 
 
 def covered(row: Mapping[str, Any], truth: Mapping[str, Any]) -> list[tuple[bool, float]]:

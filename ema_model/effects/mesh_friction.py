@@ -26,9 +26,7 @@ EFFECT = Effect(
         "table adds as much as one that drives it. The ratio counts per torque on the whole inertia; of a motor whose "
         "own rotor is much of it, the teeth carry less."
     ),
-    parameters=(
-        Parameter("ratio", "friction μ per torque carried, both at the motor", 0.15, 0.0, 0.9, plausible=(0.0, 0.6)),
-    ),
+    parameters=(Parameter("ratio", "friction μ per torque carried, both at the motor", 0.15, 0.0, 0.6),),
     severities=(0.08, 0.15, 0.25),
     places=(moving_friction,),
     shows="in the current while the speed changes or under a load, with the direction of motion",

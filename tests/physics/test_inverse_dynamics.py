@@ -4,12 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from ema_model.actuator import Actuator, load_actuator
+from ema_model.effects import CATALOGUE
 from ema_model.errors import InputError
 from ema_model.models import InverseDynamics
 from ema_model.models.motion import motion_of
+from ema_model.physics.rows import LANES
 from ema_model.recordings import Measurement, SideFile
+from ema_model.simulation.one_stack import stack_at_hand
+from ema_model.simulation.pack import monitor_rows
+from ema_model.simulation.precompile import wait_for
+from ema_model.stacks import exclusive
 
 FREE = """
 name = "free motor"
@@ -50,6 +57,40 @@ def error(plant: InverseDynamics) -> float:
 def test_current_of_a_known_motion(tmp_path):
     plant = InverseDynamics([spin()], motor(tmp_path))
     assert error(plant) < 2e-3 * np.sqrt(np.mean(spin()["current_A"] ** 2))
+
+
+# Strength, friction by the motor's torque and by what is carried on, the motor's torque by its current.
+LAWS = {
+    "load_dependent_friction": (0.4, lambda torque, carried: 0.01 + 0.4 * abs(torque), lambda current: 0.05 * current),
+    "mesh_friction": (0.6, lambda torque, carried: 0.01 + 0.6 * abs(carried), lambda current: 0.05 * current),
+    "torque_saturation": (
+        0.1,
+        lambda torque, carried: 0.01,
+        lambda current: 0.05 * current / (1.0 + 0.1 * abs(current)),
+    ),
+}
+
+
+@pytest.mark.parametrize("effect", LAWS)
+def test_the_current_is_found_that_friction_or_torque_depend_on_itself(tmp_path, effect):
+    """Driving and braking, both ways, beside the root of the one equation that it must solve."""
+    strength, friction, torque_of = LAWS[effect]
+    actuator = motor(tmp_path)
+    effects = {effect: {CATALOGUE[effect].parameters[0].name: strength}}
+    stack = stack_at_hand(actuator, effects, "reduced", "currents")
+    rows = monitor_rows(actuator, actuator.k[None], stack, effects)
+    wait_for(stack, "currents")
+    speed, acceleration = (each.ravel() for each in np.meshgrid([-80.0, 40.0], np.linspace(-700.0, 700.0, 29)))
+    nothing = np.zeros_like(speed)
+    found = np.empty((len(rows), len(speed), LANES))
+    exclusive(stack.inverse.currents, rows, nothing, speed, acceleration, nothing, nothing, 1e-9, found)
+    for one, omega, alpha in zip(found[0, :, 0], speed, acceleration):
+
+        def lacks(current: float, omega: float = omega, carried: float = 1e-4 * alpha) -> float:
+            torque = torque_of(current)
+            return carried + 2e-5 * omega + np.sign(omega) * friction(torque, carried) - torque
+
+        assert one == pytest.approx(brentq(lacks, -50.0, 50.0, xtol=1e-12), abs=1e-4)
 
 
 def test_cogging_is_seen_and_taken_off_by_the_effect(tmp_path):

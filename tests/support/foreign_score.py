@@ -45,17 +45,20 @@ _RUNOUT_SHARE = 0.5  # of the encoder's true runout, which every rig but a tidy 
 _BIAS_SHARE = 0.5  # of the current sensor's true bias, which every rig has, that a named one may be off by
 _BY_TOLERANCE = 3.0  # σ of the file's, within which a value is ordinary
 COLUMNS = ("right", "false", "silent", "hardly showable", "unknown with its variable", "contradicts", "at bound",
-           "drive told", "as the file allows")  # fmt: skip
+           "drive told", "as the file allows", "too faint")  # fmt: skip
 
 
 def tally(row: Mapping[str, Any], truth: Mapping[str, Any]) -> Counter[str]:
-    """Counts of one row of `discover`; `silent` is what could have been told, and was not."""
+    """Counts of one row of `discover`; `silent` is what could have been told, and was not.
+
+    `too faint`: what is hidden was named, though it changes no logged signal by a floor; the rigs' rule asks that
+    nothing be named there, and would call it false.
+    """
     hidden = truth["hidden"]
     told = [name for name, one in hidden.items() if max(one["change_over_floor"].values()) > _HARDLY]
     shown = any(max(one["change_over_floor"].values()) >= SHOWABLE for one in hidden.values())
     right = _names(truth, told)
-    # Alone it is false to name what nobody can tell; of a mess, what is not in it.
-    there = _names(truth, hidden) if len(hidden) > 1 else right
+    there = _names(truth, hidden)
     groups = [{name, *filter(None, same.split("+"))} for name, same in zip(row["effects"], row["same_as"])]
     values = json.loads(row["parameters"])
     wrong = [
@@ -88,6 +91,7 @@ def tally(row: Mapping[str, Any], truth: Mapping[str, Any]) -> Counter[str]:
             "at bound": int(bool(row["at_bound"])),
             "drive told": int(drive or row["verdict"] == "adequate"),
             "as the file allows": int(shown and allowed(truth)),
+            "too faint": int(not told and any(group & there for group in groups)),
         }
     )
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.discovery.fingerprints import Fingerprint
+from ema_model.discovery.let_go import at_bounds, let_go
 from ema_model.discovery.model_fit import Fit
 from ema_model.discovery.result import Candidate
 from ema_model.effects import Effect, find
@@ -20,7 +21,6 @@ from ema_model.effects import Effect, find
 Array = NDArray[np.float64]
 
 _LEAST_ENERGY = 25.0  # χ² of a strong case of the effect, below which these recordings cannot show it
-_AT_BOUND = 0.02
 
 
 def scored(found: Fit, prints: Sequence[Fingerprint]) -> list[Candidate]:
@@ -38,7 +38,9 @@ def scored_all(found: Fit, prints: Sequence[Fingerprint]) -> list[Candidate]:
     usual = movable(found)
     beyond = _beyond_all(*usual, [one.columns for one in prints if not one.frees])
     return [
-        _scored(found, one, *movable(found, one.frees)) if one.frees else _scored(found, one, *usual, next(beyond))
+        _scored(found, one, *movable(found, one.frees))
+        if one.frees
+        else _scored(found, one, *usual, next(beyond), let_go(found, one.columns))
         for one in prints
     ]
 
@@ -94,8 +96,8 @@ def movable(found: Fit, but: Sequence[str] = ()) -> tuple[Array, Array]:
 
     but: parameters that are left out.
     """
-    low, high = found.calibration.room
-    free = np.minimum(-low, high) > _AT_BOUND
+    free = np.ones(len(found.calibration.x), dtype=bool)
+    free[at_bounds(found)] = False
     free &= np.isin([*found.calibration.parameters, *found.calibration.starts], but, invert=True)
     jacobian = found.calibration.weighted_jacobian[:, free]
     return jacobian, jacobian.T @ jacobian + np.eye(jacobian.shape[1])
@@ -135,7 +137,14 @@ def unseen(energy: Array, strong: float) -> str:
     return ""
 
 
-def _scored(found: Fit, one: Fingerprint, jacobian: Array, gram: Array, beyond: Array | None = None) -> Candidate:
+def _scored(
+    found: Fit,
+    one: Fingerprint,
+    jacobian: Array,
+    gram: Array,
+    beyond: Array | None = None,
+    freed: tuple[Array, Array, Array, float] | None = None,
+) -> Candidate:
     amounts, energy, toward = amounts_of(found, one.columns, jacobian, gram, beyond)
     effect = find(one.name, found.actuator.axes)
     if one.frees:
@@ -143,19 +152,22 @@ def _scored(found: Fit, one: Fingerprint, jacobian: Array, gram: Array, beyond: 
     first = effect.parameters[0]
     strong = effect.severities[2] / one.settings[first.name]
     reason = unseen(energy, strong)
+    given = 0.0
+    if freed:
+        amounts, energy, toward, given = freed
     settings = dict(one.settings)
     linear = {first.name: settings[first.name]} | one.beside
     if len(amounts) == len(linear):
         own = {parameter.name: parameter for parameter in effect.parameters}
         ranges = [(own[name].low / value, own[name].high / value) for name, value in linear.items()]
         amounts = np.clip(amounts, *np.transpose(ranges))
-        drop = float(2.0 * amounts @ toward - amounts @ energy @ amounts)
+        drop = given + float(2.0 * amounts @ toward - amounts @ energy @ amounts)
         if first.low <= 0.0:  # otherwise the parameter is no amplitude
             settings |= {name: value * float(amount) for (name, value), amount in zip(linear.items(), amounts)}
         elif amounts[0] < 0.0:
             drop = 0.0
     else:
-        drop = float(toward @ amounts)
+        drop = given + float(toward @ amounts)
         settings[first.name] = float(np.clip(settings[first.name] * math.hypot(*amounts), first.low, first.high))
         settings["phase_rad"] = math.atan2(float(amounts[1]), float(amounts[0]))
     return Candidate(one.name, 0.0 if reason else max(0.0, drop), settings, reason)

@@ -1,0 +1,62 @@
+"""Parameters at a bound that an effect lets go.
+
+What hides behind a parameter at its bound is seen too little by a score that holds it there: beside the effect it
+would move back, and the others with it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ema_model.discovery.model_fit import Fit
+
+Array = NDArray[np.float64]
+
+AT_BOUND = 0.02  # σ from it
+_RIDGE = 1e-9  # of the columns' mean energy
+
+
+def at_bounds(found: Fit) -> NDArray[np.intp]:
+    """The unknowns that stand at a bound, by their place."""
+    low, high = found.calibration.room
+    return np.flatnonzero(np.minimum(-low, high) <= AT_BOUND)
+
+
+def let_go(found: Fit, columns: Array) -> tuple[Array, Array, Array, float] | None:
+    """Amounts a of some columns (values, columns) beside what leaves its bound for them; None where nothing does.
+
+    Returns a, and E, t and c such that χ² falls by c + 2 a·t − a·E·a with any amounts near these.  The descent is
+    linear, and holds an unknown at its bound as long as it would go beyond.
+    """
+    held = at_bounds(found)
+    if not len(held):
+        return None
+    calibration, residual = found.calibration, found.residual
+    jacobian, x = calibration.weighted_jacobian, calibration.x
+    low, high = calibration.room
+    hessian, mixed = jacobian.T @ jacobian + np.eye(len(x)), jacobian.T @ columns
+    gradient, energy = jacobian.T @ residual + x, columns.T @ columns
+    gone: set[int] = set()
+    barred: set[int] = set()
+    amounts, own, toward, given = np.zeros(columns.shape[1]), energy, energy[0], 0.0
+    for _ in range(2 * len(held) + 1):
+        free = np.array([one for one in range(len(x)) if one not in held or one in gone], dtype=int)
+        inverse = np.linalg.inv(hessian[np.ix_(free, free)])
+        own = energy - mixed[free].T @ inverse @ mixed[free]
+        toward = mixed[free].T @ inverse @ gradient[free] - columns.T @ residual
+        given = float(gradient[free] @ inverse @ gradient[free])
+        amounts = np.linalg.solve(own + _RIDGE * (np.trace(energy) + 1e-300) * np.eye(len(own)), toward)
+        step = np.zeros(len(x))
+        step[free] = -inverse @ (gradient[free] + mixed[free] @ amounts)
+        beyond = {one for one in gone if not low[one] - AT_BOUND <= step[one] <= high[one] + AT_BOUND}
+        if beyond:
+            gone, barred = gone - beyond, barred | beyond
+            continue
+        push = gradient + hessian @ step + mixed @ amounts  # χ² falls against it
+        back = {int(one) for one in held if (push[one] > 0.0 if high[one] <= AT_BOUND else push[one] < 0.0)}
+        back -= gone | barred
+        if not back:
+            break
+        gone |= back
+    return (amounts, own, toward, given) if gone else None

@@ -17,10 +17,10 @@ AT_BOUND = 0.02  # σ from it
 _RIDGE = 1e-9  # of the columns' mean energy
 
 
-def at_bounds(found: Fit) -> NDArray[np.intp]:
-    """The unknowns that stand at a bound, by their place."""
+def at_bounds(found: Fit) -> NDArray[np.bool_]:
+    """Which unknowns stand at a bound."""
     low, high = found.calibration.room
-    return np.flatnonzero(np.minimum(-low, high) <= AT_BOUND)
+    return np.minimum(-low, high) <= AT_BOUND
 
 
 def let_go(found: Fit, columns: Array) -> tuple[Array, Array, Array, float] | None:
@@ -29,7 +29,7 @@ def let_go(found: Fit, columns: Array) -> tuple[Array, Array, Array, float] | No
     Returns a, and E, t and c such that χ² falls by c + 2 a·t − a·E·a with any amounts near these.  The descent is
     linear, and holds an unknown at its bound as long as it would go beyond.
     """
-    held = at_bounds(found)
+    held = np.flatnonzero(at_bounds(found))
     if not len(held):
         return None
     calibration, residual = found.calibration, found.residual

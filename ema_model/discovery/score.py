@@ -96,8 +96,7 @@ def movable(found: Fit, but: Sequence[str] = ()) -> tuple[Array, Array]:
 
     but: parameters that are left out.
     """
-    free = np.ones(len(found.calibration.x), dtype=bool)
-    free[at_bounds(found)] = False
+    free = ~at_bounds(found)
     free &= np.isin([*found.calibration.parameters, *found.calibration.starts], but, invert=True)
     jacobian = found.calibration.weighted_jacobian[:, free]
     return jacobian, jacobian.T @ jacobian + np.eye(jacobian.shape[1])

@@ -52,13 +52,14 @@ def tally(row: Mapping[str, Any], truth: Mapping[str, Any]) -> Counter[str]:
     """Counts of one row of `discover`; `silent` is what could have been told, and was not.
 
     `too faint`: what is hidden was named, though it changes no logged signal by a floor; the rigs' rule asks that
-    nothing be named there, and would call it false.
+    nothing be named there, so that it is false as well.
     """
     hidden = truth["hidden"]
     told = [name for name, one in hidden.items() if max(one["change_over_floor"].values()) > _HARDLY]
     shown = any(max(one["change_over_floor"].values()) >= SHOWABLE for one in hidden.values())
     right = _names(truth, told)
-    there = _names(truth, hidden)
+    # Alone it is false to name what nobody can tell; of a mess, what is not in it.
+    there = _names(truth, hidden) if len(hidden) > 1 else right
     groups = [{name, *filter(None, same.split("+"))} for name, same in zip(row["effects"], row["same_as"])]
     values = json.loads(row["parameters"])
     wrong = [
@@ -91,7 +92,7 @@ def tally(row: Mapping[str, Any], truth: Mapping[str, Any]) -> Counter[str]:
             "at bound": int(bool(row["at_bound"])),
             "drive told": int(drive or row["verdict"] == "adequate"),
             "as the file allows": int(shown and allowed(truth)),
-            "too faint": int(not told and any(group & there for group in groups)),
+            "too faint": int(not told and any(group & _names(truth, hidden) for group in groups)),
         }
     )
 

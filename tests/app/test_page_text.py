@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import html as markup
+import time
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -82,12 +83,32 @@ def on_the_page(app, prop="content"):
     return [getattr(one._impl.props, prop, "") for one in handles if hasattr(one, "_impl")]
 
 
+def seen(app, name):
+    return any(name in markup.unescape(text) for text in on_the_page(app))
+
+
 def check(app, *names):
     """All of the names are seen, and nothing of them is markup."""
-    wait_until(lambda: all(any(name in markup.unescape(text) for text in on_the_page(app)) for name in names), 20.0)
+    wait_until(lambda: all(seen(app, name) for name in names), 20.0)
+    check_nothing_is_markup(app)
+
+
+def check_nothing_is_markup(app):
     assert {type(text) for text in on_the_page(app)} == {str}, "viser can send no other"
     assert not [text for text in on_the_page(app) if any(sign in text for sign in RAW)]
     assert not [text for text in on_the_page(app, "_markdown") if any(name in text for name in hostile.NAMES)]
+
+
+def check_end(app, job, line):
+    """As `check`, of a job's last line; told again where a comparison that the page began itself spoke after it."""
+
+    def told():
+        job.ended(line)
+        time.sleep(0.1)
+        return seen(app, line)
+
+    wait_until(told, 60.0)
+    check_nothing_is_markup(app)
 
 
 def test_what_explore_says_of_recovered_recordings(app):
@@ -103,11 +124,8 @@ def test_recordings_on_compare_and_what_is_said_of_them(app, name):
         wait_until(lambda kind=kind: f"uploads/{kind}{name}.csv" in app.comparing.opened)
         check(app, f"{kind}{name}.csv")
     check(app, f"{name} of a column")
-    wait_until(lambda: not app.comparing.running)  # whose end is said in the same place
-    app.comparing.job.ended(f"{name}.csv: line 1, column {name}: is wrong")
-    check(app, f"{name}.csv: line 1, column {name}: is wrong")
-    app.discovering.job.ended(f"{name}.csv: cannot be used")
-    check(app, f"{name}.csv: cannot be used")
+    check_end(app, app.comparing.job, f"{name}.csv: line 1, column {name}: is wrong")
+    check_end(app, app.discovering.job, f"{name}.csv: cannot be used")
     for kind in ("", "columns "):
         app.comparing.remove(f"uploads/{kind}{name}.csv")
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ema_model.actuator import keys
 from ema_model.actuator.parameters import SECTIONS, numbers
+from ema_model.actuator.unread import unread
 
 CONTROLLER_KINDS, INVERTER_KINDS = tuple(keys.KINDS["controller"]), tuple(keys.KINDS["inverter"])
 KINDS = {"controller": CONTROLLER_KINDS, "inverter": INVERTER_KINDS}
@@ -40,7 +41,8 @@ def layout(section: str, kinds: dict[str, str]) -> tuple[tuple[str, ...], tuple[
         needed = _DRIVES[inverter]
         return ((), needed) if controller in WITHOUT_DRIVE else (needed, ())
     if full:
-        return every, ()
+        needed = tuple(name for name in every if f"{section}.{name}" not in unread(controller, inverter))
+        return needed, tuple(name for name in every if name not in needed)
     needed = _MOTION if section == "motor" else ()
     if section == "motor" and inverter == "voltage" and controller != "unknown":
         needed = ("resistance_Ohm", *needed)

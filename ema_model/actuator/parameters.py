@@ -208,6 +208,14 @@ class Sensors:
     current_gain: float = _of(Facts("recorded current per true one", 0.5, 2.0, 1.0, 0.005), _ANYWHERE, 1.0)
     current_bias_A: float = _of(Facts("added to the recorded current", -20.0, 20.0, 0.0, sigma=0.02), _ANYWHERE, 0.0)
     delay_s: float = _of(Facts("by which recorded signals come late", -0.05, 0.05, 0.0, sigma=20e-6), _ANYWHERE, 0.0)
+    apparent_inertia: float = _of(
+        Facts(
+            "share of the inertia that a current loop adds to its command, k_t²/(R ω_c J); 0 of a measured current",
+            *(-0.2, 0.5, 0.0),
+        ),
+        _ANYWHERE,
+        0.0,
+    )
 
 
 @dataclass(frozen=True)
@@ -241,7 +249,7 @@ _POSITIVE = {
     "output_limit",
 }  # fmt: skip
 _BEHIND = "sensors.delay_s"
-_ANY_SIGN = {"rotor_offset_rad", "current_bias_A", "stop_low_rad", "stop_high_rad"}
+_ANY_SIGN = {"rotor_offset_rad", "current_bias_A", "stop_low_rad", "stop_high_rad", "apparent_inertia"}
 
 
 def numbers(section: str) -> tuple[str, ...]:

@@ -50,7 +50,8 @@ _DRIVES = {
 }
 INVERSE = "the controller is unknown, and inverse dynamics"
 _CURRENT_IN = "the recorded current or torque is put in as it is"
-_OPEN = {"sensors": {"current_gain current_bias_A": _CURRENT_IN}}
+_LOOP = {"apparent_inertia": "it is of inverse dynamics, for an unknown controller"}
+_SENSORS = {"unknown": {}, "open": {"current_gain current_bias_A": _CURRENT_IN, **_LOOP}}
 # Instead of the drive's, where a measured motion is put in and the current that it needs comes out.
 _MOTION_IN = {
     "inverter": {"bus_voltage_V hysteresis_band_A current_limit_A": f"{INVERSE} has no drive"},
@@ -93,7 +94,7 @@ def idle(places: Collection[str], has_states: bool, controller: str, inverter: s
 def unread(controller: str, inverter: str) -> dict[str, str]:
     """Why no model reads it, by "section.parameter", for an actuator of these kinds."""
     drive = _MOTION_IN if controller == "unknown" else _DRIVES[inverter]
-    by_section = {**drive, **(_OPEN if controller == "open" else {}), "controller": _CONTROLLERS[controller]}
+    by_section = {**drive, "sensors": _SENSORS.get(controller, _LOOP), "controller": _CONTROLLERS[controller]}
     return {
         f"{section}.{name}": reason
         for section, reasons in by_section.items()

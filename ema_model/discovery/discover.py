@@ -13,6 +13,7 @@ from ema_model.actuator import Actuator, load_actuator
 from ema_model.comparison.explain import Explanation
 from ema_model.discovery.begin import begun
 from ema_model.discovery.next_experiment import next_experiment
+from ema_model.discovery.outside_tolerance import outside_tolerance
 from ema_model.discovery.path import Story
 from ema_model.discovery.remaining import left_by, within_band
 from ema_model.discovery.repeated import repeated
@@ -72,7 +73,7 @@ def result_of(
     added = [replace(refreshed(one, calibration), supported_by=support_of(story, one.name)) for one in story.added]
     named = [one for one in added if one.name in names]
     faults = {name: calibration.parameters[name] for name in story.current.faults}
-    outside = [name for name in calibration.outside_tolerance if "." in name and not name.startswith("effects.")]
+    outside = outside_tolerance(story.data, story.current)
     stand_ins = [one.stands_for for one in story.added if one.stands_for]
     told = {*names, *(rival for one in named for rival in one.same_as)}  # refused at an earlier step, or not
     return Discovery(

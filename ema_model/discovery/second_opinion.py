@@ -30,6 +30,8 @@ from ema_model.estimation import Calibrated
 CLOSED_LOOP, INVERSE_DYNAMICS = "closed_loop", "inverse_dynamics"
 _DELAY = "sensors.delay_s"
 _DELAY_SIGMA_S = 1e-3  # between two channels of a usual logger
+_LOOP = "sensors.apparent_inertia"
+_LOOP_ADDS = 0.05  # and as much is 1 σ: a current loop is ten times as fast as its motor, or more
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,11 +150,19 @@ def support_of(story: Story, name: str) -> tuple[str, ...]:
 
 
 def delayed(actuator: Actuator) -> Actuator:
-    """Free in what inverse dynamics reads, and in the delay between current and motion."""
+    """Free in what inverse dynamics reads, and in the delay between current and motion.
+
+    What an ideal current source stands for may be logged as it was asked for: how much inertia its current loop adds
+    to that is free as well.
+    """
     ignored = unread(actuator.controller.kind, actuator.inverter.kind)
     kept = {path: one for path, one in actuator.tolerances.items() if path not in ignored}
     kept[_DELAY] = Tolerance(_DELAY_SIGMA_S, True)
-    return replace(actuator, tolerances=kept, sensors=replace(actuator.sensors, delay_s=0.0))
+    sensors = replace(actuator.sensors, delay_s=0.0)
+    if actuator.inverter.kind == "current":
+        kept[_LOOP] = Tolerance(_LOOP_ADDS, True)
+        sensors = replace(sensors, apparent_inertia=_LOOP_ADDS)
+    return replace(actuator, tolerances=kept, sensors=sensors)
 
 
 def _acts(name: str) -> bool:

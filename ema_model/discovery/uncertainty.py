@@ -13,9 +13,11 @@ from ema_model.discovery.evidence import colour_of, signals_of
 from ema_model.discovery.model_fit import Data, Fit, fit
 from ema_model.estimation import Calibration
 from ema_model.estimation.calibrate import calibrated, problem_of
+from ema_model.quantities.interval import HALF_90
 
 Array = NDArray[np.float64]
 
+_OF_FILE = 2.0 / HALF_90  # times that a tolerance counts which nothing checks
 _PIECES = 12, 25  # of each window, whose pulls on the parameters are independent: the division that says least counts
 _ROUNDS = 3  # of fits, each without the parameters that the one before drove to their bounds
 
@@ -26,18 +28,22 @@ def with_intervals(data: Data, found: Fit) -> Calibration:
 
     At the floor, too, what is left may last, where a model is not quite the rig's.  How its pieces in time pull at each
     parameter tells how far that may be off (White, Econometrica 48 (1980), by clusters); the wider interval counts.
+    What the file alone tells, without a controller the scale of all torques above all, nothing checks there: of its
+    tolerances, which are somebody's guess, two σ count.
     """
     calibration = found.calibration
     jacobian = calibration.weighted_jacobian / np.sqrt(colour_of(data, found))[:, None]
-    covariance = _covariance(jacobian)
+    covariance = covariance_of(jacobian)
     problem = problem_of(found.plant, data.floors, free=calibration.free, signals=data.signals)
-    wider = np.sqrt(np.maximum(1.0, _by_pieces(data, found) / np.diag(covariance)))
-    told = calibrated(problem, calibration.x, covariance * np.outer(wider, wider))
+    variance, most = np.diag(covariance), 1.0 if found.plant.simulates_commands else _OF_FILE
+    by_file = np.sum(covariance**2, axis=1)  # of it, what the tolerances leave open
+    wider = np.sqrt(np.maximum(1.0 + (most**2 - 1.0) * by_file / variance, _by_pieces(data, found) / variance))
+    told = calibrated(problem, calibration.x, covariance * np.outer(wider, wider), most)
     parameters = {n: replace(one, interval90=told[n].interval90) for n, one in calibration.parameters.items()}
     return replace(calibration, parameters=parameters)
 
 
-def _covariance(jacobian: Array) -> Array:
+def covariance_of(jacobian: Array) -> Array:
     """(JᵀJ + 1)⁻¹, of unknowns in σ of their tolerances."""
     # Orthogonal to the last digit: beside a fine floor JᵀJ itself rounds the prior away.
     root = np.linalg.inv(np.linalg.qr(np.concatenate([jacobian, np.eye(jacobian.shape[1])]), mode="r"))
@@ -48,7 +54,7 @@ def _by_pieces(data: Data, found: Fit) -> Array:
     """Variance of each unknown, in σ² of its tolerance, from how pieces of the windows pull at it: (unknowns,)."""
     calibration = found.calibration
     jacobian, residual = calibration.weighted_jacobian, calibration.residual
-    inverse = _covariance(jacobian)
+    inverse = covariance_of(jacobian)
     variances = []
     for count in _PIECES:
         pieces = _pieces(data, found, count)

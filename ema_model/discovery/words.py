@@ -134,9 +134,12 @@ def sentences(found: Discovery) -> list[str]:
             rivals = all_of([in_sentence(effect_title(name)) for name in one.same_as])
             told.append(f"These recordings cannot tell {in_sentence(effect_title(one.name))} from {rivals}.")
     if found.parameters_outside_tolerance:
-        outside = all_of([_parameter(found, path) for path in found.parameters_outside_tolerance])
+        outside = all_of([_beside_file(found, path) for path in found.parameters_outside_tolerance])
         whose = "its" if len(found.parameters_outside_tolerance) == 1 else "their"
-        told.append(f"Outside {whose} tolerance: {outside}.")
+        by_themselves = {*found.calibration.outside_tolerance, *(one.stands_for for one in found.effects)}
+        shared = set(found.parameters_outside_tolerance) - by_themselves
+        scale = f", counting what shares {whose} scale, as the torque constant" if shared else ""
+        told.append(f"Outside {whose} tolerance{scale}: {outside}.")
     told += moved(found)
     if found.unknown is not None:
         told.append(("Something else is left. " if found.effects else "") + found.unknown.sentence)
@@ -160,16 +163,16 @@ def moved(found: Discovery) -> list[str]:
         and abs(one.value - one.initial) > one.interval90[1] - one.interval90[0]
     }
     most = sorted(sure, key=lambda path: -abs(sure[path].z))[:_MOST_MOVED]
-    named = [
-        f"{_parameter(found, path)} {value(sure[path])} ({amount(sure[path].initial, sure[path].unit)})"
-        for path in most
-    ]
+    named = [_beside_file(found, path) for path in most]
     return [f"Within tolerance, but not as the file has it: {all_of(named)}."] if named else []
 
 
-def _parameter(found: Discovery, path: str) -> str:
-    """'motor inertia'."""
-    return in_sentence(on_axes(path, found.actuator.axes).title)
+def _beside_file(found: Discovery, path: str) -> str:
+    """'motor viscous friction 21.3 ± 0.35 mN·m·s/rad (8.00)'; its name alone where an effect is its value."""
+    name = in_sentence(on_axes(path, found.actuator.axes).title)
+    one = found.calibration.parameters.get(path)
+    stands_for = any(path == effect.stands_for for effect in found.effects)
+    return name if one is None or stands_for else f"{name} {value(one)} ({amount(one.initial, one.unit)})"
 
 
 def verification(found: Discovery, saved: Verified) -> str:

@@ -254,13 +254,16 @@ def by_window(problem: Problem, jacobian: Array, *, weighted: bool) -> list[dict
     return parts
 
 
-def calibrated(problem: Problem, x: Array, covariance: Array) -> dict[str, Calibrated]:
-    """What each unknown was found to be, by name; the eccentricity by its size and its angle."""
+def calibrated(problem: Problem, x: Array, covariance: Array, most: float = 1.0) -> dict[str, Calibrated]:
+    """What each unknown was found to be, by name; the eccentricity by its size and its angle.
+
+    most: tolerances that one may stay unsure by, since none is less sure than the file itself.
+    """
     axes = problem.model.actuator.axes
     found = {}
     for i, u in enumerate(problem.unknowns):
         value = float(u.nominal + u.sigma * x[i])
-        half = HALF_90 * u.sigma * min(1.0, float(np.sqrt(covariance[i, i])))  # never less sure than the file itself
+        half = HALF_90 * u.sigma * min(most, float(np.sqrt(covariance[i, i])))
         # What the file gives the value of its bound, as a delay of 0, was driven nowhere by standing there.
         at_bound = bool((x[i] < u.low + 0.01 or x[i] > u.high - 0.01) and abs(x[i]) > _AS_IN_THE_FILE)
         unit = on_axes(u.name, axes).unit

@@ -77,7 +77,8 @@ class InverseDynamics:
         """The current (A) or torque (N·m) that the motion needs, k (n, 8) → (n, blocks); friction's k1 alone counts.
 
         As in `Model`; a start means nothing here, and the load is the recorded one.  The sensors' delay is what
-        the current (or torque) comes later by than the motion.
+        the current (or torque) comes later by than the motion.  A drive's command exceeds its current by what its
+        current loop leaves of the back-EMF's rate, an apparent inertia of k_t²/(R ω_c) (PI loop of bandwidth ω_c).
         """
         window = self.windows[place]
         actuator = (actuator or self.actuator).varied(window.values)
@@ -86,7 +87,7 @@ class InverseDynamics:
         # Effects see the angle as it was read; the acceleration's own part has passed the filter already.
         static = self._currents(rows, len(k), window, np.zeros_like(window.position))
         moving = self._currents(rows, len(k), window, window.motion.acceleration)
-        needed = window.motion.filtered(static) + moving - static
+        needed = window.motion.filtered(static) + moving - static + _of_loop(actuator) * window.motion.acceleration
         needed = later(needed, _each(actuator.sensors.delay_s), window.period_s, smooth=True)
         size = window.samples_per_block
         whole = needed.shape[1] // size
@@ -141,6 +142,12 @@ class InverseDynamics:
             )
             currents[:, part] = result.transpose(0, 2, 1).reshape(len(rows) * LANES, -1)[:n]
         return currents
+
+
+def _of_loop(actuator: Actuator) -> Array:
+    """Current per acceleration that a current loop lets its command rise above the current by, A s²/rad."""
+    motor = actuator.motor
+    return _each(actuator.sensors.apparent_inertia * motor.inertia_kgm2 / motor.torque_constant_Nm_A)
 
 
 def _each(value: ArrayLike) -> Array:

@@ -60,6 +60,7 @@ BASE = {
     "sensors.current_gain": 1.02,
     "sensors.current_bias_A": 0.1,
     "sensors.delay_s": 1e-3,
+    "sensors.apparent_inertia": 0.05,
 }
 FAULTY = vector({"k3": 0.3, "k6": 0.2})  # so that the rotor's angle matters
 # Where the Monitor Model of a hysteresis drive leaves a key out by design, which its twin, the Reference Model, reads.

@@ -165,3 +165,24 @@ def test_without_current_or_motion_there_is_nothing_to_compare(tmp_path):
     still = bare.with_signals(motor_position_rad=np.zeros(500), current_A=np.ones(500))
     with pytest.raises(InputError, match="too little motion"):
         InverseDynamics([still], motor(tmp_path))
+
+
+def test_a_command_exceeds_its_current_by_an_apparent_inertia(tmp_path):
+    """The command that a current loop k_p = L ω_c, k_i = R ω_c needs for a known motion's current, step by step."""
+    resistance, inductance, bandwidth, constant = 0.3, 1.5e-4, 3000.0, 0.05
+    motion, step = spin(), 5e-6
+    time = np.arange(0.0, motion.time_s[-1], step)
+    turning = 30.0 + 8.0 * 2.0 * np.pi * 1.5 * np.cos(2.0 * np.pi * 1.5 * time)
+    current = np.interp(time, motion.time_s, motion["current_A"])
+    voltage = resistance * current + inductance * np.gradient(current, step) + constant * turning
+    asked, integral = np.empty_like(voltage), voltage[0] / (resistance * bandwidth)
+    for i, needed in enumerate(voltage):
+        more = (needed - resistance * bandwidth * integral) / (inductance * bandwidth)
+        asked[i], integral = current[i] + more, integral + step * more
+    command = motion.with_signals(current_A=np.interp(motion.time_s, time, asked))
+    share = constant**2 / (resistance * bandwidth * 1e-4)
+    ahead = f"[sensors]\ndelay_s = {-1.0 / bandwidth}\n"  # the loop's own lag
+    left = [
+        error(InverseDynamics([command], motor(tmp_path, f"{ahead}apparent_inertia = {one}\n"))) for one in (0.0, share)
+    ]
+    assert share > 0.02 and left[1] < 0.05 * left[0]

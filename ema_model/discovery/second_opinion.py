@@ -14,7 +14,7 @@ from ema_model.actuator.unread import INVERSE_PLACES, unread
 from ema_model.comparison.criteria import BAND
 from ema_model.discovery.begin import calibrated_story
 from ema_model.discovery.controller_seen import ControllerSeen, controller_seen
-from ema_model.discovery.criteria import APART, GONE, HEARD, LOOP_TOLD, MUCH_BETTER
+from ema_model.discovery.criteria import APART, GONE, HALF, HEARD, LOOP_TOLD, MUCH_BETTER
 from ema_model.discovery.objections import ratio
 from ema_model.discovery.path import Story
 from ema_model.discovery.refit import pays
@@ -64,11 +64,16 @@ class Opinion:
         return left <= BAND or left <= (1.0 if sure else MUCH_BETTER) * last
 
     def settles(self, closed: Story) -> bool:
-        """Whether the loop need not be walked on: this explains what flowed to its floor.
+        """Whether the loop need not be walked on: this explains what flowed to its floor, or so much better.
 
-        A drive's own effect beside another one is left to the loop, which alone can tell the two.
+        So much that the loop may halve its error, and would be given up still.  A drive's own effect beside another
+        one is left to the loop, which alone can tell the two.
         """
-        return at_floor(self.story.data, self.story.current) and self.explains_better(closed)
+        if not self.explains_better(closed):
+            return False
+        left = ratio(self.story.data, self.story.current)
+        far_less = left <= HALF * MUCH_BETTER * ratio(closed.data, closed.current)
+        return far_less or at_floor(self.story.data, self.story.current)
 
 
 def second_opinion(story: Story, tell: Callable[[str], None], before: Opinion | None = None) -> Opinion | None:

@@ -195,7 +195,7 @@ class _Beside:
         return opinion is not None and opinion.blames_controller
 
     def settles(self) -> bool:
-        """Whether, walked to its end, it explains what flowed to its floor, and no torque tells the loop's error."""
+        """Whether, walked to its end, it explains enough of what flowed, and no torque tells the loop's error."""
         opinion = self._ended()
         return opinion is not None and opinion.settles(self._story) and not self._bends()
 

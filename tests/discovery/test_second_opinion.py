@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from support.hidden_effects import ACTUATOR, recorded
 
 from ema_model.discovery import as_dict, discover
+from ema_model.discovery import second_opinion as asked
 from ema_model.discovery.begin import begun, calibrated_story
 from ema_model.discovery.contradiction import contradictions
 from ema_model.discovery.controller_seen import controller_seen
@@ -54,6 +56,18 @@ def test_missing_physics_is_not_blamed_on_the_controller(cogging):
 
 def test_a_loop_that_reaches_its_band_is_not_asked_again(healthy):
     assert second_opinion(begun(healthy, ACTUATOR), quiet) is None
+
+
+@pytest.mark.parametrize(
+    ("left", "loop", "settles"),
+    [(1.5, 15.0, True), (5.0, 15.0, False), (3.0, 15.0, False), (2.4, 15.0, True), (12.0, 90.0, True)],
+)
+def test_a_loop_is_not_walked_on_that_would_be_given_up_at_half_its_error(monkeypatch, left, loop, settles):
+    """Floors that inverse dynamics and the loop leave; neither is near its own."""
+    monkeypatch.setattr(asked, "ratio", lambda data, floors: floors)
+    monkeypatch.setattr(asked, "at_floor", lambda data, floors: False)
+    mine, closed = (SimpleNamespace(data=None, base=one, current=one, added=[]) for one in (left, loop))
+    assert asked.Opinion(mine, None).settles(closed) == settles
 
 
 @pytest.mark.long

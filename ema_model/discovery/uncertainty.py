@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 _OF_FILE = 2.0 / HALF_90  # times that a tolerance counts which nothing checks
 _PIECES = 12, 25  # of each window, whose pulls on the parameters are independent: the division that says least counts
-_ROUNDS = 3  # of fits, each without the parameters that the one before drove to their bounds
+_ROUNDS = 6  # of fits at most, each without the parameters that the one before drove to their bounds
 
 
 @lru_cache(maxsize=16)  # a page asks at every look

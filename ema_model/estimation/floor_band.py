@@ -9,18 +9,19 @@ from numpy.typing import NDArray
 
 from ema_model.estimation.floor import CORRELATED_S, Floor
 from ema_model.quantities.interval import HALF_90
+from ema_model.recordings.noise import SCATTER
 
 Array = NDArray[np.float64]
 
-_OF_NOISE = 1.3  # times 1/n: relative variance of a noise's standard deviation that n samples tell (third differences)
 _KNOWN_TO = 0.02  # of a floor: a few in a hundred of the noise and of what a fit takes up remain a guess
 
 
 def spread(floors: Sequence[Floor], signals: Sequence[Collection[str]]) -> float:
     """Standard deviation of a true model's error in floors, pooled over windows and over each window's signals.
 
-    The squared error is a mean: of white noise, block by block, whose size is itself estimated; and of the model's own
-    error, which is one value in 25 ms, for all signals.  A square of a normal value scatters by √2 of its mean.
+    The squared error is a mean: of white noise, block by block, whose size is itself estimated, unless it is a grid's;
+    and of the model's own error, which is one value in 25 ms, for all signals.  A square of a normal value scatters by
+    √2 of its mean.
     """
     variance = total = 0.0
     for one, names in zip(floors, signals):
@@ -29,7 +30,8 @@ def spread(floors: Sequence[Floor], signals: Sequence[Collection[str]]) -> float
         for name in names:
             of_noise = one.counts * (one.white_part(name) / one.sigma(name)) ** 2
             lasting += one.counts - of_noise
-            variance += 2.0 * float(of_noise @ of_noise) + 4.0 * _OF_NOISE / len(of_noise) * float(of_noise.sum()) ** 2
+            estimated = 0.0 if name in one.exact else 4.0 * SCATTER / len(of_noise)
+            variance += 2.0 * float(of_noise @ of_noise) + estimated * float(of_noise.sum()) ** 2
             total += float(one.counts.sum())
         together = np.add.reduceat(lasting, np.arange(0, len(lasting), size))
         variance += 2.0 * float(together @ together)

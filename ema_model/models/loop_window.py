@@ -12,7 +12,7 @@ from ema_model.commands.recorded import between
 from ema_model.errors import InputError, quoted
 from ema_model.models.model import Window
 from ema_model.recordings import SIGNALS, Measurement
-from ema_model.recordings.noise import beating, held
+from ema_model.recordings.noise import beating, held, is_of_grid
 from ema_model.simulation.pack import integral_at_start
 from ema_model.simulation.run import steps_per_sample
 
@@ -134,6 +134,9 @@ def cut(
                 held_s={
                     name: held(measurement[name][compared], samples) * period for name in known if name in measurement
                 },
+                on_grid=frozenset(
+                    name for name in known if name in measurement and is_of_grid(measurement[name][compared])
+                ),
             )
         )
     if not windows:

@@ -39,6 +39,7 @@ class Window:
     lasting: Signals = field(default_factory=dict)  # rms of what sensors are off by, where that lasts: block arrays
     beating: Signals = field(default_factory=dict)  # rms of quantisation that no mean takes away: block arrays
     held_s: Signals = field(default_factory=dict)  # how long a reading stays the same: block arrays
+    on_grid: frozenset[str] = frozenset()  # signals whose noise is their grid's
 
     @property
     def blocks(self) -> int:

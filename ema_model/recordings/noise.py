@@ -24,6 +24,8 @@ _ROUNDING, _ON_GRID = 1e-12, 0.01  # of a value, and of a grid's step
 _BEAT = 0.25  # of a beat, that a mean spans
 _LASTS = 50  # means, over which a pace stays whole
 _AROUND = 2  # means on either side, over which a pace is told
+SCATTER = 1.3  # times 1/n: relative variance of a noise's standard deviation that n samples tell (third differences)
+_MORE, _AT_MOST = 1.05, 1.12  # of a grid's noise: what differences tell of it in the mean, and of some motions
 _NEAR, _WITHIN = 3.0, 0.9866  # standard deviations, and the rms of a normal distribution's values within them
 
 
@@ -35,22 +37,33 @@ def sample_noise(values: Array, signal: str) -> float:
     shows where it moves slowly whether it has more noise than the grid's, s/√12.  Never 0: a floor is what errors are
     counted in.
     """
-    return max(_own_noise(np.asarray(values, dtype=float).tobytes()), least_noise(signal))
+    return max(_own_noise(np.asarray(values, dtype=float).tobytes())[0], least_noise(signal))
+
+
+def is_of_grid(values: Array) -> bool:
+    """Whether a signal's noise (samples,) is that of the grid on which it lies, and so known without a guess."""
+    return _own_noise(np.asarray(values, dtype=float).tobytes())[1]
 
 
 @lru_cache(maxsize=64)  # every model of a discovery asks it of the same recordings
-def _own_noise(given: bytes) -> float:
-    """`sample_noise` of float64 values, before a signal's least."""
+def _own_noise(given: bytes) -> tuple[float, bool]:
+    """`sample_noise` of float64 values, before a signal's least, and whether it is a grid's."""
     values = np.frombuffer(given)
     steps = np.abs(np.diff(values))
     steps = steps[steps > _ROUNDING * (1.0 + np.max(np.abs(values)))]
     step = float(np.min(steps)) if len(steps) else 0.0
     repeated = len(steps) < 0.9 * (len(values) - 1)  # held values are the mark of quantisation
     if not repeated:
-        return white_noise(values)
+        return _of_grid(white_noise(values), _step(values), len(values))
     pieces = np.array_split(values, max(1, len(values) // _PIECE))
-    slow = float(np.quantile([white_noise(one) for one in pieces], _SLOW))
-    return max(slow, step / np.sqrt(12.0))
+    return _of_grid(float(np.quantile([white_noise(one) for one in pieces], _SLOW)), step, len(values))
+
+
+def _of_grid(noise: float, step: float, samples: int) -> tuple[float, bool]:
+    """s/√12 where a noise on a grid of steps s is that, within 2 σ of what differences tell; and whether it is."""
+    grid = step / np.sqrt(12.0)
+    most = max(_AT_MOST, _MORE + 2.0 * np.sqrt(SCATTER / samples))
+    return (grid, True) if noise < most * grid else (noise, False)
 
 
 def beating(values: Array, size: int) -> Array:

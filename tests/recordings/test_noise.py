@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ema_model.recordings.noise import sample_noise, white_noise
+from ema_model.recordings.noise import is_of_grid, sample_noise, white_noise
 
 STEP = 1e-3
 
@@ -26,6 +26,17 @@ def test_of_a_quantised_signal_it_is_neither_more_nor_less(noise):
         found.append(sample_noise(seen, "motor_position_rad") / (STEP * np.hypot(noise, 1.0 / np.sqrt(12.0))))
     assert np.mean(found) == pytest.approx(1.0, abs=0.06)
     assert np.std(found) < 0.06
+
+
+@pytest.mark.parametrize(("noise", "is_grids"), [(0.0, True), (0.3, False), (1.0, False)])
+def test_what_is_of_the_grid_is_known_exactly(noise, is_grids):
+    """That of a slow motion, whose readings are held, and of a fast one."""
+    for samples, seed in ((2000, 0), (2000, 1), (400, 2)):
+        random = np.random.default_rng(seed)
+        seen = np.round((motion(samples, seed) / STEP) + noise * random.standard_normal(samples)) * STEP
+        assert is_of_grid(seen) == is_grids
+        exactly = sample_noise(seen, "motor_position_rad") == pytest.approx(STEP / np.sqrt(12.0), rel=1e-6)
+        assert exactly == is_grids
 
 
 def test_a_fast_motion_sampled_slowly_is_no_noise():

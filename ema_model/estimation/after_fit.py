@@ -15,6 +15,8 @@ from ema_model.models.model import Signals
 
 Array = NDArray[np.float64]
 
+_OF_TWINS = 0.25  # of the squares that the twins before and after the fit differ by: as much is left of true models
+
 
 def after_fit(
     floors: Sequence[Floor], calibration: Calibration, twins: Sequence[Signals], taken: Array | None = None
@@ -90,6 +92,6 @@ def _floors_left(
     for place, name, part, own in _parts(floors, twins, slopes):
         one = floors[place]
         before, after = (local_rms(t * one.fit_sigma(name), one.block_s) for t in (own, own - part @ taken))
-        besides = 0.5 * (np.maximum(one.model[name], before) ** 2 - before**2)  # also by how much two twins differ
+        besides = _OF_TWINS * (np.maximum(one.model[name], before) ** 2 - before**2)
         left[place][name] = np.sqrt(besides + np.minimum(before, after) ** 2)
     return [replace(one, left=its) for one, its in zip(floors, left)]

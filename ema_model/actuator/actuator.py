@@ -79,32 +79,37 @@ class Actuator:
 
         An actuator whose controller is not known has no play and end stops in its file, and so none here.
         """
+        gone = unread("open", "current")
+        neutral = {path: default_of(path) for path in gone if not path.startswith(("controller.", "inverter."))}
+        bare = replace(self, controller=Controller(kind="open"), inverter=Inverter(kind="current")).varied(neutral)
+        return replace(bare._as_read(), step_s=max(self.step_s, _OPEN_STEP_S), filter_s=Actuator.filter_s)
+
+    def without_controller(self) -> Actuator:
+        """The same for inverse dynamics: a measured motion is put in, and the current that it needs comes out."""
+        return replace(self, controller=replace(self.controller, kind="unknown"), step_s=Actuator.step_s)._as_read()
+
+    def _as_read(self) -> Actuator:
+        """Without effects that do nothing where its kind of controller is, and what is said of parameters not read."""
         from ema_model.effects import find  # the catalogue need not be loaded for an actuator without effects
 
-        gone = set(unread("open", "current"))
-        neutral = {path: default_of(path) for path in gone if not path.startswith(("controller.", "inverter."))}
+        kinds = self.controller.kind, self.inverter.kind
+        gone = unread(*kinds)
         places = {name: {place.__name__ for place in find(name).places} for name in self.effects}
         effects = {
             name: given
             for name, given in self.effects.items()
-            if not idle(places[name], bool(find(name).states), "open", "current")
+            if not idle(places[name], bool(find(name).states), *kinds)
         }
         kept = {
             path: one
             for path, one in self.tolerances.items()
             if path not in gone and (not path.startswith("effects.") or path.split(".")[1] in effects)
         }
-        return replace(
-            replace(self, controller=Controller(kind="open"), inverter=Inverter(kind="current")).varied(neutral),
-            tolerances=kept,
-            effects=effects,
-            rules=tuple(
-                replace(one, values={path: value for path, value in one.values.items() if path not in gone})
-                for one in self.rules
-            ),
-            step_s=max(self.step_s, _OPEN_STEP_S),
-            filter_s=Actuator.filter_s,
+        rules = tuple(
+            replace(one, values={path: value for path, value in one.values.items() if path not in gone})
+            for one in self.rules
         )
+        return replace(self, tolerances=kept, effects=effects, rules=rules)
 
     def circuit(self, preferred: str = "reduced") -> str:
         """The Monitor Model's drive; `preferred` is the circuit for the hysteresis current loop."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from ema_model.discovery.evidence import colour_of
 from ema_model.discovery.model_fit import Data, Fit
-from ema_model.discovery.uncertainty import covariance_of
+from ema_model.discovery.uncertainty import covariance_of, is_base
 
 _FAR = 3.0  # σ of a parameter's tolerance, beyond which it lies outside
 _TOGETHER = 0.7  # correlation from which on two are drawn by the same
@@ -21,7 +21,7 @@ def outside_tolerance(data: Data, found: Fit) -> list[str]:
     """
     calibration = found.calibration
     if found.plant.simulates_commands:
-        return [name for name in calibration.outside_tolerance if _is_base(name)]
+        return [name for name in calibration.outside_tolerance if is_base(name)]
     jacobian = calibration.weighted_jacobian / np.sqrt(colour_of(data, found))[:, None]
     expected = np.eye(calibration.x.size) - covariance_of(jacobian)
     spread = np.sqrt(np.maximum(np.diag(expected), np.finfo(float).eps))
@@ -29,10 +29,6 @@ def outside_tolerance(data: Data, found: Fit) -> list[str]:
     told: list[int] = []
     for i in np.argsort(-np.abs(calibration.x[: len(calibration.free)])):
         is_far = abs(calibration.x[i]) > _FAR * spread[i]
-        if is_far and _is_base(calibration.free[i]) and not together[i, told].any():
+        if is_far and is_base(calibration.free[i]) and not together[i, told].any():
             told.append(int(i))
     return [calibration.free[i] for i in sorted(told)]
-
-
-def _is_base(name: str) -> bool:
-    return "." in name and not name.startswith("effects.")

@@ -62,5 +62,5 @@ def by_inverse_dynamics(data: Data, actuator: Actuator) -> Actuator | None:
     if all(
         "motor_position_rad" in one and ("current_A" in one or "motor_torque_Nm" in one) for one in data.measurements
     ):
-        return replace(actuator, controller=replace(actuator.controller, kind="unknown"))
+        return actuator.without_controller()
     return None

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from ema_model.actuator import Actuator, Tolerance
-from ema_model.actuator.unread import INVERSE_PLACES, unread
+from ema_model.actuator.unread import INVERSE_PLACES
 from ema_model.comparison.criteria import BAND
 from ema_model.discovery.begin import calibrated_story
 from ema_model.discovery.controller_seen import ControllerSeen, controller_seen
@@ -92,7 +92,7 @@ def second_opinion(story: Story, tell: Callable[[str], None], before: Opinion | 
     tell("asking inverse dynamics for a second opinion")
     held = () if story.held is None else story.held.measurements
     try:
-        other = calibrated_story(story.data.measurements, delayed(without), held, None, tell, guarded=True)
+        other = calibrated_story(story.data.measurements, as_logged(without), held, None, tell, guarded=True)
     except InputError:  # too little motion, or a held-out recording without a current
         return None
     return Opinion(other, _seen(story, other))
@@ -154,20 +154,18 @@ def support_of(story: Story, name: str) -> tuple[str, ...]:
     return story.support.get(name, (own,))
 
 
-def delayed(actuator: Actuator) -> Actuator:
-    """Free in what inverse dynamics reads, and in the delay between current and motion.
+def as_logged(actuator: Actuator) -> Actuator:
+    """An actuator without its controller, free in what a log does to the current beside the motion as well.
 
-    What an ideal current source stands for may be logged as it was asked for: how much inertia its current loop adds
-    to that is free as well.
+    That is a delay; and of a drive that the model takes for an ideal current source, the log may hold the command: how
+    much inertia its current loop adds to that.
     """
-    ignored = unread(actuator.controller.kind, actuator.inverter.kind)
-    kept = {path: one for path, one in actuator.tolerances.items() if path not in ignored}
-    kept[_DELAY] = Tolerance(_DELAY_SIGMA_S, True)
+    tolerances = {**actuator.tolerances, _DELAY: Tolerance(_DELAY_SIGMA_S, True)}
     sensors = replace(actuator.sensors, delay_s=0.0)
     if actuator.inverter.kind == "current":
-        kept[_LOOP] = Tolerance(_LOOP_ADDS, True)
+        tolerances[_LOOP] = Tolerance(_LOOP_ADDS, True)
         sensors = replace(sensors, apparent_inertia=_LOOP_ADDS)
-    return replace(actuator, tolerances=kept, sensors=sensors)
+    return replace(actuator, tolerances=tolerances, sensors=sensors)
 
 
 def _acts(name: str) -> bool:

@@ -92,7 +92,7 @@ def settled(data: Data, found: Fit, tell: Callable[[str], None]) -> Fit:
     quiet, again, held = replace(data, floors=floors), found, ()
     for _ in range(_ROUNDS):
         again = fit(quiet, found.actuator, again.starts, tell, found.faults, held)
-        driven = [path for path, one in again.calibration.parameters.items() if one.at_bound and _is_base(path)]
+        driven = [path for path, one in again.calibration.parameters.items() if one.at_bound and is_base(path)]
         if not driven:
             break
         held = (*held, *driven)
@@ -113,5 +113,6 @@ def settled(data: Data, found: Fit, tell: Callable[[str], None]) -> Fit:
     )
 
 
-def _is_base(path: str) -> bool:
+def is_base(path: str) -> bool:
+    """Whether a parameter is the actuator's own, and no fault's or effect's."""
     return "." in path and not path.startswith("effects.")

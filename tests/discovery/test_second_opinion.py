@@ -15,7 +15,7 @@ from ema_model.discovery import second_opinion as asked
 from ema_model.discovery.begin import begun, calibrated_story
 from ema_model.discovery.contradiction import contradictions
 from ema_model.discovery.controller_seen import controller_seen
-from ema_model.discovery.second_opinion import delayed, second_opinion
+from ema_model.discovery.second_opinion import as_logged, second_opinion
 from ema_model.models.inverse_dynamics import InverseDynamics
 from ema_model.models.measured_motion import _moving
 
@@ -89,8 +89,8 @@ def test_a_later_current_is_found_to_be_later(healthy):
     (one,) = healthy
     steps = 8
     late = one.with_signals(current_A=np.concatenate([one["current_A"][:1].repeat(steps), one["current_A"][:-steps]]))
-    unknown = replace(ACTUATOR, controller=replace(ACTUATOR.controller, kind="unknown"))
-    stories = [calibrated_story([m], delayed(unknown), (), None, quiet, guarded=True) for m in (one, late)]
+    logged = as_logged(ACTUATOR.without_controller())
+    stories = [calibrated_story([m], logged, (), None, quiet, guarded=True) for m in (one, late)]
     first, second = (story.current.calibration.parameters["sensors.delay_s"].value for story in stories)
     assert second - first == pytest.approx(steps * one.sample_period_s, rel=0.3)
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ema_model.actuator import load_actuator, save_actuator
+from ema_model.actuator import Tolerance, load_actuator, save_actuator
 from ema_model.effects.user import torque_curve, user_torque
 from ema_model.errors import InputError
 from ema_model.faults import vector
@@ -44,6 +44,21 @@ def test_shipped_files_come_back(path, tmp_path):
     actuator = load_actuator(path)
     save_actuator(actuator, tmp_path / "again.toml")
     assert load_actuator(tmp_path / "again.toml") == actuator
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
+def test_without_its_controller_it_comes_back_with_all_that_is_read(path, tmp_path):
+    """As a discovery that goes on without one saves it, whatever acts in the drive or is told of it."""
+    given = load_actuator(path)
+    delay = {"computation_delay": {"delay_s": 1e-3}}
+    late = {"effects.computation_delay.delay_s": Tolerance(1e-3, True)}
+    bare = replace(given, effects={**given.effects, **delay}, tolerances={**given.tolerances, **late})
+    bare = replace(bare, step_s=2e-5).without_controller()
+    save_actuator(bare, tmp_path / "again.toml")
+    again = load_actuator(tmp_path / "again.toml")
+    assert again.controller.kind == "unknown" and "computation_delay" not in again.effects
+    assert again.motor.inertia_kgm2 == given.motor.inertia_kgm2 and again.sensors == given.sensors
+    assert again.tolerances == bare.tolerances and "motor.inertia_kgm2" in again.tolerances
 
 
 def test_mixed_axes_and_effects_come_back(tmp_path):

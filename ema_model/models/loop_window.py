@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 
 COMPARED = ("current_A", "motor_speed_rad_s", "motor_position_rad", "user_position_rad")
 _SLOPE_SAMPLES = 10  # on either side of a start in mid-run, over which the speed is found
+_COARSE_S = 0.01  # the same of an encoder at the user, whose steps are the motor's times the gear
 CONTEXT = ("load_torque_Nm", "temperature_C")
 BLOCK_S = 0.5e-3  # means over it take the chopping ripple away, which no low-fidelity model follows (MODEL §2)
 # Where something sticks, it does so at a step: with coarser ones the error is too rough to go downhill on (fits of a
@@ -189,11 +190,19 @@ def _start(measurement: Measurement, actuator: Actuator, at: int) -> tuple[float
     asked = measurement.get("command_rad") if user is None else user
     at_user = 0.0 if asked is None else float(asked[at])
     if motor is None:
-        return at_user, 0.0 if speed is None else float(speed[at]), 0.0
-    # A rig's speed is often the encoder's difference, far too coarse for one sample.
-    near = _near(at)
-    omega = 0.0 if at == 0 else float(np.polyfit(measurement.time_s[near], motor[near], 1)[0])
-    return float(motor[at]) * tau, omega, 0.0 if user is None else at_user / tau - float(motor[at])
+        moving = 0.0 if user is None else _slope(measurement, user, at, _COARSE_S) / tau
+        return at_user, moving if speed is None else float(speed[at]), 0.0
+    play = 0.0 if user is None else at_user / tau - float(motor[at])
+    return float(motor[at]) * tau, _slope(measurement, motor, at), play
+
+
+def _slope(measurement: Measurement, position: Array, at: int, least_s: float = 0.0) -> float:
+    """The speed of a position about a sample; a rig's own is often the encoder's difference, far too coarse for one.
+
+    0 where a recording begins.  least_s: on either side, over which it is found at least.
+    """
+    near = _near(at, max(_SLOPE_SAMPLES, round(least_s / measurement.sample_period_s)))
+    return 0.0 if at == 0 else float(np.polyfit(measurement.time_s[near], position[near], 1)[0])
 
 
 def _current(measurement: Measurement, actuator: Actuator, at: int, speed: float) -> float:
@@ -209,5 +218,5 @@ def _current(measurement: Measurement, actuator: Actuator, at: int, speed: float
     return float(pull + drag) / motor.torque_constant_Nm_A
 
 
-def _near(at: int) -> slice:
-    return slice(max(0, at - _SLOPE_SAMPLES), at + _SLOPE_SAMPLES)
+def _near(at: int, samples: int = _SLOPE_SAMPLES) -> slice:
+    return slice(max(0, at - samples), at + samples)

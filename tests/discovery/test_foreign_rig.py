@@ -29,3 +29,12 @@ def test_what_a_coarse_position_sensor_holds_is_no_missing_physics(tmp_path):
     recorded("hobby", 19, tmp_path, programmes=["random"])
     actuator = actuator_of("hobby")
     assert compare(measured(tmp_path, actuator, ["random"]), actuator).adequate
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("rate", ["1000", "2000"])
+def test_a_servo_that_is_logged_faster_is_as_near_to_its_floor(rate, tmp_path):
+    """Long enough to be fitted on parts, that begin in mid-motion, of which no motor's signal tells the speed."""
+    recorded("hobby", 51, tmp_path, programmes=["chirp", "random"], options=["--rate", rate])
+    actuator = actuator_of("hobby")
+    assert compare(measured(tmp_path, actuator, ["chirp", "random"]), actuator).over_floor <= 1.1

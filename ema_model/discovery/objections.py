@@ -49,6 +49,7 @@ def against(data: Data, before: Fit, after: Fit, keys: Sequence[str], settled: C
         next((reason for key in keys if (reason := _unmeasured(data, key) or _within(before, after, key))), "")
         or _worse(data, before, after)
         or _little(data, before, after)
+        or _needless(data, before, keys)
         or _faint(data, before, after)
         or _strained(data, before, after)
         or outdone(data, before, after)
@@ -204,6 +205,17 @@ def _little(data: Data, before: Fit, after: Fit) -> str:
     first, second = (float(one.residual @ one.residual) for one in (before, after))
     share = (first - second) / max(first - len(before.residual), len(before.residual))
     return "" if share >= LEAST_SHARE else f"it explains {100.0 * share:.0f} % of an error whose cause is not known"
+
+
+def _needless(data: Data, before: Fit, keys: Sequence[str]) -> str:
+    """Whether nothing is left to explain without a controller, where no twin says how low a true model may stand.
+
+    What is a parameter's value by another name is told as that one is.
+    """
+    is_value = any(find(catalogue_name(key)).duplicates for key in keys)
+    if is_value or not data.guarded or floor_ratio(data, before.plant, before.calibration.signals) > 1.0:
+        return ""
+    return "without it no more than the floor is left"
 
 
 def _faint(data: Data, before: Fit, after: Fit) -> str:

@@ -19,6 +19,7 @@ from ema_model.challenges.__main__ import main
 from ema_model.challenges.make import COLUMNS, RUNS, make, plant_of
 from ema_model.challenges.truth import read_truth, truths
 from ema_model.discovery import discover
+from ema_model.discovery.criteria import FAR
 from ema_model.effects import CATALOGUE
 from ema_model.errors import InputError
 from ema_model.estimation import default_free
@@ -162,7 +163,11 @@ def test_the_easy_one_is_solved():
 
 
 def test_the_readme_shows_what_discovery_says():
-    """The ladder and the names of its example, as somebody meets it who tries it."""
+    """The ladder and the names of its example, as somebody meets it who tries it.
+
+    On another processor the calibration ends elsewhere on a flat ridge, and with it the floor of a model that is far
+    from it: OpenBLAS's kernels of five kinds give 3.25 to 3.51 at first, 1.03 to 1.06 at last (OPENBLAS_CORETYPE).
+    """
     found = solved("after_the_overhaul", None)
     readme = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
     [table] = re.findall(r"^error ladder.*\n((?:  .*\n)+)", readme, re.M)
@@ -170,7 +175,8 @@ def test_the_readme_shows_what_discovery_says():
     titles = ["Calibrated", *(CATALOGUE[one.name].title for one in found.effects)]
     assert [title for title, *_ in shown] == titles
     for (title, *numbers), rung in zip(shown, found.ladder, strict=True):
-        assert [float(one) for one in numbers] == pytest.approx([rung.rmse, rung.holdout_rmse], rel=0.01), title
+        close = 0.08 if rung.rmse > FAR else 0.03
+        assert [float(one) for one in numbers] == pytest.approx([rung.rmse, rung.holdout_rmse], rel=close), title
 
 
 @pytest.mark.long

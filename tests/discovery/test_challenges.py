@@ -166,7 +166,7 @@ def test_the_readme_shows_what_discovery_says():
     """The ladder and the names of its example, as somebody meets it who tries it.
 
     On another processor the calibration ends elsewhere on a flat ridge, and with it the floor of a model that is far
-    from it: OpenBLAS's kernels of five kinds give 3.25 to 3.51 at first, 1.03 to 1.06 at last (OPENBLAS_CORETYPE).
+    from it: OpenBLAS's kernels of four kinds give 3.25 to 3.51 at first, 1.03 to 1.06 at last (OPENBLAS_CORETYPE).
     """
     found = solved("after_the_overhaul", None)
     readme = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 COMPARED = ("current_A", "motor_speed_rad_s", "motor_position_rad", "user_position_rad")
 _SLOPE_SAMPLES = 10  # on either side of a start in mid-run, over which the speed is found
-_COARSE_S = 0.01  # the same of an encoder at the user, whose steps are the motor's times the gear
+_COARSE_S = 0.01  # the same of the user's encoder, which is coarse beside a motor's
 CONTEXT = ("load_torque_Nm", "temperature_C")
 BLOCK_S = 0.5e-3  # means over it take the chopping ripple away, which no low-fidelity model follows (MODEL §2)
 # Where something sticks, it does so at a step: with coarser ones the error is too rough to go downhill on (fits of a

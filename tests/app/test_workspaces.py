@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 
 import numpy as np
 import pytest
-from playwright.sync_api import Error
-from support.on_page import wait_until
+from support.on_page import press, wait_until
 
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
@@ -56,15 +54,6 @@ def compared(tab, app, tmp_path_factory):
 def go(page, name):
     page.get_by_role("tab", name=name, exact=True).click()
     page.get_by_role("tab", name=RIGHT[name], exact=True).wait_for()
-
-
-def leads_to(page, button, name):
-    """Pressed again where the page has drawn the button anew at that moment."""
-    for _ in range(3):
-        page.get_by_role("button", name=button).click()
-        with contextlib.suppress(Error):
-            return page.get_by_role("tab", name=name, exact=True).wait_for(timeout=20_000)
-    raise AssertionError(f"{button} does not lead to {name}")
 
 
 def right(page):
@@ -135,11 +124,11 @@ def test_compare_leads_on_to_identify_and_discover(tab, app, compared):
     for lead in ("Find what is missing", "Identify faults"):
         box = tab.get_by_role("button", name=lead).bounding_box()
         assert 0.0 < box["y"] < strip - box["height"], "both are seen without scrolling"
-    leads_to(tab, "Identify faults", "Search")
+    press(tab, "Identify faults", tab.get_by_role("tab", name="Search", exact=True))
     assert app.session.settings.source == next(iter(app.comparing.opened))
     app.session.settings.set("source", "")
     go(tab, "Compare")
-    leads_to(tab, "Find what is missing", "Discovery")
+    press(tab, "Find what is missing", tab.get_by_role("tab", name="Discovery", exact=True))
     tab.get_by_text("The measurements and the actuator of Compare.").wait_for()
     assert tab.url.endswith("?view=discover")
 

@@ -27,6 +27,15 @@ def fill(page, label, value):
     field(page, label).press("Enter")
 
 
+def press(page, name, leads_to):
+    """A button, pressed again where the page has drawn it anew at that moment; leads_to: a locator that is seen then."""
+    for _ in range(3):
+        page.get_by_role("button", name=name).click()
+        with contextlib.suppress(Error):
+            return leads_to.wait_for(timeout=15_000)
+    raise AssertionError(f"{name} does not lead on")
+
+
 def choose(page, label, option):
     """Opens the list again where the page has drawn it anew meanwhile."""
     wanted = page.get_by_role("option", name=option, exact=True)

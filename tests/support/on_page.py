@@ -28,7 +28,7 @@ def fill(page, label, value):
 
 
 def press(page, name, leads_to):
-    """A button, pressed again where the page has drawn it anew at that moment; leads_to: a locator that is seen then."""
+    """A button, pressed again where the page has drawn it anew at that moment; leads_to: what is seen then."""
     for _ in range(3):
         page.get_by_role("button", name=name).click()
         with contextlib.suppress(Error):

@@ -45,7 +45,7 @@ def is_of_grid(values: Array) -> bool:
     return _own_noise(np.asarray(values, dtype=float).tobytes())[1]
 
 
-@lru_cache(maxsize=64)  # every model of a discovery asks it of the same recordings
+@lru_cache(maxsize=256)  # every model of a discovery asks it of the same recordings and of their parts
 def _own_noise(given: bytes) -> tuple[float, bool]:
     """`sample_noise` of float64 values, before a signal's least, and whether it is a grid's."""
     values = np.frombuffer(given)

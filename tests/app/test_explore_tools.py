@@ -6,7 +6,7 @@ import struct
 
 import numpy as np
 import pytest
-from support.on_page import choose, field, press, wait_until
+from support.on_page import choose, field, wait_until
 
 from ema_model.actuator import load_actuator
 from ema_model.faults import vector
@@ -74,7 +74,9 @@ def test_a_fan_comes_at_one_click_and_a_load_shows_at_once(page, app):
     settings = app.session.settings
     field(page, "k8 gain × 1.00").fill("0.8")
     wait_until(lambda: settings.k[7] == 0.8)
-    press(page, "Fan of severities", page.locator("[role=tab][aria-selected=true]", has_text="Fan"))
+    field(page, "k8 gain × 1.30").wait_for()  # drawn anew, so that the press is not lost
+    page.get_by_role("button", name="Fan of severities").click()
+    page.locator("[role=tab][aria-selected=true]", has_text="Fan").wait_for(timeout=20_000)
     page.get_by_text("gain × 1.50").first.wait_for(timeout=20_000)
     page.get_by_role("tab", name="Signals").click()
     choose(page, "Profile", "step")

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.actuator.naming import on_axes
-from ema_model.comparison.criteria import BAND, BEYOND, SLOW
+from ema_model.comparison.criteria import BEYOND, SLOW
 from ema_model.comparison.events import Event, events
 from ema_model.comparison.explain import Explanation, explain, used_blocks
 from ema_model.comparison.orders import Order, residual_orders
@@ -97,7 +97,7 @@ def judged(signals: Iterable[str]) -> list[str]:
 
 def most_of_floor(spread: float) -> float:
     """The error in floors up to which a model is adequate; spread: as of `estimation.floor_band`."""
-    return max(BAND, 1.0 + BEYOND * spread)
+    return 1.0 + BEYOND * spread
 
 
 def _order(order: Order, primary: str, residuals: Residuals, actuator: Actuator) -> str:

@@ -23,7 +23,7 @@ from ema_model.discovery.criteria import (
 )
 from ema_model.discovery.evidence import colour_of, evidence, signals_of
 from ema_model.discovery.model_fit import ANGLES, Data, Fit, floor_ratio
-from ema_model.discovery.remaining import at_floor, left_by, used_left, within_band
+from ema_model.discovery.remaining import at_floor, left_by, may_be_true, used_left
 from ema_model.discovery.stability import disagreement
 from ema_model.effects import catalogue_name, find
 from ema_model.estimation.floor_band import band
@@ -221,7 +221,7 @@ def _needless(data: Data, before: Fit, keys: Sequence[str]) -> str:
 def _faint(data: Data, before: Fit, after: Fit) -> str:
     """Whether a model that may be true as it is would keep most of what it leaves beyond the floor."""
     first, last = (floor_ratio(data, one.plant, one.calibration.signals) for one in (before, after))
-    if not within_band(data, before) or last <= 1.0:
+    if not may_be_true(data, before) or last <= 1.0:
         return ""
     kept = (last**2 - 1.0) / max(first**2 - 1.0, 1e-9)
     share = OF_FAINT if last > band(data.floor_spread)[1] else LEAST_SHARE
@@ -230,7 +230,7 @@ def _faint(data: Data, before: Fit, after: Fit) -> str:
 
 def _strained(data: Data, before: Fit, after: Fit) -> str:
     """Whether beside a model that may be true as it is, the effect needs a parameter that this has at its bound."""
-    if not within_band(data, before):
+    if not may_be_true(data, before):
         return ""
     known = before.calibration.parameters
     bent = [path for path, one in after.calibration.parameters.items() if one.at_bound and path in known]

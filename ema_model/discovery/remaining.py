@@ -48,6 +48,11 @@ def within_band(data: Data, found: Fit) -> bool:
     return floor_ratio(data, found.plant, found.calibration.signals) <= most_of_floor(data.floor_spread)
 
 
+def may_be_true(data: Data, found: Fit) -> bool:
+    """Whether a fit leaves so little that an effect must tell most of it to be more than a bent one."""
+    return within_band(data, found) or floor_ratio(data, found.plant, found.calibration.signals) <= BAND
+
+
 @lru_cache(maxsize=16)
 def lasts(data: Data, found: Fit) -> bool:
     """Whether what is left of a signal lasts longer than noise does, as `compare` has it."""

@@ -67,6 +67,7 @@ def discovered(task, i):
         "effects": named if hidden else [],
         "same_as": [""] if named and hidden else [],
         "ladder": [2.0, 1.0],
+        "floor_band": [0.95, 1.05],
         "holdout_ladder": [2.0, None],
     }
 

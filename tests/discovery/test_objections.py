@@ -153,7 +153,7 @@ def test_the_share_that_counts_is_of_what_the_settled_models_leave(monkeypatch, 
 def test_of_a_model_that_may_be_true_an_effect_takes_most_or_is_not_claimed(monkeypatch, before, after, kept):
     """Nine of ten true models leave up to 1.04 floors here, and one of a hundred up to 1.25."""
     monkeypatch.setattr(objections, "floor_ratio", lambda data, plant, signals: plant)
-    monkeypatch.setattr(objections, "within_band", lambda data, fit: fit.plant <= 1.25)
+    monkeypatch.setattr(objections, "may_be_true", lambda data, fit: fit.plant <= 1.25)
     fits = [SimpleNamespace(plant=error, calibration=SimpleNamespace(signals=[])) for error in (before, after)]
     said = objections._faint(SimpleNamespace(floor_spread=0.04 / 1.645), *fits)
     assert said == ("a true model may leave as much, and most of it stays" if kept else "")
@@ -191,7 +191,7 @@ def test_without_a_controller_nothing_is_added_to_a_model_at_its_floor(monkeypat
 def test_beside_a_model_that_may_be_true_no_effect_needs_a_parameter_at_its_bound(
     monkeypatch, path, at_bound, may_be_true, is_new, said
 ):
-    monkeypatch.setattr(objections, "within_band", lambda data, fit: may_be_true)
+    monkeypatch.setattr(objections, "may_be_true", lambda data, fit: may_be_true)
     before, after = fitted([1.0, 1.0]), fitted([1.0, 1.0])
     after.calibration.parameters = {path: Calibrated(1.0, 0.5, (0.9, 1.1), "", 1.0, at_bound)}
     before.calibration.parameters = {} if is_new else after.calibration.parameters

@@ -13,7 +13,7 @@ from support.hidden_effects import ACTUATOR, SINE, recorded
 from ema_model.comparison.criteria import BAND
 from ema_model.comparison.residuals import Residuals
 from ema_model.comparison.result import SignalError
-from ema_model.comparison.verdict import judge
+from ema_model.comparison.verdict import judge, most_of_floor
 from ema_model.discovery import as_dict, begun, result_of
 from ema_model.discovery.model_fit import floor_ratio
 from ema_model.discovery.result import VERDICTS
@@ -83,8 +83,8 @@ def test_verdict_and_ladder_never_contradict(healthy, lacking):
     for found in answers(healthy, lacking):
         seen.add(found.verdict)
         rest = found.ladder[-1].rmse
-        assert found.verdict in VERDICTS and (found.verdict not in SURE or (found.at_floor and rest <= BAND))
-        assert found.at_floor or rest > BAND or found.verdict not in SURE
+        assert found.verdict in VERDICTS and (found.verdict not in SURE or found.at_floor)
+        assert found.at_floor == (rest <= most_of_floor(found.data.floor_spread) < BAND)
         assert not found.effects or found.verdict == ("effects_found" if found.at_floor else "partly_explained")
         told = json.loads(json.dumps(as_dict(found), allow_nan=False))
         assert told["remaining"] == {"rmse": rest, "at_floor": found.at_floor}

@@ -9,7 +9,9 @@ from typing import Any
 
 from ema_model.actuator.naming import path_inside
 from ema_model.comparison.criteria import BAND
+from ema_model.comparison.verdict import most_of_floor
 from ema_model.effects import CATALOGUE
+from ema_model.quantities.interval import HALF_90
 from support.foreign_rigs import actuator_of
 
 SHOWABLE = 3.0  # `change_over_floor` of what a recording must tell; below 1 nobody can, between them hardly
@@ -75,7 +77,8 @@ def tally(row: Mapping[str, Any], truth: Mapping[str, Any]) -> Counter[str]:
     outside = any(part in path for part in parts for path in row["outside"])
     named = bool(groups) and bool(groups[0] & right) and len(groups[0]) <= _LARGEST_GROUP
     curve = bool(right & {"curve", "unknown"}) and not groups and bool(row["unknown"])
-    above = row["ladder"][-1] is None or row["ladder"][-1] > BAND
+    most = most_of_floor((row["floor_band"][1] - 1.0) / HALF_90)
+    above = row["ladder"][-1] is None or row["ladder"][-1] > most
     shaft = _BEYOND_THE_MOTOR.get(row.get("transmission") or "") in right
     correct = (named or outside or shaft) and not wrong
     drive = bool(row.get("controller_mismatch")) or any(map(_drives, row["effects"]))

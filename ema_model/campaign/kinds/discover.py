@@ -62,6 +62,7 @@ def _run(given: Given, settings: Settings, seed: int) -> dict[str, Any]:
         "unknown": None if unknown is None else f"{unknown['variable']} × {unknown['modulator']}",
         "rungs": [rung["label"] for rung in ladder],
         "ladder": [rung["rmse"] for rung in ladder],
+        "floor_band": found["floor_band"],
         "holdout_ladder": [rung["holdout_rmse"] for rung in ladder],
         "faults": list(faults),
         "fault_values": [one["value"] for one in faults.values()],
@@ -123,6 +124,7 @@ KIND = Kind(
             ("unknown", TEXT),  # what the rest goes with: variable × modulator
             ("rungs", TEXTS),
             ("ladder", NUMBERS),  # in units of the floor
+            ("floor_band", NUMBERS),  # between which nine of ten true models end
             ("holdout_ladder", NUMBERS),
             ("faults", TEXTS),
             ("fault_values", NUMBERS),

@@ -36,8 +36,10 @@ def check_all_is_read(actuator: Actuator, where: str) -> None:
         _check_effect_acts(actuator, name, where)
     if not known and actuator.step_s != Actuator.step_s:
         raise InputError(f"{where}: model.step_s: {INVERSE} takes no steps; leave it out")
-    if known and actuator.filter_s != Actuator.filter_s:
-        raise InputError(f"{where}: model.filter_s: it is of inverse dynamics, for an unknown controller; leave it out")
+    for name in ("filter_s", "derivative_noise"):
+        if known and getattr(actuator, name) != getattr(Actuator, name):
+            reason = "it is of inverse dynamics, for an unknown controller"
+            raise InputError(f"{where}: model.{name}: {reason}; leave it out")
     if actuator.has_reference_model:
         _check_reference_only(actuator, where)
 

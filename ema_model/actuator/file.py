@@ -96,8 +96,9 @@ def actuator_of(document: dict[str, Any], where: str) -> Actuator:
         faults=_faults(tables["faults"], where),
         axes=axes,
         step_s=_seconds(tables["model"], "step_s", _usual_step(kinds), where),
-        torque_known=_flag(tables["model"], "torque_known", where),
+        torque_known=_flag(tables["model"], "torque_known", True, where),
         filter_s=_seconds(tables["model"], "filter_s", 12e-3, where),
+        derivative_noise=_flag(tables["model"], "derivative_noise", False, where),
         mapping=_mapping(tables["recordings"], where),
         rules=_rules(tables["recordings"], axes, where),
         **sections,
@@ -243,8 +244,8 @@ def _seconds(table: dict[str, Any], name: str, usual: float, where: str) -> floa
     return value
 
 
-def _flag(table: dict[str, Any], name: str, where: str) -> bool:
-    value = table.get(name, True)
+def _flag(table: dict[str, Any], name: str, usual: bool, where: str) -> bool:
+    value = table.get(name, usual)
     if not isinstance(value, bool):
         raise InputError(f"{where}: [model] {name} must be true or false, not {quoted(value, 40)!r}")
     return value

@@ -54,11 +54,10 @@ def calibrated_story(
     holdout: Sequence[Measurement],
     signals: Sequence[str] | None,
     tell: Progress,
-    guarded: bool = False,
 ) -> Story:
-    """guarded: as of `InverseDynamics`."""
+    """The same of what one model can take, in its loop or without."""
     tell("measuring the model's floor")
-    data, held = (_data(recordings, actuator, signals, guarded) for recordings in (measurements, holdout))
+    data, held = (_data(recordings, actuator, signals) for recordings in (measurements, holdout))
     assert data is not None
     tell("calibrating")
     far = replace(data, floors=[replace(one, even=True) for one in data.floors])
@@ -73,10 +72,8 @@ def calibrated_story(
     return Story(data, held, [Step(base, rung_of(Change(), base, data, held), ())], not is_lost(lost))
 
 
-def _data(
-    recordings: Sequence[Measurement], actuator: Actuator, signals: Sequence[str] | None, guarded: bool
-) -> Data | None:
+def _data(recordings: Sequence[Measurement], actuator: Actuator, signals: Sequence[str] | None) -> Data | None:
     if not recordings:
         return None
     inside = [prepared(recording, actuator) for recording in recordings]
-    return gather(inside, actuator, weights_of(signals, actuator), fit_stretches(inside, actuator), guarded)
+    return gather(inside, actuator, weights_of(signals, actuator), fit_stretches(inside, actuator))

@@ -41,7 +41,7 @@ def claimed(story: Story, accepted: Sequence[Trial], tell: Progress) -> Claim | 
         elif further is not None and not further.stands_out:
             reason = f"its order {best.candidate.settings['order']:g} tells no more than its neighbours"
         # Without a controller there is no twin, whose floor would tell a faint further order from what is left.
-        alone_first = story.data.guarded and not (more is not None and _halves(story, best, more))
+        alone_first = story.current.actuator.derivative_noise and not (more is not None and _halves(story, best, more))
         for whole in () if reason else (best, more) if alone_first else (more, best):
             if whole is None:
                 continue

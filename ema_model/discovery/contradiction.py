@@ -144,7 +144,7 @@ def _with(story: Story, alone: Data, one: _Attempt) -> float | None:
     """The error with a reading put right, in floors; None where it cannot be simulated."""
     actuator = story.current.calibration.actuator
     try:
-        data = gather([one.measurement], actuator, alone.signals, alone.stretches, alone.guarded)
+        data = gather([one.measurement], actuator, alone.signals, alone.stretches)
         return resimulated(data, actuator)[0]
     except (InputError, FloatingPointError):
         return None

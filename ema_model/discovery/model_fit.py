@@ -36,7 +36,6 @@ class Data:
     stretches: Sequence[list[slice] | None] | None
     floors: Sequence[Floor]
     signals: Mapping[str, float]
-    guarded: bool = False  # inverse dynamics as a second opinion: held to what differentiation can tell
     after_fit: Sequence[Floor] = ()  # what a true model leaves once it is fitted; () before the first fit
 
     @property
@@ -56,7 +55,7 @@ class Data:
 
     def plant(self, actuator: Actuator) -> Model:
         """The recordings beside this actuator's model."""
-        return model_for(self.measurements, actuator, stretches=self.stretches, guarded=self.guarded)
+        return model_for(self.measurements, actuator, stretches=self.stretches)
 
     def over_floor(self, plant: Model, shown: Sequence[Mapping[str, Array]]) -> Array:
         """Signals of each window of the plant, (…, blocks), over the floor, in a residual's order: (…, values)."""
@@ -119,12 +118,11 @@ def gather(
     actuator: Actuator,
     signals: Mapping[str, float],
     stretches: Sequence[list[slice] | None] | None,
-    guarded: bool = False,
 ) -> Data:
     """The data with the floors of the bare model."""
-    plant = model_for(measurements, actuator, stretches=stretches, guarded=guarded)
+    plant = model_for(measurements, actuator, stretches=stretches)
     floors = [floor(plant, place) for place in range(len(plant.windows))]
-    return Data(measurements, stretches, floors, signals, guarded)
+    return Data(measurements, stretches, floors, signals)
 
 
 @lru_cache(maxsize=4)

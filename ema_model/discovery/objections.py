@@ -212,10 +212,10 @@ def _needless(data: Data, before: Fit, keys: Sequence[str]) -> str:
 
     What is a parameter's value by another name is told as that one is.
     """
-    is_value = any(find(catalogue_name(key)).duplicates for key in keys)
-    if is_value or not data.guarded or floor_ratio(data, before.plant, before.calibration.signals) > 1.0:
+    if not before.actuator.derivative_noise or any(find(catalogue_name(key)).duplicates for key in keys):
         return ""
-    return "without it no more than the floor is left"
+    left = floor_ratio(data, before.plant, before.calibration.signals)
+    return "" if left > 1.0 else "without it no more than the floor is left"
 
 
 def _faint(data: Data, before: Fit, after: Fit) -> str:

@@ -92,7 +92,7 @@ def second_opinion(story: Story, tell: Callable[[str], None], before: Opinion | 
     tell("asking inverse dynamics for a second opinion")
     held = () if story.held is None else story.held.measurements
     try:
-        other = calibrated_story(story.data.measurements, as_logged(without), held, None, tell, guarded=True)
+        other = calibrated_story(story.data.measurements, as_logged(without), held, None, tell)
     except InputError:  # too little motion, or a held-out recording without a current
         return None
     return Opinion(other, _seen(story, other))

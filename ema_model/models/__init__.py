@@ -18,12 +18,8 @@ def model_for(
     actuator: Actuator,
     effects: Mapping[str, Mapping[str, float]] | None = None,
     stretches: Sequence[list[slice] | None] | None = None,
-    guarded: bool = False,
 ) -> Model:
-    """The closed loop where the controller is known; inverse dynamics where it is not, and for static maps.
-
-    guarded: as of `InverseDynamics`.
-    """
+    """The closed loop where the controller is known; inverse dynamics where it is not, and for static maps."""
     if actuator.controller.kind == "unknown" or any(m.is_map for m in measurements):
-        return InverseDynamics(measurements, actuator, effects=effects, stretches=stretches, guarded=guarded)
+        return InverseDynamics(measurements, actuator, effects=effects, stretches=stretches)
     return ClosedLoop(measurements, actuator, effects=effects, stretches=stretches)

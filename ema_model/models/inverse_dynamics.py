@@ -44,9 +44,7 @@ class InverseDynamics:
         *,
         effects: Mapping[str, Mapping[str, float]] | None = None,
         stretches: Sequence[list[slice] | None] | None = None,
-        guarded: bool = False,
     ) -> None:
-        """guarded: whether noise of the position counts in the floor, and reversals are left out."""
         if not measurements:
             raise InputError("one recording or more is needed")
         self.actuator = actuator
@@ -60,7 +58,7 @@ class InverseDynamics:
         self.windows = [
             stretch
             for i, (m, parts) in enumerate(zip(self.measurements, chosen))
-            for stretch in stretches_of(self.recorded[i], m, actuator, recording=i, parts=parts, guarded=guarded)
+            for stretch in stretches_of(self.recorded[i], m, actuator, recording=i, parts=parts)
         ]
 
     def signals(

@@ -1,9 +1,10 @@
 """A recording's motion for inverse dynamics: filtered, with the blocks in which friction's law is known.
 
-Guarded, it is held to what differentiation can tell, as a second opinion must be.  What the position is off by
-(quantisation, jitter of its time stamps) acts on the current through the inertia; after the filter it lasts as long
-as the filter does, and stands in the floor as such: a regression that took it for white would be too sure of all that
-it finds (Janot, Vandanjon and Gautier, IEEE Trans. Control Syst. Technol. 22 (2014), on noise in the regressors).
+Where the actuator asks for it, it is held to what differentiation can tell, as a second opinion must be.  What the
+position is off by (quantisation, jitter of its time stamps) acts on the current through the inertia; after the filter
+it lasts as long as the filter does, and stands in the floor as such: a regression that took it for white would be too
+sure of all that it finds (Janot, Vandanjon and Gautier, IEEE Trans. Control Syst. Technol. 22 (2014), on noise in the
+regressors).
 About a reversal, friction is no step of the measured speed's sign, and until a stroke is on its way bristles may bend
 where the motor seems to slide: blocks within the filter's reach of either are left out, as usual in the
 identification of robots.
@@ -67,7 +68,6 @@ def stretches_of(
     *,
     recording: int,
     parts: list[slice] | None,
-    guarded: bool,
 ) -> list[Stretch]:
     """The stretches of a recording, as it was recorded and on an even grid; parts: in place of its runs.
 
@@ -83,7 +83,7 @@ def stretches_of(
     if not measurement.is_map:
         check_period(measurement, actuator.filter_s)
     size = 1 if measurement.is_map else max(1, round(actuator.filter_s / _BLOCKS_PER_FILTER / period))
-    guarded = guarded and not measurement.is_map
+    guarded = actuator.derivative_noise and not measurement.is_map
     shaken = _position_noise(recorded, measurement) if guarded else np.zeros(measurement.samples)
     found = []
     runs = [slice(0, measurement.samples)] if measurement.is_map else parts or measurement.runs

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from support.foreign_rigs import actuator_of, measured, recorded
 
+from ema_model.actuator import load_actuator, save_actuator
 from ema_model.comparison import compare
 from ema_model.comparison.criteria import BAND
 from ema_model.discovery import discover
@@ -29,6 +30,19 @@ def test_what_a_coarse_position_sensor_holds_is_no_missing_physics(tmp_path):
     recorded("hobby", 19, tmp_path, programmes=["random"])
     actuator = actuator_of("hobby")
     assert compare(measured(tmp_path, actuator, ["random"]), actuator).adequate
+
+
+@pytest.mark.long
+def test_a_model_that_went_on_without_its_controller_compares_as_it_was_discovered(tmp_path):
+    recorded("gearservo", 3, tmp_path, programmes=["chirp"])
+    actuator = actuator_of("gearservo")
+    logged = measured(tmp_path, actuator, ["chirp"])
+    found = discover(logged, actuator, candidates=("asymmetric_friction", "torsional_compliance"))
+    assert found.actuator.controller.kind == "unknown"
+    save_actuator(found.actuator, tmp_path / "found.toml")
+    again = compare(logged, load_actuator(tmp_path / "found.toml"), calibrate=False)
+    assert again.over_floor == pytest.approx(found.ladder[-1].rmse, rel=0.02)
+    assert again.floor_band == pytest.approx(found.floor_band, abs=0.01)
 
 
 @pytest.mark.long

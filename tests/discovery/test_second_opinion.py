@@ -90,7 +90,7 @@ def test_a_later_current_is_found_to_be_later(healthy):
     steps = 8
     late = one.with_signals(current_A=np.concatenate([one["current_A"][:1].repeat(steps), one["current_A"][:-steps]]))
     logged = as_logged(ACTUATOR.without_controller())
-    stories = [calibrated_story([m], logged, (), None, quiet, guarded=True) for m in (one, late)]
+    stories = [calibrated_story([m], logged, (), None, quiet) for m in (one, late)]
     first, second = (story.current.calibration.parameters["sensors.delay_s"].value for story in stories)
     assert second - first == pytest.approx(steps * one.sample_period_s, rel=0.3)
 
@@ -108,7 +108,7 @@ def test_what_creeps_before_it_slides_is_left_out():
 
 
 def test_a_stated_noise_passes_the_filter(healthy):
-    model = InverseDynamics(healthy, ACTUATOR, guarded=True)
+    model = InverseDynamics(healthy, replace(ACTUATOR, derivative_noise=True))
     own, stated = model.noise(0, {})["current_A"], model.noise(0, {"current_A": 0.4})["current_A"]
     assert 0.0 < stated < 0.4 and stated == pytest.approx(2.0 * model.noise(0, {"current_A": 0.2})["current_A"])
     assert own == pytest.approx(0.5 * stated, rel=0.5)

@@ -27,6 +27,7 @@ VERDICTS = {
     "not_repeatable": "the run does not repeat itself, so that a comparison over time means nothing",
 }
 _MOVED, _MOST_MOVED = 0.5, 3  # σ of a tolerance, from which on a parameter's own value is worth a word; of those
+_NEAR = 1.2  # times the floor, below which a digit more tells a true model from another
 FLOOR_NOTE = (
     "Errors are rms over all fitted signals in units of the floor: 1 is what noise and the model's own limits leave. "
     "A little below 1 is usual, as the floor is measured on the safe side."
@@ -60,6 +61,8 @@ def _answer(found: Discovery) -> str:
     if found.verdict == "unknown_effect" and found.at_floor and found.transmission_seen is not None:
         return f"Motion and current are explained; {found.transmission_seen.short}."
     if found.verdict == "unknown_effect" and found.curve is None:
+        if found.not_claimed:  # an effect that would pay does explain some of it
+            return f"Something is missing, and nothing that was tried can be claimed for it: {remains(found)}."
         return f"Something is missing that none of the known effects explains: {remains(found)}."
     text = VERDICTS.get(found.verdict, verdict_name(found))
     return f"{text[:1].upper()}{text[1:]}."
@@ -90,7 +93,8 @@ def remains(found: Discovery) -> str:
     left = found.unknown
     goes = "" if left is None else f", varies with {dependence(left.variable, left.modulator)}"
     shaft = "" if found.transmission_seen is None else f"; and {found.transmission_seen.short}"
-    return f"{number(found.ladder[-1].rmse, 2)} times the floor remains, cause unknown{goes}{shaft}"
+    rest = found.ladder[-1].rmse
+    return f"{number(rest, 2 if rest > _NEAR else 3)} times the floor remains, cause unknown{goes}{shaft}"
 
 
 def repeatability(found: Discovery) -> list[str]:

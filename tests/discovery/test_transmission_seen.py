@@ -124,4 +124,5 @@ def test_the_headline_says_what_is_explained_and_what_is_not(seen, at_floor, sai
     found: Any = SimpleNamespace(verdict="unknown_effect", at_floor=at_floor, transmission_seen=seen)
     found.faults, found.parameters_outside_tolerance, found.effects, found.unknown = {}, [], [], None
     found.controller_seen, found.curve, found.ladder = None, None, [SimpleNamespace(rmse=1.352)]
+    found.not_claimed = {}
     assert headline(found) == said

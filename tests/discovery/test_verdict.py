@@ -104,6 +104,11 @@ def test_what_is_not_claimed_is_told_with_the_reason(healthy):
     found = replace(result_of(healthy), not_claimed={"torsional_compliance": "the fit with it did not converge"})
     line = "Torsional compliance is not claimed: the fit with it did not converge."
     assert line in sentences(found) and line in str(found)
+    rest = replace(found.ladder[-1], rmse=1.083)
+    unknown = replace(found, verdict="unknown_effect", at_floor=False, ladder=[rest])
+    said = "Something is missing, and nothing that was tried can be claimed for it: 1.08 times the floor remains"
+    assert headline(unknown).startswith(said)
+    assert "none of the known effects explains" in headline(replace(unknown, not_claimed={}))
     assert as_dict(found)["not_claimed"] == {"torsional_compliance": "the fit with it did not converge"}
 
 

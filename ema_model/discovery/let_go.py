@@ -6,6 +6,8 @@ would move back, and the others with it.
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,6 +25,14 @@ def at_bounds(found: Fit) -> NDArray[np.bool_]:
     return np.minimum(-low, high) <= AT_BOUND
 
 
+@lru_cache(maxsize=1)  # a fit is asked with the columns of each candidate
+def _parabola(found: Fit) -> tuple[Array, Array, Array]:
+    """J, and half of χ²'s second and first derivative by the unknowns."""
+    calibration = found.calibration
+    jacobian, x = calibration.weighted_jacobian, calibration.x
+    return jacobian, jacobian.T @ jacobian + np.eye(len(x)), jacobian.T @ found.residual + x
+
+
 def let_go(found: Fit, columns: Array) -> tuple[Array, Array, Array, float] | None:
     """Amounts a of some columns (values, columns) beside what leaves its bound for them; None where nothing does.
 
@@ -32,22 +42,20 @@ def let_go(found: Fit, columns: Array) -> tuple[Array, Array, Array, float] | No
     held = np.flatnonzero(at_bounds(found))
     if not len(held):
         return None
-    calibration, residual = found.calibration, found.residual
-    jacobian, x = calibration.weighted_jacobian, calibration.x
-    low, high = calibration.room
-    hessian, mixed = jacobian.T @ jacobian + np.eye(len(x)), jacobian.T @ columns
-    gradient, energy = jacobian.T @ residual + x, columns.T @ columns
+    residual, (low, high) = found.residual, found.calibration.room
+    jacobian, hessian, gradient = _parabola(found)
+    mixed, energy = jacobian.T @ columns, columns.T @ columns
     gone: set[int] = set()
     barred: set[int] = set()
     amounts, own, toward, given = np.zeros(columns.shape[1]), energy, energy[0], 0.0
     for _ in range(2 * len(held) + 1):
-        free = np.array([one for one in range(len(x)) if one not in held or one in gone], dtype=int)
+        free = np.array([one for one in range(len(gradient)) if one not in held or one in gone], dtype=int)
         inverse = np.linalg.inv(hessian[np.ix_(free, free)])
         own = energy - mixed[free].T @ inverse @ mixed[free]
         toward = mixed[free].T @ inverse @ gradient[free] - columns.T @ residual
         given = float(gradient[free] @ inverse @ gradient[free])
         amounts = np.linalg.solve(own + _RIDGE * (np.trace(energy) + 1e-300) * np.eye(len(own)), toward)
-        step = np.zeros(len(x))
+        step = np.zeros(len(gradient))
         step[free] = -inverse @ (gradient[free] + mixed[free] @ amounts)
         beyond = {one for one in gone if not low[one] - AT_BOUND <= step[one] <= high[one] + AT_BOUND}
         if beyond:

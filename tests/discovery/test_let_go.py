@@ -10,9 +10,10 @@ import pytest
 from scipy.optimize import lsq_linear
 
 from ema_model.discovery.let_go import let_go
+from ema_model.discovery.model_fit import Fit
 
 
-def found_at_bounds(seed: int) -> tuple[Any, np.ndarray, np.ndarray]:
+def found_at_bounds(seed: int) -> tuple[Fit, np.ndarray, np.ndarray]:
     """A linear fit whose unknowns, a σ of prior each, hide a column of their own size; some end at a bound of 0.5 σ."""
     random = np.random.default_rng(seed)
     jacobian = random.standard_normal((400, 5))
@@ -20,8 +21,10 @@ def found_at_bounds(seed: int) -> tuple[Any, np.ndarray, np.ndarray]:
     measured = random.standard_normal(400) - 2.0 * column
     rows, target = np.r_[jacobian, np.eye(5)], np.r_[-measured, np.zeros(5)]
     x = lsq_linear(rows, target, (-0.5, 0.5), tol=1e-14).x
-    calibration = SimpleNamespace(weighted_jacobian=jacobian, x=x, room=(-0.5 - x, 0.5 - x))
-    return SimpleNamespace(calibration=calibration, residual=measured + jacobian @ x), column, x
+    calibration: Any = SimpleNamespace(weighted_jacobian=jacobian, x=x, room=(-0.5 - x, 0.5 - x))
+    calibration.residual = measured + jacobian @ x
+    nothing: Any = None
+    return Fit(nothing, nothing, calibration, {}), column, x
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -42,5 +45,6 @@ def test_the_fall_is_that_of_the_bounded_problem(seed):
 
 def test_nothing_is_let_go_where_none_stands_at_a_bound():
     found, column, _ = found_at_bounds(0)
-    found.calibration.room = (np.full(5, -3.0), np.full(5, 3.0))
+    calibration: Any = found.calibration
+    calibration.room = (np.full(5, -3.0), np.full(5, 3.0))
     assert let_go(found, column[:, None]) is None

@@ -54,7 +54,7 @@ class Actuator:
     axes: Axes = field(default_factory=Axes)
     step_s: float = 1e-5  # of the Monitor Model
     filter_s: float = 12e-3  # half width over which a measured motion is differentiated, for inverse dynamics
-    derivative_noise: bool = False  # whether inverse dynamics is held to what differentiating a position can tell
+    leaves_out_reversals: bool = False  # and the slow parts of strokes, where friction's law is not known
     torque_known: bool = True  # whether the torque constant is known, so that currents can be told as torques
     mapping: tuple[str, ...] = ()  # of its recordings' columns, as for --map
     rules: tuple[Rule, ...] = ()
@@ -83,16 +83,16 @@ class Actuator:
         gone = unread("open", "current")
         neutral = {path: default_of(path) for path in gone if not path.startswith(("controller.", "inverter."))}
         bare = replace(self, controller=Controller(kind="open"), inverter=Inverter(kind="current")).varied(neutral)
-        usual = {"filter_s": Actuator.filter_s, "derivative_noise": Actuator.derivative_noise}
+        usual = {"filter_s": Actuator.filter_s, "leaves_out_reversals": Actuator.leaves_out_reversals}
         return replace(bare._as_read(), step_s=max(self.step_s, _OPEN_STEP_S), **usual)
 
     def without_controller(self) -> Actuator:
         """The same for inverse dynamics: a measured motion is put in, and the current that it needs comes out.
 
-        It is held to what differentiation can tell, as its answer stands in for a closed loop's.
+        It leaves out what is about reversals, as its answer stands in for a closed loop's.
         """
         controller = replace(self.controller, kind="unknown")
-        return replace(self, controller=controller, step_s=Actuator.step_s, derivative_noise=True)._as_read()
+        return replace(self, controller=controller, step_s=Actuator.step_s, leaves_out_reversals=True)._as_read()
 
     def _as_read(self) -> Actuator:
         """Without effects that do nothing where its kind of controller is, and what is said of parameters not read."""

@@ -36,7 +36,7 @@ def check_all_is_read(actuator: Actuator, where: str) -> None:
         _check_effect_acts(actuator, name, where)
     if not known and actuator.step_s != Actuator.step_s:
         raise InputError(f"{where}: model.step_s: {INVERSE} takes no steps; leave it out")
-    for name in ("filter_s", "derivative_noise"):
+    for name in ("filter_s", "leaves_out_reversals"):
         if known and getattr(actuator, name) != getattr(Actuator, name):
             reason = "it is of inverse dynamics, for an unknown controller"
             raise InputError(f"{where}: model.{name}: {reason}; leave it out")

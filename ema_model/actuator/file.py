@@ -98,7 +98,7 @@ def actuator_of(document: dict[str, Any], where: str) -> Actuator:
         step_s=_seconds(tables["model"], "step_s", _usual_step(kinds), where),
         torque_known=_flag(tables["model"], "torque_known", True, where),
         filter_s=_seconds(tables["model"], "filter_s", 12e-3, where),
-        derivative_noise=_flag(tables["model"], "derivative_noise", False, where),
+        leaves_out_reversals=_flag(tables["model"], "leaves_out_reversals", False, where),
         mapping=_mapping(tables["recordings"], where),
         rules=_rules(tables["recordings"], axes, where),
         **sections,

@@ -20,8 +20,7 @@ TABLES: dict[str, dict[str, str]] = {
     "model": {
         "step_s": "step of the simulation; without it 1e-5 s, with an ideal current 5e-5 s",
         "filter_s": "half width over which a measured motion is differentiated (unknown controller only)",
-        "derivative_noise": "true where noise of the derivatives counts in the floor, and reversals are left out"
-        " (unknown controller only; false without it)",
+        "leaves_out_reversals": "true where only what slides steadily is compared (unknown controller only)",
         "torque_known": "false where the torque constant is a guess: findings are then told in amperes",
     },
     "faults": {fault.name: f"{fault.title.lower()} that this unit has, 0 … 1" for fault in FAULTS},

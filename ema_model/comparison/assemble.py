@@ -55,6 +55,7 @@ def residuals_of(
                 torque_constant=actuator.motor.torque_constant_Nm_A if actuator.torque_known else None,
                 known=error,
                 counts=one.counts,
+                alike=np.full(blocks, one.alike),
                 is_map=plant.measurements[window.recording].is_map,
             )
         )

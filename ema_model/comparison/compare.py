@@ -220,6 +220,7 @@ def _typical_floor(floors: list[Floor], window: Window) -> Floor:
         block_s=floors[0].block_s,
         held_s=window.held_s,
         samples=window.samples_per_block,
+        alike=window.alike,
         exact=floors[0].exact,
         even=floors[0].even,
     )

@@ -53,6 +53,7 @@ class Residuals:
     known: dict[str, Array] = field(default_factory=dict)  # the model's error that its three-phase twin shows
     adjustable: dict[str, Adjustable] = field(default_factory=dict)  # by signal, where it was fitted
     counts: Array | None = None  # how much each block counts in a mean over time; all alike without it
+    alike: Array | None = None  # over how many blocks the white noise stays alike; over one without it
     is_map: bool = False  # a static map: blocks are independent and have no time
 
     @property
@@ -104,5 +105,6 @@ def join(parts: Sequence[Residuals]) -> Residuals:
         torque_constant=parts[0].torque_constant,
         known=together("known", 0.0),
         counts=np.concatenate([np.ones(part.blocks) if part.counts is None else part.counts for part in parts]),
+        alike=np.concatenate([np.ones(part.blocks) if part.alike is None else part.alike for part in parts]),
         is_map=all(part.is_map for part in parts),
     )

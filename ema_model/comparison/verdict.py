@@ -133,7 +133,8 @@ def slow_ratio(residuals: Residuals, name: str) -> float:
     def means(array: Array) -> Array:
         return array[: count * size].reshape(count, size).mean(axis=1)
 
-    floor = means(white**2) / size + means(sigma**2 - white**2)
+    alike = np.ones_like(white) if residuals.alike is None else np.minimum(residuals.alike[used], size)
+    floor = means(white**2 * alike) / size + means(sigma**2 - white**2)
     return float(np.sqrt(np.mean(means(values) ** 2) / np.mean(floor)))
 
 

@@ -40,8 +40,9 @@ def claimed(story: Story, accepted: Sequence[Trial], tell: Progress) -> Claim | 
             reason = f"{len(apart)} others tell as much"
         elif further is not None and not further.stands_out:
             reason = f"its order {best.candidate.settings['order']:g} tells no more than its neighbours"
-        # Without a controller there is no twin, whose floor would tell a faint further order from what is left.
-        alone_first = story.current.actuator.derivative_noise and not (more is not None and _halves(story, best, more))
+        # In a second opinion there is no twin, whose floor would tell a faint further order from what is left.
+        steady = story.current.actuator.leaves_out_reversals
+        alone_first = steady and not (more is not None and _halves(story, best, more))
         for whole in () if reason else (best, more) if alone_first else (more, best):
             if whole is None:
                 continue

@@ -212,7 +212,7 @@ def _needless(data: Data, before: Fit, keys: Sequence[str]) -> str:
 
     What is a parameter's value by another name is told as that one is.
     """
-    if not before.actuator.derivative_noise or any(find(catalogue_name(key)).duplicates for key in keys):
+    if not before.actuator.leaves_out_reversals or any(find(catalogue_name(key)).duplicates for key in keys):
         return ""
     left = floor_ratio(data, before.plant, before.calibration.signals)
     return "" if left > 1.0 else "without it no more than the floor is left"

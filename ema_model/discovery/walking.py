@@ -145,7 +145,7 @@ class _Walk:
 
     def _step(self) -> bool:
         story, tell = self.story, self._tell
-        if story.current.actuator.derivative_noise and named_in(story) and at_floor(story.data, story.current):
+        if story.current.actuator.leaves_out_reversals and named_in(story) and at_floor(story.data, story.current):
             return False  # without a controller no twin says which faint rest is the model's own
         left, ranked = self._scored()
         trials = story.tried(ranked, _REFITTED_SHARE, _MOST_REFITTED, tell, self._tried)

@@ -19,9 +19,9 @@ _KNOWN_TO = 0.02  # of a floor: a few in a hundred of the noise and of what a fi
 def spread(floors: Sequence[Floor], signals: Sequence[Collection[str]]) -> float:
     """Standard deviation of a true model's error in floors, pooled over windows and over each window's signals.
 
-    The squared error is a mean: of white noise, block by block, whose size is itself estimated, unless it is a grid's;
-    and of the model's own error, which is one value in 25 ms, for all signals.  A square of a normal value scatters by
-    √2 of its mean.
+    The squared error is a mean: of noise, block by block (or as often as a filter leaves it alike), whose size is
+    itself estimated, unless it is a grid's; and of the model's own error, which is one value in 25 ms, for all signals.
+    A square of a normal value scatters by √2 of its mean.
     """
     variance = total = 0.0
     for one, names in zip(floors, signals):
@@ -31,7 +31,7 @@ def spread(floors: Sequence[Floor], signals: Sequence[Collection[str]]) -> float
             of_noise = one.counts * (one.white_part(name) / one.sigma(name)) ** 2
             lasting += one.counts - of_noise
             estimated = 0.0 if name in one.exact else 4.0 * SCATTER / len(of_noise)
-            variance += 2.0 * float(of_noise @ of_noise) + estimated * float(of_noise.sum()) ** 2
+            variance += 2.0 * one.alike * float(of_noise @ of_noise) + estimated * float(of_noise.sum()) ** 2
             total += float(one.counts.sum())
         together = np.add.reduceat(lasting, np.arange(0, len(lasting), size))
         variance += 2.0 * float(together @ together)

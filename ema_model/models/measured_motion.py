@@ -1,13 +1,12 @@
 """A recording's motion for inverse dynamics: filtered, with the blocks in which friction's law is known.
 
-Where the actuator asks for it, it is held to what differentiation can tell, as a second opinion must be.  What the
-position is off by (quantisation, jitter of its time stamps) acts on the current through the inertia; after the filter
-it lasts as long as the filter does, and stands in the floor as such: a regression that took it for white would be too
-sure of all that it finds (Janot, Vandanjon and Gautier, IEEE Trans. Control Syst. Technol. 22 (2014), on noise in the
-regressors).
+It is held to what differentiation can tell.  What the position is off by (quantisation, jitter of its time stamps) acts
+on the current through the inertia; after the filter it lasts as long as the filter does, and stands in the floor as
+such: a regression that took it for white would be too sure of all that it finds (Janot, Vandanjon and Gautier, IEEE
+Trans. Control Syst. Technol. 22 (2014), on noise in the regressors).
 About a reversal, friction is no step of the measured speed's sign, and until a stroke is on its way bristles may bend
-where the motor seems to slide: blocks within the filter's reach of either are left out, as usual in the
-identification of robots.
+where the motor seems to slide.  Where the actuator asks for it, as a second opinion does, blocks within the filter's
+reach of either are left out, as usual in the identification of robots.
 """
 
 from __future__ import annotations
@@ -83,8 +82,7 @@ def stretches_of(
     if not measurement.is_map:
         check_period(measurement, actuator.filter_s)
     size = 1 if measurement.is_map else max(1, round(actuator.filter_s / _BLOCKS_PER_FILTER / period))
-    guarded = actuator.derivative_noise and not measurement.is_map
-    shaken = _position_noise(recorded, measurement) if guarded else np.zeros(measurement.samples)
+    shaken = None if measurement.is_map else _position_noise(recorded, measurement)
     found = []
     runs = [slice(0, measurement.samples)] if measurement.is_map else parts or measurement.runs
     for run in runs:
@@ -95,9 +93,10 @@ def stretches_of(
         motion = _standing(position) if measurement.is_map else motion_of(position, period, actuator.filter_s)
         speed, still, moving = motion.speed, 1e-9, np.arange(blocks)
         if not measurement.is_map:
-            own = motion_of(position, period, actuator.filter_s / _SHORT) if guarded else motion
+            steady = actuator.leaves_out_reversals
+            own = motion_of(position, period, actuator.filter_s / _SHORT) if steady else motion
             speed, still = own.speed, max(1e-9, _STILL_STEPS * _step_of(position) / (own.kernel.size * period))
-            moving = _moving(speed, still, motion.kernel.size if guarded else 0, size)
+            moving = _moving(speed, still, motion.kernel.size, size, steady)
         if moving.size < 10:
             continue
         load = measurement.get("load_torque_Nm")
@@ -112,7 +111,7 @@ def stretches_of(
         measured = means(motion.filtered(raw))
         passed = _passed(motion.kernel, size)
         lasting = np.zeros(moving.size)
-        if guarded:
+        if shaken is not None:
             second = np.convolve(motion.kernel, [1.0, -2.0, 1.0]) / period**2
             unsure = per_acceleration * means(shaken[run]) * _passed(second, size)
             lasting = np.hypot(unsure, _RESOLVED * np.sqrt(np.mean(measured**2)))
@@ -142,6 +141,7 @@ def stretches_of(
                 context=context,
                 sensor_noise={target: sample_noise(raw, target) * passed},
                 passed=passed,
+                alike=1.0 / (size * passed**2),
                 moving=moving,
                 samples_per_block=size,
                 block_s=size * period,
@@ -167,19 +167,23 @@ def _step_of(position: Array) -> float:
     return float(np.quantile(steps, 0.01)) if steps.size else 0.0
 
 
-def _moving(speed: Array, still: float, reach: int, size: int) -> NDArray[np.intp]:
-    """Blocks of `size` samples without standstill; with a reach (samples), away from reversals and ends if some are."""
+def _moving(speed: Array, still: float, reach: int, size: int, steady: bool) -> NDArray[np.intp]:
+    """Blocks of `size` samples without standstill, and away from the ends if some are: reach samples, the filter's.
+
+    Beyond the ends nothing was recorded that the filter would need.  Steady ones are away from reversals and from the
+    slow parts of strokes as well.
+    """
     blocks = speed.size // size
     slow = np.abs(speed) <= still
     moving = np.flatnonzero(~slow[: blocks * size].reshape(blocks, size).any(axis=1))
-    if not reach:
-        return moving
-    turns = np.concatenate([np.diff(np.sign(speed)) != 0.0, [True]])
-    turns[0] = True  # beyond the ends nothing was recorded that the filter would need
-    begins = np.flatnonzero(np.concatenate([[True], turns[:-1]]))
-    fastest = np.repeat(np.maximum.reduceat(np.abs(speed), begins), np.diff(begins, append=speed.size))
-    slow |= np.abs(speed) < _SLIDES * fastest
-    near = maximum_filter1d((slow | turns).astype(np.int8), 2 * reach + 1).astype(bool)
+    left_out = np.zeros(speed.size, bool)
+    left_out[[0, -1]] = True
+    if steady:
+        left_out[:-1] |= np.diff(np.sign(speed)) != 0.0
+        begins = np.flatnonzero(np.concatenate([[True], left_out[:-1]]))
+        fastest = np.repeat(np.maximum.reduceat(np.abs(speed), begins), np.diff(begins, append=speed.size))
+        left_out |= slow | (np.abs(speed) < _SLIDES * fastest)
+    near = slow | maximum_filter1d(left_out.astype(np.int8), 2 * reach + 1).astype(bool)
     away = np.flatnonzero(~near[: blocks * size].reshape(blocks, size).any(axis=1))
     return away if away.size >= max(10, _LEAST_KEPT * moving.size) else moving
 

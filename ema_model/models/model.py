@@ -40,6 +40,7 @@ class Window:
     beating: Signals = field(default_factory=dict)  # rms of quantisation that no mean takes away: block arrays
     held_s: Signals = field(default_factory=dict)  # how long a reading stays the same: block arrays
     on_grid: frozenset[str] = frozenset()  # signals whose noise is their grid's
+    alike: float = 1.0  # over how many blocks a filter of the signals makes their noise alike
 
     @property
     def blocks(self) -> int:

@@ -29,7 +29,7 @@ def of_cogging(monkeypatch):
     monkeypatch.setattr(claim, "further_orders", lambda *args: Further(True, together))
     asked: list[int] = []
 
-    def ask(derivative_noise: bool, outdone: int, left: float = 1.0, then: float = 1.0, unseen: float | None = None):
+    def ask(steady: bool, outdone: int, left: float = 1.0, then: float = 1.0, unseen: float | None = None):
         """left, then: the error of one order and of three, in floors; unseen: that of three in what was held out."""
         asked.clear()
         held = None if unseen is None else object()
@@ -41,7 +41,7 @@ def of_cogging(monkeypatch):
             return OUTDONE if asked[-1] <= outdone else ""
 
         monkeypatch.setattr(claim, "against", spoken)
-        current = SimpleNamespace(actuator=SimpleNamespace(derivative_noise=derivative_noise))
+        current = SimpleNamespace(actuator=SimpleNamespace(leaves_out_reversals=steady))
         story = SimpleNamespace(data=None, held=held, current=current, refused={})
         return claim.claimed(story, [alone], lambda text: None), story.refused, list(asked)
 
@@ -50,9 +50,9 @@ def of_cogging(monkeypatch):
 
 def test_in_inverse_dynamics_further_orders_count_where_one_alone_is_outdone(of_cogging):
     ask, alone, together = of_cogging
-    assert ask(derivative_noise=True, outdone=1) == ((alone, [], together), {}, [1, 3])
-    assert ask(derivative_noise=True, outdone=0) == ((alone, [], None), {}, [1]), "one that is enough needs no more"
-    far = {"derivative_noise": True, "outdone": 0, "left": 20.0}
+    assert ask(steady=True, outdone=1) == ((alone, [], together), {}, [1, 3])
+    assert ask(steady=True, outdone=0) == ((alone, [], None), {}, [1]), "one that is enough needs no more"
+    far = {"steady": True, "outdone": 0, "left": 20.0}
     assert ask(**far, then=3.0, unseen=4.0) == ((alone, [], together), {}, [3]), "here one is not enough"
     for then, unseen in ((3.0, None), (3.0, 15.0), (15.0, 4.0)):
         assert ask(**far, then=then, unseen=unseen) == ((alone, [], None), {}, [1]), "what was not fitted must agree"
@@ -60,13 +60,13 @@ def test_in_inverse_dynamics_further_orders_count_where_one_alone_is_outdone(of_
 
 def test_in_a_closed_loop_all_orders_are_judged_before_one(of_cogging):
     ask, alone, together = of_cogging
-    assert ask(derivative_noise=False, outdone=1) == ((alone, [], together), {}, [3])
+    assert ask(steady=False, outdone=1) == ((alone, [], together), {}, [3])
 
 
 def test_where_a_curve_outdoes_all_orders_nothing_is_claimed(of_cogging):
     ask, _, _ = of_cogging
-    for derivative_noise in (False, True):
-        found, refused, asked = ask(derivative_noise, outdone=3)
+    for steady in (False, True):
+        found, refused, asked = ask(steady, outdone=3)
         assert found is None and refused == {"cogging_torque": OUTDONE} and sorted(asked) == [1, 3]
 
 

@@ -173,7 +173,7 @@ def test_without_a_controller_nothing_is_added_to_a_model_at_its_floor(
     monkeypatch, error, without_controller, key, is_needless
 ):
     monkeypatch.setattr(objections, "floor_ratio", lambda data, plant, signals: plant)
-    actuator = SimpleNamespace(derivative_noise=without_controller)
+    actuator = SimpleNamespace(leaves_out_reversals=without_controller)
     before = SimpleNamespace(plant=error, calibration=SimpleNamespace(signals=[]), actuator=actuator)
     said = objections._needless(DATA, before, [key])
     assert said == ("without it no more than the floor is left" if is_needless else "")

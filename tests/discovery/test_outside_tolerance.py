@@ -14,7 +14,7 @@ from ema_model.recordings import Measurement
 INERTIA, CONSTANT, FRICTION = 1e-4, 0.05, 0.01  # kg m², N·m/A, N·m
 FILE = f"""
 [model]
-derivative_noise = true
+leaves_out_reversals = true
 [controller]
 kind = "unknown"
 [motor]

@@ -57,7 +57,7 @@ def test_without_its_controller_it_comes_back_with_all_that_is_read(path, tmp_pa
     save_actuator(bare, tmp_path / "again.toml")
     again = load_actuator(tmp_path / "again.toml")
     assert again.controller.kind == "unknown" and "computation_delay" not in again.effects
-    assert again.derivative_noise and not given.derivative_noise
+    assert again.leaves_out_reversals and not given.leaves_out_reversals
     assert again.motor.inertia_kgm2 == given.motor.inertia_kgm2 and again.sensors == given.sensors
     assert again.tolerances == bare.tolerances and "motor.inertia_kgm2" in again.tolerances
 

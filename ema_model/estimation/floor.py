@@ -64,9 +64,12 @@ class Floor:
         return np.hypot(self.fit_noise(signal), np.sqrt(repeats) * self.model[signal])
 
     def fit_noise(self, signal: str) -> Array:
-        """The noise as a fit counts it: a reading that is held is one in 25 ms, not one a sample, (blocks,)."""
+        """The noise as a fit counts it: a reading that is held is one in 25 ms, not one a sample, (blocks,).
+
+        So is noise as often as a filter leaves it alike.
+        """
         if self.even or signal not in self.held_s:
-            return np.full(len(self.repeats), self.noise[signal])
+            return np.full(len(self.repeats), np.sqrt(self.alike) * self.noise[signal])
         lasts = np.minimum(self.held_s[signal], CORRELATED_S) / self.block_s
         return np.hypot(self.white_part(signal), np.sqrt(np.maximum(1.0, lasts)) * self._held(signal))
 

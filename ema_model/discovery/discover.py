@@ -15,14 +15,14 @@ from ema_model.discovery.begin import begun
 from ema_model.discovery.next_experiment import next_experiment
 from ema_model.discovery.outside_tolerance import outside_tolerance
 from ema_model.discovery.path import Story
-from ema_model.discovery.remaining import left_by, within_band
+from ema_model.discovery.remaining import left_by
 from ema_model.discovery.repeated import repeated
 from ema_model.discovery.result import Candidate, Discovery, Experiment
 from ema_model.discovery.second_opinion import support_of
 from ema_model.discovery.sentences import as_well, held_back, mismatch, untold
 from ema_model.discovery.step import refreshed
 from ema_model.discovery.uncertainty import with_intervals
-from ema_model.discovery.verdict import verdict_of
+from ema_model.discovery.verdict import explains_all, verdict_of
 from ema_model.discovery.walking import named_in, walk
 from ema_model.effects import CATALOGUE
 from ema_model.recordings import Measurement
@@ -88,7 +88,7 @@ def result_of(
         plant=story.current.plant,
         floors=story.data.told_in,
         data=story.data,
-        at_floor=within_band(story.data, story.current),
+        at_floor=explains_all(story),
         held=story.held,
         unknown=unknown,
         curve=next((one for one in added if one.name not in CATALOGUE), None),

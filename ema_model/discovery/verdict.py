@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ema_model.comparison.explain import Explanation
+from ema_model.discovery.criteria import FAR
 from ema_model.discovery.path import Story
 from ema_model.discovery.remaining import lasts, within_band
 from ema_model.discovery.result import Added
@@ -14,7 +15,7 @@ def verdict_of(story: Story, named: Sequence[Added], unknown: Explanation | None
     """One of `VERDICTS`; named: the library's effects in the last model; unknown: what the last model leaves."""
     if not story.repeatable:
         return "not_repeatable"
-    done = within_band(story.data, story.current) and story.transmission_seen is None
+    done = explains_all(story) and story.transmission_seen is None
     if named:
         return "effects_found" if done else "partly_explained"
     if not story.base.calibration.converged and not story.added:
@@ -23,3 +24,13 @@ def verdict_of(story: Story, named: Sequence[Added], unknown: Explanation | None
         noise = unknown is None and not lasts(story.data, story.current)
         return "adequate" if noise else "unknown_effect"
     return "partly_explained" if story.added else "unknown_effect"
+
+
+def explains_all(story: Story) -> bool:
+    """Whether what is left may be noise and the model's floor: within its band, and not far off what was not fitted.
+
+    A recording that was held out and has another sign, zero, unit or actuator says nothing of the model.
+    """
+    unseen = story.ladder[-1].holdout_rmse
+    missed = unseen is not None and unseen > FAR and all(one.how == "unknown" for one in story.disagreements)
+    return within_band(story.data, story.current) and not missed

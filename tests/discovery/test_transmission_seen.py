@@ -87,7 +87,7 @@ def test_it_needs_both_positions(healthy):
 
 
 def test_nothing_is_adequate_beside_it(monkeypatch):
-    monkeypatch.setattr("ema_model.discovery.verdict.within_band", lambda data, found: True)
+    monkeypatch.setattr("ema_model.discovery.verdict.explains_all", lambda story: True)
     monkeypatch.setattr("ema_model.discovery.verdict.lasts", lambda data, found: False)
     found = SimpleNamespace(calibration=SimpleNamespace(converged=True))
     named: Any = object()
@@ -123,6 +123,6 @@ def test_nothing_is_adequate_beside_it(monkeypatch):
 def test_the_headline_says_what_is_explained_and_what_is_not(seen, at_floor, said):
     found: Any = SimpleNamespace(verdict="unknown_effect", at_floor=at_floor, transmission_seen=seen)
     found.faults, found.parameters_outside_tolerance, found.effects, found.unknown = {}, [], [], None
-    found.controller_seen, found.curve, found.ladder = None, None, [SimpleNamespace(rmse=1.352)]
+    found.controller_seen, found.curve, found.ladder = None, None, [SimpleNamespace(rmse=1.352, holdout_rmse=None)]
     found.not_claimed = {}
     assert headline(found) == said

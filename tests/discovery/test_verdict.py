@@ -16,7 +16,7 @@ from ema_model.comparison.result import SignalError
 from ema_model.comparison.verdict import judge, most_of_floor
 from ema_model.discovery import as_dict, begun, result_of
 from ema_model.discovery.model_fit import floor_ratio
-from ema_model.discovery.result import VERDICTS
+from ema_model.discovery.result import VERDICTS, Contradiction
 from ema_model.discovery.snapshot import known_of
 from ema_model.discovery.step import Step, rung_of
 from ema_model.discovery.words import VERDICTS as IN_WORDS
@@ -98,6 +98,22 @@ def test_what_remains_is_told_in_every_place(healthy, lacking):
     nothing = result_of(sharper(healthy, 30.0))
     assert "times the floor remains, cause unknown" in headline(nothing) and not nothing.effects
     assert set(IN_WORDS) == set(VERDICTS)
+
+
+@pytest.mark.parametrize(
+    ("unseen", "how", "at_floor"),
+    [(1.4, None, True), (4.8, None, False), (4.8, "unknown", False), (4.8, "sign", True), (None, None, True)],
+    ids=["not far", "far", "far, cause unknown", "its own sign", "nothing held out"],
+)
+def test_nothing_is_sure_that_misses_what_was_not_fitted(healthy, unseen, how, at_floor):
+    last = healthy.steps[-1]
+    step = replace(last, rung=replace(last.rung, holdout_rmse=unseen))
+    told = [] if how is None else [Contradiction("unseen", None, how, "It is missed.", 4.8, 4.8)]
+    story = replace(healthy, steps=[*healthy.steps[:-1], step])
+    story.disagreements = told
+    found = result_of(story)
+    assert found.at_floor == at_floor and found.verdict == ("adequate" if at_floor else "unknown_effect")
+    assert ("what was not fitted is missed by 4.8 times the floor" in headline(found)) != at_floor
 
 
 def test_what_is_not_claimed_is_told_with_the_reason(healthy):

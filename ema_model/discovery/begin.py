@@ -12,7 +12,7 @@ from ema_model.discovery.model_fit import Data, fit, floor_ratio, gather, in_flo
 from ema_model.discovery.path import Story
 from ema_model.discovery.repeatability import by_inverse_dynamics, is_lost, with_divergence
 from ema_model.discovery.result import Change
-from ema_model.discovery.sentences import NOT_REPEATABLE
+from ema_model.discovery.sentences import NOT_REPEATABLE, OPEN_LOOP
 from ema_model.discovery.step import Step, rung_of
 from ema_model.models.delay_of_drive import with_delay_of_drive
 from ema_model.models.stretches import fit_stretches
@@ -40,6 +40,8 @@ def begun(
     compile_library(actuator)
     actuator = with_delay_of_drive(actuator, measurements)
     story = calibrated_story(measurements, actuator, holdout, signals, tell)
+    if actuator.controller.kind == "open":
+        story.warnings.append(OPEN_LOOP)
     inverse = None if story.repeatable else by_inverse_dynamics(story.data, actuator)
     if inverse is None:
         return story

@@ -10,6 +10,8 @@ import pytest
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
 from ema_model.comparison import compare
+from ema_model.discovery import begun
+from ema_model.discovery.sentences import OPEN_LOOP
 from ema_model.errors import InputError
 from ema_model.models.open_loop import simulate_open_loop
 from ema_model.recordings import Measurement
@@ -61,6 +63,12 @@ def test_a_comparison_in_open_loop_finds_what_differs(axis, run):
     assert set(found.signals) == {"user_position_m", "motor_position_rad", "motor_speed_rad_s"}
     inertia = found.calibration.parameters["motor.inertia_kgm2"]
     assert inertia.value == pytest.approx(heavy.motor.inertia_kgm2, rel=0.02)
+
+
+def test_a_discovery_in_open_loop_says_what_its_floor_leaves_out(axis, run):
+    recorded = Measurement(axis.axes.outside(run.signals), "run")
+    assert OPEN_LOOP in begun([recorded], axis.in_open_loop()).warnings
+    assert OPEN_LOOP not in begun([recorded], axis).warnings
 
 
 def test_what_an_open_loop_leaves_out_has_no_tolerance_left():

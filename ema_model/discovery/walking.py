@@ -91,8 +91,10 @@ class _Walk:
 
     def is_untold(self) -> bool:
         """Whether the loop is far off, and nothing would tell most of it."""
-        best = self._best()
-        return best is not None and best.predicted_drop < TOLD_WELL * self.story.current.chi2
+        best, most = self._best(), TOLD_WELL * self.story.current.chi2
+        if best is None or best.predicted_drop >= most:
+            return False
+        return with_faults(self.story, [best])[0].predicted_drop < most  # play is a fault, and no effect tells as much
 
     def suspects_drive(self) -> bool:
         """Whether the loop is far off, and what would tell most of it is of the drive."""

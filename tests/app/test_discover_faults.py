@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import pytest
 from support.on_page import wait_until
@@ -65,6 +66,15 @@ def test_start_offers_the_fault_beside_the_effects(rig):
     assert len(shown.data) == 2 and "backlash (fault k2) would change" in shown.data[1].name
     about = about_fault("k2", look.found.actuator)
     assert "99" in about and "Mistaken for" in about and "k2 0.25 to 0.75" in about
+
+
+def test_what_was_tried_in_vain_is_told_with_its_reason(rig):
+    """All that is missing was looked for, and what would pay was refused."""
+    why = {"asymmetric_friction": "the recordings ask for another ratio each: 0.0922 and 0.210"}
+    found = replace(rig.offered.found, not_claimed=why)
+    told = answer(replace(rig.offered, found=found))
+    assert headline(found) in told and "Asymmetric friction is not claimed: the recordings ask" in told
+    assert "Physics is missing" not in told
 
 
 def test_it_is_added_by_its_name(worn):

@@ -16,9 +16,13 @@ from ema_model.discovery.score import scored_all
 from ema_model.effects import find
 
 
-def walk_of(monkeypatch, ranked, floors=50.0, simulates=True):
-    """A walk whose model stands so many floors off, with these candidates for a χ² of 1000."""
+def walk_of(monkeypatch, ranked, floors=50.0, simulates=True, fault=0.0):
+    """A walk whose model stands so many floors off, with these candidates, and a fault, for a χ² of 1000."""
     monkeypatch.setattr(walking, "ratio", lambda data, found: floors)
+    play = Candidate("k2", fault, {"k2": 0.2})
+    monkeypatch.setattr(
+        walking, "with_faults", lambda story, effects: sorted([*effects, play], key=lambda one: -one.predicted_drop)
+    )
     current = SimpleNamespace(chi2=1000.0, plant=SimpleNamespace(simulates_commands=simulates))
     story = SimpleNamespace(data=None, current=current, left=lambda: None, ranked=lambda names, left: ranked)
     return walking._Walk(story, lambda text: None, None, 3)
@@ -35,9 +39,18 @@ DELAY, COGGING = Candidate("computation_delay", 550.0, {}), Candidate("cogging_t
         ([Candidate("dead_band", 900.0, {})], {}, False, True),
         ([DELAY], {"floors": 1.5}, False, False),
         ([DELAY], {"simulates": False}, False, False),
+        ([DELAY], {"fault": 900.0}, False, True),
         ([], {}, False, False),
     ],
-    ids=["a little of several", "an effect first", "one thing tells it well", "near", "without a loop", "none"],
+    ids=[
+        "a little of several",
+        "an effect first",
+        "one thing tells it well",
+        "near",
+        "without a loop",
+        "a fault",
+        "none",
+    ],
 )
 def test_a_far_loop_is_untold_and_its_drive_suspected_where_that_tells_a_little(
     monkeypatch, ranked, given, untold, suspected

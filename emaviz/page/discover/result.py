@@ -180,7 +180,8 @@ def answer(look: Look) -> Html:
     meaning = of_discovery(found)
     if look.assessment is None:
         first, others, meaning = sentences(found)[0], ["Analysing the residual …"], "open"
-    elif not look.added and not found.faults and look.promising:  # nothing was added, of which a verdict could speak
+    elif not look.added and not found.faults and look.promising and not found.not_claimed:
+        # Nothing was added, of which a verdict could speak, and nothing was tried in vain.
         left = look.assessment.left.explanation
         best, meaning = look.promising[0].name, "warning"
         may_be_worn = any(name in BY_NAME for name in (best, *look.assessment.alike.get(best, ())))

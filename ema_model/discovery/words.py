@@ -31,7 +31,7 @@ _MOVED, _MOST_MOVED = 0.5, 3  # σ of a tolerance, from which on a parameter's o
 _NEAR = 1.2  # times the floor, below which a digit more tells a true model from another
 FLOOR_NOTE = (
     "Errors are rms over all fitted signals in units of the floor: 1 is what noise and the model's own limits leave. "
-    "A little below 1 is usual, as the floor is measured on the safe side."
+    "Nine of ten true models end within the band that is drawn."
 )
 
 

@@ -63,17 +63,18 @@ class Opinion:
         sure = self.seen is not None and self.seen.holds and any(gain.differs for gain in self.seen.gains)
         return left <= BAND or left <= (1.0 if sure else MUCH_BETTER) * last
 
-    def settles(self, closed: Story) -> bool:
+    def settles(self, closed: Story, may_be_faulty: bool) -> bool:
         """Whether the loop need not be walked on: this explains what flowed to its floor, or so much better.
 
         So much that the loop may halve its error, and would be given up still.  A drive's own effect beside another
-        one is left to the loop, which alone can tell the two.
+        one is left to the loop, which alone can tell the two; and where the actuator may have a fault, that is the
+        loop's to tell, as play and the proportional gain are nothing that the motor needs a current for.
         """
         if not self.explains_better(closed):
             return False
         left = ratio(self.story.data, self.story.current)
         far_less = left <= HALF * MUCH_BETTER * ratio(closed.data, closed.current)
-        return far_less or at_floor(self.story.data, self.story.current)
+        return (far_less and not may_be_faulty) or at_floor(self.story.data, self.story.current)
 
 
 def second_opinion(story: Story, tell: Callable[[str], None], before: Opinion | None = None) -> Opinion | None:

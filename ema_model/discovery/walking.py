@@ -199,7 +199,8 @@ class _Beside:
     def settles(self) -> bool:
         """Whether, walked to its end, it explains enough of what flowed, and no torque tells the loop's error."""
         opinion = self._ended()
-        return opinion is not None and opinion.settles(self._story) and not self._bends()
+        may_be_faulty = self._story.current.actuator.has_reference_model
+        return opinion is not None and opinion.settles(self._story, may_be_faulty) and not self._bends()
 
     def explains_better(self) -> bool:
         """Whether, walked to its end, it explains what flowed better than the loop."""

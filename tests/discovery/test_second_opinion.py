@@ -67,7 +67,8 @@ def test_a_loop_is_not_walked_on_that_would_be_given_up_at_half_its_error(monkey
     monkeypatch.setattr(asked, "ratio", lambda data, floors: floors)
     monkeypatch.setattr(asked, "at_floor", lambda data, floors: False)
     mine, closed = (SimpleNamespace(data=None, base=one, current=one, added=[]) for one in (left, loop))
-    assert asked.Opinion(mine, None).settles(closed) == settles
+    assert asked.Opinion(mine, None).settles(closed, may_be_faulty=False) == settles
+    assert not asked.Opinion(mine, None).settles(closed, may_be_faulty=True), "play and a gain are the loop's to tell"
 
 
 @pytest.mark.long

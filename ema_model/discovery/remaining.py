@@ -50,7 +50,8 @@ def within_band(data: Data, found: Fit) -> bool:
 
 def may_be_true(data: Data, found: Fit) -> bool:
     """Whether a fit leaves so little that an effect must tell most of it to be more than a bent one."""
-    return within_band(data, found) or floor_ratio(data, found.plant, found.calibration.signals) <= BAND
+    most = max(BAND, most_of_floor(data.floor_spread))
+    return floor_ratio(data, found.plant, found.calibration.signals) <= most
 
 
 @lru_cache(maxsize=16)

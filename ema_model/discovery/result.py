@@ -12,6 +12,7 @@ from ema_model.actuator import Actuator
 from ema_model.comparison.events import Event
 from ema_model.comparison.explain import Explanation
 from ema_model.discovery.controller_seen import ControllerSeen
+from ema_model.discovery.criteria import FAR
 from ema_model.discovery.model_fit import Data
 from ema_model.discovery.repeated import Repeated
 from ema_model.discovery.transmission_seen import TransmissionSeen
@@ -120,6 +121,12 @@ class Contradiction:
     sentence: str
     before: float  # its error, in floors
     after: float  # the same once that is put right
+
+
+def misses_unseen(last: Rung, disagreements: Sequence[Contradiction]) -> bool:
+    """Whether a model is far off what was not fitted, and that has no other sign, zero, unit or actuator to blame."""
+    unseen = last.holdout_rmse
+    return unseen is not None and unseen > FAR and all(one.how == "unknown" for one in disagreements)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ema_model.comparison.explain import Explanation
-from ema_model.discovery.criteria import FAR
 from ema_model.discovery.path import Story
 from ema_model.discovery.remaining import lasts, within_band
-from ema_model.discovery.result import Added
+from ema_model.discovery.result import Added, misses_unseen
 
 
 def verdict_of(story: Story, named: Sequence[Added], unknown: Explanation | None) -> str:
@@ -27,10 +26,5 @@ def verdict_of(story: Story, named: Sequence[Added], unknown: Explanation | None
 
 
 def explains_all(story: Story) -> bool:
-    """Whether what is left may be noise and the model's floor: within its band, and not far off what was not fitted.
-
-    A recording that was held out and has another sign, zero, unit or actuator says nothing of the model.
-    """
-    unseen = story.ladder[-1].holdout_rmse
-    missed = unseen is not None and unseen > FAR and all(one.how == "unknown" for one in story.disagreements)
-    return within_band(story.data, story.current) and not missed
+    """Whether what is left may be noise and the model's floor: within its band, and not far off what was not fitted."""
+    return within_band(story.data, story.current) and not misses_unseen(story.ladder[-1], story.disagreements)

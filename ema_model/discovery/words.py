@@ -7,7 +7,7 @@ from ema_model.actuator.readings import sentences as phrases_of
 from ema_model.comparison.sentences import dependence
 from ema_model.discovery.criteria import FAR
 from ema_model.discovery.labels import effect_title, value
-from ema_model.discovery.result import Discovery, Rung
+from ema_model.discovery.result import Discovery, Rung, misses_unseen
 from ema_model.discovery.sentences import masked
 from ema_model.discovery.tables import added, candidates, ladder, per_recording
 from ema_model.discovery.verify import Verified
@@ -95,7 +95,7 @@ def remains(found: Discovery) -> str:
     goes = "" if left is None else f", varies with {dependence(left.variable, left.modulator)}"
     shaft = "" if found.transmission_seen is None else f"; and {found.transmission_seen.short}"
     rest, unseen = found.ladder[-1].rmse, found.ladder[-1].holdout_rmse
-    if unseen is not None and unseen > FAR > rest:
+    if unseen is not None and rest < FAR and misses_unseen(found.ladder[-1], found.disagreements):
         return f"what was not fitted is missed by {number(unseen, 2)} times the floor, cause unknown{goes}{shaft}"
     return f"{number(rest, 2 if rest > _NEAR else 3)} times the floor remains, cause unknown{goes}{shaft}"
 

@@ -9,6 +9,12 @@ from ema_model.quantities.titles import in_sentence
 from ema_model.quantities.variables import MODULATORS, VARIABLES, is_turn, of_variable
 from ema_model.recordings import SIGNALS
 
+OPEN_LOOP = (
+    "In open loop the noise of what is put in adds up in the motion, which the floor does not count: an error of some "
+    "floors may be that alone, and a small effect is not told from it. Where the motor's position and current are "
+    "recorded, discovery puts the motion in instead."
+)
+
 
 def dependence(variable: str, modulator: str) -> str:
     """'motor speed and direction'."""

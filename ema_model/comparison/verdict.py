@@ -17,7 +17,7 @@ from ema_model.comparison.orders import Order, residual_orders
 from ema_model.comparison.regions import worst_regions
 from ema_model.comparison.residuals import Residuals
 from ema_model.comparison.result import Region, SignalError
-from ema_model.comparison.sentences import order_sentence
+from ema_model.comparison.sentences import OPEN_LOOP, order_sentence
 from ema_model.estimation import Calibration
 from ema_model.estimation.floor import CORRELATED_S
 from ema_model.quantities.numbers import Quantity
@@ -148,7 +148,7 @@ def _summary(signal: Quantity, error: SignalError, adequate: bool) -> str:
 
 
 def _warnings(residuals: Residuals, primary: str, calibration: Calibration | None, actuator: Actuator) -> list[str]:
-    found = []
+    found = [OPEN_LOOP] if actuator.controller.kind == "open" else []
     if used_blocks(residuals, primary) is None:
         title = in_sentence(SIGNALS[primary].title)
         found.append(f"Of the {title} too little can be judged: the motor stands, or the drive is at its limits.")

@@ -7,12 +7,13 @@ from dataclasses import replace
 
 from ema_model.actuator import Actuator
 from ema_model.comparison.compare import weights_of
+from ema_model.comparison.sentences import OPEN_LOOP
 from ema_model.discovery.criteria import FAR
 from ema_model.discovery.model_fit import Data, fit, floor_ratio, gather, in_floors_of
 from ema_model.discovery.path import Story
 from ema_model.discovery.repeatability import by_inverse_dynamics, is_lost, with_divergence
 from ema_model.discovery.result import Change
-from ema_model.discovery.sentences import NOT_REPEATABLE, OPEN_LOOP
+from ema_model.discovery.sentences import NOT_REPEATABLE, OPEN_LOOP_LEFT
 from ema_model.discovery.step import Step, rung_of
 from ema_model.models.delay_of_drive import with_delay_of_drive
 from ema_model.models.stretches import fit_stretches
@@ -22,6 +23,8 @@ from ema_model.recordings.read import check_same_actuator
 from ema_model.simulation.one_stack import compile_library
 
 Progress = Callable[[str], None]
+
+_MOTOR = frozenset({"current_A", "motor_torque_Nm"})  # what a measured motion tells something of
 
 
 def begun(
@@ -33,20 +36,26 @@ def begun(
 ) -> Story:
     """The calibrated model, before any effect.
 
-    A loop that is not repeatable is taken by inverse dynamics, where the recordings allow it.
+    A loop that is not repeatable is taken by inverse dynamics, where the recordings allow it, and so is an open one:
+    there the noise of what is put in adds up in the motion.
     Raises InputError for recordings that cannot be compared.
     """
     check_same_actuator([*measurements, *holdout])
     compile_library(actuator)
     actuator = with_delay_of_drive(actuator, measurements)
-    story = calibrated_story(measurements, actuator, holdout, signals, tell)
-    if actuator.controller.kind == "open":
-        story.warnings.append(OPEN_LOOP)
-    inverse = None if story.repeatable else by_inverse_dynamics(story.data, actuator)
-    if inverse is None:
+    is_open = actuator.controller.kind == "open"
+    story = None if is_open else calibrated_story(measurements, actuator, holdout, signals, tell)
+    if story is not None and story.repeatable:
         return story
-    story = calibrated_story(measurements, inverse, holdout, signals, tell)
-    story.warnings.append(NOT_REPEATABLE)
+    of_motor = not _MOTOR.isdisjoint(weights_of(signals, actuator))
+    inverse = by_inverse_dynamics([*measurements, *holdout], actuator) if of_motor else None
+    if inverse is not None:
+        story = calibrated_story(measurements, inverse, holdout, signals, tell)
+        story.warnings.append(OPEN_LOOP_LEFT if is_open else NOT_REPEATABLE)
+        return story
+    story = story or calibrated_story(measurements, actuator, holdout, signals, tell)
+    if is_open:
+        story.warnings.append(OPEN_LOOP)
     return story
 
 

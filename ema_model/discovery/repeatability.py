@@ -6,6 +6,7 @@ means nothing then, and what the motor needed (inverse dynamics) is compared ins
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +16,7 @@ from scipy.ndimage import uniform_filter1d
 from ema_model.actuator import Actuator
 from ema_model.discovery.model_fit import Data, Fit
 from ema_model.estimation.floor import CORRELATED_S
+from ema_model.recordings import Measurement
 
 Array = NDArray[np.float64]
 
@@ -57,10 +59,8 @@ def is_lost(share: float) -> bool:
     return share > _LOST
 
 
-def by_inverse_dynamics(data: Data, actuator: Actuator) -> Actuator | None:
+def by_inverse_dynamics(measurements: Sequence[Measurement], actuator: Actuator) -> Actuator | None:
     """The actuator without its controller, where the recordings tell what the motor needed; None where they do not."""
-    if all(
-        "motor_position_rad" in one and ("current_A" in one or "motor_torque_Nm" in one) for one in data.measurements
-    ):
+    if all("motor_position_rad" in one and ("current_A" in one or "motor_torque_Nm" in one) for one in measurements):
         return actuator.without_controller()
     return None

@@ -87,7 +87,7 @@ def second_opinion(story: Story, tell: Callable[[str], None], before: Opinion | 
         return None
     if before is not None:
         return before.again(story)
-    without = by_inverse_dynamics(story.data, story.base.actuator)
+    without = by_inverse_dynamics(story.data.measurements, story.base.actuator)
     if without is None:
         return None
     tell("asking inverse dynamics for a second opinion")

@@ -19,10 +19,9 @@ LOOP_UNTOLD = (
     "the drive samples, filters or delays may differ. What the measured motion needs of the motor is reported instead, "
     "without a controller."
 )
-OPEN_LOOP = (
-    "In open loop the noise of the recorded current adds up in the motion, which the floor does not count: what is "
-    "small beside the motion may be named wrongly. With the controller told to be unknown, the recorded motion is put "
-    "in instead."
+OPEN_LOOP_LEFT = (
+    "In open loop the noise of the recorded current adds up in the motion. What the measured motion needs of the motor "
+    "is compared instead."
 )
 NOT_REPEATABLE = (
     "The closed loop is not repeatable (a change of 0.05 % in the inertia moves its signals by more than the noise): "

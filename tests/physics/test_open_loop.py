@@ -10,8 +10,9 @@ import pytest
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
 from ema_model.comparison import compare
+from ema_model.comparison.sentences import OPEN_LOOP
 from ema_model.discovery import begun
-from ema_model.discovery.sentences import OPEN_LOOP
+from ema_model.discovery.sentences import OPEN_LOOP_LEFT
 from ema_model.errors import InputError
 from ema_model.models.open_loop import simulate_open_loop
 from ema_model.recordings import Measurement
@@ -65,10 +66,15 @@ def test_a_comparison_in_open_loop_finds_what_differs(axis, run):
     assert inertia.value == pytest.approx(heavy.motor.inertia_kgm2, rel=0.02)
 
 
-def test_a_discovery_in_open_loop_says_what_its_floor_leaves_out(axis, run):
+def test_a_discovery_in_open_loop_puts_the_motion_in_where_it_can(axis, run):
+    """Without the motor's own position it cannot, and says what its floor leaves out."""
     recorded = Measurement(axis.axes.outside(run.signals), "run")
-    assert OPEN_LOOP in begun([recorded], axis.in_open_loop()).warnings
-    assert OPEN_LOOP not in begun([recorded], axis).warnings
+    begun_with = begun([recorded], axis.in_open_loop())
+    assert OPEN_LOOP_LEFT in begun_with.warnings and "current_A" in begun_with.data.told_in[0].noise
+    alone = Measurement({name: one for name, one in recorded.signals.items() if name != "motor_position_rad"}, "table")
+    begun_alone = begun([alone], axis.in_open_loop())
+    assert OPEN_LOOP in begun_alone.warnings and "current_A" not in begun_alone.data.told_in[0].noise
+    assert not {OPEN_LOOP, OPEN_LOOP_LEFT} & set(begun([recorded], axis).warnings)
 
 
 def test_what_an_open_loop_leaves_out_has_no_tolerance_left():

@@ -15,20 +15,20 @@ Array = NDArray[np.float64]
 
 _FILE = """
 [controller]
-kind = "unknown"
+kind = "{kind}"
 [motor]
 torque_constant_Nm_A = 0.05
-inertia_kgm2 = { value = 1e-4, tolerance = 0.1 }
-viscous_friction_Nms_rad = { value = 2e-5, sigma = 2e-5 }
+inertia_kgm2 = {{ value = 1e-4, tolerance = 0.1 }}
+viscous_friction_Nms_rad = {{ value = 2e-5, sigma = 2e-5 }}
 static_friction_Nm = 0.01
-dynamic_friction_Nm = { value = 0.01, tolerance = 0.15 }
+dynamic_friction_Nm = {{ value = 0.01, tolerance = 0.15 }}
 """
 
 
-def drive_of(folder: Path, leaves_out_reversals: bool) -> Actuator:
-    """As its file describes it."""
+def drive_of(folder: Path, leaves_out_reversals: bool, kind: str = "unknown") -> Actuator:
+    """As its file describes it; kind: of its controller."""
     reversals = "[model]\nleaves_out_reversals = true\n" if leaves_out_reversals else ""
-    (folder / "motor.toml").write_text(reversals + _FILE, encoding="utf-8")
+    (folder / "motor.toml").write_text(reversals + _FILE.format(kind=kind), encoding="utf-8")
     return load_actuator(folder / "motor.toml")
 
 

@@ -18,7 +18,7 @@ from ema_model.errors import InputError, quoted
 from ema_model.estimation import Calibration, Floor, after_fit, floor, of_unseen, taken_up
 from ema_model.estimation import calibrate as fit
 from ema_model.estimation.floor import twin_error
-from ema_model.estimation.floor_band import band, spread
+from ema_model.estimation.floor_band import band, least, spread
 from ema_model.estimation.problem import SIGNALS
 from ema_model.faults import named
 from ema_model.models import Model, Window, model_for
@@ -135,7 +135,7 @@ def _compare(
         events=judgement.events,
         adequate=judgement.adequate,
         over_floor=judgement.over_floor,
-        floor_band=band(known_to),
+        floor_band=band(known_to, least(floors, pooled)),
         sentences=judgement.sentences,
         warnings=judgement.warnings,
         holdout=held,
@@ -220,6 +220,7 @@ def _typical_floor(floors: list[Floor], window: Window) -> Floor:
         block_s=floors[0].block_s,
         held_s=window.held_s,
         samples=window.samples_per_block,
+        allowed=window.allowed,
         alike=window.alike,
         exact=floors[0].exact,
         even=floors[0].even,

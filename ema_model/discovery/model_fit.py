@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
@@ -14,7 +14,7 @@ from ema_model.actuator import Actuator, Tolerance
 from ema_model.effects import find
 from ema_model.estimation import Calibration, Floor, after_fit, calibrate, default_free, floor, of_unseen, taken_up
 from ema_model.estimation.floor import twin_error
-from ema_model.estimation.floor_band import spread
+from ema_model.estimation.floor_band import band, least, spread
 from ema_model.models import Model, model_for
 from ema_model.models.model import Signals
 from ema_model.recordings import Measurement
@@ -51,7 +51,17 @@ class Data:
     @cached_property
     def floor_spread(self) -> float:
         """Standard deviation of a true model's error in floors."""
-        return spread(self.told_in, [one.noise.keys() & self.signals.keys() for one in self.told_in])
+        return spread(self.told_in, self._pooled)
+
+    @property
+    def floor_band(self) -> tuple[float, float]:
+        """Between which multiples of the floor nine of ten true models end."""
+        return band(self.floor_spread, least(self.told_in, self._pooled))
+
+    @property
+    def _pooled(self) -> Sequence[Collection[str]]:
+        """Signals of which the error is pooled, by window."""
+        return [one.noise.keys() & self.signals.keys() for one in self.told_in]
 
     def plant(self, actuator: Actuator) -> Model:
         """The recordings beside this actuator's model."""

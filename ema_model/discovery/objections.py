@@ -26,7 +26,6 @@ from ema_model.discovery.model_fit import ANGLES, Data, Fit, floor_ratio
 from ema_model.discovery.remaining import at_floor, left_by, may_be_true, used_left
 from ema_model.discovery.stability import disagreement
 from ema_model.effects import catalogue_name, find
-from ema_model.estimation.floor_band import band
 from ema_model.quantities.numbers import number
 from ema_model.quantities.titles import in_sentence
 from ema_model.recordings import SIGNALS
@@ -224,7 +223,7 @@ def _faint(data: Data, before: Fit, after: Fit) -> str:
     if not may_be_true(data, before) or last <= 1.0:
         return ""
     kept = (last**2 - 1.0) / max(first**2 - 1.0, 1e-9)
-    share = OF_FAINT if last > band(data.floor_spread)[1] else LEAST_SHARE
+    share = OF_FAINT if last > data.floor_band[1] else LEAST_SHARE
     return "" if kept < 1.0 - share else "a true model may leave as much, and most of it stays"
 
 

@@ -17,7 +17,6 @@ from ema_model.discovery.model_fit import Data
 from ema_model.discovery.repeated import Repeated
 from ema_model.discovery.transmission_seen import TransmissionSeen
 from ema_model.estimation import Calibrated, Calibration, Floor
-from ema_model.estimation.floor_band import band
 from ema_model.models import Model
 from ema_model.text import InWords
 
@@ -160,7 +159,7 @@ class Discovery(InWords):
     @property
     def floor_band(self) -> tuple[float, float]:
         """Multiples of the floor, between which nine of ten true models' errors lie."""
-        return band(self.data.floor_spread)
+        return self.data.floor_band
 
     @property
     def floor_believable(self) -> bool:

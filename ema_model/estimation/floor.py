@@ -45,6 +45,7 @@ class Floor:
     beating: Mapping[str, Array] = field(default_factory=dict)  # of quantisation, (blocks,); told once it was fitted
     held_s: Mapping[str, Array] = field(default_factory=dict)  # how long a reading stays the same, (blocks,)
     samples: int = 1  # in a block
+    allowed: Mapping[str, Array] = field(default_factory=dict)  # of `model`, what need not be there, (blocks,) each
     alike: float = 1.0  # over how many blocks the noise stays alike
     exact: frozenset[str] = frozenset()  # signals whose noise is known, and not estimated
     even: bool = False  # a fit counts the noise of all blocks alike: far from the floor it is no reading's error
@@ -131,6 +132,7 @@ def floor(
         beating=window.beating,
         held_s=window.held_s,
         samples=window.samples_per_block,
+        allowed=window.allowed,
         alike=window.alike,
         exact=frozenset({*window.on_grid, *told}),
     )

@@ -38,7 +38,18 @@ def spread(floors: Sequence[Floor], signals: Sequence[Collection[str]]) -> float
     return float(np.hypot(0.5 * np.sqrt(variance) / total, _KNOWN_TO)) if total else _KNOWN_TO
 
 
-def band(spread: float) -> tuple[float, float]:
-    """Between which multiples of the floor nine of ten true models' errors lie."""
+def least(floors: Sequence[Floor], signals: Sequence[Collection[str]]) -> float:
+    """The error in floors of a true model of which nothing is there that the floors only allow for, pooled likewise."""
+    left = total = 0.0
+    for one, names in zip(floors, signals):
+        for name in names:
+            allowed = (one.allowed[name] / one.sigma(name)) ** 2 if name in one.allowed else np.zeros(len(one.counts))
+            left += float(one.counts @ (1.0 - allowed))
+            total += float(one.counts.sum())
+    return float(np.sqrt(left / total)) if total else 1.0
+
+
+def band(spread: float, least: float = 1.0) -> tuple[float, float]:
+    """Between which multiples of the floor nine of ten true models' errors lie; `least`: what a floor is made of."""
     half = HALF_90 * spread
-    return max(0.0, 1.0 - half), 1.0 + half
+    return max(0.0, 1.0 - half) * least, 1.0 + half

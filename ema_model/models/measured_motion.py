@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter1d, median_filter
+from scipy.ndimage import maximum_filter1d, median_filter, uniform_filter1d
 
 from ema_model.actuator import Actuator
 from ema_model.errors import InputError, quoted
@@ -34,6 +34,7 @@ _SLIDES = 0.03  # of a stroke's highest speed, below which bristles may still be
 _SHORT = 4.0  # times that the speed's own filter is shorter, so that what depends on it is filtered once
 _LEAST_KEPT = 0.3  # of the moving blocks, which must be left when those about reversals are left out
 _NOISE_SAMPLES = 101  # over which a position's noise is taken to stay alike: with jitter it grows with the speed
+_FAR, _WITHIN = 3.0, 0.9866  # standard deviations, and the rms of a normal distribution's values within them
 _RESOLVED = 2e-3  # of a signal's rms, that no rig tells better: a magnet's torque falls by half of it a kelvin
 
 
@@ -110,11 +111,12 @@ def stretches_of(
             per_acceleration *= actuator.sensors.current_gain / actuator.motor.torque_constant_Nm_A
         measured = means(motion.filtered(raw))
         passed = _passed(motion.kernel, size)
-        lasting = np.zeros(moving.size)
+        lasting = allowed = np.zeros(moving.size)
         if shaken is not None:
             second = np.convolve(motion.kernel, [1.0, -2.0, 1.0]) / period**2
             unsure = per_acceleration * means(shaken[run]) * _passed(second, size)
-            lasting = np.hypot(unsure, _RESOLVED * np.sqrt(np.mean(measured**2)))
+            allowed = np.full(moving.size, _RESOLVED * np.sqrt(np.mean(measured**2)))
+            lasting = np.hypot(unsure, allowed)
         context = {
             "motor_position_rad": means(position),
             "motor_speed_rad_s": means(motion.speed),
@@ -138,6 +140,7 @@ def stretches_of(
                 command=None,
                 measured={target: measured},
                 lasting={target: lasting},
+                allowed={target: allowed},
                 context=context,
                 sensor_noise={target: sample_noise(raw, target) * passed},
                 passed=passed,
@@ -201,7 +204,13 @@ def _position_noise(recorded: Measurement, even: Measurement) -> Array:
         weights = 1.0 / np.prod(away, axis=2)
         weights /= np.sqrt(np.sum(weights**2, axis=1, keepdims=True))
     third = np.nan_to_num(np.sum(weights * np.lib.stride_tricks.sliding_window_view(position, 4), axis=1))
-    local = 1.4826 * median_filter(np.abs(third), min(_NOISE_SAMPLES, third.size), mode="nearest")
+    size = np.abs(third)
+    around = min(_NOISE_SAMPLES, size.size)
+    near = size <= _FAR * 1.4826 * median_filter(size, around, mode="nearest")  # which on a grid is one of few numbers
+    squares, share = (
+        uniform_filter1d(one, around, mode="nearest") for one in (np.where(near, size**2, 0.0), near.astype(float))
+    )
+    local = np.sqrt(np.maximum(squares, 0.0) / np.maximum(share, 1.0 / around)) / _WITHIN
     local = np.concatenate([local, local[-1:].repeat(3)])
     if source is not even:
         local = np.interp(even.time_s, time, local)

@@ -37,6 +37,7 @@ class Window:
     block_s: float  # time between compared values
     values: dict[str, float] = field(default_factory=dict)  # of the actuator, in this recording alone
     lasting: Signals = field(default_factory=dict)  # rms of what sensors are off by, where that lasts: block arrays
+    allowed: Signals = field(default_factory=dict)  # of that, what is granted, and not known to be there: block arrays
     beating: Signals = field(default_factory=dict)  # rms of quantisation that no mean takes away: block arrays
     held_s: Signals = field(default_factory=dict)  # how long a reading stays the same: block arrays
     on_grid: frozenset[str] = frozenset()  # signals whose noise is their grid's

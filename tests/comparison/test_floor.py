@@ -158,7 +158,7 @@ def test_a_long_recording_of_which_parts_are_fitted_knows_what_its_grid_holds():
     """Where it is held, not where it was fitted."""
     name, moving, held_there = "user_position_rad", np.full(50, 1e-3), np.repeat([1e-3, 1.0], 100)
     part = Floor({name: 1.0}, {name: np.zeros(50)}, np.ones(50), 1e-3, left={name: np.zeros(50)}, held_s={name: moving})
-    whole: Any = SimpleNamespace(blocks=200, held_s={name: held_there}, samples_per_block=1, alike=1.0)
+    whole: Any = SimpleNamespace(blocks=200, held_s={name: held_there}, samples_per_block=1, allowed={}, alike=1.0)
     told = _typical_floor([part, part], whole)
     assert told.sigma(name) == pytest.approx(np.ones(200))
     assert told.white_part(name)[:100] == pytest.approx(np.ones(100)) and np.max(told.white_part(name)[100:]) < 0.3

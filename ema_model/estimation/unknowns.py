@@ -116,7 +116,14 @@ def _parameter(actuator: Actuator, name: str) -> Unknown:
         low, high = next((p.low, p.high) for p in find(effect, actuator.axes).parameters if p.name == parameter)
     # Zero itself is no inertia.
     low = low + 1e-3 * abs(nominal) if low == 0.0 else low
-    return Unknown(name, nominal, sigma, max(-BOUND, (low - nominal) / sigma), min(BOUND, (high - nominal) / sigma))
+    below, above = (_room(limit, nominal) / sigma for limit in (low, high))
+    return Unknown(name, nominal, sigma, max(-BOUND, -below), min(BOUND, above))
+
+
+def _room(limit: float, nominal: float) -> float:
+    """How far a value may go from nominal to a limit, so that no rounding brings it beyond."""
+    rounding = 4.0 * math.ulp(max(abs(limit), abs(nominal))) if math.isfinite(limit) else 0.0
+    return max(0.0, abs(limit - nominal) - rounding)
 
 
 def starts_of(model: Model, floors: Sequence[Floor], *, worn: bool, exact: bool = False) -> list[Unknown]:

@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ema_model.actuator import load_actuator
+from ema_model.actuator import Tolerance, load_actuator
 from ema_model.commands import command
+from ema_model.effects import find
 from ema_model.estimation import calibrate, floor
 from ema_model.estimation.calibrate import calibrated, problem_of
 from ema_model.estimation.descent import Descent
@@ -165,3 +166,16 @@ def test_others_beside_the_derivatives_are_what_they_are_alone(recording):
     alone, its = identifying.jacobians(x[:1], in_whole_blocks=True)
     assert np.array_equal(beside, identifying.residuals(x[1:]))
     assert np.array_equal(residual, alone) and np.array_equal(slopes, its)
+
+
+@pytest.mark.parametrize("end", [-1.0, 1.0])
+def test_no_rounding_brings_a_parameter_beyond_its_range(end):
+    """An effect's number at its bound is one that the effect takes, whatever it started from."""
+    path, effect = "effects.load_dependent_friction.ratio", find("load_dependent_friction")
+    parameter = effect.parameters[0]
+    for nominal in np.random.default_rng(2).uniform(0.1, 0.4, 500):
+        settings = effect.settings({parameter.name: float(nominal)})
+        beside = replace(ACTUATOR, effects={effect.name: settings}, tolerances={path: Tolerance(0.4, True)})
+        unknown = unknowns_of(beside, [path])[0]
+        at_bound = unknown.nominal + unknown.sigma * (unknown.low if end < 0.0 else unknown.high)
+        effect.settings({parameter.name: at_bound})  # InputError for one outside its range

@@ -5,6 +5,7 @@ from __future__ import annotations
 from ema_model.actuator.naming import on_axes
 from ema_model.actuator.readings import sentences as phrases_of
 from ema_model.comparison.sentences import dependence
+from ema_model.comparison.verdict import most_of_floor
 from ema_model.discovery.criteria import FAR
 from ema_model.discovery.labels import effect_title, value
 from ema_model.discovery.result import Discovery, Rung, misses_unseen
@@ -134,6 +135,7 @@ def sentences(found: Discovery) -> list[str]:
     if found.floor_believable:
         low, high = found.floor_band
         told.append(f"A true model's error is {low:.2f} to {high:.2f} times the floor (90 % interval).")
+    told += not_fitted(found)
     if found.faults:
         told.append(f"{'; '.join(faults(found).values())}. Effects and faults are estimated together.")
     for one in found.effects:
@@ -154,6 +156,17 @@ def sentences(found: Discovery) -> list[str]:
     if found.curve is not None:
         told.append(f"A torque curve stands in for it, with which the error falls from {_times(first, last)}.")
     return told + repeatability(found)
+
+
+def not_fitted(found: Discovery) -> list[str]:
+    """That a model that is at its floor is not there on what was held out."""
+    error = found.ladder[-1].holdout_rmse
+    at_floor = found.verdict in ("adequate", "effects_found") and found.floor_believable
+    if not at_floor or found.held is None or error is None or error <= most_of_floor(found.held.floor_spread):
+        return []
+    low, high = found.held.floor_band
+    told = f"{number(error)} times its floor, where a true model's error is {low:.2f} to {high:.2f} times"
+    return [f"What was not fitted is off by {told}: the model does not tell all of it."]
 
 
 def moved(found: Discovery) -> list[str]:

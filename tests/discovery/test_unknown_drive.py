@@ -7,6 +7,7 @@ import pytest
 from support.unknown_drive import drive_of, logged
 
 from ema_model.discovery import Discovery, discover
+from ema_model.discovery.words import not_fitted
 
 
 def found_of(folder, hidden=None, seed: int = 0, leaves_out_reversals: bool = False) -> Discovery:
@@ -25,6 +26,7 @@ def test_where_nothing_is_missing_nothing_is_named(tmp_path, seed, steady):
     assert found.verdict == "adequate" and not found.effects and not found.parameters_outside_tolerance
     low, high = found.calibration.parameters["motor.inertia_kgm2"].interval90
     assert low < 1.05e-4 < high < 1.02 * low
+    assert not not_fitted(found)
 
 
 @pytest.mark.parametrize(
@@ -53,3 +55,16 @@ def test_a_law_that_is_not_in_the_library_is_told_by_its_variable(tmp_path):
     found = found_of(tmp_path, lambda angle, speed: 8e-4 * np.sign(speed) * np.sqrt(np.abs(speed)))
     assert found.verdict in ("unknown_effect", "partly_explained") and not found.effects
     assert found.unknown is not None and found.unknown.variable == "motor_speed"
+
+
+def test_a_model_at_its_floor_that_misses_what_was_not_fitted_says_so(tmp_path):
+    """By too little for a verdict of its own, and by more than a true model would."""
+    fitted = [logged(i, name=f"move {i}", times=1.0 - 0.15 * i) for i in range(2)]
+    held = logged(2, hidden=lambda angle, speed: 0.0012 * np.sin(3.0 * angle), name="held out", times=0.7)
+    found = discover(fitted, drive_of(tmp_path, False), holdout=[held])
+    print(found)
+    assert found.verdict == "adequate" and 1.1 < found.ladder[-1].holdout_rmse < 2.0
+    assert [f"off by {found.ladder[-1].holdout_rmse:.2f} times its floor" in line for line in not_fitted(found)] == [
+        True
+    ]
+    assert not_fitted(found)[0] in str(found)

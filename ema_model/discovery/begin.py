@@ -15,6 +15,7 @@ from ema_model.discovery.repeatability import by_inverse_dynamics, is_lost, with
 from ema_model.discovery.result import Change
 from ema_model.discovery.sentences import NOT_REPEATABLE, OPEN_LOOP_LEFT
 from ema_model.discovery.step import Step, rung_of
+from ema_model.errors import InputError
 from ema_model.models.delay_of_drive import with_delay_of_drive
 from ema_model.models.stretches import fit_stretches
 from ema_model.recordings import Measurement
@@ -44,19 +45,34 @@ def begun(
     compile_library(actuator)
     actuator = with_delay_of_drive(actuator, measurements)
     is_open = actuator.controller.kind == "open"
-    story = None if is_open else calibrated_story(measurements, actuator, holdout, signals, tell)
-    if story is not None and story.repeatable:
-        return story
-    of_motor = not _MOTOR.isdisjoint(weights_of(signals, actuator))
-    inverse = by_inverse_dynamics([*measurements, *holdout], actuator) if of_motor else None
-    if inverse is not None:
-        story = calibrated_story(measurements, inverse, holdout, signals, tell)
-        story.warnings.append(OPEN_LOOP_LEFT if is_open else NOT_REPEATABLE)
-        return story
-    story = story or calibrated_story(measurements, actuator, holdout, signals, tell)
+    simulated = None if is_open else calibrated_story(measurements, actuator, holdout, signals, tell)
+    if simulated is not None and simulated.repeatable:
+        return simulated
+    moved = _by_motion(measurements, actuator, holdout, signals, tell)
+    if moved is not None:
+        moved.warnings.append(OPEN_LOOP_LEFT if is_open else NOT_REPEATABLE)
+        return moved
+    story = simulated or calibrated_story(measurements, actuator, holdout, signals, tell)
     if is_open:
         story.warnings.append(OPEN_LOOP)
     return story
+
+
+def _by_motion(
+    measurements: Sequence[Measurement],
+    actuator: Actuator,
+    holdout: Sequence[Measurement],
+    signals: Sequence[str] | None,
+    tell: Progress,
+) -> Story | None:
+    """The same by inverse dynamics; None where the recordings, or the signals that are asked for, do not allow it."""
+    inverse = by_inverse_dynamics([*measurements, *holdout], actuator)
+    if inverse is None or _MOTOR.isdisjoint(weights_of(signals, actuator)):
+        return None
+    try:
+        return calibrated_story(measurements, inverse, holdout, signals, tell)
+    except InputError:  # too little motion
+        return None
 
 
 def calibrated_story(

@@ -108,7 +108,7 @@ def _order(order: Order, primary: str, residuals: Residuals, actuator: Actuator)
 def over_floor(residuals: Residuals, names: Sequence[str]) -> float:
     """rms of the residual over its floor, pooled over signals; where the drive is at its limits nothing is counted."""
     squared = counted = 0.0
-    weights = np.ones(residuals.blocks) if residuals.counts is None else residuals.counts
+    weights = _weights(residuals)
     for name in names:
         used = np.isfinite(residuals.values[name]) & ~residuals.saturated
         squared += float(weights[used] @ (residuals.values[name][used] / residuals.sigma[name][used]) ** 2)
@@ -122,7 +122,7 @@ def lasting(residuals: Residuals, names: Sequence[str]) -> list[str]:
 
 
 def slow_ratio(residuals: Residuals, name: str) -> float:
-    """rms of the residual's means over 25 ms, over what noise and model floor give."""
+    """rms of the residual's means over 25 ms, over what noise and model floor give; a standstill counts once."""
     size = max(1, round(CORRELATED_S / residuals.block_s))
     used = np.isfinite(residuals.values[name]) & ~residuals.saturated
     values, sigma, white = residuals.values[name][used], residuals.sigma[name][used], residuals.white[name][used]
@@ -135,7 +135,13 @@ def slow_ratio(residuals: Residuals, name: str) -> float:
 
     alike = np.ones_like(white) if residuals.alike is None else np.minimum(residuals.alike[used], size)
     floor = means(white**2 * alike) / size + means(sigma**2 - white**2)
-    return float(np.sqrt(np.mean(means(values) ** 2) / np.mean(floor)))
+    weights = means(_weights(residuals)[used])
+    return float(np.sqrt(weights @ means(values) ** 2 / (weights @ floor)))
+
+
+def _weights(residuals: Residuals) -> Array:
+    """How much each block counts in a mean over time, (blocks,)."""
+    return np.ones(residuals.blocks) if residuals.counts is None else residuals.counts
 
 
 def _summary(signal: Quantity, error: SignalError, adequate: bool) -> str:

@@ -13,6 +13,7 @@ from ema_model.recordings.noise import SCATTER
 
 Array = NDArray[np.float64]
 
+_ROUNDING = 1e-9
 _KNOWN_TO = 0.02  # of a floor: a few in a hundred of the noise and of what a fit takes up remain a guess
 
 
@@ -20,7 +21,8 @@ def spread(floors: Sequence[Floor], signals: Sequence[Collection[str]]) -> float
     """Standard deviation of a true model's error in floors, pooled over windows and over each window's signals.
 
     The squared error is a mean: of noise, block by block (or as often as a filter leaves it alike), whose size is
-    itself estimated, unless it is a grid's; and of the model's own error, which is one value in 25 ms, for all signals.
+    itself estimated, unless it is a grid's; and of the model's own error, which is one value in 25 ms, or a standstill,
+    for all signals.
     A square of a normal value scatters by √2 of its mean.
     """
     variance = total = 0.0
@@ -33,7 +35,8 @@ def spread(floors: Sequence[Floor], signals: Sequence[Collection[str]]) -> float
             estimated = 0.0 if name in one.exact else 4.0 * SCATTER / len(of_noise)
             variance += 2.0 * one.alike * float(of_noise @ of_noise) + estimated * float(of_noise.sum()) ** 2
             total += float(one.counts.sum())
-        together = np.add.reduceat(lasting, np.arange(0, len(lasting), size))
+        value = np.ceil(np.cumsum(one.counts) / size - _ROUNDING).astype(int)  # a standstill counts 25 ms, in all
+        together = np.bincount(value, lasting)
         variance += 2.0 * float(together @ together)
     return float(np.hypot(0.5 * np.sqrt(variance) / total, _KNOWN_TO)) if total else _KNOWN_TO
 

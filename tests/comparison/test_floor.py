@@ -14,6 +14,8 @@ from ema_model.campaign.draws import base_parameters
 from ema_model.commands import command
 from ema_model.comparison import compare
 from ema_model.comparison.compare import _typical_floor
+from ema_model.comparison.residuals import Residuals
+from ema_model.comparison.verdict import slow_ratio
 from ema_model.estimation import Floor, after_fit, calibrate, floor
 from ema_model.estimation.floor import twin_error
 from ema_model.estimation.floor_band import spread
@@ -85,6 +87,38 @@ def test_the_spread_of_white_noise_is_that_of_its_mean_square():
     assert spread([own], [["current_A"]]) == pytest.approx(np.hypot(expected, 0.02))
     certain = replace(own, model={"current_A": np.full(blocks, 10.0)})
     assert spread([certain], [["current_A"]]) == pytest.approx(0.5 * np.sqrt(2.0 / 40.0), rel=0.05)
+
+
+def test_a_standstill_is_one_value_of_the_model_error():
+    """Of 2 s the axis moves for 0.5 s, 20 values of 25 ms; at each of three stops friction holds it anywhere once."""
+    size, moving, stops = 25, 20, 3
+    repeats = np.concatenate([np.full(size * moving, size), *[np.full(500, 500.0)] * stops])
+    own = Floor({"current_A": 1e-6}, {"current_A": np.ones(len(repeats))}, repeats, 1e-3)
+    random = np.random.default_rng(4)
+    once = np.repeat(np.arange(moving + stops), [size] * moving + [500] * stops)
+    drawn = random.standard_normal((2000, moving + stops))[:, once]
+    errors = np.sqrt(np.average(drawn**2, axis=1, weights=own.counts))
+    assert spread([own], [["current_A"]]) == pytest.approx(np.std(errors), rel=0.05)
+    slow = [slow_ratio(_left(row, own), "current_A") for row in drawn[:300]]
+    assert np.sqrt(np.mean(np.square(slow))) == pytest.approx(1.0, abs=0.05)
+
+
+def _left(values: np.ndarray, own: Floor) -> Residuals:
+    """Of one signal, over its floor."""
+    nothing, name = np.zeros(len(values)), "current_A"
+    return Residuals(
+        time_s=nothing,
+        values={name: values},
+        sigma={name: own.sigma(name)},
+        noise={name: nothing},
+        white={name: nothing},
+        variables={},
+        recording=nothing.astype(int),
+        run=nothing.astype(int),
+        saturated=nothing.astype(bool),
+        block_s=own.block_s,
+        counts=own.counts,
+    )
 
 
 def test_a_true_model_is_at_its_floor_where_it_was_not_fitted():

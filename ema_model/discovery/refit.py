@@ -117,13 +117,8 @@ def _better(one: Fit, other: Fit) -> Fit:
 
 
 def settings_in(found: Fit, effects: Iterable[str]) -> dict[str, Mapping[str, float]]:
-    """Of these effects, as a fit found them: a value at its bound may lie beyond by the last bit."""
-    settings = {}
-    for name in effects:
-        limits = {one.name: (one.low, one.high) for one in find(name, found.actuator.axes).parameters}
-        own = found.calibration.actuator.effects[name]
-        settings[name] = {key: float(np.clip(value, *limits[key])) for key, value in own.items()}
-    return settings
+    """Of these effects, as a fit found them."""
+    return {name: dict(found.calibration.actuator.effects[name]) for name in effects}
 
 
 def stands_for(before: Fit, trial: Trial) -> str:

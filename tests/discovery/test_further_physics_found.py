@@ -51,6 +51,19 @@ def test_it_is_named_at_its_values(name):
             assert one.chosen[parameter] == value
 
 
+@pytest.mark.long
+def test_a_sagging_bus_is_named_where_the_drive_is_at_its_voltage():
+    """Of the whole library; a dead time takes as much voltage away, and is named with it."""
+    steps = [("step", {"final_rad": rad}, 0.5) for rad in (0.05, 0.03)]
+    seen = recorded(83, commands=[CHIRP, *steps], effects={"bus_voltage_sag": {"drop_V": 6.0}})
+    found = discover(seen, ACTUATOR)
+    [one] = found.effects
+    assert {one.name, *one.same_as} == {"bus_voltage_sag", "dead_time"} and found.verdict == "effects_found"
+    assert found.ladder[-1].rmse < 1.1 < 0.5 * found.ladder[0].rmse
+    (low, high), volts = one.parameters.popitem()[1].interval90, 6.0
+    assert 0.8 * volts < high and low < 1.2 * volts
+
+
 def test_a_place_is_looked_for_along_the_recordings():
     spring = find("one_sided_spring")
     places = [one["contact_rad"] for [one] in variants(spring, [], ranges={"user_position": (-2.0, 2.0)})]

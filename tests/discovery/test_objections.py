@@ -155,7 +155,7 @@ def test_of_a_model_that_may_be_true_an_effect_takes_most_or_is_not_claimed(monk
     monkeypatch.setattr(objections, "floor_ratio", lambda data, plant, signals: plant)
     monkeypatch.setattr(objections, "may_be_true", lambda data, fit: fit.plant <= 1.25)
     fits = [SimpleNamespace(plant=error, calibration=SimpleNamespace(signals=[])) for error in (before, after)]
-    said = objections._faint(SimpleNamespace(floor_spread=0.04 / 1.645), *fits)
+    said = objections._faint(SimpleNamespace(floor_band=(0.96, 1.04)), *fits)
     assert said == ("a true model may leave as much, and most of it stays" if kept else "")
 
 

@@ -184,6 +184,7 @@ def answer(given: Problem, names: tuple[str, ...], rig: str) -> dict[str, object
         "outside": outside,
         "unknown": "",
         "ladder": [1.0],
+        "floor_band": [1.0, 1.0],
         "at_bound": [],
     }
 

@@ -160,21 +160,13 @@ def test_of_a_model_that_may_be_true_an_effect_takes_most_or_is_not_claimed(monk
 
 
 @pytest.mark.parametrize(
-    ("error", "without_controller", "key", "is_needless"),
-    [
-        (0.94, True, "mesh_friction", True),
-        (1.05, True, "mesh_friction", False),
-        (0.94, False, "mesh_friction", False),
-        (0.94, True, "viscous_friction", False),
-    ],
-    ids=["at its floor", "above it", "in a closed loop", "a parameter's value"],
+    ("error", "key", "is_needless"),
+    [(0.94, "mesh_friction", True), (1.05, "mesh_friction", False), (0.94, "viscous_friction", False)],
+    ids=["at its floor", "above it", "a parameter's value"],
 )
-def test_without_a_controller_nothing_is_added_to_a_model_at_its_floor(
-    monkeypatch, error, without_controller, key, is_needless
-):
+def test_nothing_is_added_to_a_model_at_its_floor(monkeypatch, error, key, is_needless):
     monkeypatch.setattr(objections, "floor_ratio", lambda data, plant, signals: plant)
-    actuator = SimpleNamespace(leaves_out_reversals=without_controller)
-    before = SimpleNamespace(plant=error, calibration=SimpleNamespace(signals=[]), actuator=actuator)
+    before = SimpleNamespace(plant=error, calibration=SimpleNamespace(signals=[]))
     said = objections._needless(DATA, before, [key])
     assert said == ("without it no more than the floor is left" if is_needless else "")
 

@@ -24,7 +24,7 @@ from ema_model.models.model import Window
 from ema_model.models.motion import Motion, motion_of
 from ema_model.models.sampling import check_period
 from ema_model.recordings import Measurement
-from ema_model.recordings.noise import sample_noise
+from ema_model.recordings.noise import NEAR, WITHIN, sample_noise
 
 Array = NDArray[np.float64]
 
@@ -34,7 +34,6 @@ _SLIDES = 0.03  # of a stroke's highest speed, below which bristles may still be
 _SHORT = 4.0  # times that the speed's own filter is shorter, so that what depends on it is filtered once
 _LEAST_KEPT = 0.3  # of the moving blocks, which must be left when those about reversals are left out
 _NOISE_SAMPLES = 101  # over which a position's noise is taken to stay alike: with jitter it grows with the speed
-_FAR, _WITHIN = 3.0, 0.9866  # standard deviations, and the rms of a normal distribution's values within them
 _RESOLVED = 2e-3  # of a signal's rms, that no rig tells better: a magnet's torque falls by half of it a kelvin
 
 
@@ -206,11 +205,11 @@ def _position_noise(recorded: Measurement, even: Measurement) -> Array:
     third = np.nan_to_num(np.sum(weights * np.lib.stride_tricks.sliding_window_view(position, 4), axis=1))
     size = np.abs(third)
     around = min(_NOISE_SAMPLES, size.size)
-    near = size <= _FAR * 1.4826 * median_filter(size, around, mode="nearest")  # which on a grid is one of few numbers
+    near = size <= NEAR * 1.4826 * median_filter(size, around, mode="nearest")  # which on a grid is one of few numbers
     squares, share = (
         uniform_filter1d(one, around, mode="nearest") for one in (np.where(near, size**2, 0.0), near.astype(float))
     )
-    local = np.sqrt(np.maximum(squares, 0.0) / np.maximum(share, 1.0 / around)) / _WITHIN
+    local = np.sqrt(np.maximum(squares, 0.0) / np.maximum(share, 1.0 / around)) / WITHIN
     local = np.concatenate([local, local[-1:].repeat(3)])
     if source is not even:
         local = np.interp(even.time_s, time, local)

@@ -26,7 +26,7 @@ _LASTS = 50  # means, over which a pace stays whole
 _AROUND = 2  # means on either side, over which a pace is told
 SCATTER = 1.3  # times 1/n: relative variance of a noise's standard deviation that n samples tell (third differences)
 _MORE, _AT_MOST = 1.05, 1.12  # of a grid's noise: what differences tell of it in the mean, and of some motions
-_NEAR, _WITHIN = 3.0, 0.9866  # standard deviations, and the rms of a normal distribution's values within them
+NEAR, WITHIN = 3.0, 0.9866  # standard deviations, and the rms of a normal distribution's values within them
 
 
 def sample_noise(values: Array, signal: str) -> float:
@@ -124,5 +124,5 @@ def _typical(differences: Array) -> float:
     The median alone scatters by twice as much, and on a grid it is one of few numbers, up to a seventh off.
     """
     size = np.abs(differences)
-    near = size <= _NEAR * 1.4826 * float(np.median(size))
-    return float(np.sqrt(np.mean(size[near] ** 2))) / _WITHIN
+    near = size <= NEAR * 1.4826 * float(np.median(size))
+    return float(np.sqrt(np.mean(size[near] ** 2))) / WITHIN

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from ema_model.comparison.explain import Explanation
+from ema_model.discovery.beside_a_fault import beside_a_fault
 from ema_model.discovery.claim import claimed
 from ema_model.discovery.contradiction import contradictions
 from ema_model.discovery.criteria import FAR, HALF, LOOP_TOLD, TOLD_WELL
@@ -21,7 +22,7 @@ from ema_model.discovery.result import Candidate
 from ema_model.discovery.second_opinion import Opinion, compared, second_opinion, taken_over
 from ema_model.discovery.transmission_seen import transmission_seen
 from ema_model.discovery.unknown import curve_instead, is_a_shape
-from ema_model.discovery.weighed_again import near, weigh_again
+from ema_model.discovery.weighed_again import fault_instead, near, weigh_again
 from ema_model.effects import CATALOGUE, find
 
 Progress = Callable[[str], None]
@@ -118,9 +119,12 @@ class _Walk:
     def ended(self) -> Walked:
         """Goes on to the end; takes out what became idle or doubtful, draws what is unknown, and settles."""
         # Each round looks whether or not anything is seen to be left: a fingerprint knows better what to look for.
+        story, tell = self.story, self._tell
         while self._going:
             self.go()
-        story, tell = self.story, self._tell
+            fault = None if self._going else fault_instead(story, self._near, tell)
+            if fault:
+                self._begin_with(fault)
         weigh_again(story, self._near, tell)
         drop_idle(story, tell)
         drop_doubtful(story, tell)
@@ -129,6 +133,13 @@ class _Walk:
             unknown = _with_curve(story, self._curve, unknown, tell)
         story.settle(tell)  # last: beside a settled model any refit falls that only goes back to the sensors' noise
         return Walked(self._first, self._rivals, unknown)
+
+    def _begin_with(self, fault: Trial) -> None:
+        """Walks anew beside a fault in whose place an effect stood."""
+        self.story.restart()
+        self.story.refused.clear()
+        self.story.add(self.story.trial(fault.candidate, self._tell))
+        self._rivals, self._near, self._going = [], {}, True
 
     def _best(self) -> Candidate | None:
         """What would tell most of a loop that is far off."""
@@ -162,6 +173,13 @@ class _Walk:
             trials = story.tried_whole([one for one in ranked if one not in [t.candidate for t in trials]], tell)
             accepted = [trial for trial in trials if pays(story.current, trial, story.data, story.held)]
         claim = claimed(story, accepted, tell)
+        leader = next(iter(trials), None)
+        if leader and (claim is None or claim.best.drop < leader.drop and leader not in claim.others):
+            fault = beside_a_fault(story, leader, tell)
+            if fault:
+                story.add(leader)
+                story.add(fault)
+                return True
         if claim is None:
             return False
         best, others, more = claim
@@ -172,7 +190,7 @@ class _Walk:
         if others and not self._rivals:
             self._rivals = [best, *others]
         story.add(best, ties=[trial.candidate.name for trial in others])
-        self._near[best.candidate.name] = near(best, trials)
+        self._near[best.candidate.name] = near(best, [*trials, *faults])
         if more:
             story.add(more)
         return True

@@ -1,7 +1,8 @@
-"""Effects weighed again in the last model, against those that told nearly as much when they were added.
+"""Effects weighed again in the last model, against what told nearly as much when they were added.
 
 Where two causes share the error, the first is chosen beside all that the second leaves, which falls a little with the
-one or the other of two effects that are alike.  Once both causes are in the model, the data tell them apart.
+one or the other of two that are alike, a fault and an effect among them.  Once both causes are in the model, the data
+tell them apart.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from dataclasses import replace
 
 from ema_model.discovery.criteria import NEAR_AS_MUCH, TIE
 from ema_model.discovery.evidence import evidence
+from ema_model.discovery.faults import fault_trial
 from ema_model.discovery.objections import against
 from ema_model.discovery.path import Story
 from ema_model.discovery.refit import Trial, price, settings_in, tried
@@ -22,9 +24,10 @@ _MOST = 2  # rivals of an effect
 
 
 def near(best: Trial, trials: Sequence[Trial]) -> list[Trial]:
-    """Those of one step that told nearly as much as the one that was added."""
-    others = [one for one in trials if one.candidate.name != best.candidate.name and not one.faults]
-    return [one for one in others if one.drop > NEAR_AS_MUCH * best.drop][:_MOST]
+    """Those of one step that told nearly as much as the one that was added, the best first."""
+    others = [one for one in trials if one.candidate.name != best.candidate.name]
+    close = [one for one in others if one.drop > NEAR_AS_MUCH * best.drop]
+    return sorted(close, key=lambda one: -one.drop)[:_MOST]
 
 
 def weigh_again(story: Story, rivals: Mapping[str, Sequence[Trial]], tell: Progress) -> None:
@@ -32,6 +35,7 @@ def weigh_again(story: Story, rivals: Mapping[str, Sequence[Trial]], tell: Progr
 
     rivals: by the effect's key, as of `near`.  The last effect was weighed against its own in this very model.
     """
+    rivals = {key: [one for one in its if not one.faults] for key, its in rivals.items()}
     for one in story.added[:-1]:
         orders = [other for other in story.added if catalogue_name(other.key) == catalogue_name(one.key)]
         present = story.current.actuator.effects
@@ -52,3 +56,22 @@ def weigh_again(story: Story, rivals: Mapping[str, Sequence[Trial]], tell: Progr
             else:
                 equal = evidence(story.data, trial.fit, story.current) + more < TIE
                 story.tie(one.key, name, equal)
+
+
+def fault_instead(story: Story, rivals: Mapping[str, Sequence[Trial]], tell: Progress) -> Trial | None:
+    """The fault that tells more than an effect of the last model in its place; None where there is none.
+
+    rivals: as of `weigh_again`.
+    """
+    for one in story.added[:-1]:
+        for rival in rivals.get(one.key, ()):
+            if not rival.faults or rival.faults[0] in story.current.faults:
+                continue
+            tell(f"weighing the fault {rival.candidate.name} against {one.name} again")
+            smaller = story.without(one.key, tell)
+            trial = fault_trial(story.data, smaller, rival.candidate, tell)
+            own = price(story.data, smaller, replace(trial, effects={one.key: {}}, faults=()))
+            more = price(story.data, smaller, trial) - own
+            if evidence(story.data, story.current, trial.fit) - more > TIE:
+                return rival
+    return None

@@ -14,6 +14,7 @@ from ema_model.discovery.criteria import NEAR_AS_MUCH, TIE
 from ema_model.discovery.evidence import evidence
 from ema_model.discovery.faults import fault_trial
 from ema_model.discovery.objections import against
+from ema_model.discovery.model_fit import Fit, fit, without_effect
 from ema_model.discovery.path import Story
 from ema_model.discovery.refit import Trial, price, settings_in, tried
 from ema_model.effects import catalogue_name
@@ -61,6 +62,7 @@ def weigh_again(story: Story, rivals: Mapping[str, Sequence[Trial]], tell: Progr
 def fault_instead(story: Story, rivals: Mapping[str, Sequence[Trial]], tell: Progress) -> Trial | None:
     """The fault that tells more than an effect of the last model in its place; None where there is none.
 
+    In its place and in the last effect's, too, which may only have mended what the first one got wrong.
     rivals: as of `weigh_again`.
     """
     for one in story.added[:-1]:
@@ -69,9 +71,18 @@ def fault_instead(story: Story, rivals: Mapping[str, Sequence[Trial]], tell: Pro
                 continue
             tell(f"weighing the fault {rival.candidate.name} against {one.name} again")
             smaller = story.without(one.key, tell)
-            trial = fault_trial(story.data, smaller, rival.candidate, tell)
-            own = price(story.data, smaller, replace(trial, effects={one.key: {}}, faults=()))
-            more = price(story.data, smaller, trial) - own
-            if evidence(story.data, story.current, trial.fit) - more > TIE:
+            last = story.added[-1].key
+            if _outdoes(story, smaller, rival, [one.key], tell):
+                return rival
+            smallest = fit(story.data, without_effect(smaller.actuator, last), smaller.starts, tell, smaller.faults)
+            if _outdoes(story, smallest, rival, [one.key, last], tell):
                 return rival
     return None
+
+
+def _outdoes(story: Story, smaller: Fit, rival: Trial, keys: Sequence[str], tell: Progress) -> bool:
+    """Whether a fault tells more than effects of the last model do beside the rest of it."""
+    trial = fault_trial(story.data, smaller, rival.candidate, tell)
+    own = replace(trial, effects={key: {} for key in keys}, faults=())
+    more = price(story.data, smaller, trial) - price(story.data, smaller, own)
+    return evidence(story.data, story.current, trial.fit) - more > TIE

@@ -174,7 +174,7 @@ class _Walk:
             accepted = [trial for trial in trials if pays(story.current, trial, story.data, story.held)]
         claim = claimed(story, accepted, tell)
         leader = next(iter(trials), None)
-        if leader and (claim is None or claim.best.drop < leader.drop and leader not in claim.others):
+        if leader and (claim is None or (claim.best.drop < leader.drop and leader not in claim.others)):
             fault = beside_a_fault(story, leader, tell)
             if fault:
                 story.add(leader)

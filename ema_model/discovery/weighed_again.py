@@ -13,8 +13,8 @@ from dataclasses import replace
 from ema_model.discovery.criteria import NEAR_AS_MUCH, TIE
 from ema_model.discovery.evidence import evidence
 from ema_model.discovery.faults import fault_trial
-from ema_model.discovery.objections import against
 from ema_model.discovery.model_fit import Fit, fit, without_effect
+from ema_model.discovery.objections import against
 from ema_model.discovery.path import Story
 from ema_model.discovery.refit import Trial, price, settings_in, tried
 from ema_model.effects import catalogue_name

@@ -21,14 +21,15 @@ from ema_model.effects import catalogue_name
 
 Progress = Callable[[str], None]
 
-_MOST = 2  # rivals of an effect
+_MOST = 2  # rivals of an effect, of either kind
 
 
 def near(best: Trial, trials: Sequence[Trial]) -> list[Trial]:
     """Those of one step that told nearly as much as the one that was added, the best first."""
-    others = [one for one in trials if one.candidate.name != best.candidate.name]
+    others = sorted((one for one in trials if one.candidate.name != best.candidate.name), key=lambda one: -one.drop)
     close = [one for one in others if one.drop > NEAR_AS_MUCH * best.drop]
-    return sorted(close, key=lambda one: -one.drop)[:_MOST]
+    effects, faults = ([one for one in close if bool(one.faults) is fault] for fault in (False, True))
+    return effects[:_MOST] + faults[:_MOST]
 
 
 def weigh_again(story: Story, rivals: Mapping[str, Sequence[Trial]], tell: Progress) -> None:

@@ -336,3 +336,14 @@ def test_screw_lead_error_repeats_with_its_period(model):
     off = seen["user_position_rad"] - (GEAR * theta - HALF_PLAY_RAD)
     expected = amplitude * np.sin(2.0 * np.pi * theta / period + 0.7)
     np.testing.assert_allclose(off[late], expected[late], atol=0.01 * amplitude)
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_no_severity_is_one_that_no_such_part_has(name):
+    strength = CATALOGUE[name].parameters[0]
+    size = {"": 1.0, "current_A": ACTUATOR.controller.current_limit_A}[strength.plausible_at]
+    if strength.plausible_of:
+        size = 1.0 / ACTUATOR.value(strength.plausible_of)
+    low, high = strength.plausible
+    for value in CATALOGUE[name].severities:
+        assert (low is None or low <= value * size) and (high is None or value * size <= high)

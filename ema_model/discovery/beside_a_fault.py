@@ -12,8 +12,9 @@ from ema_model.discovery.criteria import LEAST_BIC
 from ema_model.discovery.faults import tried_faults
 from ema_model.discovery.model_fit import in_floors_of
 from ema_model.discovery.objections import against
+from ema_model.discovery.paid_for import pays, worth
 from ema_model.discovery.path import Story
-from ema_model.discovery.refit import Trial, pays, worth
+from ema_model.discovery.refit import Trial
 from ema_model.discovery.remaining import at_floor
 
 Progress = Callable[[str], None]

@@ -10,8 +10,9 @@ from ema_model.discovery.evidence import evidence
 from ema_model.discovery.harmonics import Further, further_orders
 from ema_model.discovery.model_fit import holdout_error
 from ema_model.discovery.objections import against, ratio
+from ema_model.discovery.paid_for import price
 from ema_model.discovery.path import Story
-from ema_model.discovery.refit import Trial, price, stands_for
+from ema_model.discovery.refit import Trial, stands_for
 from ema_model.effects import find
 
 Progress = Callable[[str], None]

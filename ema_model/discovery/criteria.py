@@ -5,6 +5,9 @@ from __future__ import annotations
 # ΔBIC from which on data decide between two models: Kass and Raftery, Bayes factors, J. Am. Stat. Assoc. 90 (1995).
 LEAST_BIC = 10.0
 
+# Of evidence, from which on what was fitted stands alone where nothing else could tell: ten times as much.
+BEYOND_DOUBT = 100.0
+
 # Of evidence, within which rivals cannot be told apart: the same.
 TIE = 10.0
 

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from ema_model.discovery.criteria import LEAST_BIC
 from ema_model.discovery.model_fit import Data, Fit, fit
-from ema_model.discovery.refit import Trial, pays, worth
+from ema_model.discovery.paid_for import pays, worth
+from ema_model.discovery.refit import Trial
 from ema_model.discovery.result import Candidate
 from ema_model.discovery.score import amounts_of, beyond_of, movable, unseen
 from ema_model.discovery.unknown import TEETH

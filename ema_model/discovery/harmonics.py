@@ -11,7 +11,8 @@ from ema_model.comparison.orders import Order, colour
 from ema_model.discovery.criteria import LEAST_BIC
 from ema_model.discovery.fingerprints import fingerprints
 from ema_model.discovery.model_fit import Data
-from ema_model.discovery.refit import Trial, pays, tried
+from ema_model.discovery.paid_for import pays
+from ema_model.discovery.refit import Trial, tried
 from ema_model.discovery.remaining import left_by
 from ema_model.discovery.result import Candidate
 from ema_model.discovery.score import scored_beside, scored_together

@@ -227,11 +227,26 @@ def holdout_fit(data: Data, found: Fit) -> tuple[float, dict[str, float], dict[s
     return resimulated(data, found.calibration.actuator)
 
 
+@lru_cache(maxsize=2)  # of the current fit and a trial
+def holdout_signals(data: Data, found: Fit) -> Sequence[Signals]:
+    """The signals of recordings that were not fitted, by window."""
+    return _with_starts(data, data.plant(found.calibration.actuator))
+
+
+def holdout_change(data: Data, one: Fit, other: Fit) -> float:
+    """rms of what two fits differ by on recordings that were not fitted, in floors."""
+    shown = [holdout_signals(data, found) for found in (one, other)]
+    return floor_ratio(data, data.plant(one.calibration.actuator), shown[0], beside=shown[1])
+
+
+def _with_starts(data: Data, plant: Model) -> Sequence[Signals]:
+    return calibrate(plant, data.floors, free=(), signals=data.signals, start={}).signals
+
+
 def resimulated(data: Data, actuator: Actuator) -> tuple[float, dict[str, float], dict[str, float]]:
     """`floor_ratio`, `rms_by_signal` and `ratio_by_recording` where only the recordings' starts are fitted."""
     plant = data.plant(actuator)
-    calibration = calibrate(plant, data.floors, free=(), signals=data.signals, start={})
-    shown = calibration.signals
+    shown = _with_starts(data, plant)
     ratio = floor_ratio(data, plant, shown)
     ratio = ratio if math.isfinite(ratio) else math.inf
     return ratio, rms_by_signal(data, plant, shown), ratio_by_recording(data, plant, shown)
@@ -258,14 +273,22 @@ def ratio_by_recording(data: Data, plant: Model, shown: Sequence[Mapping[str, Ar
     return found
 
 
-def floor_ratio(data: Data, plant: Model, shown: Sequence[Mapping[str, Array]], recording: int | None = None) -> float:
+def floor_ratio(
+    data: Data,
+    plant: Model,
+    shown: Sequence[Mapping[str, Array]],
+    recording: int | None = None,
+    beside: Sequence[Mapping[str, Array]] | None = None,
+) -> float:
     """rms of measurement − model in units of the floor after the fit, pooled over windows and signals: 1 is the floor.
 
     A standstill counts as 25 ms of motion do.  recording: the one, from 0, whose windows count; all without it.
+    beside: what stands in the place of the measurement, by window.
     """
+    others = beside or [window.measured for window in plant.windows]
     each = [
-        (((signals[name] - window.measured[name]) / one.sigma(name)) ** 2, one.counts)
-        for window, one, signals in zip(plant.windows, data.told_in, shown)
+        (((signals[name] - other[name]) / one.sigma(name)) ** 2, one.counts)
+        for window, one, signals, other in zip(plant.windows, data.told_in, shown, others)
         for name in data.signals
         if name in window.measured and recording in (None, window.recording)
     ]

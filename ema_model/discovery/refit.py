@@ -1,4 +1,4 @@
-"""A candidate in the model, refitted, and whether the data pay for it."""
+"""A candidate in the model, refitted."""
 
 from __future__ import annotations
 
@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ema_model.discovery.criteria import HALF, LEAST_BIC, MOMENT, MOMENTS
-from ema_model.discovery.evidence import colour_of, effective_values, evidence
-from ema_model.discovery.model_fit import ANGLES, Data, Fit, fit, holdout_error, with_effect
+from ema_model.discovery.criteria import HALF, LEAST_BIC
+from ema_model.discovery.model_fit import ANGLES, Data, Fit, fit, with_effect
 from ema_model.discovery.result import Candidate
 from ema_model.effects import Effect, find
 from ema_model.estimation import default_free
@@ -18,14 +17,7 @@ from ema_model.quantities.axes import Axes
 
 Progress = Callable[[str], None]
 
-_LEAST_FALL = 0.004  # of the error: what is less is immaterial
-_FALL = 0.01  # below which a fall is slight, and the data must be twice as sure
-_LEAST_T = 2.4  # of the mean gain over blocks of time: 1 % of chance
-_HELD = 0.01  # of the held-out error, that must go above the floor
-_SHOWS = 0.125  # of the fall of the fitted error at the floor, that must be seen there as well
-_AGREES = 0.8  # of the held-out error: so great a fall there, and of the fitted one, needs no other test
-_FLOOR = 1.1  # of the floor, up to which an error counts as at it
-_CORRELATED = 50  # values of a signal that may share their error
+LEAST_FALL = 0.004  # of the error: what is less is immaterial
 _SCORE = 0.4  # of what a refit gives, that a score may have fallen short of predicting
 _RECENTRED = 4  # times that a refit begins anew from where its first guess held it back
 _HELD_BACK = 2.0  # σ of that guess, from which on it did
@@ -147,53 +139,6 @@ def _moves_alike(found: Fit, *paths: str) -> bool:
     return abs(float(one @ other)) > _ALIKE * float(np.linalg.norm(one) * np.linalg.norm(other))
 
 
-def worth(data: Data, current: Fit, trial: Trial) -> float:
-    """How much a trial tells beyond what its parameters must (BIC), relative to what it leaves."""
-    return evidence(data, current, trial.fit) - price(data, current, trial)
-
-
-def price(data: Data, current: Fit, trial: Trial) -> float:
-    """What the parameters of a trial must tell before they tell anything (BIC)."""
-    count = sum(fitted_count(name, current.actuator.axes) for name in trial.effects) + len(trial.faults)
-    return count * math.log(min(len(current.residual), effective_values(data, trial.fit)))
-
-
-def pays(current: Fit, trial: Trial, data: Data, held: Data | None) -> bool:
-    """Whether the data pay for the parameters: most of the time, materially, and where they were not fitted."""
-    fall = 1.0 - trial.fit.error() / current.error()
-    if fall < _LEAST_FALL:
-        return False
-    tells = worth(data, current, trial) >= (LEAST_BIC if fall > _FALL else 2.0 * LEAST_BIC)
-    if held is not None and (tells or fall > 1.0 - _AGREES):
-        before, after = holdout_error(held, current), holdout_error(held, trial.fit)
-        if after < _AGREES * before:
-            return True  # no chance repeats itself where it was not fitted
-        tells = tells and _holds(before, after, fall)
-    return tells and _lasts(data, current, trial.fit)
-
-
-def _lasts(data: Data, before: Fit, after: Fit) -> bool:
-    """Whether a gain is seen most of the time, or beyond chance in several moments apart."""
-    gains = (before.residual**2 - after.residual**2) / colour_of(data, after)
-    blocks = np.array_split(gains, max(8, len(gains) // _CORRELATED))
-    sums = np.array([block.sum() for block in blocks])
-    if sums.sum() >= _LEAST_T * np.std(sums, ddof=1) * np.sqrt(len(sums)):
-        return True
-    moments = np.flatnonzero(sums > MOMENT)
-    apart = np.count_nonzero(np.diff(moments) > 1) + min(1, len(moments))
-    return bool(apart >= MOMENTS and -sums[sums < 0.0].sum() < 0.5 * sums[sums > 0.0].sum())
-
-
-def _holds(before: float, after: float, fall: float) -> bool:
-    """Whether what was not fitted agrees; fall: of the error of what was.
-
-    What falls by little at the floor must fall there as well: a model that is not quite the rig's finds something in
-    every recording, and another thing in each.
-    """
-    least = _HELD if before > _FLOOR else _SHOWS * fall
-    return after < (1.0 - least) * before
-
-
 def _refitted(
     data: Data,
     current: Fit,
@@ -241,7 +186,7 @@ def promising(
     """
     told = {c.name: c.predicted_drop for c in ranked} | dict(expected or {})
     values = len(current.residual)
-    material = (1.0 - (1.0 - _LEAST_FALL) ** 2) * current.chi2
+    material = (1.0 - (1.0 - LEAST_FALL) ** 2) * current.chi2
     needed = {c.name: fitted_count(c.name, current.actuator.axes) * np.log(values) + LEAST_BIC for c in ranked}
     chosen = [
         c

@@ -16,8 +16,8 @@ from ema_model.discovery.begin import calibrated_story
 from ema_model.discovery.controller_seen import ControllerSeen, controller_seen
 from ema_model.discovery.criteria import APART, GONE, HALF, HEARD, LOOP_TOLD, MUCH_BETTER
 from ema_model.discovery.objections import ratio
+from ema_model.discovery.paid_for import pays
 from ema_model.discovery.path import Story
-from ema_model.discovery.refit import pays
 from ema_model.discovery.remaining import at_floor
 from ema_model.discovery.repeatability import by_inverse_dynamics
 from ema_model.discovery.result import Added, Candidate, Change

@@ -7,7 +7,8 @@ from collections.abc import Callable
 from ema_model.comparison.explain import Explanation
 from ema_model.discovery.criteria import LEAST_BIC
 from ema_model.discovery.model_fit import Data, Fit, fit
-from ema_model.discovery.refit import Trial, pays, stands_for
+from ema_model.discovery.paid_for import pays
+from ema_model.discovery.refit import Trial, stands_for
 from ema_model.discovery.result import Candidate
 from ema_model.discovery.torque_curve import is_torque, with_curve
 from ema_model.effects import find

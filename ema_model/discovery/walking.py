@@ -14,9 +14,10 @@ from ema_model.discovery.criteria import FAR, HALF, LOOP_TOLD, TOLD_WELL
 from ema_model.discovery.dropped import drop_doubtful, drop_idle
 from ema_model.discovery.model_fit import Fit
 from ema_model.discovery.objections import ratio
+from ema_model.discovery.paid_for import pays
 from ema_model.discovery.path import Story
 from ema_model.discovery.ranking import with_faults
-from ema_model.discovery.refit import Trial, pays, with_drops
+from ema_model.discovery.refit import Trial, with_drops
 from ema_model.discovery.remaining import Left, at_floor
 from ema_model.discovery.result import Candidate
 from ema_model.discovery.second_opinion import Opinion, compared, second_opinion, taken_over

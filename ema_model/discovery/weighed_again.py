@@ -15,8 +15,9 @@ from ema_model.discovery.evidence import evidence
 from ema_model.discovery.faults import fault_trial
 from ema_model.discovery.model_fit import Fit, fit, without_effect
 from ema_model.discovery.objections import against
+from ema_model.discovery.paid_for import price
 from ema_model.discovery.path import Story
-from ema_model.discovery.refit import Trial, price, settings_in, tried
+from ema_model.discovery.refit import Trial, settings_in, tried
 from ema_model.effects import catalogue_name
 
 Progress = Callable[[str], None]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ema_model.actuator.naming import on_axes
 from ema_model.actuator.readings import sentences as phrases_of
+from ema_model.comparison.criteria import BAND
 from ema_model.comparison.sentences import dependence
 from ema_model.comparison.verdict import most_of_floor
 from ema_model.discovery.criteria import FAR
@@ -29,6 +30,7 @@ VERDICTS = {
     "not_repeatable": "the run does not repeat itself, so that a comparison over time means nothing",
 }
 _MOVED, _MOST_MOVED = 0.5, 3  # σ of a tolerance, from which on a parameter's own value is worth a word; of those
+_HARDLY = 0.02  # of the held-out error: what takes less from it is hardly seen there
 _NEAR = 1.2  # times the floor, below which a digit more tells a true model from another
 FLOOR_NOTE = (
     "Errors are rms over all fitted signals in units of the floor: 1 is what noise and the model's own limits leave. "
@@ -253,4 +255,7 @@ def _times(first: Rung, last: Rung) -> str:
     fall = f"{number(first.rmse)} to {number(last.rmse)} times the floor"
     if first.holdout_rmse is None or last.holdout_rmse is None:
         return fall
-    return f"{fall}, and on what was not fitted from {number(first.holdout_rmse)} to {number(last.holdout_rmse)} times"
+    unseen = f"from {number(first.holdout_rmse)} to {number(last.holdout_rmse)} times"
+    if last.holdout_rmse <= BAND and last.holdout_rmse > (1.0 - _HARDLY) * first.holdout_rmse:
+        return f"{fall}; what was not fitted hardly shows it ({unseen})"
+    return f"{fall}, and on what was not fitted {unseen}"

@@ -8,6 +8,7 @@ from support.hidden_effects import ACTUATOR, recorded
 from ema_model.commands import command
 from ema_model.discovery import discover
 from ema_model.discovery.fingerprints import variants
+from ema_model.discovery.words import sentences
 from ema_model.effects import CATALOGUE, find
 from ema_model.simulation.run import Run, simulate_reference
 from ema_model.simulation.sensors import Sensors
@@ -102,3 +103,19 @@ def test_places_are_the_effects_own_parameters(name):
     assert set(effect.placed) <= {one.name for one in effect.parameters}
     assert len({len(shares) for shares in effect.placed.values()}) == 1
     assert effect.against in ("user_position", "time")
+
+
+@pytest.mark.long
+def test_what_only_steps_show_is_named_beside_a_sine_that_was_held_out():
+    """At small angles the drive never asks for more acceleration than its limit."""
+    hidden = {"acceleration_limit": {"ramp_s": 0.01}}
+    fitted = recorded(83, commands=[CHIRP, ("step", {"final_rad": 0.005}, 0.5), SINE], effects=hidden)
+    held = recorded(
+        84, plant_seed=83, commands=[("sine", {"amplitude_rad": 0.02, "frequency_Hz": 5.0}, 0.5)], effects=hidden
+    )
+    found = discover(fitted, ACTUATOR, holdout=held)
+    [one] = found.effects
+    assert one.name == "acceleration_limit" and found.verdict == "effects_found"
+    assert one.parameters["ramp_s"].value == pytest.approx(0.01, rel=0.1)
+    assert found.ladder[-1].rmse < 1.1 < 2.0 < found.ladder[0].rmse
+    assert "what was not fitted hardly shows it" in " ".join(sentences(found))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ema_model.actuator import Tolerance
-from ema_model.discovery import objections, refit
+from ema_model.discovery import objections, paid_for, refit
 from ema_model.effects import find
 from ema_model.estimation import Calibrated
 
@@ -69,7 +69,25 @@ def test_an_effect_that_is_no_parameter_stands_for_none():
     ],
 )
 def test_what_falls_where_it_was_fitted_must_fall_elsewhere(before, after, fall, holds):
-    assert refit._holds(before, after, fall) is holds
+    assert paid_for._holds(before, after, fall) is holds
+
+
+@pytest.mark.parametrize(
+    ("change", "after", "worth", "silent"),
+    [
+        (0.10, 0.9005, 480.0, True),
+        (0.30, 0.9005, 480.0, False),  # it would have fallen by 6 % if all were true
+        (0.10, 0.9200, 480.0, False),  # it rises by more than it was asked to fall
+        (0.10, 0.9005, 60.0, False),  # and what was fitted might be chance
+    ],
+)
+def test_what_could_not_show_an_effect_says_nothing_against_it(monkeypatch, change, after, worth, silent):
+    current, fitted = (SimpleNamespace(error=lambda error=error: error) for error in (1.0, 0.88))
+    held = SimpleNamespace()
+    monkeypatch.setattr(paid_for, "holdout_error", lambda data, found: 0.9 if found is current else after)
+    monkeypatch.setattr(paid_for, "holdout_change", lambda data, one, other: change)
+    monkeypatch.setattr(paid_for, "worth", lambda data, before, trial: worth)
+    assert paid_for._holds_its_peace(None, held, current, SimpleNamespace(fit=fitted)) is silent
 
 
 def arm(moment_Nm: float, file: bool = True):

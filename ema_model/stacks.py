@@ -21,6 +21,8 @@ from importlib.machinery import ModuleSpec
 from types import ModuleType
 from typing import Any
 
+import numba
+
 from ema_model.effects import find
 from ema_model.effects.effect import ADVANCE, PLACES, STAGES
 from ema_model.errors import InputError
@@ -73,11 +75,22 @@ def _refuse_after_fork() -> None:
         )
 
 
-def exclusive(kernel: Callable[..., Any], *arguments: Any) -> Any:
-    """Calls a parallel kernel, one at a time in the whole process; ForkedError as `find_stack`."""
+def exclusive(kernel: Callable[..., Any], *arguments: Any, jobs: int | None = None) -> Any:
+    """Calls a parallel kernel, one at a time in the whole process; ForkedError as `find_stack`.
+
+    jobs: how many threads have something to do, all without it.  The others are left out: numba waits for each of
+    them, which beside a busy browser takes as long as several simulations.
+    """
     _refuse_after_fork()
     with _one_parallel_kernel:
-        return kernel(*arguments)
+        threads = numba.get_num_threads()
+        if jobs is None or jobs >= threads:
+            return kernel(*arguments)
+        numba.set_num_threads(jobs)  # of this thread
+        try:
+            return kernel(*arguments)
+        finally:
+            numba.set_num_threads(threads)
 
 
 def find_stack(circuit: str = "reduced", effects: Iterable[str] = (), controller: str = "cascade") -> Stack:

@@ -201,6 +201,11 @@ def promising(
     return best + [c for c in bent if c not in best and not c.untestable_reason]
 
 
+def falls_short(candidate: Candidate, whole: float) -> bool:
+    """Whether no refit would bring a candidate near what a model that explains all has told: a fall of χ²."""
+    return candidate.predicted_drop < _SCORE * whole
+
+
 def with_drops(ranked: Sequence[Candidate], trials: Sequence[Trial]) -> list[Candidate]:
     """All candidates with what their refits gave, the best first."""
     drops: Mapping[str, float] = {trial.candidate.name: trial.drop for trial in trials}

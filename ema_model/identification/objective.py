@@ -85,6 +85,7 @@ class Objective(ClosedLoop):
                 group.steps_per_block,
                 group.step_s,
                 result,
+                jobs=len(states) * len(rows),
             )
             total += result.sum(axis=0).ravel()
         rmse = np.sqrt(total[: len(k)] / self.blocks)
@@ -114,6 +115,7 @@ class Objective(ClosedLoop):
                 1,
                 window.step_s,
                 result,
+                jobs=len(rows),
             )
             parts.append(result[:, :, 0, :].transpose(0, 2, 1).reshape(len(rows) * LANES, -1)[: len(k)])
         return np.concatenate(parts, axis=1)

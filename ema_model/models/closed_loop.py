@@ -230,6 +230,7 @@ class ClosedLoop:
                 window.samples_per_block,
                 window.step_s,
                 result,
+                jobs=len(rows),
             )
             for block, shown in enumerate(result):
                 ours = lanes[:, block * LANES : (block + 1) * LANES, part]

@@ -137,6 +137,7 @@ class InverseDynamics:
                 window.since_s[part],
                 window.still,
                 result,
+                jobs=len(rows),
             )
             currents[:, part] = result.transpose(0, 2, 1).reshape(len(rows) * LANES, -1)[:n]
         return currents

@@ -205,6 +205,7 @@ def simulate_monitors(
         1,
         dt,
         result,
+        jobs=blocks,
     )
     runs = (_signals(run, actuator, result[i // LANES, :, :, i % LANES], start) for i in range(len(k)))
     return tuple(Measurement(finite(one, "the monitor model", actuator.axes), name="monitor model") for one in runs)

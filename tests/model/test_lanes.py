@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numba
 import numpy as np
 import pytest
 from support.representative import first_of
@@ -72,9 +73,10 @@ def test_traces_of_a_population_are_single_runs(monkeypatch, circuit, effects):
     assert len(rows) == 2
     calls = []
 
-    def spy(kernel, *arguments):
+    def spy(kernel, *arguments, jobs):
+        assert jobs == 1, "a single run is one block"
         calls.append((kernel, arguments))
-        return exclusive(kernel, *arguments)
+        return exclusive(kernel, *arguments, jobs=jobs)
 
     monkeypatch.setattr(simulation, "exclusive", spy)
     simulate_monitor(RUN, ACTUATOR, k[0], effects, circuit)
@@ -198,3 +200,13 @@ def test_what_is_not_a_number_is_no_answer(recording, circuit, component):
     k = HEALTHY.copy()
     k[component] = np.nan
     assert Objective([recording], ACTUATOR, circuit=circuit)(k)[0] == np.inf
+
+
+def test_no_thread_is_kept_waiting_that_has_nothing_to_do():
+    seen, threads = [], numba.get_num_threads()
+    for jobs in (1, threads, threads + 1, None):
+        exclusive(lambda: seen.append(numba.get_num_threads()), jobs=jobs)
+    assert seen == [1, threads, threads, threads]
+    with pytest.raises(ZeroDivisionError):
+        exclusive(lambda: 1 / 0, jobs=1)
+    assert numba.get_num_threads() == threads, "also after a kernel that failed"

@@ -137,9 +137,16 @@ class _Walk:
 
     def _begin_with(self, fault: Trial) -> None:
         """Walks anew beside a fault in whose place an effect stood."""
-        self.story.restart()
-        self.story.refused.clear()
-        self.story.add(self.story.trial(fault.candidate, self._tell))
+        story = self.story
+        walked = story.steps[story.bare :]
+        story.restart()
+        try:
+            trial = story.trial(fault.candidate, self._tell)
+        except BaseException:  # it was stopped
+            story.steps += walked
+            raise
+        story.refused.clear()
+        story.add(trial)
         self._rivals, self._near, self._going = [], {}, True
 
     def _best(self) -> Candidate | None:

@@ -128,3 +128,21 @@ def test_friction_that_falls_is_tried_from_where_its_whole_change_comes_nearest(
     ranked = [Candidate("hinge_moment", 9.0, {}), Candidate("stribeck_friction", 0.0, {"speed_rad_s": 3.0})]
     [tried] = Story.tried_whole(story, ranked, lambda text: None)
     assert tried.name == "stribeck_friction" and tried.settings == {"speed_rad_s": 0.3}
+
+
+def test_a_stop_while_a_fault_is_tried_first_leaves_the_model_that_was_walked_to(monkeypatch):
+    def stopped(candidate, tell):
+        raise KeyboardInterrupt
+
+    walk = walk_of(monkeypatch, [])
+    story = walk.story
+    story.steps, story.bare, story.refused = ["calibrated", "zone", "load"], 1, {"hinge_moment": "unsteady"}
+    story.restart = lambda: story.steps.__delitem__(slice(story.bare, None))
+    story.trial = stopped
+    with pytest.raises(KeyboardInterrupt):
+        walk._begin_with(SimpleNamespace(candidate=Candidate("k1", 1.0, {"k1": 0.4})))
+    assert story.steps == ["calibrated", "zone", "load"] and story.refused
+    story.trial, story.add = lambda candidate, tell: candidate.name, story.steps.append
+    walk._near, walk._going = {"zone": []}, False
+    walk._begin_with(SimpleNamespace(candidate=Candidate("k1", 1.0, {"k1": 0.4})))
+    assert story.steps == ["calibrated", "k1"] and walk._going and not walk._near and not story.refused

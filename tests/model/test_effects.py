@@ -57,7 +57,10 @@ SHOWN = {
     "screw_lead_error": (SINE, "motor_position_rad"),
     "stribeck_friction": (CHIRP, "current_A"),
 }
-STRONGER = {"torque_ripple": 0.3}  # than the strongest severity, to stand out of the inverter's chopping
+STRONGER = {
+    "torque_ripple": 0.3,
+    "torque_saturation": 0.02,
+}  # than the strongest severity, to stand out of the inverter's chopping
 # A phase's dead time in the Reference Model is this much in the Monitor Model's equivalent winding.
 PHASE_TO_WINDING = {"dead_time": math.sqrt(2.0) * 4.0 / math.pi}
 

@@ -229,14 +229,15 @@ class Story:
         ]
         self.steps[-1] = replace(last, added=tuple(added))
 
-    def without(self, key: str, tell: Progress = lambda text: None) -> Fit:
-        """The last model without one of its effects or faults, refitted."""
+    def without(self, key: str, tell: Progress = lambda text: None, found: Fit | None = None) -> Fit:
+        """The last model, or another one that was found, without one of its effects or faults, refitted."""
+        found = found or self.current
         if key in FAULTS:
-            return without_fault(self.data, self.current, key, tell)
-        actuator = without_effect(self.current.actuator, key)
+            return without_fault(self.data, found, key, tell)
+        actuator = without_effect(found.actuator, key)
         if key in self.of_the_file:
             actuator = as_in(self.base.actuator, key, actuator)
-        return fit(self.data, actuator, self.current.starts, tell, self.current.faults)
+        return fit(self.data, actuator, found.starts, tell, found.faults)
 
     def settle(self, tell: Progress = lambda text: None) -> None:
         """Fits the models anew as what each leaves asks for, where what the last one leaves is no noise.

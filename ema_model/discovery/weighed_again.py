@@ -13,7 +13,7 @@ from dataclasses import replace
 from ema_model.discovery.criteria import NEAR_AS_MUCH, TIE
 from ema_model.discovery.evidence import evidence
 from ema_model.discovery.faults import fault_trial
-from ema_model.discovery.model_fit import Fit, fit, without_effect
+from ema_model.discovery.model_fit import Fit
 from ema_model.discovery.objections import against
 from ema_model.discovery.paid_for import price
 from ema_model.discovery.path import Story
@@ -76,8 +76,7 @@ def fault_instead(story: Story, rivals: Mapping[str, Sequence[Trial]], tell: Pro
             last = story.added[-1].key
             if _outdoes(story, smaller, rival, [one.key], tell):
                 return rival
-            smallest = fit(story.data, without_effect(smaller.actuator, last), smaller.starts, tell, smaller.faults)
-            if _outdoes(story, smallest, rival, [one.key, last], tell):
+            if _outdoes(story, story.without(last, tell, smaller), rival, [one.key, last], tell):
                 return rival
     return None
 

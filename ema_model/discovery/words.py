@@ -30,7 +30,7 @@ VERDICTS = {
     "not_repeatable": "the run does not repeat itself, so that a comparison over time means nothing",
 }
 _MOVED, _MOST_MOVED = 0.5, 3  # σ of a tolerance, from which on a parameter's own value is worth a word; of those
-_HARDLY = 0.02  # of the held-out error: what takes less from it is hardly seen there
+_HARDLY = 0.02  # of the held-out error: what moves it by less is hardly seen there
 _NEAR = 1.2  # times the floor, below which a digit more tells a true model from another
 FLOOR_NOTE = (
     "Errors are rms over all fitted signals in units of the floor: 1 is what noise and the model's own limits leave. "
@@ -256,6 +256,6 @@ def _times(first: Rung, last: Rung) -> str:
     if first.holdout_rmse is None or last.holdout_rmse is None:
         return fall
     unseen = f"from {number(first.holdout_rmse)} to {number(last.holdout_rmse)} times"
-    if last.holdout_rmse <= BAND and last.holdout_rmse > (1.0 - _HARDLY) * first.holdout_rmse:
+    if last.holdout_rmse <= BAND and abs(last.holdout_rmse - first.holdout_rmse) < _HARDLY * first.holdout_rmse:
         return f"{fall}; what was not fitted hardly shows it ({unseen})"
     return f"{fall}, and on what was not fitted {unseen}"

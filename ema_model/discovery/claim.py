@@ -14,6 +14,7 @@ from ema_model.discovery.paid_for import price
 from ema_model.discovery.path import Story
 from ema_model.discovery.refit import Trial, stands_for
 from ema_model.effects import find
+from ema_model.quantities.titles import in_sentence
 
 Progress = Callable[[str], None]
 
@@ -29,18 +30,23 @@ class Claim(NamedTuple):
 def claimed(story: Story, accepted: Sequence[Trial], tell: Progress) -> Claim | None:
     """The best trial that nothing speaks against, those that cannot be told from it, and further orders of it.
 
-    None where none is to be claimed.  A trial that tells far less than one that is refused only bends as that one does.
+    None where none is to be claimed.  A trial that tells far less than one that is refused only bends as that one does;
+    so does one by orders, where another law of the same orders tells more.
     """
     left = [trial for trial in accepted if trial.drop > SECOND * accepted[0].drop]
+    by_orders: list[Trial] = []  # refused, each with the further orders of its law
     while left:
         best, others = _chosen(story, left)
         further = _further(story, best, tell)
         more, reason = None if further is None else further.trial, ""
         apart = _of_other_parts(best, others)
+        law = None if further is None else _better_law(story, more or best, by_orders)
         if len(apart) >= LARGEST_GROUP:
             reason = f"{len(apart)} others tell as much"
         elif further is not None and not further.stands_out:
             reason = f"its order {best.candidate.settings['order']:g} tells no more than its neighbours"
+        elif law is not None:
+            reason = f"{in_sentence(find(law.candidate.name).title)}, which is not claimed, tells more by such orders"
         # In a second opinion there is no twin, whose floor would tell a faint further order from what is left.
         steady = story.current.actuator.leaves_out_reversals
         alone_first = steady and not (more is not None and _halves(story, best, more))
@@ -53,6 +59,7 @@ def claimed(story: Story, accepted: Sequence[Trial], tell: Progress) -> Claim | 
                 return Claim(best, others, more if whole is more else None)
             reason = spoken if whole is best else reason
         story.refused[best.candidate.name] = reason
+        by_orders += [] if further is None else [more or best]
         left = [trial for trial in left if trial is not best]
     return None
 
@@ -99,6 +106,18 @@ def _of_other_parts(best: Trial, others: Sequence[Trial]) -> list[Trial]:
     if find(best.candidate.name).family != "drive":
         return list(others)
     return [trial for trial in others if find(trial.candidate.name).family != "drive"]
+
+
+def _better_law(story: Story, trial: Trial, refused: Sequence[Trial]) -> Trial | None:
+    """The refused trial whose law, at orders too, tells more than this one's does.
+
+    A ripple goes with the current, a friction with the direction: what one of them is, the others' orders imitate.
+    """
+    for other in refused:
+        more = price(story.data, story.current, other) - price(story.data, story.current, trial)
+        if evidence(story.data, trial.fit, other.fit) - more > TIE:
+            return other
+    return None
 
 
 def _further(story: Story, best: Trial, tell: Progress) -> Further | None:

@@ -43,8 +43,8 @@ PHASES_APART = 1.0
 # tells less of an error whose cause is not known may be a part of that cause (a drive's bias is a constant load).
 LEAST_SHARE = 0.25
 
-# Of what a model leaves beyond the floor, though it may be true as it is: an effect must take more, or LEAST_SHARE if
-# that brings it into the band of true models (all right ones of the own study do; two false ones of servos took 0.2).
+# Of what a model leaves beyond the floor, though it may be true as it is: an effect must take more (right ones of the
+# own study take 0.8 or more; false ones of servos took 0.2 to 0.5).
 OF_FAINT = 0.5
 
 # Of the floor, beyond which that share is asked for: nearer to it, two causes may share the error (a shorted phase and

@@ -5,7 +5,7 @@ They share one stack, in which every lane has one of them on and all others do n
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -13,17 +13,16 @@ from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.actuator.unread import idle
+from ema_model.discovery.extents import Ranges, moves_both_ways, ranges_of, top_speed
 from ema_model.discovery.model_fit import Data, Fit
 from ema_model.effects import Effect, find
 
 Array = NDArray[np.float64]
 Lane = tuple[Effect, dict[str, float]]
-Ranges = Mapping[str, tuple[float, float]]  # by variable
 
 _FAR = 30.0  # times what there is to explain
 _ATTEMPTS = 3
 _LONGEST_STEP_S = 2e-5  # at which no score differs in its first three digits from that at 1e-5
-_BACKWARD = 0.05  # of the top speed, that both directions must reach for motion to count as both ways
 _DIVERGED = 1e100  # floors, from which on a change has no meaning: its square would overflow
 
 
@@ -84,9 +83,9 @@ def _beside(effect: Effect) -> dict[str, float]:
 def fingerprints(data: Data, found: Fit, names: Iterable[str], orders: Sequence[float]) -> list[Fingerprint]:
     """Those of all effects that are not yet in the model, at the model's calibrated parameters."""
     effects = [find(name, found.actuator.axes) for name in names if name not in found.effects]
-    if not _moves_both_ways(found):
+    if not moves_both_ways(found):
         effects = [one for one in effects if not one.by_direction]
-    top, ranges = _top_speed(found), _ranges(found)
+    top, ranges = top_speed(found), ranges_of(found)
     tried = [(effect, settings) for effect in effects for settings in variants(effect, orders, top, ranges)]
     lanes = [(effect, one) for effect, settings in tried for one in settings]
     if not lanes:
@@ -123,37 +122,6 @@ def of_the_file(found: Fit, names: Iterable[str]) -> list[Fingerprint]:
             jacobian = calibration.weighted_jacobian[:, [columns.index(path) for path in own]]
             prints.append(Fingerprint(name, dict(calibration.actuator.effects[name]), jacobian, frees=own))
     return prints
-
-
-def _moves_both_ways(found: Fit) -> bool:
-    """Whether the motor goes forward and backward in the recordings; also where its speed is not known."""
-    speeds = _speeds(found)
-    if not speeds:
-        return True
-    fastest = _top_speed(found)
-    return all(max(float(np.max(side * one)) for one in speeds) > _BACKWARD * fastest for side in (1.0, -1.0))
-
-
-def _speeds(found: Fit) -> list[Array]:
-    """The motor's speed in each window where it is known, (blocks,)."""
-    windows = zip(found.plant.windows, found.calibration.signals)
-    shown = [window.context.get("motor_speed_rad_s", signals.get("motor_speed_rad_s")) for window, signals in windows]
-    return [one for one in shown if one is not None]
-
-
-def _top_speed(found: Fit) -> float:
-    """The motor's top speed in the recordings, rad/s; 0 where it is not known."""
-    return float(max((np.max(np.abs(one)) for one in _speeds(found)), default=0.0))
-
-
-def _ranges(found: Fit) -> Ranges:
-    """What the user's position goes through in the recordings, where it is known."""
-    user, tau = [], found.actuator.transmission.gear_ratio
-    for window, signals in zip(found.plant.windows, found.calibration.signals):
-        motor = signals.get("motor_position_rad", window.context.get("motor_position_rad"))
-        shown = signals.get("user_position_rad", None if motor is None else tau * motor)
-        user += [] if shown is None else [np.min(shown), np.max(shown)]
-    return {"user_position": (float(min(user)), float(max(user)))} if user else {}
 
 
 def _changes(data: Data, found: Fit, lanes: list[Lane]) -> Array:

@@ -22,6 +22,7 @@ from ema_model.discovery.criteria import (
     TIE,
 )
 from ema_model.discovery.evidence import colour_of, evidence, signals_of
+from ema_model.discovery.extents import greatest, travel
 from ema_model.discovery.model_fit import ANGLES, Data, Fit, floor_ratio
 from ema_model.discovery.remaining import at_floor, left_by, may_be_true, used_left
 from ema_model.discovery.stability import disagreement
@@ -161,7 +162,7 @@ def _implausible(after: Fit, key: str) -> str:
         value, low, high = values[parameter.name], *parameter.plausible
         size, beside = 1.0, ""
         if parameter.plausible_at:
-            size = _greatest(after, parameter.plausible_at)
+            size = greatest(after, parameter.plausible_at)
             beside = f" at {number(size)} {SIGNALS[parameter.plausible_at].unit}"
         elif parameter.plausible_of:
             whole = abs(after.calibration.actuator.value(parameter.plausible_of))
@@ -169,21 +170,9 @@ def _implausible(after: Fit, key: str) -> str:
             beside = f" beside a {_title(after, parameter.plausible_of)} of {number(whole)}"
         if (low is not None and value * size < low) or (high is not None and value * size > high):
             return f"its {_title(after, f'effects.{key}.{parameter.name}')} of {number(value)} is not plausible{beside}"
-        if parameter.name == "period_rad" and value > _travel(after):
+        if parameter.name == "period_rad" and value > travel(after):
             return "its period is longer than the travel"
     return ""
-
-
-def _greatest(found: Fit, signal: str) -> float:
-    """The greatest size of a signal in the recordings; 0 where it is not known."""
-    shown = [signals[signal] for signals in found.calibration.signals if signal in signals]
-    return float(max((np.max(np.abs(one)) for one in shown), default=0.0))
-
-
-def _travel(found: Fit) -> float:
-    """What the motor turns in the recordings, rad."""
-    shown = [signals["motor_position_rad"] for signals in found.calibration.signals if "motor_position_rad" in signals]
-    return float(max((np.ptp(one) for one in shown), default=np.inf))
 
 
 def _worse(data: Data, before: Fit, after: Fit) -> str:
@@ -224,8 +213,7 @@ def _faint(data: Data, before: Fit, after: Fit) -> str:
     if not may_be_true(data, before) or last <= 1.0:
         return ""
     kept = (last**2 - 1.0) / max(first**2 - 1.0, 1e-9)
-    share = OF_FAINT if last > data.floor_band[1] else LEAST_SHARE
-    return "" if kept < 1.0 - share else "a true model may leave as much, and most of it stays"
+    return "" if kept < 1.0 - OF_FAINT else "a true model may leave as much, and most of it stays"
 
 
 def _strained(data: Data, before: Fit, after: Fit) -> str:

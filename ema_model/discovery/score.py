@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ema_model.discovery.extents import greatest
 from ema_model.discovery.fingerprints import Fingerprint
 from ema_model.discovery.let_go import at_bounds, let_go
 from ema_model.discovery.model_fit import Fit
@@ -149,8 +150,7 @@ def _scored(
     if one.frees:
         return _beyond_the_file(found, one, effect, amounts, float(toward @ amounts))
     first = effect.parameters[0]
-    strong = effect.severities[2] / one.settings[first.name]
-    reason = unseen(energy, strong)
+    reason = unseen(energy, _strong(found, effect) / one.settings[first.name])
     given = 0.0
     if freed:
         amounts, energy, toward, given = freed
@@ -170,6 +170,17 @@ def _scored(
         settings[first.name] = float(np.clip(settings[first.name] * math.hypot(*amounts), first.low, first.high))
         settings["phase_rad"] = math.atan2(float(amounts[1]), float(amounts[0]))
     return Candidate(one.name, 0.0 if reason else max(0.0, drop), settings, reason)
+
+
+def _strong(found: Fit, effect: Effect) -> float:
+    """A strong case of an effect's first parameter; of one that counts by a signal's size, what this machine may have.
+
+    The library's own machine has other currents.
+    """
+    first = effect.parameters[0]
+    size = greatest(found, first.plausible_at) if first.plausible_at else 0.0
+    most = first.plausible[1]
+    return max(effect.severities[2], most / size) if most and size else effect.severities[2]
 
 
 def _beyond_the_file(found: Fit, one: Fingerprint, effect: Effect, amounts: Array, drop: float) -> Candidate:

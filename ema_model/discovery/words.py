@@ -47,7 +47,7 @@ def headline(found: Discovery) -> str:
     """The verdict in one sentence; in two where the controller is not the file's."""
     if found.controller_seen is None:
         return _answer(found)
-    if found.verdict == "adequate" and not found.parameters_outside_tolerance:
+    if found.verdict == "adequate" and not found.parameters_outside_tolerance and not found.not_claimed:
         return "The controller is not what the file says; without it, motion and current show nothing else missing."
     return f"The controller is not what the file says. Without it: {in_sentence(_answer(found))}"
 
@@ -60,6 +60,8 @@ def _answer(found: Discovery) -> str:
         return f"No physics is missing: the actuator has {faulty}."
     if found.verdict == "adequate" and found.parameters_outside_tolerance:
         return "No physics is missing, but not all parameters are within their tolerance."
+    if found.verdict == "adequate" and found.not_claimed:
+        return "No more is left than a true model leaves, and nothing that was tried can be claimed for it."
     if found.verdict == "partly_explained":
         return f"Found in part: {_named(found) or 'a curve'}{f', and {faulty}' if faulty else ''}; {remains(found)}."
     if found.verdict == "unknown_effect" and found.at_floor and found.transmission_seen is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from types import SimpleNamespace
 
 import pytest
@@ -68,6 +69,40 @@ def test_where_a_curve_outdoes_all_orders_nothing_is_claimed(of_cogging):
     for steady in (False, True):
         found, refused, asked = ask(steady, outdone=3)
         assert found is None and refused == {"cogging_torque": OUTDONE} and sorted(asked) == [1, 3]
+
+
+@dataclass(frozen=True)
+class Named:
+    """A fit."""
+
+    name: str
+
+
+@pytest.mark.parametrize(("more", "is_claimed"), [(30.0, False), (24.0, True), (-50.0, True)])
+def test_an_effect_by_orders_is_not_claimed_where_another_law_of_them_tells_more(monkeypatch, more, is_claimed):
+    """Friction by place, outdone by a curve, and a ripple of the current that imitates it.
+
+    more: evidence by which the friction of two orders tells more than the ripple of one; its second order costs 15.
+    """
+    friction, ripple = (
+        Trial(Candidate(name, {"order": 6.0}, drop), {name: {}}, Named(name), drop)
+        for name, drop in (("position_dependent_friction", 900.0), ("torque_ripple", 880.0))
+    )
+    two = Trial(friction.candidate, {"position_dependent_friction_2": {}}, Named("of two"), 950.0)
+    further = {friction.fit: Further(True, two), ripple.fit: Further(True, None)}
+    monkeypatch.setattr(claim, "_chosen", lambda story, accepted: (accepted[0], []))
+    monkeypatch.setattr(claim, "_further", lambda story, best, tell: further[best.fit])
+    monkeypatch.setattr(claim, "price", lambda data, current, trial: 30.0 if trial is two else 15.0)
+    told = {("torque_ripple", "of two"): more}
+    monkeypatch.setattr(claim, "evidence", lambda data, small, large: told[small.name, large.name])
+    monkeypatch.setattr(claim, "against", lambda data, before, after, *rest: "" if after is ripple.fit else OUTDONE)
+    current = SimpleNamespace(actuator=SimpleNamespace(leaves_out_reversals=False))
+    story = SimpleNamespace(data=None, held=None, current=current, refused={})
+    found = claim.claimed(story, [friction, ripple], lambda text: None)
+    assert found == ((ripple, [], None) if is_claimed else None)
+    told_more = "position-dependent friction, which is not claimed, tells more by such orders"
+    refused = {"position_dependent_friction": OUTDONE} | ({} if is_claimed else {"torque_ripple": told_more})
+    assert story.refused == refused
 
 
 class Grown:

@@ -143,12 +143,21 @@ def test_the_share_that_counts_is_of_what_the_settled_models_leave(monkeypatch, 
     [
         (1.09, 1.07, True),
         (1.09, 1.03, False),
+        (1.031, 1.022, True),
         (1.2, 1.06, False),
         (1.6, 1.5, False),
         (1.045, 1.036, True),
         (1.0, 0.99, False),
     ],
-    ids=["hardly less", "in the band", "most of it", "far from true", "hardly into the band", "at the floor before"],
+    ids=[
+        "hardly less",
+        "in the band",
+        "hardly less in it",
+        "most of it",
+        "far from true",
+        "hardly into it",
+        "at the floor",
+    ],
 )
 def test_of_a_model_that_may_be_true_an_effect_takes_most_or_is_not_claimed(monkeypatch, before, after, kept):
     """Nine of ten true models leave up to 1.04 floors here, and one of a hundred up to 1.25."""

@@ -7,6 +7,7 @@ would move back, and the others with it.
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,16 @@ Array = NDArray[np.float64]
 
 AT_BOUND = 0.02  # σ from it
 _RIDGE = 1e-9  # of the columns' mean energy
+
+
+class Freed(NamedTuple):
+    """Amounts a of some columns beside what leaves its bound: χ² falls by c + 2 a·t − a·E·a with any near these."""
+
+    amounts: Array  # a
+    energy: Array  # E
+    toward: Array  # t
+    given: float  # c
+    change: Array  # of the residual, (values,), with all that moves beside them
 
 
 def at_bounds(found: Fit) -> NDArray[np.bool_]:
@@ -33,11 +44,10 @@ def _parabola(found: Fit) -> tuple[Array, Array, Array]:
     return jacobian, jacobian.T @ jacobian + np.eye(len(x)), jacobian.T @ found.residual + x
 
 
-def let_go(found: Fit, columns: Array) -> tuple[Array, Array, Array, float] | None:
-    """Amounts a of some columns (values, columns) beside what leaves its bound for them; None where nothing does.
+def let_go(found: Fit, columns: Array) -> Freed | None:
+    """Amounts of some columns (values, columns) beside what leaves its bound for them; None where nothing does.
 
-    Returns a, and E, t and c such that χ² falls by c + 2 a·t − a·E·a with any amounts near these.  The descent is
-    linear, and holds an unknown at its bound as long as it would go beyond.
+    The descent is linear, and holds an unknown at its bound as long as it would go beyond.
     """
     held = np.flatnonzero(at_bounds(found))
     if not len(held):
@@ -48,6 +58,7 @@ def let_go(found: Fit, columns: Array) -> tuple[Array, Array, Array, float] | No
     gone: set[int] = set()
     barred: set[int] = set()
     amounts, own, toward, given = np.zeros(columns.shape[1]), energy, energy[0], 0.0
+    step = np.zeros(len(gradient))
     for _ in range(2 * len(held) + 1):
         free = np.array([one for one in range(len(gradient)) if one not in held or one in gone], dtype=int)
         inverse = np.linalg.inv(hessian[np.ix_(free, free)])
@@ -67,4 +78,4 @@ def let_go(found: Fit, columns: Array) -> tuple[Array, Array, Array, float] | No
         if not back:
             break
         gone |= back
-    return (amounts, own, toward, given) if gone else None
+    return Freed(amounts, own, toward, given, columns @ amounts + jacobian @ step) if gone else None

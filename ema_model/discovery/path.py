@@ -19,7 +19,7 @@ from ema_model.discovery.evidence import predicted_evidence
 from ema_model.discovery.faults import fault_for, fault_trial, tried_faults, without_fault
 from ema_model.discovery.fingerprints import Fingerprint, fingerprints, may_act, of_the_file
 from ema_model.discovery.model_fit import Data, Fit, as_in, fit, in_floors_of, without_effect
-from ema_model.discovery.refit import Trial, again, falls_short, is_near, promising, stands_for, tried
+from ema_model.discovery.refit import Trial, again, is_near, promising, stands_for, tried
 from ema_model.discovery.remaining import Left, at_floor, left_by
 from ema_model.discovery.result import Added, Candidate, Change, Contradiction, Rung
 from ema_model.discovery.score import scored, signatures
@@ -121,15 +121,9 @@ class Story:
     def tried(
         self, ranked: Sequence[Candidate], share: float, most: int, tell: Progress, known: Sequence[Trial] = ()
     ) -> list[Trial]:
-        """The most promising candidates, each in the model and refitted, the best first; known: refitted before.
-
-        Once one explains all, those that fall far short of it are left out.
-        """
+        """The most promising candidates, each in the model and refitted, the best first; known: refitted before."""
         trials: list[Trial] = []
         for candidate in self.promising(ranked, share, most):
-            whole = max((trial.drop for trial in trials if at_floor(self.data, trial.fit)), default=0.0)
-            if falls_short(candidate, whole):
-                continue
             trial = next((one for one in known if one.candidate is candidate), None)
             if trial is None:
                 tell(f"trying {candidate.name}")

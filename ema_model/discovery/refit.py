@@ -27,6 +27,7 @@ _NEAR = 5.0  # of the floor
 _ALIKE = 0.9  # cosine of two parameters' columns, from which on they do the same
 _STRAINED = 2.0  # σ, from which on a parameter may be what holds an effect's place
 _AS_IN_THE_FILE: Mapping[str, float] = {}  # a start
+_BENT = 0.2  # of the greatest fall of χ² that is predicted
 _FAINT = 0.1  # of the suggested strength, from which a fit that went astray begins anew
 
 
@@ -182,7 +183,8 @@ def promising(
     """Candidates worth a refit: near the best, and such that a refit might make the data pay for them.
 
     expected: the evidence that is predicted for each; without it, the fall of χ².  What would be a parameter of the
-    actuator that stands at its bound is refitted whatever is predicted, as others have gone out of their way there.
+    actuator that stands at its bound is refitted where it would take a fair share of χ², too: others have gone out of
+    its way.
     """
     told = {c.name: c.predicted_drop for c in ranked} | dict(expected or {})
     values = len(current.residual)
@@ -198,12 +200,8 @@ def promising(
     best = [c for c in chosen if c.predicted_drop >= share * chosen[0].predicted_drop][:most]
     known = current.calibration.parameters
     bent = [c for c in ranked if (path := find(c.name).duplicates) in known and known[path].at_bound]
-    return best + [c for c in bent if c not in best and not c.untestable_reason]
-
-
-def falls_short(candidate: Candidate, whole: float) -> bool:
-    """Whether no refit would bring a candidate near what a model that explains all has told: a fall of χ²."""
-    return candidate.predicted_drop < _SCORE * whole
+    least = _BENT * max((c.predicted_drop for c in ranked), default=0.0)
+    return best + [c for c in bent if c not in best and c.predicted_drop >= least and not c.untestable_reason]
 
 
 def with_drops(ranked: Sequence[Candidate], trials: Sequence[Trial]) -> list[Candidate]:

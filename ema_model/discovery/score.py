@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ema_model.discovery.extents import greatest
 from ema_model.discovery.fingerprints import Fingerprint
-from ema_model.discovery.let_go import at_bounds, let_go
+from ema_model.discovery.let_go import Freed, at_bounds, let_go
 from ema_model.discovery.model_fit import Fit
 from ema_model.discovery.result import Candidate
 from ema_model.effects import Effect, find
@@ -54,8 +54,11 @@ def signatures(found: Fit, prints: Mapping[str, Sequence[Fingerprint]]) -> dict[
     beyond = _beyond_all(*movable(found), [one.columns for its in prints.values() for one in its if not one.frees])
     told = {}
     for name, its in prints.items():
-        own = [beyond_of(*movable(found, one.frees), one.columns) if one.frees else next(beyond) for one in its]
-        parts = [columns @ np.linalg.lstsq(columns, -found.residual, rcond=None)[0] for columns in own]
+        parts = []
+        for one in its:
+            own = beyond_of(*movable(found, one.frees), one.columns) if one.frees else next(beyond)
+            freed = None if one.frees else let_go(found, one.columns)
+            parts.append(own @ np.linalg.lstsq(own, -found.residual, rcond=None)[0] if freed is None else freed.change)
         told[name] = min(parts, key=lambda part: float(np.sum((found.residual + part) ** 2)))
     return told
 
@@ -143,7 +146,7 @@ def _scored(
     jacobian: Array,
     gram: Array,
     beyond: Array | None = None,
-    freed: tuple[Array, Array, Array, float] | None = None,
+    freed: Freed | None = None,
 ) -> Candidate:
     amounts, energy, toward = amounts_of(found, one.columns, jacobian, gram, beyond)
     effect = find(one.name, found.actuator.axes)
@@ -153,7 +156,7 @@ def _scored(
     reason = unseen(energy, _strong(found, effect) / one.settings[first.name])
     given = 0.0
     if freed:
-        amounts, energy, toward, given = freed
+        amounts, energy, toward, given = freed[:4]
     settings = dict(one.settings)
     linear = {first.name: settings[first.name]} | one.beside
     if len(amounts) == len(linear):

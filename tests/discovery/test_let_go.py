@@ -33,7 +33,7 @@ def test_the_fall_is_that_of_the_bounded_problem(seed):
     assert np.sum(np.abs(x) > 0.49) >= 2
     freed = let_go(found, column[:, None])
     assert freed is not None
-    amounts, energy, toward, given = freed
+    amounts, energy, toward, given, change = freed
     rows = np.c_[np.r_[found.calibration.weighted_jacobian, np.eye(5)], np.r_[column, np.zeros(5)]]
     target = -np.r_[found.residual, x]
     low, high = found.calibration.room
@@ -41,6 +41,7 @@ def test_the_fall_is_that_of_the_bounded_problem(seed):
     fall = float(target @ target) - 2.0 * least.cost
     assert given + 2.0 * amounts @ toward - amounts @ energy @ amounts == pytest.approx(fall, rel=0.02)
     assert amounts[0] == pytest.approx(least.x[-1], rel=0.02)
+    np.testing.assert_allclose(change, (rows @ least.x)[:400], atol=0.02 * np.abs(change).max())
 
 
 def test_nothing_is_let_go_where_none_stands_at_a_bound():

@@ -74,7 +74,7 @@ def result_of(
     named = [one for one in added if one.name in names]
     faults = {name: calibration.parameters[name] for name in story.current.faults}
     outside = outside_tolerance(story.data, story.current)
-    stand_ins = [one.stands_for for one in story.added if one.stands_for]
+    freed = [one for one in added if one.stands_for]
     told = {*names, *(rival for one in named for rival in one.same_as)}  # refused at an earlier step, or not
     return Discovery(
         verdict=verdict_of(story, named, unknown),
@@ -83,7 +83,7 @@ def result_of(
         ladder=story.ladder,
         candidates=candidates,
         faults=faults,
-        parameters_outside_tolerance=list(dict.fromkeys([*stand_ins, *outside])),
+        parameters_outside_tolerance=list(dict.fromkeys([*(one.stands_for for one in freed), *outside])),
         actuator=calibration.actuator,
         plant=story.current.plant,
         floors=story.data.told_in,
@@ -108,6 +108,7 @@ def result_of(
         disagreements=story.disagreements,
         repeated=repeated(story.data, story.held, calibration.actuator),
         events=events,
+        freed=freed,
     )
 
 

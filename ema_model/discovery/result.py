@@ -155,6 +155,7 @@ class Discovery(InWords):
     disagreements: Sequence[Contradiction] = field(default_factory=tuple)  # held-out recordings at odds with the fitted
     repeated: Repeated | None = None  # where a command was recorded twice
     events: Sequence[Event] = field(default_factory=tuple)  # what happened at one moment of a recording
+    freed: Sequence[Added] = field(default_factory=tuple)  # effects that are a base parameter's value beyond tolerance
 
     @property
     def floor_band(self) -> tuple[float, float]:

@@ -18,8 +18,8 @@ _DIVERGED = 1e3  # times what was predicted, by which a refit is worse than the 
 
 
 def added(found: Discovery) -> Iterator[Facts]:
-    """Each effect with its parameters."""
-    for one in found.effects:
+    """Each effect with its parameters, also where it is a base parameter's value."""
+    for one in (*found.effects, *found.freed):
         effect = find(one.name)
         lines = [f"it belongs to {FAMILIES[effect.family]}"] if effect.family == "drive" else []
         yield Facts(_parameters(found, one), f"{effect.title}: {effect.equation}", lines)

@@ -149,7 +149,7 @@ def sentences(found: Discovery) -> list[str]:
     if found.parameters_outside_tolerance:
         outside = all_of([_beside_file(found, path) for path in found.parameters_outside_tolerance])
         whose = "its" if len(found.parameters_outside_tolerance) == 1 else "their"
-        by_themselves = {*found.calibration.outside_tolerance, *(one.stands_for for one in found.effects)}
+        by_themselves = {*found.calibration.outside_tolerance, *(one.stands_for for one in found.freed)}
         shared = set(found.parameters_outside_tolerance) - by_themselves
         scale = f", counting what shares {whose} scale, as the torque constant" if shared else ""
         told.append(f"Outside {whose} tolerance{scale}: {outside}.")
@@ -195,7 +195,7 @@ def _beside_file(found: Discovery, path: str) -> str:
     """'motor viscous friction 21.3 ± 0.35 mN·m·s/rad (8.00)'; its name alone where an effect is its value."""
     name = in_sentence(on_axes(path, found.actuator.axes).title)
     one = found.calibration.parameters.get(path)
-    stands_for = any(path == effect.stands_for for effect in found.effects)
+    stands_for = any(path == effect.stands_for for effect in found.freed)
     return name if one is None or stands_for else f"{name} {value(one)} ({amount(one.initial, one.unit)})"
 
 

@@ -59,6 +59,23 @@ def test_an_effect_that_is_a_parameter_does_not_mask_itself():
     assert masked([itself], found.actuator.axes) == []
 
 
+def test_a_parameter_that_an_effect_takes_beyond_its_tolerance_is_told_by_the_effect():
+    """Its own value, which stays within, would say the contrary."""
+    found = with_cogging()
+    [one], path = found.effects, "motor.viscous_friction_Nms_rad"
+    within = Calibrated(0.009, 0.008, (0.008, 0.01), "N·m·s/rad", 0.1, False)
+    calibration = replace(found.calibration, parameters={**found.calibration.parameters, path: within})
+    told = replace(
+        found,
+        effects=[],
+        freed=[replace(one, stands_for=path)],
+        calibration=calibration,
+        parameters_outside_tolerance=[path],
+    )
+    assert "Outside its tolerance: motor viscous friction." in sentences(told)
+    assert [facts.title for facts in tables.added(told)] == [facts.title for facts in tables.added(found)]
+
+
 def test_orders_along_a_linear_motor_are_pitches():
     change = Change("effect", ("cogging_torque",), (2513.274, 7539.82))
     assert rung_label(change, Axes("linear", "linear")) == "+ cogging_torque of pitches 2.50 mm, 0.833 mm"

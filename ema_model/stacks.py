@@ -67,7 +67,8 @@ if hasattr(os, "register_at_fork"):  # not on Windows, which cannot fork
     os.register_at_fork(after_in_child=_begin_child)
 
 
-def _refuse_after_fork() -> None:
+def refuse_after_fork() -> None:
+    """Raises ForkedError in a process where kernels would hang or abort it."""
     if _forked:
         raise ForkedError(
             "kernels cannot run in a process forked from one that has used them; start it by multiprocessing's "
@@ -81,7 +82,7 @@ def exclusive(kernel: Callable[..., Any], *arguments: Any, jobs: int | None = No
     jobs: how many threads have something to do, all without it.  The others are left out: numba waits for each of
     them, which beside a busy browser takes as long as several simulations.
     """
-    _refuse_after_fork()
+    refuse_after_fork()
     with _one_parallel_kernel:
         threads = numba.get_num_threads()
         if jobs is None or jobs >= threads:
@@ -99,7 +100,7 @@ def find_stack(circuit: str = "reduced", effects: Iterable[str] = (), controller
     InputError tells an unknown name; ForkedError a process forked from one that has used kernels.
     """
     global _used
-    _refuse_after_fork()
+    refuse_after_fork()
     _used = True
     if circuit not in DRIVES:
         raise InputError(f"no circuit {circuit!r}; circuits are {', '.join(DRIVES)}")

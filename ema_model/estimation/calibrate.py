@@ -17,6 +17,7 @@ from ema_model.estimation.unknowns import ECCENTRICITY, K_SIGMA, Unknown, polar,
 from ema_model.faults import named
 from ema_model.models import Model
 from ema_model.quantities.interval import HALF_90
+from ema_model.side_by_side import windows
 
 Array = NDArray[np.float64]
 
@@ -242,7 +243,7 @@ def default_free(actuator: Actuator) -> tuple[str, ...]:
 
 def _signals(problem: Problem, x: Array) -> list[list[dict[str, Array]]]:
     """The model's at each x (n, unknowns), per window."""
-    shown = [problem.simulate(x, i) for i in range(len(problem.model.windows))]
+    shown = windows(lambda window: problem.simulate(x, window), range(len(problem.model.windows)))
     return [[{name: values[i] for name, values in one.items()} for one in shown] for i in range(len(x))]
 
 

@@ -17,6 +17,7 @@ from ema_model.models.closed_loop import LOAD
 from ema_model.models.later import later
 from ema_model.models.model import Effects, Signals
 from ema_model.physics.rows import LANES
+from ema_model.side_by_side import windows
 
 Array = NDArray[np.float64]
 
@@ -93,7 +94,7 @@ class Problem:
 
     def residuals(self, x: Array) -> Array:
         """(n, unknowns) → (n, values + unknowns)."""
-        errors = [self._errors(x, window) for window in range(len(self.weights))]
+        errors = windows(lambda window: self._errors(x, window), range(len(self.weights)))
         return np.concatenate([*errors, x * self.prior], axis=1)
 
     def jacobians(self, x: Array, *, in_whole_blocks: bool = False) -> tuple[Array, Array]:
@@ -108,31 +109,38 @@ class Problem:
     def jacobians_beside(self, x: Array, others: Array, *, in_whole_blocks: bool) -> tuple[Array, Array, Array]:
         """The same, and the residuals of other candidates (l, unknowns) that are simulated with them, (l, m)."""
         n = len(x)
-        low, high = np.maximum(x - self._step, self.low), np.minimum(x + self._step, self.high)
-        far = np.where(high - x >= x - low, high, low)
-        residuals, beside, slopes = [], [], np.zeros((n, self.count, self.values + self.count))
-        first = 0
-        for window in range(len(self.weights)):
-            acting = self._acting[window]
-            both = _room(n, len(acting), len(others)) if in_whole_blocks else len(acting)
-            sides, side = acting[:both], acting[both:]
-            lanes = 1 + 2 * len(sides) + len(side)
-            points = np.repeat(x[:, None, :], lanes, axis=1)
-            for at, moved, to in ((1, sides, low), (1 + both, sides, high), (1 + 2 * both, side, far)):
-                points[:, at + np.arange(len(moved)), moved] = to[:, moved]
-            shown = self._errors(np.concatenate([points.reshape(-1, self.count), others]), window)
-            beside.append(shown[n * lanes :])
-            errors = shown[: n * lanes].reshape(n, lanes, -1)
-            rows = slice(first, first + errors.shape[2])
-            here, below, above, there = np.split(errors, [1, 1 + both, 1 + 2 * both], axis=1)
-            slopes[:, sides, rows] = (above - below) / (high - low)[:, sides, None]
-            slopes[:, side, rows] = (there - here) / (far - x)[:, side, None]
-            residuals.append(errors[:, 0])
-            first = rows.stop
+        slopes = np.zeros((n, self.count, self.values + self.count))
+        ends = np.cumsum([0, *(sum(map(len, weights.values())) for weights in self.weights)])
+
+        def of_window(window: int) -> tuple[Array, Array]:
+            rows = slice(ends[window], ends[window + 1])
+            return self._differences(x, others, window, in_whole_blocks, slopes[:, :, rows])
+
+        residuals, beside = zip(*windows(of_window, range(len(self.weights))))
         at = np.arange(self.count)
         slopes[:, at, self.values + at] = self.prior
         found = np.concatenate([*residuals, x * self.prior], axis=1)
         return found, np.swapaxes(slopes, 1, 2), np.concatenate([*beside, others * self.prior], axis=1)
+
+    def _differences(
+        self, x: Array, others: Array, window: int, in_whole_blocks: bool, slopes: Array
+    ) -> tuple[Array, Array]:
+        """A window's part of the residuals of x (n, values) and of others (l, values); slopes, too, is written."""
+        n, acting = len(x), self._acting[window]
+        low, high = np.maximum(x - self._step, self.low), np.minimum(x + self._step, self.high)
+        far = np.where(high - x >= x - low, high, low)
+        both = _room(n, len(acting), len(others)) if in_whole_blocks else len(acting)
+        sides, side = acting[:both], acting[both:]
+        lanes = 1 + 2 * len(sides) + len(side)
+        points = np.repeat(x[:, None, :], lanes, axis=1)
+        for at, moved, to in ((1, sides, low), (1 + both, sides, high), (1 + 2 * both, side, far)):
+            points[:, at + np.arange(len(moved)), moved] = to[:, moved]
+        shown = self._errors(np.concatenate([points.reshape(-1, self.count), others]), window)
+        errors = shown[: n * lanes].reshape(n, lanes, -1)
+        here, below, above, there = np.split(errors, [1, 1 + both, 1 + 2 * both], axis=1)
+        slopes[:, sides] = (above - below) / (high - low)[:, sides, None]
+        slopes[:, side] = (there - here) / (far - x)[:, side, None]
+        return errors[:, 0], shown[n * lanes :]
 
     def has_room_for(self, others: int) -> bool:
         """Whether so many candidates stand together with the derivatives of one, all to both sides."""

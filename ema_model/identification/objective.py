@@ -17,6 +17,7 @@ from ema_model.physics.rows import LANES
 from ema_model.recordings import Measurement
 from ema_model.simulation.pack import initial_state, monitor_rows
 from ema_model.simulation.plant import FITNESSES
+from ema_model.simulation.traced import traced
 from ema_model.stacks import exclusive
 
 Array = NDArray[np.float64]
@@ -103,20 +104,9 @@ class Objective(ClosedLoop):
         for window in self.windows:
             one = (actuator or self.actuator).varied(window.values)
             rows = monitor_rows(one, k, self.stack, self.effects)
-            result = np.empty((len(rows), window.blocks, 4, LANES))
-            exclusive(
-                self.stack.monitor.traces,
-                self._state(window, k, one),
-                rows,
-                window.command,
-                window.load,
-                window.supply,
-                window.steps_per_block,
-                1,
-                window.step_s,
-                result,
-                jobs=len(rows),
-            )
+            run = window.command, window.load, window.supply
+            state = self._state(window, k, one)
+            result = traced(self.stack, state, rows, run, window.steps_per_block, 1, window.step_s)
             parts.append(result[:, :, 0, :].transpose(0, 2, 1).reshape(len(rows) * LANES, -1)[: len(k)])
         return np.concatenate(parts, axis=1)
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
 from ema_model.physics.elementary import clamp
-from ema_model.physics.jit import parallel_kernel, scalar
+from ema_model.physics.jit import kernel, scalar
 from ema_model.physics.rows import (
     DYNAMIC_FRICTION,
     GEAR_RATIO,
@@ -55,14 +54,14 @@ def needed_current(s, p, i, theta, omega, acceleration, load, time, still):
     return current_reading(current, s, 0, p, i)
 
 
-@parallel_kernel
+@kernel
 def currents(parameters, theta, omega, acceleration, load, time, still, result):
     """The current of every sample for a population: parameters (blocks, rows·LANES).
 
     The motion, the load and the time: (samples,) each.
     result: (blocks, samples, LANES), A, written here.  Effects' own states stay at 0.
     """
-    for block in numba.prange(parameters.shape[0]):
+    for block in range(parameters.shape[0]):
         p = parameters[block]
         s = np.zeros(_MOST_STATES * LANES)
         for n in range(theta.size):

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from ema_model.physics.jit import parallel_kernel
+from ema_model.physics.jit import kernel, parallel_kernel
 from ema_model.physics.rows import LANES, TOLD
 
 from .drive_step import is_driven
@@ -63,7 +63,7 @@ def squared_errors(
             result[run, block, i] = total[i]
 
 
-@parallel_kernel
+@kernel
 def traces(states, parameters, command, load, supply, period, group, dt, result):
     """Signals of a population over one run, each value the mean of `group` samples of `period` steps.
 
@@ -71,7 +71,7 @@ def traces(states, parameters, command, load, supply, period, group, dt, result)
     A sample of the current is its mean over the period; one of motor speed, motor angle and user position
     is taken at the period's end.
     """
-    for block in numba.prange(states.shape[0]):
+    for block in range(states.shape[0]):
         s = states[block].copy()  # of its own, which proves to the compiler that nothing overlaps
         p = parameters[block]
         driven = is_driven(p)

@@ -27,10 +27,9 @@ from ema_model.recordings import Measurement
 from ema_model.recordings.noise import least_noise, sample_noise
 from ema_model.simulation.one_stack import own_stack, stack_at_hand
 from ema_model.simulation.pack import initial_state, monitor_rows
-from ema_model.simulation.precompile import wait_for
 from ema_model.simulation.reference_runs import simulate_references
 from ema_model.simulation.run import Run, simulate_reference
-from ema_model.stacks import exclusive
+from ema_model.simulation.traced import traced
 
 Array = NDArray[np.float64]
 
@@ -212,26 +211,14 @@ class ClosedLoop:
             window.integral_Nm(actuator, k, turned_rad, play_rad),
             window.begins_s,
         )
-        wait_for(self.stack, "traces")
         lanes = np.empty((4, len(k), window.blocks))
         steps = window.steps_per_block
         for first in range(0, window.blocks, _CHUNK):  # long recordings would fill the memory with lanes
             part = slice(first, min(first + _CHUNK, window.blocks))
             at = slice(part.start * steps, part.stop * steps)
-            result = np.empty((len(rows), part.stop - part.start, 4, LANES))
-            exclusive(
-                self.stack.monitor.traces,
-                state,
-                rows,
-                window.command[at],
-                window.load[at],
-                window.supply[at],
-                window.steps_per_sample,
-                window.samples_per_block,
-                window.step_s,
-                result,
-                jobs=len(rows),
-            )
+            run = window.command[at], window.load[at], window.supply[at]
+            period, group = window.steps_per_sample, window.samples_per_block
+            result = traced(self.stack, state, rows, run, period, group, window.step_s)
             for block, shown in enumerate(result):
                 ours = lanes[:, block * LANES : (block + 1) * LANES, part]
                 ours[...] = shown.transpose(1, 2, 0)[:, : ours.shape[1]]

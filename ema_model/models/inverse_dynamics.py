@@ -24,8 +24,7 @@ from ema_model.recordings import Measurement
 from ema_model.recordings.noise import least_noise
 from ema_model.simulation.one_stack import stack_at_hand
 from ema_model.simulation.pack import monitor_rows
-from ema_model.simulation.precompile import wait_for
-from ema_model.stacks import exclusive
+from ema_model.simulation.traced import needed_currents
 
 Array = NDArray[np.float64]
 
@@ -122,23 +121,12 @@ class InverseDynamics:
 
     def _currents(self, rows: Array, n: int, window: Stretch, acceleration: Array) -> Array:
         """(n, samples), A"""
-        wait_for(self.stack, "currents")
         currents = np.empty((n, window.position.size))
         for first in range(0, window.position.size, _CHUNK):
             part = slice(first, min(first + _CHUNK, window.position.size))
-            result = np.empty((len(rows), part.stop - part.start, LANES))
-            exclusive(
-                self.stack.inverse.currents,
-                rows,
-                window.position[part],
-                window.speed[part],
-                acceleration[part],
-                window.load[part],
-                window.since_s[part],
-                window.still,
-                result,
-                jobs=len(rows),
-            )
+            given = window.position, window.speed, acceleration, window.load, window.since_s
+            position, speed, faster, load, since_s = (one[part] for one in given)
+            result = needed_currents(self.stack, rows, (position, speed, faster, load, since_s), window.still)
             currents[:, part] = result.transpose(0, 2, 1).reshape(len(rows) * LANES, -1)[:n]
         return currents
 

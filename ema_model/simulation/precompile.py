@@ -22,7 +22,7 @@ from ema_model.faults import HEALTHY
 from ema_model.kernel_cache.folder import cache_folder
 from ema_model.physics.rows import LANES
 from ema_model.simulation.pack import initial_reference_state, initial_state, monitor_rows, reference_rows
-from ema_model.stacks import Stack, exclusive, find_stack
+from ema_model.stacks import Stack, find_stack
 
 MODULES = {"traces": "monitor", "currents": "inverse", "run": "reference", "runs": "reference"}  # of the kernels
 _POLL_S = 0.02
@@ -88,10 +88,10 @@ def compile_here(stack: Stack, kernel: str) -> None:
     if kernel == "traces":
         state = initial_state(actuator, len(rows), stack=stack)
         result = np.empty((len(rows), 1, 4, LANES))
-        exclusive(stack.monitor.traces, state, rows, samples, samples, samples, 1, 1, actuator.step_s, result)
+        stack.monitor.traces(state, rows, samples, samples, samples, 1, 1, actuator.step_s, result)
     elif kernel == "currents":
         result = np.empty((len(rows), 1, LANES))
-        exclusive(stack.inverse.currents, rows, samples, samples, samples, samples, samples, 1.0, result)
+        stack.inverse.currents(rows, samples, samples, samples, samples, samples, 1.0, result)
     else:
         rows = reference_rows(actuator, HEALTHY, stack, {})
         state, pair = initial_reference_state(actuator, stack=stack), np.zeros(2)

@@ -20,7 +20,7 @@ from ema_model.simulation.load_profile import LoadProfile, RecordedLoad
 from ema_model.simulation.one_stack import stack_at_hand
 from ema_model.simulation.pack import initial_reference_state, initial_state, monitor_rows, reference_rows
 from ema_model.simulation.precompile import wait_for
-from ema_model.stacks import exclusive
+from ema_model.simulation.traced import traced
 
 Array = NDArray[np.float64]
 Effects = Mapping[str, Mapping[str, float]]
@@ -188,25 +188,12 @@ def simulate_monitors(
     stack = stack_at_hand(actuator, effects, circuit, "traces")
     period = _steps_per_sample(run, actuator.step_s)
     dt = 1.0 / run.sample_rate_Hz / period
-    times = np.arange(run.samples * period + 1) * dt
+    times = np.arange(run.samples * period) * dt
     demand = run.command.at(times)
     start = float(demand[0]) if start_rad is None else start_rad
     blocks = -(-len(k) // LANES)
-    result = np.empty((blocks, run.samples, 4, LANES))
-    wait_for(stack, "traces")
-    exclusive(
-        stack.monitor.traces,
-        initial_state(actuator, blocks, start, stack=stack),
-        monitor_rows(actuator, k, stack, effects),
-        demand,
-        run.load_at(times),
-        np.ones_like(demand),
-        period,
-        1,
-        dt,
-        result,
-        jobs=blocks,
-    )
+    state, rows = initial_state(actuator, blocks, start, stack=stack), monitor_rows(actuator, k, stack, effects)
+    result = traced(stack, state, rows, (demand, run.load_at(times), np.ones_like(demand)), period, 1, dt)
     runs = (_signals(run, actuator, result[i // LANES, :, :, i % LANES], start) for i in range(len(k)))
     return tuple(Measurement(finite(one, "the monitor model", actuator.axes), name="monitor model") for one in runs)
 

@@ -21,6 +21,7 @@ from ema_model.simulation.one_stack import stack_at_hand
 from ema_model.simulation.pack import initial_state, monitor_rows
 from ema_model.simulation.plant import simulated
 from ema_model.simulation.run import Run, simulate_monitor
+from ema_model.simulation.traced import traced
 from ema_model.stacks import CIRCUITS, exclusive, find_stack
 
 ACTUATOR = load_actuator()
@@ -73,16 +74,15 @@ def test_traces_of_a_population_are_single_runs(monkeypatch, circuit, effects):
     assert len(rows) == 2
     calls = []
 
-    def spy(kernel, *arguments, jobs):
-        assert jobs == 1, "a single run is one block"
-        calls.append((kernel, arguments))
-        return exclusive(kernel, *arguments, jobs=jobs)
+    def spy(stack, state, own_rows, *same):
+        assert len(own_rows) == 1, "a single run is one block"
+        calls.append(same)
+        return traced(stack, state, own_rows, *same)
 
-    monkeypatch.setattr(simulation, "exclusive", spy)
+    monkeypatch.setattr(simulation, "traced", spy)
     simulate_monitor(RUN, ACTUATOR, k[0], effects, circuit)
-    [(kernel, (_, _, *same, alone))] = calls
-    result = np.empty((len(rows), *alone.shape[1:]))
-    exclusive(kernel, initial_state(ACTUATOR, len(rows), stack=stack), rows, *same, result)
+    [same] = calls
+    result = traced(stack, initial_state(ACTUATOR, len(rows), stack=stack), rows, *same)
     columns = ("current_A", "motor_speed_rad_s", "motor_position_rad")
     for i in (0, 1, LANES - 1, LANES, n - 1):
         single = simulate_monitor(RUN, ACTUATOR, k[i], effects, circuit)

@@ -26,7 +26,7 @@ from ema_model.simulation.pack import initial_reference_state, initial_state, mo
 from ema_model.simulation.plant import simulated
 from ema_model.simulation.precompile import is_compiled
 from ema_model.simulation.run import Run
-from ema_model.stacks import Stack, exclusive
+from ema_model.stacks import Stack
 
 ACTUATOR = load_actuator()
 GEAR = ACTUATOR.transmission.gear_ratio
@@ -86,7 +86,7 @@ def monitored(stack: Stack, effects: Effects, demand: np.ndarray, k: np.ndarray)
     result = np.empty((len(rows), STEPS // PER_VALUE, 4, LANES))
     load, supply = np.full(STEPS, LOAD_NM), np.ones(STEPS)
     state = initial_state(ACTUATOR, len(rows), stack=stack)
-    exclusive(stack.monitor.traces, state, rows, demand, load, supply, PER_VALUE, 1, STEP_S, result)
+    stack.monitor.traces(state, rows, demand, load, supply, PER_VALUE, 1, STEP_S, result)
     return result.transpose(2, 0, 3, 1).reshape(4, -1, STEPS // PER_VALUE)[:, : len(k)]
 
 
@@ -105,7 +105,7 @@ def needed(stack: Stack, effects: Effects) -> np.ndarray:
     motion = [50.0 * np.sin(2.0 * np.pi * time + phase) for phase in (0.0, 1.0, 2.0)]
     result = np.empty((1, 500, LANES))
     rows = monitor_rows(ACTUATOR, population()[:LANES], stack, effects)
-    exclusive(stack.inverse.currents, rows, *motion, np.full(500, LOAD_NM), np.zeros(500), 0.1, result)
+    stack.inverse.currents(rows, *motion, np.full(500, LOAD_NM), np.zeros(500), 0.1, result)
     return result[0].T
 
 

@@ -180,14 +180,14 @@ from ema_model.effects import find
 from ema_model.faults import HEALTHY
 from ema_model.physics.rows import LANES
 from ema_model.simulation.pack import monitor_rows
-from ema_model.stacks import exclusive, find_stack
+from ema_model.stacks import find_stack
 effects = {{"cogging_torque": find("cogging_torque").settings({{"amplitude_Nm": 0.02}})}} if {effect} else {{}}
 stack = find_stack("reduced", effects)
 turn = np.linspace(0.0, 6.0, 200)
 motion = [turn, 50.0 * np.sin(turn), 20.0 * np.cos(turn)]
 needed = np.empty((1, 200, LANES))
 rows = monitor_rows(load_actuator(), HEALTHY, stack, effects)
-exclusive(stack.inverse.currents, rows, *motion, np.full(200, 5.0), np.zeros(200), 0.1, needed)
+stack.inverse.currents(rows, *motion, np.full(200, 5.0), np.zeros(200), 0.1, needed)
 print("RESULT", repr(float((needed ** 2).mean())))
 """
 

@@ -16,7 +16,6 @@ from ema_model.recordings import Measurement, SideFile
 from ema_model.simulation.one_stack import stack_at_hand
 from ema_model.simulation.pack import monitor_rows
 from ema_model.simulation.precompile import wait_for
-from ema_model.stacks import exclusive
 
 FREE = """
 name = "free motor"
@@ -83,7 +82,7 @@ def test_the_current_is_found_that_friction_or_torque_depend_on_itself(tmp_path,
     speed, acceleration = (each.ravel() for each in np.meshgrid([-80.0, 40.0], np.linspace(-700.0, 700.0, 29)))
     nothing = np.zeros_like(speed)
     found = np.empty((len(rows), len(speed), LANES))
-    exclusive(stack.inverse.currents, rows, nothing, speed, acceleration, nothing, nothing, 1e-9, found)
+    stack.inverse.currents(rows, nothing, speed, acceleration, nothing, nothing, 1e-9, found)
     for one, omega, alpha in zip(found[0, :, 0], speed, acceleration):
 
         def lacks(current: float, omega: float = omega, carried: float = 1e-4 * alpha) -> float:

@@ -23,6 +23,7 @@ from ema_model.discovery.score import amounts_of, beyond_of, movable, unseen
 from ema_model.discovery.unknown import TEETH
 from ema_model.estimation.unknowns import to_k, to_vector, unknowns_of
 from ema_model.faults import CAUSES, NAMES, cause_of
+from ema_model.side_by_side import fits
 
 Array = NDArray[np.float64]
 
@@ -72,7 +73,11 @@ def tried_faults(data: Data, current: Fit, ranked: Sequence[Candidate], tell: Ca
     """
     best = max((one.predicted_drop for one in ranked), default=0.0)
     strong = [one for one in scored_faults(data, current) if one.drop > max(LEAST_BIC, _RIVAL * best)]
-    return [_refitted(data, current, one.names, one.there, one.candidate, tell) for one in strong[:_MOST_REFITTED]]
+
+    def refitted(one: ScoredFault, tell: Callable[[str], None]) -> Trial:
+        return _refitted(data, current, one.names, one.there, one.candidate, tell)
+
+    return fits(refitted, strong[:_MOST_REFITTED], tell)
 
 
 def fault_trial(data: Data, current: Fit, candidate: Candidate, tell: Callable[[str], None]) -> Trial:

@@ -30,6 +30,7 @@ from ema_model.discovery.unknown import curve_for
 from ema_model.effects import CATALOGUE, catalogue_name, find
 from ema_model.faults import NAMES as FAULTS
 from ema_model.faults import cause_of
+from ema_model.side_by_side import fits
 from ema_model.simulation.one_stack import compile_behind
 
 Progress = Callable[[str], None]
@@ -122,17 +123,20 @@ class Story:
         self, ranked: Sequence[Candidate], share: float, most: int, tell: Progress, known: Sequence[Trial] = ()
     ) -> list[Trial]:
         """The most promising candidates, each in the model and refitted, the best first; known: refitted before."""
-        trials: list[Trial] = []
-        for candidate in self.promising(ranked, share, most):
-            trial = next((one for one in known if one.candidate is candidate), None)
-            if trial is None:
-                tell(f"trying {candidate.name}")
-                trial = self.trial(candidate, tell)
-            trials.append(trial)
+        chosen = self.promising(ranked, share, most)
+        trials = [one for one in known if any(one.candidate is candidate for candidate in chosen)]
+        new = [one for one in chosen if all(one is not trial.candidate for trial in trials)]
+        trials += fits(self._tried, new, tell)
         if is_near(self.current):
             leading = max([LEAST_BIC, *(_LEADS * trial.drop for trial in trials)])
-            trials = [again(self.data, self.current, t, tell) if t.drop > leading else t for t in trials]
+            leaders = [trial for trial in trials if trial.drop > leading]
+            trials = [trial for trial in trials if trial.drop <= leading]
+            trials += fits(lambda trial, tell: again(self.data, self.current, trial, tell), leaders, tell)
         return sorted(trials, key=lambda trial: -trial.drop)
+
+    def _tried(self, candidate: Candidate, tell: Progress) -> Trial:
+        tell(f"trying {candidate.name}")
+        return self.trial(candidate, tell)
 
     def promising(self, ranked: Sequence[Candidate], share: float, most: int) -> list[Candidate]:
         """The candidates that are worth a refit."""
@@ -146,14 +150,13 @@ class Story:
 
         What sticks and slides is not straight in any parameter; a score, which takes it to be, may then see nothing.
         """
-        trials = []
+        nearest = []
         for candidate in ranked:
             prints = [one for one in self._prints if one.name == candidate.name and find(one.name).at_speeds]
             if prints and not candidate.untestable_reason:
-                nearest = min(prints, key=lambda one: float(np.sum((self.current.residual + one.columns[:, 0]) ** 2)))
-                tell(f"trying {candidate.name}")
-                trials.append(self.trial(replace(candidate, settings=nearest.settings), tell))
-        return trials
+                best = min(prints, key=lambda one: float(np.sum((self.current.residual + one.columns[:, 0]) ** 2)))
+                nearest.append(replace(candidate, settings=best.settings))
+        return fits(self._tried, nearest, tell)
 
     def trial(self, candidate: Candidate, tell: Progress = lambda text: None) -> Trial:
         """One candidate in the model, refitted."""

@@ -49,7 +49,7 @@ def fits(fitted: Callable[[T, Tell], R], each: Sequence[T], tell: Tell) -> list[
 
     begun = [_pool("fit", _threads()).submit(copy_context().run, fitted, one, say) for one in each]
     try:
-        while not all(one.done() for one in begun):
+        while not all(one.done() for one in begun) or not told.empty():
             try:
                 tell(told.get(timeout=_SEEN_S))
             except Empty:

@@ -126,17 +126,13 @@ class Story:
         chosen = self.promising(ranked, share, most)
         trials = [one for one in known if any(one.candidate is candidate for candidate in chosen)]
         new = [one for one in chosen if all(one is not trial.candidate for trial in trials)]
-        trials += fits(self._tried, new, tell)
+        trials += fits(self.trial, new, tell)
         if is_near(self.current):
             leading = max([LEAST_BIC, *(_LEADS * trial.drop for trial in trials)])
             leaders = [trial for trial in trials if trial.drop > leading]
             trials = [trial for trial in trials if trial.drop <= leading]
             trials += fits(lambda trial, tell: again(self.data, self.current, trial, tell), leaders, tell)
         return sorted(trials, key=lambda trial: -trial.drop)
-
-    def _tried(self, candidate: Candidate, tell: Progress) -> Trial:
-        tell(f"trying {candidate.name}")
-        return self.trial(candidate, tell)
 
     def promising(self, ranked: Sequence[Candidate], share: float, most: int) -> list[Candidate]:
         """The candidates that are worth a refit."""
@@ -156,12 +152,13 @@ class Story:
             if prints and not candidate.untestable_reason:
                 best = min(prints, key=lambda one: float(np.sum((self.current.residual + one.columns[:, 0]) ** 2)))
                 nearest.append(replace(candidate, settings=best.settings))
-        return fits(self._tried, nearest, tell)
+        return fits(self.trial, nearest, tell)
 
     def trial(self, candidate: Candidate, tell: Progress = lambda text: None) -> Trial:
         """One candidate in the model, refitted."""
         if candidate.name in FAULTS:
             return fault_trial(self.data, self.current, candidate, tell)
+        tell(f"trying {candidate.name}")
         return tried(self.data, self.current, candidate, {candidate.name: candidate.settings}, tell)
 
     def faults(self, ranked: Sequence[Candidate], tell: Progress = lambda text: None) -> list[Trial]:

@@ -109,7 +109,6 @@ class _Walk:
         promising = self.story.promising(ranked, _REFITTED_SHARE, _MOST_REFITTED)
         for one in promising:
             if _of_drive(one):
-                self._tell(f"trying {one.name}")
                 self._tried.append(self.story.trial(one, self._tell))
         return min((ratio(self.story.data, trial.fit) for trial in self._tried), default=math.inf)
 

@@ -19,7 +19,7 @@ FLOORS = {
         ["physics", "faults"],
         ["effects", "kernels", "commands"],
         ["stacks", "actuator"],
-        ["recordings"],
+        ["recordings", "side_by_side"],
         ["simulation"],
         ["models"],
         ["estimation"],

@@ -114,7 +114,8 @@ def allowed(truth: Mapping[str, Any]) -> bool:
         true[_ARM] = one["parameters"]["scale_bias"]
     actuator = actuator_of(truth["rig"])
     inside = {path_inside(path, actuator.tolerances, actuator.axes): value for path, value in true.items()}
-    far = [abs(value - actuator.value(path)) / actuator.tolerances[path].sigma for path, value in inside.items()]
+    told = {path: actuator.tolerances[path].sigma for path in inside if path in actuator.tolerances}
+    far = [abs(inside[path] - actuator.value(path)) / sigma for path, sigma in told.items()]
     return bool(far) and max(far) < _BY_TOLERANCE
 
 

@@ -54,9 +54,11 @@ def discover(
     experiment = None
     if walked.rivals:
         tell("looking for a test that tells the rivals apart")
-        experiment = next_experiment(story.data, walked.rivals[0].fit, walked.rivals[1].fit)
+        first, second = walked.rivals[:2]
+        names = first.candidate.name, second.candidate.name
+        experiment = next_experiment(story.data, first.fit, second.fit, names)
         if experiment is None:
-            story.warnings.append(untold(*(trial.candidate.name for trial in walked.rivals[:2])))
+            story.warnings.append(untold(*names))
     return result_of(story, walked.candidates, walked.unknown, experiment)
 
 

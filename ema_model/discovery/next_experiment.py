@@ -34,14 +34,15 @@ _DURATION_S = (0.3, 3.0)
 _SAMPLES = 10_000  # of a run, about
 
 
-def next_experiment(data: Data, first: Fit, second: Fit) -> Experiment | None:
+def next_experiment(data: Data, first: Fit, second: Fit, rivals: tuple[str, str]) -> Experiment | None:
     """The allowed command and load, and if need be a further signal, that tell two fitted models apart best.
+
+    rivals: what each of them has, by name; both may hold an effect of the file, one of them at its values.
 
     None where no allowed experiment does, or where the actuator cannot be simulated.
     """
     if not first.plant.simulates_commands:
         return None
-    rivals = _names(first, second)
     further = [name for name in SIGNALS[2:] if name not in data.signals or not _is_measured(first, name)]
     for signals in (dict(data.signals), {**data.signals, **dict.fromkeys(further, 1.0)}):
         found = []
@@ -188,10 +189,3 @@ def _load(actuator: Actuator) -> float:
         current = min(current, inverter.bus_voltage_V / motor.resistance_Ohm)
     torque = min(motor.torque_limit_Nm, motor.torque_constant_Nm_A * current)
     return float(f"{_LOAD * torque / actuator.transmission.gear_ratio:.2g}") if torque < 1e6 else 0.0
-
-
-def _names(first: Fit, second: Fit) -> tuple[str, str]:
-    """What each of two models has and the other has not."""
-    ours, theirs = (*first.effects, *first.faults), (*second.effects, *second.faults)
-    one = next(name for name in ours if name not in theirs)
-    return one, next(name for name in theirs if name not in ours)

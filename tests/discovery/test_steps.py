@@ -128,10 +128,20 @@ def test_next_experiment_tells_rivals_apart():
         fit(data, with_effect(ACTUATOR, name, settings))
         for name, settings in (*hinge.items(), ("inertia_error", {"ratio": -0.2}))
     ]
-    found = next_experiment(data, *rivals)
+    found = next_experiment(data, *rivals, ("hinge_moment", "inertia_error"))
     assert found is not None and found.separates == ("hinge_moment", "inertia_error")
     assert found.expected_chi2 > 25.0 and found.add_signal is None
     assert 0.0 < found.duration_s <= 3.0
+
+
+def test_a_test_is_sought_beside_an_effect_of_the_file_too():
+    """One rival frees the file's hinge, the other adds an inertia beside it: both hold a hinge."""
+    hinged = replace(ACTUATOR, effects={"hinge_moment": {"stiffness_Nm_rad": 500.0}})
+    data = data_of(recorded(44, commands=[SINE], effects={"hinge_moment": {"stiffness_Nm_rad": 700.0}}))
+    rivals = [fit(data, one) for one in (hinged, with_effect(hinged, "inertia_error", {"ratio": -0.2}))]
+    names = ("hinge_moment", "inertia_error")
+    found = next_experiment(data, *rivals, names)
+    assert found is None or found.separates == names
 
 
 def test_allowed_commands_stay_within_what_was_recorded():

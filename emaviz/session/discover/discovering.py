@@ -219,7 +219,9 @@ class Discovering:
                 tell(f"fitting {in_sentence(effect_title(one.name))}")
                 trials.append(told.trials.of(base, one, tell))
             tell("simulating the tests that the actuator allows")
-            told.experiment = next_experiment(base.data, trials[0].fit, trials[1].fit)
+            first, second = trials
+            names = first.candidate.name, second.candidate.name
+            told.experiment = next_experiment(base.data, first.fit, second.fit, names)
             self._shown.show(told)
             if told.experiment is None:
                 self.events.unsuggested()

@@ -47,6 +47,10 @@ LEAST_SHARE = 0.25
 # own study take 0.8 or more; false ones of servos took 0.2 to 0.5).
 OF_FAINT = 0.5
 
+# Half-widths of its 90 % interval, that an effect's strength must be from none, which is 2.5 σ: right ones of the rigs
+# are 1.6 or more from it, and all but eight of 230 three or more; a false one was 1.1.
+NONE_OF_IT = 1.5
+
 # Of the floor, beyond which that share is asked for: nearer to it, two causes may share the error (a shorted phase and
 # cogging), and the own studies name no effect falsely.
 FAR = 2.0

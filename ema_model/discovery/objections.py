@@ -18,6 +18,7 @@ from ema_model.discovery.criteria import (
     FAR,
     LEAST_FALL,
     LEAST_SHARE,
+    NONE_OF_IT,
     OF_FAINT,
     TIE,
 )
@@ -26,6 +27,7 @@ from ema_model.discovery.extents import greatest, travel
 from ema_model.discovery.model_fit import ANGLES, Data, Fit, floor_ratio
 from ema_model.discovery.remaining import at_floor, left_by, may_be_true, used_left
 from ema_model.discovery.stability import disagreement
+from ema_model.discovery.uncertainty import with_intervals
 from ema_model.effects import catalogue_name, find
 from ema_model.quantities.numbers import number
 from ema_model.quantities.titles import in_sentence
@@ -61,8 +63,7 @@ def against(data: Data, before: Fit, after: Fit, keys: Sequence[str], settled: C
 def _against_settled(data: Data, before: Fit, after: Fit, keys: Sequence[str], settled: Callable[[Fit], Fit]) -> str:
     calm = settled(after)
     seen = before if calm is after else calm
-    known = [_bent(seen, calm, key) or _implausible(calm, key) or _unsteady(data, calm, key) for key in keys]
-    reason = next((reason for reason in known if reason), "")
+    reason = next((reason for key in keys if (reason := _of_its_values(data, before, seen, calm, key))), "")
     if not reason and not calm.calibration.converged:
         reason = "the fit with it did not converge"
     if reason or calm is after:
@@ -74,10 +75,15 @@ def _against_settled(data: Data, before: Fit, after: Fit, keys: Sequence[str], s
 
 def still_against(data: Data, base: Fit, found: Fit, key: str) -> str:
     """What speaks against one of the effects of a model, in it."""
+    return _of_its_values(data, base, base if at_floor(data, found) else found, found, key)
+
+
+def _of_its_values(data: Data, base: Fit, before: Fit, after: Fit, key: str) -> str:
     return (
-        _bent(base if at_floor(data, found) else found, found, key)
-        or _implausible(found, key)
-        or _unsteady(data, found, key)
+        _bent(before, after, key)
+        or _implausible(after, key)
+        or _unsteady(data, after, key)
+        or _may_be_none(data, base, after, key)
     )
 
 
@@ -233,6 +239,23 @@ def _unsteady(data: Data, after: Fit, key: str) -> str:
     values = " and ".join(number(value) for value in (min(apart.values), max(apart.values)))
     parts = "the recordings" if len(data.measurements) > 1 else "the halves of the recording"
     return f"{parts} ask for another {_title(after, apart.parameter)} each: {values}"
+
+
+def _may_be_none(data: Data, base: Fit, after: Fit, key: str) -> str:
+    """Whether the interval that is told of an effect's strength nearly reaches none of it.
+
+    Evidence counts what a model takes; how what is left pulls at the effect from piece to piece may tell less of it.
+    What is a parameter's value by another name is as open as that one's tolerance.
+    """
+    effect = find(catalogue_name(key))
+    path, is_gradual = f"effects.{key}.{effect.parameters[0].name}", effect.parameters[0].low <= 0.0
+    if not is_gradual or effect.duplicates or key in base.actuator.effects:
+        return ""
+    low, high = with_intervals(data, after).parameters[path].interval90
+    value, half = (low + high) / 2.0, (high - low) / 2.0
+    if abs(value) > NONE_OF_IT * half:
+        return ""
+    return f"its {_title(after, path)} is {number(value)} ± {number(half)} and may as well be none"
 
 
 def _title(found: Fit, path: str) -> str:

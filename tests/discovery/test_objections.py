@@ -44,7 +44,7 @@ def fitted(amplitudes, noise=1.0, settings=None, at_bound=False, path=PATH):
         converged=True,
         signals=[{"motor_position_rad": np.linspace(0.0, 3.0, N), "current_A": np.linspace(0.0, -15.0, N)}],
     )
-    actuator = SimpleNamespace(tolerances={path: Tolerance(500.0, True)}, axes=ROTARY)
+    actuator = SimpleNamespace(tolerances={path: Tolerance(500.0, True)}, axes=ROTARY, effects={})
     return Fit(plant=SimpleNamespace(windows=windows), residual=residual, calibration=calibration, actuator=actuator)
 
 
@@ -132,6 +132,7 @@ def test_the_share_that_counts_is_of_what_the_settled_models_leave(monkeypatch, 
     """A model that is bent to an error of unknown cause tells more of it than it may; near the floor two share it."""
     monkeypatch.setattr(objections, "ratio", lambda _, found: float(np.sqrt(np.mean(found.residual**2))))
     monkeypatch.setattr(objections, "at_floor", lambda *_: False)
+    monkeypatch.setattr(objections, "with_intervals", lambda data, found: found.calibration)
     before, after = (fitted([1.0, 1.0], noise=one) for one in bent)
     settled = {found: fitted([1.0, 1.0], noise=one) for found, one in zip((before, after), calm)}
     found = objections._against_settled(DATA, before, after, [KEY], settled.__getitem__)
@@ -201,3 +202,26 @@ def test_beside_a_model_that_may_be_true_no_effect_needs_a_parameter_at_its_boun
     before.calibration.parameters = {} if is_new else after.calibration.parameters
     reason = objections._strained(DATA, before, after)
     assert (said in reason) if said else not reason
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "half", "of_file", "is_open"),
+    [
+        ("effects.position_sensor_gain.ratio", -0.051, 0.047, False, True),
+        ("effects.position_sensor_gain.ratio", -0.051, 0.0321, False, False),
+        ("effects.hinge_moment.stiffness_Nm_rad", 0.3, 0.25, False, True),
+        ("effects.torsional_compliance.stiffness_Nm_rad", 4000.0, 5000.0, False, False),
+        ("effects.inertia_error.ratio", 0.134, 0.098, False, False),
+        ("effects.pendulum_load.moment_Nm", 0.3, 0.25, True, False),
+    ],
+    ids=["nearly none", "apart from none", "a stiffness", "none is far", "open as its tolerance", "the file's own"],
+)
+def test_an_effect_whose_interval_nearly_reaches_none_of_it_is_not_claimed(
+    monkeypatch, path, value, half, of_file, is_open
+):
+    key = path.split(".")[1]
+    told = Calibrated(value, 1.0, (value - half, value + half), "", 1.0, False)
+    monkeypatch.setattr(objections, "with_intervals", lambda data, found: SimpleNamespace(parameters={path: told}))
+    base = SimpleNamespace(actuator=SimpleNamespace(effects={key: {}} if of_file else {}))
+    reason = objections._may_be_none(DATA, base, fitted([1.0, 1.0], path=path), key)
+    assert ("may as well be none" in reason) if is_open else not reason

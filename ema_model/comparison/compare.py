@@ -96,7 +96,7 @@ def _compare(
         floors,
         free=free if calibrate else (),
         signals=wanted,
-        on_progress=lambda evaluations: tell(f"calibrating: {evaluations} simulations"),
+        on_progress=lambda evaluations: tell(f"calibrating (simulations: {evaluations})"),
     )
     tell("looking where it fails")
     twins = [twin_error(fitted, i, calibration.actuator, calibration.k) for i in range(len(fitted.windows))]

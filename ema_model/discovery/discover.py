@@ -55,10 +55,9 @@ def discover(
     if walked.rivals:
         tell("looking for a test that tells the rivals apart")
         first, second = walked.rivals[:2]
-        names = first.candidate.name, second.candidate.name
-        experiment = next_experiment(story.data, first.fit, second.fit, names)
+        experiment = next_experiment(story.data, first, second)
         if experiment is None:
-            story.warnings.append(untold(*names))
+            story.warnings.append(untold(first.candidate.name, second.candidate.name))
     return result_of(story, walked.candidates, walked.unknown, experiment)
 
 

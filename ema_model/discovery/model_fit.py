@@ -209,7 +209,7 @@ def fit(
         free=(*(path for path in default_free(actuator) if path not in held), *faults),
         signals=data.signals,
         start=start,
-        on_progress=None if tell is None else lambda evaluations: tell(f"fitting: {evaluations} simulations"),
+        on_progress=None if tell is None else lambda evaluations: tell(f"fitting (simulations: {evaluations})"),
     )
     names = [*calibration.parameters, *calibration.starts]
     starts = {name: float(x) for name, x in zip(names, calibration.x)}

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ema_model.actuator import Actuator
 from ema_model.commands import command
 from ema_model.discovery.model_fit import Data, Fit
+from ema_model.discovery.refit import Trial
 from ema_model.discovery.result import Experiment
 from ema_model.estimation import default_free
 from ema_model.estimation.calibrate import problem_of
@@ -34,13 +35,14 @@ _DURATION_S = (0.3, 3.0)
 _SAMPLES = 10_000  # of a run, about
 
 
-def next_experiment(data: Data, first: Fit, second: Fit, rivals: tuple[str, str]) -> Experiment | None:
-    """The allowed command and load, and if need be a further signal, that tell two fitted models apart best.
+def next_experiment(data: Data, one: Trial, other: Trial) -> Experiment | None:
+    """The allowed command and load, and if need be a further signal, that tell two rivals apart best.
 
-    rivals: what each of them has, by name; both may hold an effect of the file, one of them at its values.
+    Both models may hold an effect of the file, one of them at its values.
 
     None where no allowed experiment does, or where the actuator cannot be simulated.
     """
+    first, second, rivals = one.fit, other.fit, (one.candidate.name, other.candidate.name)
     if not first.plant.simulates_commands:
         return None
     further = [name for name in SIGNALS[2:] if name not in data.signals or not _is_measured(first, name)]

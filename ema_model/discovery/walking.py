@@ -132,7 +132,7 @@ class _Walk:
         if unknown is not None and not named_in(story):
             unknown = _with_curve(story, self._curve, unknown, tell)
         story.settle(tell)  # last: beside a settled model any refit falls that only goes back to the sensors' noise
-        return Walked(self._first, self._rivals, unknown)
+        return Walked(self._first, _still_alike(story, self._rivals), unknown)
 
     def _begin_with(self, fault: Trial) -> None:
         """Walks anew beside a fault in whose place an effect stood."""
@@ -274,6 +274,14 @@ def _with_curve(story: Story, curve: Trial | None, unknown: Explanation, tell: P
     if curve:
         story.add(curve)
     return unknown
+
+
+def _still_alike(story: Story, rivals: Sequence[Trial]) -> list[Trial]:
+    """An effect and its rivals, where the last model still has it and cannot tell it from them."""
+    known = {one.name: one.same_as for one in story.added}
+    names = known.get(rivals[0].candidate.name, ()) if rivals else ()
+    alike = [rival for rival in rivals[1:] if rival.candidate.name in names]
+    return [rivals[0], *alike] if alike else []
 
 
 def _of_drive(one: Candidate) -> bool:

@@ -108,8 +108,7 @@ def test_the_command_line_ranks_faults_beside_effects():
 def test_a_test_is_sought_between_a_fault_and_an_effect():
     story = worn({"k1": 0.3})
     assessment = assessed(story)
-    rivals = [story.trial(card(assessment, name)).fit for name in ("k1", "demagnetisation")]
-    found = next_experiment(story.data, *rivals, ("k1", "demagnetisation"))
+    found = next_experiment(story.data, *(story.trial(card(assessment, name)) for name in ("k1", "demagnetisation")))
     assert found is not None and found.separates == ("k1", "demagnetisation")
 
 

@@ -12,9 +12,11 @@ from ema_model.commands import command
 from ema_model.comparison.compare import weights_of
 from ema_model.discovery import discover
 from ema_model.discovery.fingerprints import fingerprints
-from ema_model.discovery.model_fit import fit, gather, with_effect
+from ema_model.discovery.model_fit import Fit, fit, gather, with_effect
 from ema_model.discovery.next_experiment import allowed, next_experiment
+from ema_model.discovery.refit import Trial
 from ema_model.discovery.repeatability import is_lost, with_divergence
+from ema_model.discovery.result import Candidate
 from ema_model.discovery.score import scored, scored_together
 from ema_model.estimation.floor import floor
 from ema_model.models import model_for
@@ -119,16 +121,20 @@ def test_a_loop_that_is_not_repeatable_and_has_no_current_is_said_to_be():
     assert found.verdict == "not_repeatable" and not found.effects
 
 
+def rival(name: str, found: Fit) -> Trial:
+    return Trial(Candidate(name, {}, 0.0), {}, found, 0.0)
+
+
 @pytest.mark.long
 def test_next_experiment_tells_rivals_apart():
     """In a slow sine a hinge moment and a heavier rotor look alike; a faster or wider one tells them apart."""
     hinge = {"hinge_moment": {"stiffness_Nm_rad": 500.0}}
     data = data_of(recorded(44, commands=[SINE], effects=hinge))
-    rivals = [
-        fit(data, with_effect(ACTUATOR, name, settings))
+    hinged, heavier = (
+        rival(name, fit(data, with_effect(ACTUATOR, name, settings)))
         for name, settings in (*hinge.items(), ("inertia_error", {"ratio": -0.2}))
-    ]
-    found = next_experiment(data, *rivals, ("hinge_moment", "inertia_error"))
+    )
+    found = next_experiment(data, hinged, heavier)
     assert found is not None and found.separates == ("hinge_moment", "inertia_error")
     assert found.expected_chi2 > 25.0 and found.add_signal is None
     assert 0.0 < found.duration_s <= 3.0
@@ -138,10 +144,10 @@ def test_a_test_is_sought_beside_an_effect_of_the_file_too():
     """One rival frees the file's hinge, the other adds an inertia beside it: both hold a hinge."""
     hinged = replace(ACTUATOR, effects={"hinge_moment": {"stiffness_Nm_rad": 500.0}})
     data = data_of(recorded(44, commands=[SINE], effects={"hinge_moment": {"stiffness_Nm_rad": 700.0}}))
-    rivals = [fit(data, one) for one in (hinged, with_effect(hinged, "inertia_error", {"ratio": -0.2}))]
-    names = ("hinge_moment", "inertia_error")
-    found = next_experiment(data, *rivals, names)
-    assert found is None or found.separates == names
+    freed = rival("hinge_moment", fit(data, hinged))
+    heavier = rival("inertia_error", fit(data, with_effect(hinged, "inertia_error", {"ratio": -0.2})))
+    found = next_experiment(data, freed, heavier)
+    assert found is None or found.separates == ("hinge_moment", "inertia_error")
 
 
 def test_allowed_commands_stay_within_what_was_recorded():

@@ -11,6 +11,7 @@ from ema_model.actuator import load_actuator
 from ema_model.discovery import walking
 from ema_model.discovery.fingerprints import Fingerprint, variants
 from ema_model.discovery.path import Story
+from ema_model.discovery.refit import Trial
 from ema_model.discovery.result import Candidate
 from ema_model.discovery.score import scored_all
 from ema_model.effects import find
@@ -76,6 +77,27 @@ def test_the_drives_own_effects_are_refitted_once_before_the_first_step(monkeypa
     walk.story.trial = trial
     assert walk.drive_leaves() == left
     assert tried == list(errors) == [one.candidate.name for one in walk._tried]
+
+
+@pytest.mark.parametrize(
+    ("added", "alike"),
+    [
+        ([("pendulum_load", ("hinge_moment",))], ["pendulum_load", "hinge_moment"]),
+        ([("pendulum_load", ("hinge_moment", "friction_zone"))], ["pendulum_load", "hinge_moment", "friction_zone"]),
+        ([("pendulum_load", ())], []),
+        ([("inertia_error", ())], []),
+        ([], []),
+    ],
+    ids=["one", "both", "told apart since", "replaced", "taken out"],
+)
+def test_a_test_is_sought_only_for_rivals_of_the_last_model(added, alike):
+    story = SimpleNamespace(added=[SimpleNamespace(name=name, same_as=same) for name, same in added])
+    rivals = [
+        Trial(Candidate(name, 1.0, {}), {}, SimpleNamespace(), 1.0)
+        for name in ("pendulum_load", "hinge_moment", "friction_zone")
+    ]
+    assert [one.candidate.name for one in walking._still_alike(story, rivals)] == alike
+    assert walking._still_alike(story, []) == []
 
 
 def test_candidates_are_scored_once_for_a_model(monkeypatch):

@@ -220,8 +220,7 @@ class Discovering:
                 trials.append(told.trials.of(base, one, tell))
             tell("simulating the tests that the actuator allows")
             first, second = trials
-            names = first.candidate.name, second.candidate.name
-            told.experiment = next_experiment(base.data, first.fit, second.fit, names)
+            told.experiment = next_experiment(base.data, first, second)
             self._shown.show(told)
             if told.experiment is None:
                 self.events.unsuggested()

@@ -11,19 +11,19 @@ from dataclasses import replace
 
 from ema_model.actuator import Actuator, load_actuator
 from ema_model.comparison.explain import Explanation
-from ema_model.discovery.begin import begun
-from ema_model.discovery.next_experiment import next_experiment
-from ema_model.discovery.outside_tolerance import outside_tolerance
-from ema_model.discovery.path import Story
-from ema_model.discovery.remaining import left_by
-from ema_model.discovery.repeated import repeated
+from ema_model.discovery.candidates.next_experiment import next_experiment
+from ema_model.discovery.evidence.outside_tolerance import outside_tolerance
+from ema_model.discovery.evidence.remaining import left_by
+from ema_model.discovery.evidence.uncertainty import with_intervals
+from ema_model.discovery.observed.repeated import repeated
 from ema_model.discovery.result import Candidate, Discovery, Experiment
-from ema_model.discovery.second_opinion import support_of
-from ema_model.discovery.sentences import as_well, held_back, mismatch, untold
-from ema_model.discovery.step import refreshed
-from ema_model.discovery.uncertainty import with_intervals
-from ema_model.discovery.verdict import explains_all, verdict_of
-from ema_model.discovery.walking import named_in, walk
+from ema_model.discovery.shown.sentences import as_well, held_back, mismatch, untold
+from ema_model.discovery.steps.begin import begun
+from ema_model.discovery.steps.path import Story
+from ema_model.discovery.steps.second_opinion import support_of
+from ema_model.discovery.steps.step import refreshed
+from ema_model.discovery.steps.verdict import explains_all, verdict_of
+from ema_model.discovery.steps.walking import named_in, walk
 from ema_model.effects import CATALOGUE
 from ema_model.recordings import Measurement
 

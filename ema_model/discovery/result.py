@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from ema_model.actuator import Actuator
 from ema_model.comparison.events import Event
 from ema_model.comparison.explain import Explanation
-from ema_model.discovery.controller_seen import ControllerSeen
 from ema_model.discovery.criteria import FAR
 from ema_model.discovery.model_fit import Data
-from ema_model.discovery.repeated import Repeated
-from ema_model.discovery.transmission_seen import TransmissionSeen
+from ema_model.discovery.observed.controller import ControllerSeen
+from ema_model.discovery.observed.repeated import Repeated
+from ema_model.discovery.observed.transmission import TransmissionSeen
 from ema_model.estimation import Calibrated, Calibration, Floor
 from ema_model.models import Model
 from ema_model.text import InWords

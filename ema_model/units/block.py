@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
-from ema_model.discovery.evidence import colour
+from ema_model.discovery.evidence.counted import colour
 from ema_model.discovery.model_fit import Data
 from ema_model.estimation import Floor, calibrate, default_free, floor
 from ema_model.estimation.problem import SIGNALS, Problem

@@ -5,7 +5,7 @@ from __future__ import annotations
 import plotly.graph_objects as go
 
 from ema_model.discovery import Discovery
-from ema_model.discovery.labels import effect_title
+from ema_model.discovery.shown.labels import effect_title
 from emaviz.colours import FITTED
 from emaviz.figures import theme
 

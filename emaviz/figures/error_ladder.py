@@ -7,7 +7,7 @@ import math
 import plotly.graph_objects as go
 
 from ema_model.discovery import Discovery
-from ema_model.discovery.labels import rung_title
+from ema_model.discovery.shown.labels import rung_title
 from ema_model.quantities.numbers import number
 from emaviz.colours import FITTED, HELD_OUT
 from emaviz.figures import theme

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import plotly.graph_objects as go
 
-from ema_model.discovery.tracks import Track
+from ema_model.discovery.shown.tracks import Track
 from ema_model.estimation.floor import BAND_SIGMAS
 from ema_model.quantities.axes import ROTARY
 from ema_model.quantities.shown import of_residual

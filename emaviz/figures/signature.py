@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from ema_model.comparison.residuals import Residuals
 from ema_model.discovery import Candidate
-from ema_model.discovery.labels import effect_title
-from ema_model.discovery.snapshot import Look
+from ema_model.discovery.shown.labels import effect_title
+from ema_model.discovery.steps.snapshot import Look
 from ema_model.quantities.numbers import Quantity
 from ema_model.quantities.shown import of_residual
 from ema_model.quantities.titles import in_sentence

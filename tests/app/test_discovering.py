@@ -11,7 +11,7 @@ from support.on_page import wait_until
 from support.rig import Rig
 
 from ema_model.actuator import load_actuator
-from ema_model.discovery.tracks import tracks
+from ema_model.discovery.shown.tracks import tracks
 from ema_model.effects.user import user_torque
 from ema_model.errors import InputError
 from ema_model.faults import HEALTHY

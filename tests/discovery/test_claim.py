@@ -7,10 +7,10 @@ from types import SimpleNamespace
 
 import pytest
 
-from ema_model.discovery import claim, dropped
-from ema_model.discovery.harmonics import Further
-from ema_model.discovery.refit import Trial
+from ema_model.discovery.candidates.harmonics import Further
+from ema_model.discovery.candidates.refit import Trial
 from ema_model.discovery.result import Added, Candidate
+from ema_model.discovery.steps import claim, dropped
 
 OUTDONE = "a curve over the motor angle tells more"
 

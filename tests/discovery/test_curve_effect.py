@@ -13,8 +13,8 @@ from ema_model.actuator.parameters import Controller, Inverter
 from ema_model.comparison.assemble import residuals_of
 from ema_model.comparison.explain import Explanation, explain
 from ema_model.comparison.residuals import Residuals
+from ema_model.discovery.candidates.torque_curve import curve_of, is_torque, with_curve
 from ema_model.discovery.model_fit import Data, Fit, fit, gather, holdout_error
-from ema_model.discovery.torque_curve import curve_of, is_torque, with_curve
 from ema_model.effects import find
 from ema_model.effects.user import torque_curve, user_torque
 from ema_model.errors import InputError

@@ -9,10 +9,10 @@ import pytest
 from scipy.signal import lfilter
 
 from ema_model.comparison.orders import colour as around_orders
+from ema_model.discovery.candidates.harmonics import _stands_out
+from ema_model.discovery.candidates.paid_for import _lasts
 from ema_model.discovery.criteria import LEAST_BIC
-from ema_model.discovery.evidence import colour, evidence
-from ema_model.discovery.harmonics import _stands_out
-from ema_model.discovery.paid_for import _lasts
+from ema_model.discovery.evidence.counted import colour, evidence
 
 RANDOM = np.random.default_rng(5)
 N = 8000

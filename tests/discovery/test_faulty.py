@@ -9,12 +9,12 @@ from ema_model.actuator import load_actuator
 from ema_model.commands import command
 from ema_model.comparison.criteria import BAND
 from ema_model.discovery import discover
-from ema_model.discovery.begin import begun
+from ema_model.discovery.candidates.faults import scored_faults, tried_faults
 from ema_model.discovery.discover import result_of
-from ema_model.discovery.faults import scored_faults, tried_faults
 from ema_model.discovery.model_fit import holdout_error
 from ema_model.discovery.result import Change
-from ema_model.discovery.summary import as_dict
+from ema_model.discovery.shown.summary import as_dict
+from ema_model.discovery.steps.begin import begun
 from ema_model.faults import vector
 from ema_model.simulation.run import Run, simulate_reference
 from ema_model.simulation.sensors import Sensors

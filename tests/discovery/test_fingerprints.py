@@ -6,9 +6,9 @@ import numpy as np
 
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
-from ema_model.discovery import fingerprints
-from ema_model.discovery.begin import begun
-from ema_model.discovery.score import scored
+from ema_model.discovery.candidates import fingerprints
+from ema_model.discovery.candidates.score import scored
+from ema_model.discovery.steps.begin import begun
 from ema_model.simulation.run import Run, simulate_reference
 from ema_model.simulation.sensors import Sensors
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from ema_model.discovery.let_go import let_go
+from ema_model.discovery.candidates.let_go import let_go
 from ema_model.discovery.model_fit import Fit
 
 

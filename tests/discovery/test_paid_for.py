@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from ema_model.actuator import Tolerance
-from ema_model.discovery import objections, paid_for, refit
+from ema_model.discovery.candidates import paid_for, refit
+from ema_model.discovery.evidence import objections
 from ema_model.effects import find
 from ema_model.estimation import Calibrated
 

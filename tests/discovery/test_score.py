@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from ema_model.discovery import score
+from ema_model.discovery.candidates import score
 from ema_model.effects import find
 
 

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from support.hidden_effects import ACTUATOR, recorded
 
-from ema_model.discovery.transmission_seen import TransmissionSeen, transmission_seen
-from ema_model.discovery.verdict import verdict_of
-from ema_model.discovery.words import headline
+from ema_model.discovery.observed.transmission import TransmissionSeen, transmission_seen
+from ema_model.discovery.shown.words import headline
+from ema_model.discovery.steps.verdict import verdict_of
 
 MOTION = ("multisine", {"amplitude_rad": 0.012, "frequencies_Hz": (2, 5, 9)}, 0.6)
 NOISE = 2e-6  # rad of the user, rms
@@ -87,8 +87,8 @@ def test_it_needs_both_positions(healthy):
 
 
 def test_nothing_is_adequate_beside_it(monkeypatch):
-    monkeypatch.setattr("ema_model.discovery.verdict.explains_all", lambda story: True)
-    monkeypatch.setattr("ema_model.discovery.verdict.lasts", lambda data, found: False)
+    monkeypatch.setattr("ema_model.discovery.steps.verdict.explains_all", lambda story: True)
+    monkeypatch.setattr("ema_model.discovery.steps.verdict.lasts", lambda data, found: False)
     found = SimpleNamespace(calibration=SimpleNamespace(converged=True))
     named: Any = object()
     story: Any = SimpleNamespace(

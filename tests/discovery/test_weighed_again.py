@@ -8,9 +8,9 @@ import pytest
 from support.hidden_effects import ACTUATOR, recorded
 
 from ema_model.discovery import as_dict, begun, result_of
-from ema_model.discovery.labels import rung_label, rung_title
 from ema_model.discovery.result import Change
-from ema_model.discovery.weighed_again import near, weigh_again
+from ema_model.discovery.shown.labels import rung_label, rung_title
+from ema_model.discovery.steps.weighed_again import near, weigh_again
 from emaviz.session.discover.record import steps_of, take_again
 
 COMMANDS = [("chirp", {}, 0.5), ("sine", {"amplitude_rad": 0.03, "frequency_Hz": 3.0}, 1.0)]

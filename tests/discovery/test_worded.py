@@ -8,12 +8,12 @@ from dataclasses import replace
 import pytest
 from support.discovered import with_cogging
 
-from ema_model.discovery import tables
-from ema_model.discovery.labels import effect_title, rung_label
 from ema_model.discovery.result import Change, StoodIn
-from ema_model.discovery.sentences import NOT_REPEATABLE, masked, untold
-from ema_model.discovery.summary import as_dict
-from ema_model.discovery.words import moved, sentences
+from ema_model.discovery.shown import tables
+from ema_model.discovery.shown.labels import effect_title, rung_label
+from ema_model.discovery.shown.sentences import NOT_REPEATABLE, masked, untold
+from ema_model.discovery.shown.summary import as_dict
+from ema_model.discovery.shown.words import moved, sentences
 from ema_model.estimation import Calibrated
 from ema_model.quantities.axes import ROTARY, Axes
 from emaviz.report import write_discovery_report

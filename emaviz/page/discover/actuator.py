@@ -7,7 +7,7 @@ from contextlib import suppress
 
 import numpy as np
 
-from ema_model.discovery.tracks import Track
+from ema_model.discovery.shown.tracks import Track
 from ema_model.errors import InputError
 from ema_model.faults import HEALTHY
 from ema_model.recordings import Measurement

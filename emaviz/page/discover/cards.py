@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ema_model.discovery import Candidate
-from ema_model.discovery.fault_pages import size
-from ema_model.discovery.labels import effect_title
-from ema_model.discovery.snapshot import Look
+from ema_model.discovery.shown.fault_pages import size
+from ema_model.discovery.shown.labels import effect_title
+from ema_model.discovery.steps.snapshot import Look
 from ema_model.effects import find
 from ema_model.faults import BY_NAME
 from ema_model.quantities.numbers import amount, number, with_uncertainty

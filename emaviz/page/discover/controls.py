@@ -8,8 +8,8 @@ from typing import Any
 import viser
 
 from ema_model.discovery import Candidate
-from ema_model.discovery.labels import effect_title, rung_title
-from ema_model.discovery.snapshot import Look
+from ema_model.discovery.shown.labels import effect_title, rung_title
+from ema_model.discovery.steps.snapshot import Look
 from ema_model.effects import CATALOGUE
 from ema_model.faults import CAUSES
 from ema_model.quantities.numbers import number

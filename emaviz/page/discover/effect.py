@@ -10,10 +10,10 @@ import viser
 
 from ema_model.actuator import Actuator
 from ema_model.discovery import Candidate
-from ema_model.discovery.fault_pages import page_of
-from ema_model.discovery.fault_pages import typical as typical_fault
-from ema_model.discovery.labels import effect_title
-from ema_model.discovery.snapshot import Look
+from ema_model.discovery.shown.fault_pages import page_of
+from ema_model.discovery.shown.fault_pages import typical as typical_fault
+from ema_model.discovery.shown.labels import effect_title
+from ema_model.discovery.steps.snapshot import Look
 from ema_model.effects import Effect, find
 from ema_model.effects.effect import FAMILIES
 from ema_model.faults import BY_NAME

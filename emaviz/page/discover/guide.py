@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import viser
 
-from ema_model.discovery.labels import effect_title
-from ema_model.discovery.snapshot import Look
+from ema_model.discovery.shown.labels import effect_title
+from ema_model.discovery.steps.snapshot import Look
 from ema_model.quantities.numbers import number
 from emaviz.page.page import Page
 from emaviz.session.discover.discovering import Discovering

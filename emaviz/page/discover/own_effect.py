@@ -9,7 +9,7 @@ from typing import Any
 import plotly.graph_objects as go
 import viser
 
-from ema_model.discovery.snapshot import Look
+from ema_model.discovery.steps.snapshot import Look
 from ema_model.effects.user import UserEffect, user_torque
 from ema_model.effects.user.expression import FUNCTIONS, VARIABLES
 from ema_model.errors import InputError

@@ -9,7 +9,7 @@ from typing import Any
 import viser
 
 from ema_model.challenges import Challenge
-from ema_model.discovery.snapshot import Look
+from ema_model.discovery.steps.snapshot import Look
 from emaviz.page.page import Page
 from emaviz.server.uploads import Uploads
 from emaviz.session.data_folder import CHALLENGE_SUFFIX

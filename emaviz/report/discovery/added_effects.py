@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ema_model.discovery.labels import effect_title, fitted_of
 from ema_model.discovery.result import Added
+from ema_model.discovery.shown.labels import effect_title, fitted_of
 from ema_model.effects import Effect, find
 from ema_model.effects.effect import FAMILIES
 from ema_model.quantities.numbers import number

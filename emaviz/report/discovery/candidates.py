@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ema_model.discovery import tables
+from ema_model.discovery.shown import tables
 from emaviz.figures import candidates
 from emaviz.report.discovery.subject import Told
 from emaviz.report.markup import document_table, paragraph

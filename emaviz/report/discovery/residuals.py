@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ema_model.discovery.tracks import Track, primary
+from ema_model.discovery.shown.tracks import Track, primary
 from ema_model.recordings import SIGNALS
 from emaviz.figures import residual_steps
 from emaviz.report.discovery.subject import Told

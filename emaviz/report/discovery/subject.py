@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ema_model.discovery import Discovery
-from ema_model.discovery.tracks import Track, tracks
+from ema_model.discovery.shown.tracks import Track, tracks
 
 
 @dataclass(frozen=True, eq=False)

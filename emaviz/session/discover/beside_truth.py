@@ -8,8 +8,8 @@ from numpy.typing import ArrayLike
 from ema_model.actuator.readings import sentences
 from ema_model.challenges.truth import Truth
 from ema_model.discovery import Discovery
-from ema_model.discovery.labels import effect_title, fitted_of, value
 from ema_model.discovery.result import Added
+from ema_model.discovery.shown.labels import effect_title, fitted_of, value
 from ema_model.effects import CATALOGUE, find
 from ema_model.faults import BY_NAME, NAMES
 from ema_model.quantities.numbers import amount

@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from typing import Any
 
 from ema_model.discovery import Candidate, verified, walk
-from ema_model.discovery.labels import effect_title
-from ema_model.discovery.next_experiment import next_experiment
-from ema_model.discovery.refit import Trial
+from ema_model.discovery.candidates.next_experiment import next_experiment
+from ema_model.discovery.candidates.refit import Trial
+from ema_model.discovery.candidates.unknown import curve_for
 from ema_model.discovery.result import Experiment
-from ema_model.discovery.snapshot import Look
-from ema_model.discovery.unknown import curve_for
-from ema_model.discovery.words import verification
+from ema_model.discovery.shown.labels import effect_title
+from ema_model.discovery.shown.words import verification
+from ema_model.discovery.steps.snapshot import Look
 from ema_model.effects import CATALOGUE
 from ema_model.effects.user import UserEffect
 from ema_model.errors import InputError, quoted

@@ -8,7 +8,7 @@ from datetime import datetime
 import msgspec
 
 from ema_model.challenges import Challenge
-from ema_model.discovery.snapshot import Look
+from ema_model.discovery.steps.snapshot import Look
 from ema_model.quantities.numbers import number
 from emaviz.session.discover.progress import Telling
 from emaviz.session.discover.saved_story import Recipe, SavedStory

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ema_model.discovery.snapshot import Look
+from ema_model.discovery.steps.snapshot import Look
 from emaviz.session.signal import Signal
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ema_model.actuator import save_actuator
-from ema_model.discovery.snapshot import Look
+from ema_model.discovery.steps.snapshot import Look
 from emaviz.session.data_folder import DataFolder
 
 

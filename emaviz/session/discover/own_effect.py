@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ema_model.discovery import Candidate, Story
-from ema_model.discovery.preview import Preview as Room
-from ema_model.discovery.preview import preview as room_for
-from ema_model.discovery.snapshot import Look
-from ema_model.discovery.step import Step
+from ema_model.discovery.candidates.preview import Preview as Room
+from ema_model.discovery.candidates.preview import preview as room_for
+from ema_model.discovery.steps.snapshot import Look
+from ema_model.discovery.steps.step import Step
 from ema_model.effects.user import Expression, UserEffect, parse
 from ema_model.errors import InputError
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 
 from ema_model.comparison.explain import Explanation
 from ema_model.discovery import Candidate, Story, result_of
-from ema_model.discovery.refit import Trial, with_drops
+from ema_model.discovery.candidates.refit import Trial, with_drops
 from ema_model.discovery.result import Experiment
-from ema_model.discovery.snapshot import Assessment, Look, assessed, known_of, look_at
-from ema_model.discovery.step import Step
+from ema_model.discovery.steps.snapshot import Assessment, Look, assessed, known_of, look_at
+from ema_model.discovery.steps.step import Step
 from ema_model.effects import CATALOGUE
 from emaviz.session.discover.record import steps_of
 from emaviz.session.discover.refits import Trials

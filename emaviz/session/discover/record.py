@@ -8,9 +8,9 @@ from itertools import pairwise
 
 from ema_model.actuator.write import as_toml
 from ema_model.discovery import Candidate, Story
+from ema_model.discovery.candidates.refit import Trial
 from ema_model.discovery.model_fit import fit
-from ema_model.discovery.refit import Trial
-from ema_model.discovery.step import Step
+from ema_model.discovery.steps.step import Step
 from ema_model.effects import CATALOGUE, catalogue_name
 from ema_model.errors import InputError
 from ema_model.faults import NAMES

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from ema_model.discovery import Candidate, Story
-from ema_model.discovery.labels import effect_title
-from ema_model.discovery.refit import Trial
-from ema_model.discovery.snapshot import Assessment, Look, known_of
-from ema_model.discovery.step import Step
+from ema_model.discovery.candidates.refit import Trial
+from ema_model.discovery.shown.labels import effect_title
+from ema_model.discovery.steps.snapshot import Assessment, Look, known_of
+from ema_model.discovery.steps.step import Step
 from ema_model.errors import InputError
 from ema_model.quantities.titles import in_sentence
 from emaviz.session.job import Tell

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ema_model.discovery import begun
-from ema_model.discovery.refit import Trial
-from ema_model.discovery.snapshot import Look
+from ema_model.discovery.candidates.refit import Trial
+from ema_model.discovery.steps.snapshot import Look
 from emaviz.session.discover.entries import Entries, Entry
 from emaviz.session.discover.progress import Telling
 from emaviz.session.discover.refits import check_value

@@ -1,0 +1,175 @@
+"""Fingerprints: what each effect would change in the signals, for all of them in one population.
+
+They share one stack, in which every lane has one of them on and all others do nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ema_model.actuator import Actuator
+from ema_model.actuator.unread import idle
+from ema_model.discovery.evidence.extents import Ranges, moves_both_ways, ranges_of, top_speed
+from ema_model.discovery.model_fit import Data, Fit
+from ema_model.effects import Effect, find
+
+Array = NDArray[np.float64]
+Lane = tuple[Effect, dict[str, float]]
+
+_FAR = 30.0  # times what there is to explain
+_ATTEMPTS = 3
+_LONGEST_STEP_S = 2e-5  # at which no score differs in its first three digits from that at 1e-5
+_DIVERGED = 1e100  # floors, from which on a change has no meaning: its square would overflow
+
+
+@dataclass(frozen=True, eq=False)
+class Fingerprint:
+    """What an effect with these settings changes, over the floor: (values, columns).
+
+    Two columns are the two phases of a periodic effect, or those after the first what other linear parameters do at
+    these values, `beside`.  Of an effect that the file has they are what its own parameters do beyond their tolerances.
+    """
+
+    name: str
+    settings: dict[str, float]
+    columns: Array
+    beside: dict[str, float] = field(default_factory=dict)
+    frees: tuple[str, ...] = ()  # the calibrated parameters of the file's effect, whose columns they are
+
+
+def variants(
+    effect: Effect, orders: Sequence[float], top_rad_s: float = 0.0, ranges: Ranges | None = None
+) -> list[list[dict[str, float]]]:
+    """Settings to try; those of one entry are columns of one fingerprint.
+
+    top_rad_s: the motor's top speed; ranges: of the variables, for effects that begin at a place along one.
+    """
+    names = [parameter.name for parameter in effect.parameters]
+    first = effect.parameters[0].name
+    middle = effect.severities[1]
+    if "phase_rad" in names and "order" in names:
+        low, high = next((one.low, one.high) for one in effect.parameters if one.name == "order")
+        return [
+            [{first: middle, "order": float(order), "phase_rad": phase} for phase in (0.0, 0.5 * np.pi)]
+            for order in orders
+            if low <= order <= high
+        ]
+    if "phase_rad" in names:
+        return [[{first: middle, "phase_rad": phase} for phase in (0.0, 0.5 * np.pi)]]
+    if effect.placed:
+        low, high = (ranges or {}).get(effect.against, (0.0, 0.0))
+        own = {one.name: one for one in effect.parameters}
+        places = [
+            {name: low + s * (high - low) for name, s in zip(effect.placed, at)} for at in zip(*effect.placed.values())
+        ]
+        within = [at for at in places if all(own[name].low <= value <= own[name].high for name, value in at.items())]
+        return [[{first: middle, **place}] for place in within] if high > low else []
+    low, high = effect.parameters[0].low, effect.parameters[0].high
+    speeds = [share * top_rad_s for share in effect.at_speeds]
+    beside = [{first: effect.nothing, name: value} for name, value in _beside(effect).items()]
+    usual = (*effect.severities, *(speed for speed in speeds if low <= speed <= high))
+    return [[{first: one}, *beside] for one in usual]
+
+
+def _beside(effect: Effect) -> dict[str, float]:
+    """Values at which one looks at what an effect's other linear parameters do."""
+    return {one.name: effect.beside[one.name] * one.high for one in effect.parameters if one.name in effect.beside}
+
+
+def fingerprints(data: Data, found: Fit, names: Iterable[str], orders: Sequence[float]) -> list[Fingerprint]:
+    """Those of all effects that are not yet in the model, at the model's calibrated parameters."""
+    effects = [find(name, found.actuator.axes) for name in names if name not in found.effects]
+    if not moves_both_ways(found):
+        effects = [one for one in effects if not one.by_direction]
+    top, ranges = top_speed(found), ranges_of(found)
+    tried = [(effect, settings) for effect in effects for settings in variants(effect, orders, top, ranges)]
+    lanes = [(effect, one) for effect, settings in tried for one in settings]
+    if not lanes:
+        return []
+    change = _changes(data, found, lanes)
+    for _ in range(1, _ATTEMPTS):
+        with np.errstate(over="ignore"):  # a loop that an effect makes unstable
+            size = np.sqrt(np.mean(change**2, axis=1))
+        gentle = [_gentler(effect, one, s, found.error()) for (effect, one), s in zip(lanes, size)]
+        again = [lane for lane, new in enumerate(gentle) if new is not None]
+        if not again:
+            break
+        lanes = [(effect, new or one) for (effect, one), new in zip(lanes, gentle)]
+        change[again] = _changes(data, found, [lanes[lane] for lane in again])
+    prints, lane = [], 0
+    for effect, settings in tried:
+        columns = change[lane : lane + len(settings)].T
+        columns = np.where(np.abs(columns) < _DIVERGED, columns, 0.0)  # also NaN
+        own = [one for _, one in lanes[lane : lane + len(settings)]]
+        beside = {name: one[name] for one in own[1:] for name in effect.beside if name in one}
+        prints.append(Fingerprint(effect.name, dict(own[0]), columns, beside))
+        lane += len(settings)
+    return prints
+
+
+def of_the_file(found: Fit, names: Iterable[str]) -> list[Fingerprint]:
+    """Those of effects that the file has, as far as their parameters are free: what they would do beyond it."""
+    calibration = found.calibration
+    columns = [*calibration.parameters, *calibration.starts]
+    prints = []
+    for name in names:
+        own = tuple(path for path in calibration.parameters if path.startswith(f"effects.{name}."))
+        if own:
+            jacobian = calibration.weighted_jacobian[:, [columns.index(path) for path in own]]
+            prints.append(Fingerprint(name, dict(calibration.actuator.effects[name]), jacobian, frees=own))
+    return prints
+
+
+def _changes(data: Data, found: Fit, lanes: list[Lane]) -> Array:
+    """What each lane's effect changes, over the floor: (lanes, values).
+
+    Only what the drive does within a step of its own needs the model's shortest steps.
+    """
+    of_drive = np.array([effect.family == "drive" for effect, _ in lanes])
+    parts = [(np.flatnonzero(of_drive), 0.0), (np.flatnonzero(~of_drive), _LONGEST_STEP_S)]
+    changes = [_changed(data, found, lanes, rows, longest_s) for rows, longest_s in parts if len(rows)]
+    return np.concatenate(changes)[np.argsort(np.concatenate([rows for rows, _ in parts]))]
+
+
+def _changed(data: Data, found: Fit, lanes: list[Lane], rows: NDArray[np.intp], longest_s: float) -> Array:
+    """The same for some of the lanes, by their place, at steps of up to longest_s."""
+    actuator: Actuator = found.calibration.actuator
+    resting = {effect.name: effect.neutral for effect, _ in lanes} | actuator.effects
+    varied = {
+        name: {parameter: np.full(len(rows) + 1, value) for parameter, value in values.items()}
+        for name, values in resting.items()
+    }
+    for lane, row in enumerate(rows, 1):
+        effect, settings = lanes[row]
+        for parameter, value in effect.settings(settings).items():
+            varied[effect.name][parameter][lane] = value
+    plant = data.plant(replace(actuator, effects=resting)).at_longer_steps(longest_s)
+    model = replace(actuator, effects=varied)
+    k = np.tile(found.calibration.k, (len(rows) + 1, 1))
+    shown = [plant.signals(i, model, k, *found.calibration.start_of(i)) for i in range(len(plant.windows))]
+    signals = data.over_floor(plant, shown)
+    return signals[1:] - signals[0]
+
+
+def _gentler(effect: Effect, settings: dict[str, float], size: float, error: float) -> dict[str, float] | None:
+    """Settings that change about as much as there is to explain, where these change far more (another actuator's)."""
+    first = effect.parameters[0]
+    if size <= _FAR * max(1.0, error) or first.low > 0.0:
+        return None
+    share = max(2.0 * max(1.0, error) / size, 1e-4) if np.isfinite(size) else 1e-3
+    amounts = {first.name, *effect.beside}
+    return {name: share * value if name in amounts else value for name, value in settings.items()}
+
+
+def may_act(name: str, actuator: Actuator) -> bool:
+    """Whether an effect is of something that is there: of a drive only where its controller is simulated."""
+    effect = find(name)
+    if not effect.has_part(actuator.axes):
+        return False
+    kinds = actuator.controller.kind, actuator.inverter.kind
+    places = {function.__name__ for function in effect.places}
+    return effect.family != "drive" or not idle(places, bool(effect.states), *kinds)

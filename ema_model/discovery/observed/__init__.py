@@ -1,0 +1,1 @@
+"""What recordings show by themselves, before any effect is tried: controller, transmission, what a rig repeats."""

@@ -1,0 +1,106 @@
+"""The first model of a discovery: calibrated to the recordings, before any effect."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from ema_model.actuator import Actuator
+from ema_model.comparison.compare import weights_of
+from ema_model.comparison.sentences import OPEN_LOOP
+from ema_model.discovery.criteria import FAR
+from ema_model.discovery.model_fit import Data, fit, floor_ratio, gather, in_floors_of
+from ema_model.discovery.observed.repeatability import by_inverse_dynamics, is_lost, with_divergence
+from ema_model.discovery.result import Change
+from ema_model.discovery.shown.sentences import NOT_REPEATABLE, OPEN_LOOP_LEFT
+from ema_model.discovery.steps.path import Story
+from ema_model.discovery.steps.step import Step, rung_of
+from ema_model.errors import InputError
+from ema_model.models.delay_of_drive import with_delay_of_drive
+from ema_model.models.stretches import fit_stretches
+from ema_model.recordings import Measurement
+from ema_model.recordings.prepared import prepared
+from ema_model.recordings.read import check_same_actuator
+from ema_model.simulation.one_stack import compile_library
+
+Progress = Callable[[str], None]
+
+_MOTOR = frozenset({"current_A", "motor_torque_Nm"})  # what a measured motion tells something of
+
+
+def begun(
+    measurements: Sequence[Measurement],
+    actuator: Actuator,
+    holdout: Sequence[Measurement] = (),
+    signals: Sequence[str] | None = None,
+    tell: Progress = lambda text: None,
+) -> Story:
+    """The calibrated model, before any effect.
+
+    A loop that is not repeatable is taken by inverse dynamics, where the recordings allow it, and so is an open one:
+    there the noise of what is put in adds up in the motion.
+    Raises InputError for recordings that cannot be compared.
+    """
+    check_same_actuator([*measurements, *holdout])
+    compile_library(actuator)
+    actuator = with_delay_of_drive(actuator, measurements)
+    is_open = actuator.controller.kind == "open"
+    simulated = None if is_open else calibrated_story(measurements, actuator, holdout, signals, tell)
+    if simulated is not None and simulated.repeatable:
+        return simulated
+    moved = _by_motion(measurements, actuator, holdout, signals, tell)
+    if moved is not None:
+        moved.warnings.append(OPEN_LOOP_LEFT if is_open else NOT_REPEATABLE)
+        return moved
+    story = simulated or calibrated_story(measurements, actuator, holdout, signals, tell)
+    if is_open:
+        story.warnings.append(OPEN_LOOP)
+    return story
+
+
+def _by_motion(
+    measurements: Sequence[Measurement],
+    actuator: Actuator,
+    holdout: Sequence[Measurement],
+    signals: Sequence[str] | None,
+    tell: Progress,
+) -> Story | None:
+    """The same by inverse dynamics; None where the recordings, or the signals that are asked for, do not allow it."""
+    inverse = by_inverse_dynamics([*measurements, *holdout], actuator)
+    if inverse is None or _MOTOR.isdisjoint(weights_of(signals, actuator)):
+        return None
+    try:
+        return calibrated_story(measurements, inverse, holdout, signals, tell)
+    except InputError:  # too little motion
+        return None
+
+
+def calibrated_story(
+    measurements: Sequence[Measurement],
+    actuator: Actuator,
+    holdout: Sequence[Measurement],
+    signals: Sequence[str] | None,
+    tell: Progress,
+) -> Story:
+    """The same of what one model can take, in its loop or without."""
+    tell("measuring the model's floor")
+    data, held = (_data(recordings, actuator, signals) for recordings in (measurements, holdout))
+    assert data is not None
+    tell("calibrating")
+    far = replace(data, floors=[replace(one, even=True) for one in data.floors])
+    base = fit(far, actuator, tell=tell)
+    is_far = floor_ratio(far, base.plant, base.calibration.signals) > FAR
+    # How the two models differ depends on their parameters: on where the motor comes to stand above all.
+    data, lost = with_divergence((far if is_far else data).beside(base), base)
+    held = None if held is None else held.beside(base)
+    if not data.weighs_as(far):
+        base = fit(data, actuator, base.starts, tell)
+    data, held = in_floors_of(base, data, held)
+    return Story(data, held, [Step(base, rung_of(Change(), base, data, held), ())], not is_lost(lost))
+
+
+def _data(recordings: Sequence[Measurement], actuator: Actuator, signals: Sequence[str] | None) -> Data | None:
+    if not recordings:
+        return None
+    inside = [prepared(recording, actuator) for recording in recordings]
+    return gather(inside, actuator, weights_of(signals, actuator), fit_stretches(inside, actuator))

@@ -1,0 +1,178 @@
+"""Held-out recordings that contradict the fitted ones, and how: a sign, a zero, a unit, another actuator.
+
+A model that meets what it was fitted to and misses by far what it was not has met a recording of something else.  Each
+cheap explanation is tried by putting the recording right and simulating it anew; what brings the error down is told.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ema_model.actuator.naming import on_axes
+from ema_model.discovery.criteria import ANOTHER, MISSED, PUT_RIGHT, WIDER
+from ema_model.discovery.evidence.objections import ratio
+from ema_model.discovery.model_fit import Data, Fit, fit, floor_ratio, gather, resimulated
+from ema_model.discovery.result import Contradiction
+from ema_model.errors import InputError
+from ema_model.estimation import calibrate
+from ema_model.quantities.axes import Axes
+from ema_model.quantities.numbers import amount, number
+from ema_model.quantities.shown import of_signal
+from ema_model.quantities.titles import in_sentence
+from ema_model.recordings import Measurement
+
+if TYPE_CHECKING:
+    from ema_model.discovery.steps.path import Story
+
+Array = NDArray[np.float64]
+
+_COMPARED = ("user_position_rad", "motor_position_rad", "current_A", "motor_torque_Nm")
+_POSITIONS = ("user_position_rad", "motor_position_rad")
+_DEGREES = ("degrees", 180.0 / math.pi)
+_THOUSAND = 1e3
+_CLOSE = 6.0  # times, within which a ratio of sizes may be that of two units: motions differ, too
+
+
+@dataclass(frozen=True, eq=False)
+class _Attempt:
+    signal: str
+    how: str
+    what: str  # "the other sign", "a zero that is 0.12 rad off"
+    measurement: Measurement
+
+
+def contradictions(story: Story, tell: Callable[[str], None]) -> list[Contradiction]:
+    """One for each held-out recording that the last model misses by far more than the fitted ones."""
+    if story.held is None:
+        return []
+    found, limit = [], MISSED * max(1.0, ratio(story.data, story.current))
+    for place, measurement in enumerate(story.held.measurements):
+        alone = _alone(story.held, story.current, place)
+        if alone is None:
+            continue
+        before = resimulated(alone, story.current.calibration.actuator)[0]
+        if before > limit:
+            tell(f"asking why {measurement.name} is at odds")
+            found.append(_explained(story, alone, before, limit))
+    return found
+
+
+def _explained(story: Story, alone: Data, before: float, limit: float) -> Contradiction:
+    (measurement,) = alone.measurements
+    axes = story.current.actuator.axes
+    tried = [(after, one) for one in _attempts(story, alone) if (after := _with(story, alone, one)) is not None]
+    after, best = min(tried, key=lambda pair: pair[0], default=(math.inf, None))
+    name = measurement.name or "the held-out recording"
+    missed = f"{name} contradicts the fitted recordings: {number(before, 2)} times the floor"
+    if best is not None and after < PUT_RIGHT * before and after <= limit:
+        title = in_sentence(of_signal(best.signal, axes).title)
+        sentence = f"{missed}, and {number(after, 2)} with {best.what} of its {title}."
+        return Contradiction(name, best.signal, best.how, sentence, before, after)
+    again, others = _another(story, alone)
+    if others and again < PUT_RIGHT * before:
+        told = f"{missed}, and {number(again, 2)} as another actuator's, with {', '.join(others)}."
+        return Contradiction(name, None, "actuator", told, before, again)
+    least = min(after, again, before)
+    told = f"{missed}; no other sign, zero or unit of a signal and no other actuator explains it."
+    return Contradiction(name, None, "unknown", told, before, least)
+
+
+def _attempts(story: Story, alone: Data) -> Iterator[_Attempt]:
+    """The recording with one reading put right."""
+    (measurement,) = alone.measurements
+    plant = alone.plant(story.current.calibration.actuator)
+    shown = calibrate(plant, alone.floors, free=(), signals=alone.signals, start={}).signals
+    axes = story.current.actuator.axes
+    names = [name for name in _COMPARED if name in measurement]
+    simulates = plant.simulates_commands
+    for name in (*names, *(("command_rad",) if simulates else ())):
+        yield _Attempt(name, "sign", "the other sign", _scaled(measurement, name, -1.0))
+    for name in _POSITIONS if simulates else ():
+        away = _away([window.measured for window in plant.windows], shown, name)
+        if name in measurement and away:
+            what = f"a zero that is {amount(abs(away), of_signal(name, axes).unit)} off"
+            yield _Attempt(name, "zero", what, measurement.with_signals(**{name: measurement[name] - away}))
+    if not simulates and "motor_position_rad" in measurement:
+        for part in range(1, 8):  # of a turn: what depends on the angle is elsewhere
+            turned = measurement["motor_position_rad"] + 0.25 * math.pi * part
+            what = f"a zero that is {amount(0.25 * math.pi * part, 'rad')} off"
+            yield _Attempt("motor_position_rad", "zero", what, measurement.with_signals(motor_position_rad=turned))
+    sizes = _sizes(story, measurement)
+    for name, size in sizes.items():
+        for unit, factor in _units(name, axes):
+            for times in (factor, 1.0 / factor):
+                if 1.0 / _CLOSE < size / times < _CLOSE:
+                    what = f"{unit} as the unit" if times > 1.0 else f"a unit that is {number(factor, 3)} times greater"
+                    yield _Attempt(name, "unit", what, _scaled(measurement, name, 1.0 / times))
+
+
+def _units(name: str, axes: Axes) -> list[tuple[str, float]]:
+    """Units that a signal may have been recorded in by mistake, and how many of them make one of its own."""
+    unit = of_signal(name, axes).unit
+    angular = [_DEGREES] if unit == "rad" else []
+    return [*angular, (f"m{unit}", _THOUSAND)]
+
+
+def _sizes(story: Story, measurement: Measurement) -> dict[str, float]:
+    """How much larger each signal of a recording is than in the fitted recordings."""
+    found = {}
+    for name in (*_COMPARED, "command_rad"):
+        known = [float(np.std(one[name])) for one in story.data.measurements if name in one]
+        if name in measurement and known and min(known) > 0.0:
+            found[name] = float(np.std(measurement[name])) / float(np.median(known))
+    return found
+
+
+def _scaled(measurement: Measurement, name: str, factor: float) -> Measurement:
+    more = {"motor_position_rad": ("motor_speed_rad_s",)}.get(name, ()) if factor < 0.0 else ()
+    return measurement.with_signals(**{n: factor * measurement[n] for n in (name, *more) if n in measurement})
+
+
+def _away(measured: list[dict[str, Array]], shown: list[dict[str, Array]], name: str) -> float:
+    """By how much a signal is off its model all the time."""
+    parts = [its[name] - model[name] for its, model in zip(measured, shown) if name in its and name in model]
+    return float(np.median(np.concatenate(parts))) if parts else 0.0
+
+
+def _with(story: Story, alone: Data, one: _Attempt) -> float | None:
+    """The error with a reading put right, in floors; None where it cannot be simulated."""
+    actuator = story.current.calibration.actuator
+    try:
+        data = gather([one.measurement], actuator, alone.signals, alone.stretches)
+        return resimulated(data, actuator)[0]
+    except (InputError, FloatingPointError):
+        return None
+
+
+def _another(story: Story, alone: Data) -> tuple[float, list[str]]:
+    """The error with parameters of its own, and those that are others than the fitted recordings'."""
+    fitted = story.current.calibration.actuator
+    own = [path for path in fitted.tolerances if not path.startswith(("effects.", "sensors."))]
+    wide = {path: replace(fitted.tolerances[path], sigma=WIDER * fitted.tolerances[path].sigma) for path in own}
+    found = fit(alone, replace(fitted, tolerances=wide))
+    after = floor_ratio(alone, found.plant, found.calibration.signals)
+    others = []
+    for path, one in found.calibration.parameters.items():
+        if WIDER * abs(one.z) > ANOTHER and path in wide:
+            shown = on_axes(path, fitted.axes)
+            others.append(
+                f"{in_sentence(shown.title)} {amount(one.value, shown.unit)} for {amount(one.initial, shown.unit)}"
+            )
+    return after, others
+
+
+def _alone(held: Data, found: Fit, place: int) -> Data | None:
+    """One of the held-out recordings."""
+    windows = held.plant(found.calibration.actuator).windows
+    floors = [one for window, one in zip(windows, held.floors) if window.recording == place]
+    stretches = None if held.stretches is None else [held.stretches[place]]
+    measurements = [held.measurements[place]]
+    return (
+        replace(held, measurements=measurements, stretches=stretches, floors=floors, after_fit=()) if floors else None
+    )

@@ -1,0 +1,298 @@
+"""How a model grows: from the calibrated one, an effect a step, each with its error; steps can be taken back.
+
+`discover` walks by itself; a person at the page takes the same steps by hand.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import takewhile
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ema_model.comparison.explain import Explanation
+from ema_model.discovery.candidates.faults import fault_for, fault_trial, tried_faults, without_fault
+from ema_model.discovery.candidates.fingerprints import Fingerprint, fingerprints, may_act, of_the_file
+from ema_model.discovery.candidates.refit import Trial, again, is_near, promising, stands_for, tried
+from ema_model.discovery.candidates.score import scored, signatures
+from ema_model.discovery.candidates.unknown import curve_for
+from ema_model.discovery.criteria import LEAST_BIC
+from ema_model.discovery.evidence.counted import predicted_evidence
+from ema_model.discovery.evidence.remaining import Left, at_floor, left_by
+from ema_model.discovery.evidence.uncertainty import settled
+from ema_model.discovery.model_fit import Data, Fit, as_in, fit, in_floors_of, without_effect
+from ema_model.discovery.observed.controller import ControllerSeen
+from ema_model.discovery.observed.transmission import TransmissionSeen
+from ema_model.discovery.result import Added, Candidate, Change, Contradiction, Rung
+from ema_model.discovery.steps.step import Step, change_of, refreshed, rung_of, stood_in
+from ema_model.effects import CATALOGUE, catalogue_name, find
+from ema_model.faults import NAMES as FAULTS
+from ema_model.faults import cause_of
+from ema_model.side_by_side import fits
+from ema_model.simulation.one_stack import compile_behind
+
+Progress = Callable[[str], None]
+Array = NDArray[np.float64]
+
+_LEADS = 0.5  # of the greatest fall of χ², from which on a trial is refitted from the file's values, too
+_MOST_PITCHES = 8  # along a linear motor, each of which is simulated
+_NOT_LOOKED_FOR = ("pendulum_load",)  # whoever has an arm on the shaft knows of it
+
+
+@dataclass
+class Story:
+    """The steps so far, and the recordings that they are judged by."""
+
+    data: Data
+    held: Data | None
+    steps: list[Step]
+    repeatable: bool = True
+    warnings: list[str] = field(default_factory=list)
+    ties: dict[str, str] = field(default_factory=dict)  # effects by the fault that would explain as much
+    refused: dict[str, str] = field(default_factory=dict)  # effects that are not claimed, and what speaks against each
+    support: dict[str, tuple[str, ...]] = field(default_factory=dict)  # models that bear out an effect, by its name
+    controller_seen: ControllerSeen | None = None  # where it is not the file's
+    transmission_seen: TransmissionSeen | None = None  # where the user's position leaves the motor's
+    disagreements: list[Contradiction] = field(default_factory=list)  # of held-out recordings
+    _calm: dict[Fit, Fit] = field(default_factory=dict)  # fits by those that they were settled from
+    _prints: list[Fingerprint] = field(default_factory=list)
+
+    @property
+    def base(self) -> Fit:
+        """The calibrated model without any effect."""
+        return self.steps[0].fit
+
+    @property
+    def current(self) -> Fit:
+        """The last model."""
+        return self.steps[-1].fit
+
+    @property
+    def without_curve(self) -> Fit:
+        """The last model that has no curve of what is unknown, which would take up anything."""
+        return next(step.fit for step in reversed(self.steps) if all(one.name in CATALOGUE for one in step.added))
+
+    @property
+    def added(self) -> tuple[Added, ...]:
+        """The effects in the last model."""
+        return self.steps[-1].added
+
+    @property
+    def of_the_file(self) -> Mapping[str, Mapping[str, float]]:
+        """Effects that the actuator's file has, as it has them."""
+        return self.base.actuator.effects
+
+    @property
+    def ladder(self) -> list[Rung]:
+        """The error of each step."""
+        return [step.rung for step in self.steps]
+
+    def left(self) -> Left:
+        """What the last model leaves."""
+        return left_by(self.data, self.current)
+
+    def ranked(self, names: Sequence[str] | None = None, left: Left | None = None) -> list[Candidate]:
+        """All effects (or these) with the fall of χ² that is predicted for each, the most promising first."""
+        known = self.current.actuator.effects
+        actuator = self.current.actuator
+        looked_for = [name for name in CATALOGUE if name not in _NOT_LOOKED_FOR and may_act(name, actuator)]
+        wanted = [name for name in names or looked_for if name not in known and name not in _NOT_LOOKED_FOR]
+        given = [name for name in self.of_the_file if name not in {one.key for one in self.added}]
+        orders = (left or self.left()).orders
+        if actuator.axes.motor == "linear":
+            orders = orders[:_MOST_PITCHES]  # the rest are there to tell what noise is
+        self._prints = fingerprints(self.data, self.current, wanted, orders)
+        self._prints += of_the_file(self.current, [name for name in given if not names or name in names])
+        return scored(self.current, self._prints)
+
+    def signatures(self, ranked: Sequence[Candidate]) -> dict[str, Array]:
+        """What each candidate, of the last `ranked`, would take from what is measured less the model.
+
+        (values,), over the floor, at the strength that suits best; only what the calibration cannot do as well.
+        """
+        prints = {
+            one.name: [p for p in self._prints if p.name == one.name and p.settings.get("order") == order]
+            for one in ranked
+            for order in (one.settings.get("order"),)
+        }
+        return signatures(self.current, {name: its for name, its in prints.items() if its})
+
+    def tried(
+        self, ranked: Sequence[Candidate], share: float, most: int, tell: Progress, known: Sequence[Trial] = ()
+    ) -> list[Trial]:
+        """The most promising candidates, each in the model and refitted, the best first; known: refitted before."""
+        chosen = self.promising(ranked, share, most)
+        trials = [one for one in known if any(one.candidate is candidate for candidate in chosen)]
+        new = [one for one in chosen if all(one is not trial.candidate for trial in trials)]
+        trials += fits(self.trial, new, tell)
+        if is_near(self.current):
+            leading = max([LEAST_BIC, *(_LEADS * trial.drop for trial in trials)])
+            leaders = [trial for trial in trials if trial.drop > leading]
+            trials = [trial for trial in trials if trial.drop <= leading]
+            trials += fits(lambda trial, tell: again(self.data, self.current, trial, tell), leaders, tell)
+        return sorted(trials, key=lambda trial: -trial.drop)
+
+    def promising(self, ranked: Sequence[Candidate], share: float, most: int) -> list[Candidate]:
+        """The candidates that are worth a refit."""
+        expected = {
+            name: predicted_evidence(self.data, self.current, part) for name, part in self.signatures(ranked).items()
+        }
+        return promising(self.current, ranked, share, most, expected)
+
+    def tried_whole(self, ranked: Sequence[Candidate], tell: Progress) -> list[Trial]:
+        """The candidates that act by a speed, refitted from where all of their change comes nearest.
+
+        What sticks and slides is not straight in any parameter; a score, which takes it to be, may then see nothing.
+        """
+        nearest = []
+        for candidate in ranked:
+            prints = [one for one in self._prints if one.name == candidate.name and find(one.name).at_speeds]
+            if prints and not candidate.untestable_reason:
+                best = min(prints, key=lambda one: float(np.sum((self.current.residual + one.columns[:, 0]) ** 2)))
+                nearest.append(replace(candidate, settings=best.settings))
+        return fits(self.trial, nearest, tell)
+
+    def trial(self, candidate: Candidate, tell: Progress = lambda text: None) -> Trial:
+        """One candidate in the model, refitted."""
+        if candidate.name in FAULTS:
+            return fault_trial(self.data, self.current, candidate, tell)
+        tell(f"trying {candidate.name}")
+        return tried(self.data, self.current, candidate, {candidate.name: candidate.settings}, tell)
+
+    def faults(self, ranked: Sequence[Candidate], tell: Progress = lambda text: None) -> list[Trial]:
+        """The actuator's faults that are worth a refit beside these effects, each in the model and refitted."""
+        return tried_faults(self.data, self.current, ranked, tell)
+
+    def fault(self, faults: Sequence[Trial], effects: Callable[[], Sequence[Trial]]) -> Trial | None:
+        """Of the faults() refitted the one that tells more than any of the effects() refitted."""
+        found = fault_for(self.data, self.held, self.current, faults, effects)
+        if found and found.same_as:
+            self.ties[found.candidate.name] = found.same_as
+        return None if found and found.yields else found
+
+    def curve(self, explanation: Explanation | None, tell: Progress = lambda text: None) -> Trial | None:
+        """The residual's own curve as a torque, refitted, if the data pay for it."""
+        return curve_for(self.data, self.held, self.current, explanation, tell)
+
+    def add(self, trial: Trial, ties: Sequence[str] = ()) -> None:
+        """Takes a trial for the next model."""
+        if trial.faults:
+            self._tell_in_floors_of(trial.fit)
+            if ties:
+                self.ties[trial.candidate.name] = ties[0]
+        before, moved = self.steps[-1].rung, stood_in(self.current, trial.fit)
+        parameter = "" if trial.faults else stands_for(self.current, trial)
+        rung = self._rung(change_of(trial, parameter), trial.fit)
+        errors = before.rmse, rung.rmse, before.holdout_rmse, rung.holdout_rmse
+        new = [
+            Added(catalogue_name(key), {}, *errors, tuple(ties), key, {}, moved, (), parameter, key in self.of_the_file)
+            for key in trial.effects
+        ]
+        self._append(trial.fit, rung, (*self.added, *new))
+        compile_behind(trial.fit.actuator)
+
+    def remove(self, key: str, found: Fit | None = None) -> None:
+        """Takes an effect or a fault out again, as a step of its own; found: the fit without it, if it is known."""
+        smaller = found or self.without(key)
+        if key in FAULTS:
+            self._tell_in_floors_of(smaller)
+        names = cause_of(key) if key in FAULTS else (next(one.name for one in self.added if one.key == key),)
+        rung = self._rung(Change("removed", names), smaller)
+        self._append(smaller, rung, tuple(one for one in self.added if one.key != key))
+
+    def swap(self, key: str, trial: Trial) -> None:
+        """Takes a trial in the place of an effect, as a step of its own."""
+        place = next(i for i, one in enumerate(self.added) if one.key == key)
+        old, name = self.added[place], trial.candidate.name
+        rung = self._rung(Change("replaced", (old.name, name)), trial.fit)
+        errors = old.rmse_before, rung.rmse, old.holdout_before, rung.holdout_rmse
+        new = Added(name, {}, *errors, (), name, of_the_file=name in self.of_the_file)
+        self._append(trial.fit, rung, (*self.added[:place], new, *self.added[place + 1 :]))
+        compile_behind(trial.fit.actuator)
+
+    def tie(self, key: str, name: str, equal: bool) -> None:
+        """Names another effect beside one of the last model's, as not to be told from it, or no more."""
+        last = self.steps[-1]
+        added = [
+            replace(one, same_as=(*(known for known in one.same_as if known != name), *((name,) if equal else ())))
+            if one.key == key
+            else one
+            for one in last.added
+        ]
+        self.steps[-1] = replace(last, added=tuple(added))
+
+    def without(self, key: str, tell: Progress = lambda text: None, found: Fit | None = None) -> Fit:
+        """The last model, or another one that was found, without one of its effects or faults, refitted."""
+        found = found or self.current
+        if key in FAULTS:
+            return without_fault(self.data, found, key, tell)
+        actuator = without_effect(found.actuator, key)
+        if key in self.of_the_file:
+            actuator = as_in(self.base.actuator, key, actuator)
+        return fit(self.data, actuator, found.starts, tell, found.faults)
+
+    def settle(self, tell: Progress = lambda text: None) -> None:
+        """Fits the models anew as what each leaves asks for, where what the last one leaves is no noise.
+
+        Counted in the sensors' noise, an error that the model cannot have outvotes every tolerance.  All of them, so
+        that the ladder's rungs are of one kind: a settled model may leave more than one that was bent.
+        """
+        if self.settled(self.current, tell) is self.current:
+            return
+        calms = [self.settled(step.fit, tell) for step in self.steps]  # tell may raise to stop: then all stay
+        before, self.steps = self.steps, []
+        for step, calm in zip(before, calms):
+            if calm is step.fit:
+                self.steps.append(step)
+            else:
+                self._append(calm, self._rung(step.rung.change, calm), step.added, step)
+
+    def settled(self, found: Fit, tell: Progress = lambda text: None) -> Fit:
+        """A fit made anew as what it leaves asks for; itself where it is at the floor, or is so already."""
+        if found in self._calm.values() or at_floor(self.data, found):
+            return found
+        if found not in self._calm:
+            tell("calibrating with the residual as the noise")
+            self._calm[found] = settled(self.data, found, tell)
+        return self._calm[found]
+
+    def undo(self) -> bool:
+        """Takes the last step back; False where there is none."""
+        if len(self.steps) == 1:
+            return False
+        faults = self.steps.pop().fit.faults
+        if faults != self.current.faults:
+            as_now = takewhile(lambda step: step.fit.faults == self.current.faults, reversed(self.steps))
+            self._tell_in_floors_of([*as_now][-1].fit)
+        return True
+
+    @property
+    def bare(self) -> int:
+        """The number of steps before the first effect: the calibrated model, and its faults."""
+        return next((i for i, step in enumerate(self.steps) if step.added), len(self.steps))
+
+    def take_over(self, other: Story) -> None:
+        """Goes on as another story of the same recordings, by another model; its warnings come last."""
+        self.data, self.held, self.steps = other.data, other.held, other.steps
+        self.ties, self._calm, self._prints = other.ties, other._calm, other._prints
+        self.refused = {**self.refused, **other.refused}
+        self.warnings += other.warnings
+
+    def restart(self) -> None:
+        """Takes all effects back."""
+        del self.steps[self.bare :]
+
+    def _tell_in_floors_of(self, found: Fit) -> None:
+        """All errors from now on: how far the model is from its three-phase twin depends on the faults."""
+        self.data, self.held = in_floors_of(found, self.data, self.held)
+        told = (self._rung(one.rung.change, one.fit) for one in self.steps)
+        self.steps = [replace(one, rung=rung, settled_from=one) for one, rung in zip(self.steps, told)]
+
+    def _append(self, found: Fit, rung: Rung, added: Sequence[Added], settled_from: Step | None = None) -> None:
+        # All with the last model's values: what is added later moves what was there.
+        self.steps.append(Step(found, rung, tuple(refreshed(one, found.calibration) for one in added), settled_from))
+
+    def _rung(self, change: Change, found: Fit) -> Rung:
+        return rung_of(change, found, self.data, self.held)

@@ -1,0 +1,175 @@
+"""What the page shows of a discovery at one moment: the model so far, what it leaves, and what may be missing."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ema_model.comparison.assemble import residuals_of
+from ema_model.comparison.explain import Explanation
+from ema_model.comparison.residuals import Residuals
+from ema_model.discovery.candidates.alike import alike
+from ema_model.discovery.criteria import LEAST_BIC
+from ema_model.discovery.evidence.remaining import Left
+from ema_model.discovery.result import Added, Candidate, Discovery
+from ema_model.discovery.shown.tracks import primary
+from ema_model.discovery.steps.path import Story
+from ema_model.discovery.steps.ranking import signatures, with_faults
+from ema_model.discovery.steps.step import Step
+from ema_model.effects import find
+from ema_model.faults import BY_NAME, causes
+from ema_model.quantities.interval import HALF_90
+
+Array = NDArray[np.float64]
+
+_RIVAL = 25.0  # of χ², below which a candidate is too faint to be taken for another
+
+
+@dataclass(frozen=True, eq=False)
+class Assessment:
+    """What a model leaves and what may be missing; it belongs to one step of a story."""
+
+    left: Left
+    candidates: Sequence[Candidate]
+    signatures: Mapping[str, Array]  # (values,) over the floor
+    alike: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """A story as it stands.  Without an assessment, the candidates are still being scored."""
+
+    found: Discovery
+    added: tuple[Added, ...]
+    steps: int
+    counts: Array  # (blocks,), how much each counts in the ladder's means
+    residuals: Residuals
+    weights: Sequence[Mapping[str, float]]  # of the fitted signals in each window, over the floor's σ
+    sigmas: Sequence[Mapping[str, Array]]
+    assessment: Assessment | None = None
+    reach: tuple[str, ...] = ()  # names of recordings: fitted
+    held: tuple[str, ...] = ()  # and held out
+    explained_before: Sequence[Explanation] = ()  # the calibrated model's residual, before any step
+
+    @property
+    def rmse(self) -> float:
+        """Error of the last model, in floors."""
+        return self.found.ladder[-1].rmse
+
+    @property
+    def promising(self) -> list[Candidate]:
+        """Candidates that are worth a refit, the best first."""
+        if self.assessment is None:
+            return []
+        return [one for one in self.assessment.candidates if not one.untestable_reason and self.is_worth(one)]
+
+    def candidate(self, name: str) -> Candidate | None:
+        """The candidate of that name."""
+        known = self.assessment.candidates if self.assessment else ()
+        return next((one for one in known if one.name == name), None)
+
+    @staticmethod
+    def is_worth(one: Candidate) -> bool:
+        """Whether so much would hardly be chance."""
+        return one.predicted_drop > LEAST_BIC
+
+    def predicted_rmse(self, one: Candidate) -> float:
+        """The error with a candidate in the model, in floors, before any refit."""
+        return min(self.error_with(one), self.rmse)
+
+    def error_with(self, one: Candidate) -> float:
+        """The same of a candidate that may make it worse."""
+        squared, counted = 0.0, 0.0
+        for signal in self.weights[0]:
+            left, change = self.residuals.values.get(signal), self.change(one, signal)
+            if left is None or change is None or len(left) != len(change):
+                return self.rmse
+            squared += float(np.sum(self.counts * ((left - change) / self.residuals.sigma[signal]) ** 2))
+            counted += float(np.sum(self.counts))
+        return math.sqrt(squared / counted) if counted else self.rmse
+
+    def share(self, one: Candidate) -> float:
+        """Of the error, that a candidate would take away, 0 … 1."""
+        return max(0.0, 1.0 - self.predicted_rmse(one) / self.rmse) if self.rmse > 0.0 else 0.0
+
+    def uncertainty(self, one: Candidate) -> float | None:
+        """Half of the 90 % interval of the first parameter; None where that is no strength.
+
+        A strength that explains d of χ² is known to 1/√d of itself.
+        """
+        if one.name in BY_NAME:
+            return None  # a fault is not straight in k: only a fit tells how well it is known
+        first = find(one.name, self.found.actuator.axes).parameters[0]
+        if first.low > 0.0 or one.predicted_drop <= 0.0:
+            return None
+        return HALF_90 * abs(one.settings[first.name]) / math.sqrt(one.predicted_drop)
+
+    @property
+    def removable(self) -> list[str]:
+        """Keys of what was added, which can be taken out again: of the effects, then the first of each fault's."""
+        return [*(one.key for one in self.added), *causes(self.found.faults)]
+
+    @property
+    def primary(self) -> str:
+        """The signal whose residual tells most."""
+        return primary(self.found)
+
+    def change(self, one: Candidate, signal: str) -> Array | None:
+        """What a candidate would change in a signal, (blocks,) beside `residuals`, in the signal's unit."""
+        whole = self.assessment.signatures.get(one.name) if self.assessment else None
+        if whole is None:
+            return None
+        parts, at = [], 0
+        for weights, sigmas in zip(self.weights, self.sigmas):
+            for name, weight in weights.items():
+                blocks = len(sigmas[name])
+                if name == signal:
+                    parts.append(whole[at : at + blocks] * sigmas[name] / weight)
+                at += blocks
+        return np.concatenate(parts) if parts else None
+
+
+def assessed(story: Story) -> Assessment:
+    """What the last model of a story leaves; takes a second, and the first time a compilation."""
+    left = story.left()
+    ranked = with_faults(story, story.ranked(None, left))
+    worth = [one for one in ranked if not one.untestable_reason]
+    found = signatures(story, worth)
+    rivals = {one.name: found[one.name] for one in worth if one.predicted_drop > _RIVAL and one.name in found}
+    return Assessment(left, ranked, found, alike(rivals))
+
+
+def known_of(step: Step, known: Mapping[Step, Assessment]) -> Assessment | None:
+    """What is known of a step, or of the one that it was settled from."""
+    at: Step | None = step
+    while at is not None and at not in known:
+        at = at.settled_from
+    return None if at is None else known[at]
+
+
+def look_at(story: Story, found: Discovery, assessment: Assessment | None, first: Assessment | None = None) -> Look:
+    """A picture of a story that later steps leave as it is; first: of its calibrated model."""
+    fit, data = story.current, story.data
+    known: list[dict[str, Array]] = [{} for _ in fit.plant.windows]
+    weights, sigmas = [], []
+    for window, one in zip(fit.plant.windows, data.floors):
+        names = [name for name in data.signals if name in window.measured]
+        weights.append({name: data.signals[name] for name in names})
+        sigmas.append({name: np.broadcast_to(one.fit_sigma(name), (window.blocks,)) for name in names})
+    return Look(
+        found=found,
+        added=story.added,
+        steps=len(story.steps),
+        counts=np.concatenate([one.counts for one in data.floors]),
+        residuals=residuals_of(fit.plant, data.told_in, fit.calibration.signals, known, fit.calibration.actuator),
+        weights=weights,
+        sigmas=sigmas,
+        assessment=assessment,
+        reach=tuple(one.name for one in data.measurements),
+        held=() if story.held is None else tuple(one.name for one in story.held.measurements),
+        explained_before=first.left.explained if first is not None else (),
+    )

@@ -133,6 +133,10 @@ class Parameter:
         """'Amplitude [N·m]'."""
         return labelled(self.shown, self.unit)
 
+    def nearest(self, value: float) -> float:
+        """The value within its range that is nearest."""
+        return min(max(float(value), self.low), self.high)
+
     def check(self, value: float, where: str) -> None:
         """Raises InputError for a value out of its range, or one that is not whole where it must be."""
         if not (math.isfinite(value) and self.low <= value <= self.high):

@@ -165,12 +165,13 @@ def _scored(
         amounts = np.clip(amounts, *np.transpose(ranges))
         drop = given + float(2.0 * amounts @ toward - amounts @ energy @ amounts)
         if first.low <= 0.0:  # otherwise the parameter is no amplitude
-            settings |= {name: value * float(amount) for (name, value), amount in zip(linear.items(), amounts)}
+            # A product of the two may come to stand an ulp beyond the range that the amounts keep.
+            settings |= {name: own[name].nearest(linear[name] * amount) for name, amount in zip(linear, amounts)}
         elif amounts[0] < 0.0:
             drop = 0.0
     else:
         drop = given + float(toward @ amounts)
-        settings[first.name] = float(np.clip(settings[first.name] * math.hypot(*amounts), first.low, first.high))
+        settings[first.name] = first.nearest(settings[first.name] * math.hypot(*amounts))
         settings["phase_rad"] = math.atan2(float(amounts[1]), float(amounts[0]))
     return Candidate(one.name, 0.0 if reason else max(0.0, drop), settings, reason)
 
@@ -192,6 +193,5 @@ def _beyond_the_file(found: Fit, one: Fingerprint, effect: Effect, amounts: Arra
     of = {f"effects.{one.name}.{parameter.name}": parameter for parameter in effect.parameters}
     for path, step in zip(one.frees, amounts):
         parameter, sigma = of[path], found.actuator.tolerances[path].sigma
-        value = settings[parameter.name] + sigma * float(step)
-        settings[parameter.name] = float(np.clip(value, parameter.low, parameter.high))
+        settings[parameter.name] = parameter.nearest(settings[parameter.name] + sigma * float(step))
     return Candidate(one.name, max(0.0, drop), settings)

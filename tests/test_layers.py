@@ -37,7 +37,7 @@ FLOORS = {
         ["result"],
         ["evidence", "verify"],
         ["candidates", "shown"],
-        ["steps"],
+        ["steps", "words"],
         ["discover"],
     ],
     "emaviz": [

@@ -9,7 +9,7 @@ from ema_model.discovery import Discovery
 from ema_model.discovery.result import Added
 from ema_model.discovery.shown.fault_pages import page_of
 from ema_model.discovery.shown.labels import effect_title, settings
-from ema_model.discovery.shown.words import faults
+from ema_model.discovery.words import faults
 from ema_model.effects import Effect, find
 from ema_model.effects.effect import STAGES
 from ema_model.faults import cause_of, causes

@@ -14,7 +14,7 @@ from ema_model.challenges.truth import Truth
 from ema_model.comparison.criteria import BAND
 from ema_model.discovery.criteria import LEAST_BIC
 from ema_model.discovery.result import Change
-from ema_model.discovery.shown.words import faults, headline, sentences
+from ema_model.discovery.words import faults, headline, sentences
 from ema_model.errors import InputError
 from emaviz.figures import signature
 from emaviz.figures.model_equation import equation

@@ -8,7 +8,7 @@ from support.hidden_effects import ACTUATOR, recorded
 from ema_model.commands import command
 from ema_model.discovery import discover
 from ema_model.discovery.candidates.fingerprints import variants
-from ema_model.discovery.shown.words import sentences
+from ema_model.discovery.words import sentences
 from ema_model.effects import CATALOGUE, find
 from ema_model.simulation.run import Run, simulate_reference
 from ema_model.simulation.sensors import Sensors

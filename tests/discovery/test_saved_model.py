@@ -13,7 +13,7 @@ from ema_model.actuator import load_actuator, save_actuator
 from ema_model.commands import command
 from ema_model.comparison import compare
 from ema_model.discovery import as_dict, discover, verified
-from ema_model.discovery.shown.words import verification
+from ema_model.discovery.words import verification
 from ema_model.faults import vector
 from ema_model.simulation.run import Run, simulate_reference
 from ema_model.simulation.sensors import Sensors

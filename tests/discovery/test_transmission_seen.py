@@ -11,8 +11,8 @@ import pytest
 from support.hidden_effects import ACTUATOR, recorded
 
 from ema_model.discovery.observed.transmission import TransmissionSeen, transmission_seen
-from ema_model.discovery.shown.words import headline
 from ema_model.discovery.steps.verdict import verdict_of
+from ema_model.discovery.words import headline
 
 MOTION = ("multisine", {"amplitude_rad": 0.012, "frequencies_Hz": (2, 5, 9)}, 0.6)
 NOISE = 2e-6  # rad of the user, rms

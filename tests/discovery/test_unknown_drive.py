@@ -7,7 +7,7 @@ import pytest
 from support.unknown_drive import drive_of, logged
 
 from ema_model.discovery import Discovery, discover
-from ema_model.discovery.shown.words import not_fitted
+from ema_model.discovery.words import not_fitted
 
 
 def found_of(folder, hidden=None, seed: int = 0, leaves_out_reversals: bool = False) -> Discovery:

@@ -17,10 +17,10 @@ from ema_model.comparison.verdict import judge, most_of_floor
 from ema_model.discovery import as_dict, begun, result_of
 from ema_model.discovery.model_fit import floor_ratio
 from ema_model.discovery.result import VERDICTS, Contradiction
-from ema_model.discovery.shown.words import VERDICTS as IN_WORDS
-from ema_model.discovery.shown.words import headline, sentences
 from ema_model.discovery.steps.snapshot import known_of
 from ema_model.discovery.steps.step import Step, rung_of
+from ema_model.discovery.words import VERDICTS as IN_WORDS
+from ema_model.discovery.words import headline, sentences
 
 CLEAR = {"load_dependent_friction": {"ratio": 0.25}}
 SURE = ("adequate", "effects_found")

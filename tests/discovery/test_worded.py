@@ -13,7 +13,7 @@ from ema_model.discovery.shown import tables
 from ema_model.discovery.shown.labels import effect_title, rung_label
 from ema_model.discovery.shown.sentences import NOT_REPEATABLE, masked, untold
 from ema_model.discovery.shown.summary import as_dict
-from ema_model.discovery.shown.words import moved, sentences
+from ema_model.discovery.words import moved, sentences
 from ema_model.estimation import Calibrated
 from ema_model.quantities.axes import ROTARY, Axes
 from emaviz.report import write_discovery_report

@@ -1,1 +1,1 @@
-"""A discovery as it is shown: in words, numbers, tables and lines over time."""
+"""What words, reports, recordings and the page show of a discovery: titles, sentences, tables, lines over time."""

@@ -7,7 +7,7 @@ import argparse
 from ema_model.actuator import save_actuator
 from ema_model.comparison.summary import plain
 from ema_model.discovery import Discovery, as_dict, discover, verified
-from ema_model.discovery.shown.words import verification
+from ema_model.discovery.words import verification
 from emaviz.cli import by_unit, files, given, options, output
 from emaviz.cli.numbers import whole
 

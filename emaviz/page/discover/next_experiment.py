@@ -11,8 +11,8 @@ import viser
 
 from ema_model.commands import command
 from ema_model.discovery.result import Experiment
-from ema_model.discovery.shown.words import next_experiment
 from ema_model.discovery.steps.snapshot import Look
+from ema_model.discovery.words import next_experiment
 from emaviz.page.page import Page
 from emaviz.session.discover.discovering import Discovering
 from emaviz.text.html import add_html, html, joined

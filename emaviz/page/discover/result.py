@@ -10,8 +10,8 @@ import viser
 
 from ema_model.discovery.shown.tables import per_recording
 from ema_model.discovery.shown.tracks import Track, tracks
-from ema_model.discovery.shown.words import FLOOR_NOTE, headline, sentences
 from ema_model.discovery.steps.snapshot import Look
+from ema_model.discovery.words import FLOOR_NOTE, headline, sentences
 from ema_model.effects import CATALOGUE
 from ema_model.faults import BY_NAME
 from ema_model.recordings import SIGNALS

@@ -15,7 +15,7 @@ from ema_model.discovery import Discovery, as_dict
 from ema_model.discovery.shown.labels import rung_title
 from ema_model.discovery.shown.tables import candidates
 from ema_model.discovery.shown.tracks import PAUSE_S, Track, one_after_another, primary, tracks
-from ema_model.discovery.shown.words import verdict_name
+from ema_model.discovery.words import verdict_name
 from ema_model.errors import InputError
 from ema_model.estimation.floor import BAND_SIGMAS
 from ema_model.estimation.words import calibration_table, convergence, warnings

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ema_model.discovery.shown.tables import ladder, ladder_by_signal, per_recording
-from ema_model.discovery.shown.words import FLOOR_NOTE
+from ema_model.discovery.words import FLOOR_NOTE
 from emaviz.figures import error_ladder
 from emaviz.report.discovery.subject import Told
 from emaviz.report.markup import document_table, paragraph, with_remarks

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ema_model.discovery.shown.words import next_experiment
+from ema_model.discovery.words import next_experiment
 from emaviz.report.discovery.subject import Told
 from emaviz.report.markup import paragraph
 from emaviz.report.section import Figures, Section

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ema_model.discovery.shown.words import headline, sentences, verdict_name
+from ema_model.discovery.words import headline, sentences, verdict_name
 from emaviz.report.discovery.subject import Told
 from emaviz.report.markup import bullets, escape, paragraph
 from emaviz.report.section import Figures, Section

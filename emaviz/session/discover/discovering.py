@@ -11,8 +11,8 @@ from ema_model.discovery.candidates.refit import Trial
 from ema_model.discovery.candidates.unknown import curve_for
 from ema_model.discovery.result import Experiment
 from ema_model.discovery.shown.labels import effect_title
-from ema_model.discovery.shown.words import verification
 from ema_model.discovery.steps.snapshot import Look
+from ema_model.discovery.words import verification
 from ema_model.effects import CATALOGUE
 from ema_model.effects.user import UserEffect
 from ema_model.errors import InputError, quoted

@@ -205,23 +205,34 @@ def test_beside_a_model_that_may_be_true_no_effect_needs_a_parameter_at_its_boun
 
 
 @pytest.mark.parametrize(
-    ("path", "value", "half", "of_file", "is_open"),
+    ("key", "told", "of_file", "is_open"),
     [
-        ("effects.position_sensor_gain.ratio", -0.051, 0.047, False, True),
-        ("effects.position_sensor_gain.ratio", -0.051, 0.0321, False, False),
-        ("effects.hinge_moment.stiffness_Nm_rad", 0.3, 0.25, False, True),
-        ("effects.torsional_compliance.stiffness_Nm_rad", 4000.0, 5000.0, False, False),
-        ("effects.inertia_error.ratio", 0.134, 0.098, False, False),
-        ("effects.pendulum_load.moment_Nm", 0.3, 0.25, True, False),
+        ("position_sensor_gain", {"ratio": (-0.051, 0.047)}, False, True),
+        ("position_sensor_gain", {"ratio": (-0.051, 0.0321)}, False, False),
+        ("hinge_moment", {"stiffness_Nm_rad": (0.3, 0.25)}, False, True),
+        ("torsional_compliance", {"stiffness_Nm_rad": (4000.0, 5000.0)}, False, False),
+        ("inertia_error", {"ratio": (0.134, 0.098)}, False, False),
+        ("pendulum_load", {"moment_Nm": (0.3, 0.25)}, True, False),
+        ("asymmetric_friction", {"ratio": (0.12, 0.11), "viscous_part_Nms_rad": (13.0, 0.9)}, False, False),
+        ("asymmetric_friction", {"ratio": (0.12, 0.11), "viscous_part_Nms_rad": (0.9, 0.9)}, False, True),
     ],
-    ids=["nearly none", "apart from none", "a stiffness", "none is far", "open as its tolerance", "the file's own"],
+    ids=[
+        "nearly none",
+        "apart from none",
+        "a stiffness",
+        "none is far",
+        "open as its tolerance",
+        "the file's own",
+        "one part of two",
+        "both parts",
+    ],
 )
-def test_an_effect_whose_interval_nearly_reaches_none_of_it_is_not_claimed(
-    monkeypatch, path, value, half, of_file, is_open
-):
-    key = path.split(".")[1]
-    told = Calibrated(value, 1.0, (value - half, value + half), "", 1.0, False)
-    monkeypatch.setattr(objections, "with_intervals", lambda data, found: SimpleNamespace(parameters={path: told}))
+def test_an_effect_whose_interval_nearly_reaches_none_of_it_is_not_claimed(monkeypatch, key, told, of_file, is_open):
+    parameters = {
+        f"effects.{key}.{name}": Calibrated(value, 1.0, (value - half, value + half), "", 1.0, False)
+        for name, (value, half) in told.items()
+    }
+    monkeypatch.setattr(objections, "with_intervals", lambda data, found: SimpleNamespace(parameters=parameters))
     base = SimpleNamespace(actuator=SimpleNamespace(effects={key: {}} if of_file else {}))
-    reason = objections._may_be_none(DATA, base, fitted([1.0, 1.0], path=path), key)
+    reason = objections._may_be_none(DATA, base, fitted([1.0, 1.0], path=next(iter(parameters))), key)
     assert ("may as well be none" in reason) if is_open else not reason

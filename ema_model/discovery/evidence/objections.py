@@ -242,20 +242,23 @@ def _unsteady(data: Data, after: Fit, key: str) -> str:
 
 
 def _may_be_none(data: Data, base: Fit, after: Fit, key: str) -> str:
-    """Whether the interval that is told of an effect's strength nearly reaches none of it.
+    """Whether the intervals that are told of an effect's strength, in each of its parts, nearly reach none of it.
 
     Evidence counts what a model takes; how what is left pulls at the effect from piece to piece may tell less of it.
     What is a parameter's value by another name is as open as that one's tolerance.
     """
     effect = find(catalogue_name(key))
-    path, is_gradual = f"effects.{key}.{effect.parameters[0].name}", effect.parameters[0].low <= 0.0
-    if not is_gradual or effect.duplicates or key in base.actuator.effects:
+    first = effect.parameters[0]
+    if first.low > 0.0 or effect.duplicates or key in base.actuator.effects:
         return ""
-    low, high = with_intervals(data, after).parameters[path].interval90
+    told = with_intervals(data, after).parameters
+    paths = [f"effects.{key}.{name}" for name in (first.name, *effect.beside)]
+    intervals = {path: told[path].interval90 for path in paths}
+    if any(abs(low + high) > NONE_OF_IT * (high - low) for low, high in intervals.values()):
+        return ""
+    low, high = intervals[paths[0]]
     value, half = (low + high) / 2.0, (high - low) / 2.0
-    if abs(value) > NONE_OF_IT * half:
-        return ""
-    return f"its {_title(after, path)} is {number(value)} ± {number(half)} and may as well be none"
+    return f"its {_title(after, paths[0])} is {number(value)} ± {number(half)} and may as well be none"
 
 
 def _title(found: Fit, path: str) -> str:

@@ -52,6 +52,12 @@ def headline(found: Discovery) -> str:
     return f"The controller is not what the file says. Without it: {in_sentence(_answer(found))}"
 
 
+def so_far(found: Discovery) -> str:
+    """What the model has, and how far that brought the error, while there is no verdict yet."""
+    has = [text for text in (_named(found), _faulty(found)) if text]
+    return f"{f'So far: {all_of(has)}. ' if has else ''}{sentences(found)[0]}"
+
+
 def _answer(found: Discovery) -> str:
     faulty = _faulty(found)
     if found.verdict == "effects_found":

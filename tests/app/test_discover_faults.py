@@ -89,6 +89,12 @@ def test_it_is_added_by_its_name(worn):
     assert MEANINGS["found"] in answer(look), "at the floor, and not as it should be"
     assert "Backlash (fault k2):" in equation(look.found, look.added) and look.removable == ["k2"]
     assert worn.entries.current.result.startswith("1 added")
+    assert "So far: the fault k2 backlash. With it the error falls" in answer(replace(look, assessment=None))
+
+
+def test_before_a_verdict_nothing_is_said_to_be_found(rig):
+    told = answer(replace(rig.offered, assessment=None))
+    assert "The calibrated model" in told and "So far" not in told and "Analysing the residual" in told
 
 
 @pytest.mark.long

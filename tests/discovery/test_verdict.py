@@ -20,7 +20,7 @@ from ema_model.discovery.result import VERDICTS, Contradiction
 from ema_model.discovery.steps.snapshot import known_of
 from ema_model.discovery.steps.step import Step, rung_of
 from ema_model.discovery.words import VERDICTS as IN_WORDS
-from ema_model.discovery.words import headline, sentences
+from ema_model.discovery.words import headline, sentences, so_far
 
 CLEAR = {"load_dependent_friction": {"ratio": 0.25}}
 SURE = ("adequate", "effects_found")
@@ -98,6 +98,12 @@ def test_what_remains_is_told_in_every_place(healthy, lacking):
     nothing = result_of(sharper(healthy, 30.0))
     assert "times the floor remains, cause unknown" in headline(nothing) and not nothing.effects
     assert set(IN_WORDS) == set(VERDICTS)
+
+
+def test_without_a_verdict_yet_it_says_what_the_model_has(lacking):
+    bare, added = (so_far(result_of(story)) for story in lacking)
+    assert added.startswith("So far: load-dependent friction. With it the error falls from ")
+    assert bare.startswith("The calibrated model's error is ")
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ import viser
 from ema_model.discovery.shown.tables import per_recording
 from ema_model.discovery.shown.tracks import Track, tracks
 from ema_model.discovery.steps.snapshot import Look
-from ema_model.discovery.words import FLOOR_NOTE, headline, sentences
+from ema_model.discovery.words import FLOOR_NOTE, headline, sentences, so_far
 from ema_model.effects import CATALOGUE
 from ema_model.faults import BY_NAME
 from ema_model.recordings import SIGNALS
@@ -179,7 +179,7 @@ def answer(look: Look) -> Html:
     found = look.found
     meaning = of_discovery(found)
     if look.assessment is None:
-        first, others, meaning = sentences(found)[0], ["Analysing the residual …"], "open"
+        first, others, meaning = so_far(found), ["Analysing the residual …"], "open"
     elif not look.added and not found.faults and look.promising and not found.not_claimed:
         # Nothing was added, of which a verdict could speak, and nothing was tried in vain.
         left = look.assessment.left.explanation

@@ -29,7 +29,7 @@ from ema_model.discovery.evidence.stability import disagreement
 from ema_model.discovery.evidence.uncertainty import with_intervals
 from ema_model.discovery.model_fit import ANGLES, Data, Fit, floor_ratio
 from ema_model.effects import catalogue_name, find
-from ema_model.quantities.numbers import number
+from ema_model.quantities.numbers import number, with_uncertainty
 from ema_model.quantities.titles import in_sentence
 from ema_model.recordings import SIGNALS
 
@@ -257,8 +257,9 @@ def _may_be_none(data: Data, base: Fit, after: Fit, key: str) -> str:
     if any(abs(low + high) > NONE_OF_IT * (high - low) for low, high in intervals.values()):
         return ""
     low, high = intervals[paths[0]]
-    value, half = (low + high) / 2.0, (high - low) / 2.0
-    return f"its {_title(after, paths[0])} is {number(value)} ± {number(half)} and may as well be none"
+    unit = on_axes(paths[0], after.actuator.axes).unit
+    told_as = with_uncertainty((low + high) / 2.0, (high - low) / 2.0, unit)
+    return f"its {_title(after, paths[0])} is {told_as} and may as well be none"
 
 
 def _title(found: Fit, path: str) -> str:

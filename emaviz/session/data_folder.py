@@ -37,16 +37,22 @@ class DataFolder:
     """Recordings, uploads and actuator files below one folder.  Raises InputError, one line, for what is refused."""
 
     def __init__(self, folder: Path) -> None:
-        """Makes the folder with `recordings`, `uploads`, `actuators`, `sessions`, `challenges` and `scenes` in it."""
-        self.recordings, self.uploads, self.actuators = (folder / n for n in ("recordings", "uploads", "actuators"))
-        self.sessions, self.challenges, self.scenes = (folder / n for n in ("sessions", "challenges", "scenes"))
-        self.own = (self.recordings, self.uploads, self.actuators, self.sessions, self.challenges, self.scenes)
+        """Makes the folder with `recordings`, `uploads`, `actuators`, `sessions`, `challenges` and `scenes` in it.
+
+        A relative path or a link is resolved here, once: what is built from it below holds wherever the program works.
+        """
+        try:
+            self.folder = folder.resolve()
+        except (OSError, RuntimeError):
+            raise InputError(f"--data-dir {folder}: links there lead in a circle; name a folder") from None
+        self.recordings, self.uploads, self.actuators, self.sessions, self.challenges, self.scenes = self.own = tuple(
+            self.folder / name for name in ("recordings", "uploads", "actuators", "sessions", "challenges", "scenes")
+        )
         for made in self.own:
             try:
                 made.mkdir(parents=True, exist_ok=True)
             except OSError as error:
                 raise InputError(f"--data-dir {folder}: {made.name} cannot be made ({error.strerror})") from None
-        self.folder = folder.resolve()
         self._receiving: dict[Path, FileLock] = {}
         for at, _ in _walked(self.folder):
             remove_abandoned(at)

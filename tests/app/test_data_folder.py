@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from support.robot_datasets import write_robot_dataset
@@ -25,6 +27,36 @@ def outside(tmp_path):
     file = tmp_path / "outside.csv"
     file.write_text(ROWS)
     return file
+
+
+@pytest.mark.parametrize("way", ["relative", "linked", "up and down", "renamed"])
+def test_a_folder_lists_what_was_kept_in_it_however_it_is_named(way, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    real = tmp_path / "real"
+    if way == "linked":
+        real.mkdir()
+        (tmp_path / "data").symlink_to("real")
+    named = Path({"up and down": "other/../data"}.get(way, "data"))
+    before = DataFolder(named)
+    kept = {"uploads/run.csv": ROWS, "actuators/drive.toml": "", "sessions/one.emaviz": "", "challenges/a.challenge": ""}
+    for name, text in kept.items():
+        place = before.place(Path(name).name)
+        place.write_text(text)
+        assert before.name_of(place) == name
+    if way == "renamed":
+        named = named.rename("new")
+    folder = DataFolder(named)
+    monkeypatch.chdir("/")
+    for one in (folder, *([before] if way != "renamed" else [])):
+        assert one.measurements() == ["uploads/run.csv"] and one.actuator_files() == ["actuators/drive.toml"]
+        assert one.session_files() == ["sessions/one.emaviz"] and one.challenge_files() == ["challenges/a.challenge"]
+        assert one.session("sessions/one.emaviz").is_file() and one.fresh(one.sessions, "b", ".emaviz").is_absolute()
+
+
+def test_links_in_a_circle_are_no_data_folder(tmp_path):
+    (tmp_path / "circle").symlink_to("circle")
+    with pytest.raises(InputError, match="lead in a circle; name a folder"):
+        DataFolder(tmp_path / "circle")
 
 
 @pytest.mark.parametrize(

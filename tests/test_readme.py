@@ -1,0 +1,204 @@
+"""What the README says is what happens: the app started as it is written there, and each of its command lines."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import shlex
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from support.on_page import choose, field, press, wait_until
+
+from ema_model.actuator import load_actuator
+from ema_model.recordings import read
+from emaviz.cli import main
+
+ROOT = Path(__file__).parents[1]
+BLOCKS = re.findall(r"```sh\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
+
+SERVED = re.compile(r"https?://127\.0\.0\.1:\d+\S*")
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="runs a POSIX shell's lines")
+
+
+def started(line: str, folder: Path) -> Any:
+    """A shell's line in that folder, as after `activate`; what it says comes on one pipe."""
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    return subprocess.Popen(
+        ["/bin/sh", "-c", line],
+        cwd=folder,
+        env={**os.environ, "PATH": path, "BROWSER": "true", "PYTHONUNBUFFERED": "1"},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
+
+
+# --- the app ----------------------------------------------------------------------------------------------------------
+
+
+@contextlib.contextmanager
+def app_of_the_readme(folder: Path) -> Iterator[str]:
+    """Starts the program that ends the README's first line, with the options that stand there; its address."""
+    process = started(f"exec {BLOCKS[0].split('&&')[-1].replace('.venv/bin/', '')}", folder)
+    said = []
+    try:
+        for line in process.stdout:
+            said.append(line)
+            if line.startswith("first picture"):
+                break
+        address = SERVED.search("".join(said))
+        assert address, "".join(said)
+        yield address.group()
+    finally:
+        process.send_signal(signal.SIGINT)
+        said.append(process.communicate(timeout=60)[0])
+        assert "Traceback" not in "".join(said), "".join(said)
+
+
+def opened(browser: Any, address: str) -> Any:
+    page = browser.new_page(viewport={"width": 1400, "height": 900})
+    page.set_default_timeout(60_000)
+    page.goto(address)
+    page.get_by_role("tab", name="Explore", exact=True).wait_for()
+    return page
+
+
+def tab(page: Any, name: str) -> None:
+    page.get_by_role("tab", name=name, exact=True).click()
+
+
+def options(page: Any, label: str) -> list[str]:
+    page.get_by_label(label, exact=True).click()
+    page.get_by_role("option").first.wait_for()
+    found = page.get_by_role("option").all_inner_texts()
+    page.keyboard.press("Escape")
+    return found
+
+
+def files(folder: Path, kind: str) -> list[Path]:
+    return [path for path in (folder / "emaviz-data" / kind).iterdir() if not path.name.startswith(".")]
+
+
+@pytest.mark.browser
+def test_what_was_saved_is_there_when_the_app_is_started_again_as_the_readme_does(browser, tmp_path):
+    with app_of_the_readme(tmp_path) as address:
+        page = opened(browser, address)
+        choose(page, "Preset", "friction, low")
+        press(page, "Seal as a challenge…", page.get_by_role("button", name="Seal it"))
+        field(page, "Challenge title").fill("For a colleague")
+        page.locator("textarea:visible").last.fill("It runs heavily.")
+        page.wait_for_timeout(500)
+        page.get_by_role("button", name="Seal it").click()
+        page.get_by_text("Challenge sealed").wait_for()
+        tab(page, "Compare")
+        page.get_by_text("New actuator", exact=True).click()
+        field(page, "Name").fill("Rig 2")
+        press(page, "Make this actuator", page.get_by_text("is made, and chosen above"))
+        wait_until(lambda: files(tmp_path, "challenges"))
+        tab(page, "Identify")
+        page.get_by_role("button", name="Identify", exact=True).click()
+        page.get_by_role("link", name="in Rerun").wait_for(timeout=120_000)
+        tab(page, "Runs")
+        field(page, "Session name").fill("monday")
+        page.wait_for_timeout(500)
+        page.get_by_role("button", name="Save session").click()
+        wait_until(lambda: files(tmp_path, "sessions"))
+        page.get_by_text("Session saved").wait_for()
+        runs = options(page, "Run")
+        page.close()
+    kinds = ("challenges", "actuators", "recordings", "sessions")
+    saved = {kind: sorted(path.name for path in files(tmp_path, kind)) for kind in kinds}
+    assert all(saved.values()), saved
+    with app_of_the_readme(tmp_path) as address:
+        page = opened(browser, address)
+        tab(page, "Runs")
+        assert options(page, "Run") == runs
+        assert options(page, "Saved") == [f"sessions/{name}" for name in saved["sessions"]]
+        press(page, "Load session", page.get_by_text("Session loaded"))
+        tab(page, "Compare")
+        assert any("Rig 2" in name for name in options(page, "Actuator"))
+        tab(page, "Discover")
+        assert any("For a colleague" in name for name in options(page, "Measurements"))
+        choose(page, "Measurements", next(n for n in options(page, "Measurements") if "For a colleague" in n))
+        page.close()
+
+
+# --- the command lines ------------------------------------------------------------------------------------------------
+
+# Their verbs take half a minute or more; each but the first needs what those before it have written.
+LONG = ("challenge six_siblings", "--by unit", "discover", "challenge one_life", "track", "campaign", "reproduce")
+
+
+def lines_of(blocks: list[str]) -> list[str]:
+    """The command lines without their comments, as a shell reads them."""
+    lines = [line for block in blocks for line in block.splitlines()]
+    return [re.sub(r"\s+# .*", "", line) for line in lines if line.strip()]
+
+
+def marked(line: str) -> Any:
+    long = any(text in line for text in LONG)
+    return pytest.param(line, id=line[:60], marks=[pytest.mark.long] if long else [])
+
+
+LINES = lines_of(BLOCKS[1:-1])  # without what installs
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """One folder for all lines, in the place of the clone."""
+    folder = tmp_path_factory.mktemp("clone")
+    (folder / "assets").symlink_to(ROOT / "assets")
+    return folder
+
+
+def serves(line: str) -> bool:
+    """Whether the line opens a page and stays."""
+    words = shlex.split(line)
+    return words[0] == "emaviz" and (words[1] == "view" or Path(words[1]).suffix != "")
+
+
+@pytest.mark.parametrize("line", [marked(line) for line in LINES])
+def test_a_command_line_of_the_readme_runs_as_it_stands(line, folder):
+    process = started(f"exec {line}" if serves(line) else line, folder)
+    said = ""
+    if serves(line):
+        for one in process.stdout:
+            said += one
+            if SERVED.search(one):
+                process.send_signal(signal.SIGINT)
+                break
+        assert SERVED.search(said), said
+    said += process.communicate()[0]
+    assert process.returncode == (130 if serves(line) else 0), said
+    assert "Traceback" not in said
+    words = shlex.split(line)
+    for option in ("--out", "--report", "--record", "--json", "--save-actuator"):
+        if option in words:
+            assert (folder / words[words.index(option) + 1]).exists(), f"{option} wrote nothing"
+    if words[1] == "discover":
+        shown = (ROOT / "README.md").read_text(encoding="utf-8").split(line)[1].split("```\n", 2)[2].split("```")[0]
+        printed = said.splitlines()
+        assert [one for one in shown.strip("\n").splitlines() if one not in printed and one.strip()] == []
+
+
+def test_the_log_that_lines_are_shown_on_is_one_of_the_reference_model(tmp_path):
+    made = tmp_path / "made.csv"
+    law = "user_torque:expression=-c*sqrt(abs(omega))*sign(omega),c=0.003"
+    run = f"simulate --effect {law} --noise-current 0.1 --encoder-bits 14 --sample-rate 2000 --seed 7 --out {made}"
+    assert main(run.split()) == 0
+    own = load_actuator()
+    shipped = read(ROOT / "assets/examples/rig.csv", own, ["current_A=ch7[mA]", "motor_speed_rad_s=n[rpm]"])
+    again = read(made, own)
+    for name in ("user_position_rad", "motor_speed_rad_s", "current_A"):
+        off = np.sqrt(np.mean((shipped[name] - again[name]) ** 2)) / np.std(again[name])
+        assert off < 0.02, name

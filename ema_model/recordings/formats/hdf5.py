@@ -23,6 +23,7 @@ _UNIT = ("units", "unit", "Unit", "Units", "UNIT")
 _NAMES = ("columns", "column_names", "names", "labels", "channels")
 _MATLAB = "MATLAB_class"
 _TEXT = ("char", "string", "cell", "function_handle")
+_HARD, _EXTERNAL = 0, 64  # kinds of links (HDF5 specification, "Link Message")
 _SAME_FILE = "."  # as a virtual dataset names its own
 _FAILURES = (OSError, RuntimeError, KeyError, ValueError)
 
@@ -43,10 +44,8 @@ def opened(path: str, most_bytes: int) -> Iterator[Log]:
 
 def _check_links(path: str, file: Any) -> None:
     """Raises InputError for a link to another file.  Soft links lead along these, so that none leads out either."""
-    import h5py
-
     try:  # what the function returns ends the visit
-        name = file.id.links.visit(lambda name, link: name if link.type == h5py.h5l.TYPE_EXTERNAL else None, info=True)
+        name = file.id.links.visit(lambda name, link: name if link.type == _EXTERNAL else None, info=True)
         target = "" if name is None else _text(file.id.links.get_val(name)[0])
     except _FAILURES as error:
         raise NoLog(_reason(error)) from None
@@ -100,7 +99,7 @@ def _log(path: str, file: Any, most_bytes: int) -> Log:
     seen = 0
     is_searched = False
 
-    def walk(group: Any, above: tuple[str, ...], entered: frozenset[int]) -> None:
+    def walk(group: Any, above: tuple[str, ...], entered: tuple[Any, ...]) -> None:
         nonlocal seen, is_searched
         for name in group:
             seen += 1
@@ -122,15 +121,14 @@ def _log(path: str, file: Any, most_bytes: int) -> Log:
                 else:
                     aside.append(".".join(here))
             elif isinstance(item, h5py.Group):
-                address = _address(item)
-                if address in entered:
+                if item in entered:
                     unresolved.append(".".join(here))
                 elif len(here) < _DEEPEST:
-                    walk(item, here, entered | {address})
+                    walk(item, here, (*entered, item))
             elif item is None:
                 unresolved.append(".".join(here))
 
-    walk(file, (), frozenset({_address(file)}))
+    walk(file["/"], (), (file["/"],))
     for name in list(file.attrs)[:ARRAYS]:
         value = _attribute(file, name)
         if isinstance(value, (int, float, np.number)) and np.isfinite(float(value)):
@@ -141,27 +139,16 @@ def _log(path: str, file: Any, most_bytes: int) -> Log:
 
 def _item(group: Any, name: str) -> Any:
     """What a link leads to; None for one by name that leads nowhere, NoLog for an object that cannot be read."""
-    import h5py
-
     try:
         return group[name]
     except _FAILURES as error:
         try:
-            is_by_name = group.id.links.get_info(name.encode("utf-8", "surrogateescape")).type != h5py.h5l.TYPE_HARD
+            is_by_name = group.id.links.get_info(name.encode("utf-8", "surrogateescape")).type != _HARD
         except _FAILURES:
             is_by_name = False
         if is_by_name:
             return None
         raise NoLog(f"{shown(name)!r}: {_reason(error)}") from None
-
-
-def _address(group: Any) -> int:
-    import h5py
-
-    try:
-        return h5py.h5o.get_info(group.id).addr
-    except _FAILURES as error:
-        raise NoLog(f"{shown(group.name)!r}: {_reason(error)}") from None
 
 
 def _reason(error: Exception) -> str:

@@ -22,7 +22,7 @@ def opened(path: str, most_bytes: int) -> Iterator[Log]:
 
     with broken_file():
         # Descriptions of buses may stand in other files, which would be read for what is of no use here.
-        file = MDF(path, process_bus_logging=False)
+        file = MDF(path, process_bus_logging=False)  # type: ignore  its versions take it
     with file:
         with broken_file():
             log = _log(file, most_bytes)

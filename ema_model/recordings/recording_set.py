@@ -108,3 +108,21 @@ def held_out(measurements: Sequence[Measurement], rule: str) -> tuple[list[Measu
         [one for one, out in zip(measurements, taken) if not out],
         [one for one, out in zip(measurements, taken) if out],
     )
+
+
+def check_held_out(fitted: Sequence[Measurement], held: Sequence[Measurement]) -> None:
+    """InputError for a recording that is both fitted and held out, whatever its files are called.
+
+    It would say nothing of what the model does elsewhere.  Two are the same where they have the same signals, with the
+    same values at the same times.
+    """
+    for one in held:
+        for other in fitted:
+            if _is_same(one, other):
+                same = "" if one.name == other.name else f" (its content is that of {shown(other.name, 100)})"
+                both = f"{shown(one.name, 100)}: is both fitted and held out{same}"
+                raise InputError(f"{both}; hold out a recording that is not fitted")
+
+
+def _is_same(one: Measurement, other: Measurement) -> bool:
+    return set(one) == set(other) and all(np.array_equal(one[name], other[name]) for name in one)

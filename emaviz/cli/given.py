@@ -19,7 +19,15 @@ from ema_model.quantities.axes import Axes
 from ema_model.recordings import Measurement, read
 from ema_model.recordings.formats.text_layout import Hints
 from ema_model.recordings.read import COMMAND_ALONE, INPUT_ALONE, Needs
-from ema_model.recordings.recording_set import column_of_runs, episodes_of, files_of, held_out, is_pattern, runs_of
+from ema_model.recordings.recording_set import (
+    check_held_out,
+    column_of_runs,
+    episodes_of,
+    files_of,
+    held_out,
+    is_pattern,
+    runs_of,
+)
 from ema_model.simulation.load_profile import LoadProfile
 from ema_model.simulation.run import Run
 from emaviz.cli.options import COMMAND_OR_FILE
@@ -30,15 +38,7 @@ def read_set(
     arguments: argparse.Namespace, actuator: Actuator, progress: Progress
 ) -> tuple[list[Measurement], list[Measurement]]:
     """The recordings to fit and those held out, cut to --from and --to; says on stderr what was assumed of columns."""
-    named = [text for text in arguments.holdout if not is_pattern(text)]
-    unseen = [file for text in named for file in files_of(text)]
-    places = [Path(file).resolve() for file in unseen]
-    given = [
-        file
-        for text in arguments.files
-        for file in files_of(text)
-        if file == text or Path(file).resolve() not in places  # what is named itself is fitted all the same
-    ]
+    given, unseen = files_to_read(arguments)
     if not given and arguments.files:
         raise InputError("--holdout takes out every recording; leave some to fit")
     fitted, held = (read_files(names, arguments, actuator, progress) for names in (given, unseen))
@@ -46,7 +46,27 @@ def read_set(
         if is_pattern(rule):
             fitted, taken = held_out(fitted, rule)
             held += taken
+    check_held_out(fitted, held)
     return fitted, held
+
+
+def files_to_read(arguments: argparse.Namespace, *, in_folders: bool = False) -> tuple[list[str], list[str]]:
+    """The files to fit and those that --holdout names, which are taken out of folders and patterns.
+
+    in_folders: as of `files_of`.  InputError for one that is named itself both times.
+    """
+    unseen = [file for text in arguments.holdout if not is_pattern(text) for file in files_of(text)]
+    places = {Path(file).resolve() for file in unseen}
+    given: list[str] = []
+    for text in arguments.files:
+        for file in files_of(text, in_folders=in_folders):
+            if Path(file).resolve() not in places:
+                given.append(file)
+            elif file == text:
+                raise InputError(
+                    f"{quoted(file)}: is named to be fitted and by --holdout; hold out a recording that is not fitted"
+                )
+    return given, unseen
 
 
 def read_files(

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gzip
 import re
+import shutil
 
 import numpy as np
 import pytest
@@ -117,6 +119,26 @@ def test_a_mistake_is_one_line(arguments, says, logs, tmp_path, monkeypatch, cap
     assert main(["compare", *arguments, "--actuator", str(logs / "mine.toml")]) == 2
     told = capsys.readouterr().err
     assert (says or "a folder without recordings; they end in .csv") in told and told.count("\n") == 1
+
+
+@pytest.mark.parametrize("verb", ["compare", "discover", "identify"])
+@pytest.mark.parametrize("again", ["itself", "link", "copy", "packed copy"])
+def test_what_is_fitted_is_not_held_out(verb, again, logs, tmp_path, capsys):
+    """Neither a file, nor a link to it, nor another with the same content."""
+    source, held = logs / "set" / "kp100_sine.csv", tmp_path / "held.csv"
+    if again == "itself":
+        held = source
+    elif again == "link":
+        held.symlink_to(source)
+    elif again == "copy":
+        shutil.copy(source, held)
+    else:
+        held = tmp_path / "held.csv.gz"
+        held.write_bytes(gzip.compress(source.read_bytes()))
+    assert main([verb, str(source), "--holdout", str(held), "--actuator", str(logs / "mine.toml")]) == 2
+    told = capsys.readouterr().err
+    assert told.count("\n") == 1 and "fitted and " in told and "hold out a recording that is not fitted" in told
+    assert source.stem in told or "held" in told
 
 
 def test_names_and_patterns(tmp_path):

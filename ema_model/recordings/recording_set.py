@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
 from ema_model.errors import InputError
 from ema_model.files.refusal import listed, refusal, shown
+from ema_model.recordings.checks import TooShort
 from ema_model.recordings.formats import FORMATS, robot_dataset
 from ema_model.recordings.measurement import Measurement
+
+File = TypeVar("File")
+Read = TypeVar("Read")
 
 _MARKS = frozenset("*?[")
 RUN = "#"  # between a file's name and the number of one of its runs
@@ -65,6 +70,29 @@ def recordings_in(folder: Path) -> list[Path]:
 
 def _is_recording(path: Path) -> bool:
     return path.is_file() and path.suffix.lower() in FORMATS and not path.name.startswith(".")
+
+
+def long_enough(
+    files: Iterable[File], read: Callable[[File], Read], left_out: Callable[[str], object]
+) -> Iterator[tuple[File, Read]]:
+    """Each file with what is read of it; of several files, those that are too short are left out, with a line each.
+
+    Raises TooShort where none is long enough, and what else `read` raises.
+    """
+    short: list[TooShort] = []  # until one is long enough
+    is_any = False
+    for file in files:
+        try:
+            found = read(file)
+        except TooShort as error:
+            short.append(error)
+        else:
+            is_any = True
+            yield file, found
+        while is_any and short:
+            left_out(f"{short.pop(0)}; left out")
+    if short:
+        raise short[0] if len(short) == 1 else TooShort(f"{short[0]}; none of the {len(short)} recordings is longer")
 
 
 def column_of_runs(file: str) -> str:

@@ -126,9 +126,8 @@ def read_units(arguments: argparse.Namespace, actuator: Actuator, progress: outp
         arguments.runs = column
     fitted: _Units = {}
     held: _Units = {}
-    for number, file in enumerate(files):
-        progress.show(f"reading {Path(file).name} ({number + 1} of {len(files)})")
-        for one in given.read_files([file], arguments, actuator, progress):
+    for file, found in given.read_each(files, arguments, actuator, progress):
+        for one in found:
             unit = f"{column} {one.name.rpartition(RUN)[2]}" if column else _unit_of(file, one.name, arguments.unit)
             (held if Path(file).resolve() in named else fitted).setdefault(unit, []).append(one)
     for text in arguments.unit:

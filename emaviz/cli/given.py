@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +26,7 @@ from ema_model.recordings.recording_set import (
     files_of,
     held_out,
     is_pattern,
+    long_enough,
     runs_of,
 )
 from ema_model.simulation.load_profile import LoadProfile
@@ -73,16 +74,34 @@ def read_files(
     names: Sequence[str], arguments: argparse.Namespace, actuator: Actuator, progress: Progress
 ) -> list[Measurement]:
     """One after another, cut into runs and to --from and --to; says on stderr what was assumed of columns."""
-    found: list[Measurement] = []
-    for i, name in enumerate(names):
-        progress.show(f"reading {Path(name).name} ({i + 1} of {len(names)})")
+    return [one for _, found in read_each(names, arguments, actuator, progress) for one in found]
+
+
+def read_each(
+    names: Sequence[str], arguments: argparse.Namespace, actuator: Actuator, progress: Progress
+) -> Iterator[tuple[str, list[Measurement]]]:
+    """The same by file; says on stderr which of several is too short, and leaves it out."""
+
+    def read_runs(numbered: tuple[int, str]) -> list[Measurement]:
+        number, name = numbered
+        progress.show(f"reading {Path(name).name} ({number} of {len(names)})")
         one = read_one(name, arguments, actuator, progress)
-        found += runs_of(one) if arguments.runs else episodes_of(one, name)
-    if arguments.start_s is None and arguments.stop_s is None:
-        return found
-    start = -math.inf if arguments.start_s is None else arguments.start_s
-    stop = math.inf if arguments.stop_s is None else arguments.stop_s
-    return [measurement.selected((start, stop)) for measurement in found]
+        found = runs_of(one) if arguments.runs else episodes_of(one, name)
+        if arguments.start_s is None and arguments.stop_s is None:
+            return found
+        start = -math.inf if arguments.start_s is None else arguments.start_s
+        stop = math.inf if arguments.stop_s is None else arguments.stop_s
+        return [measurement.selected((start, stop)) for measurement in found]
+
+    for (_, name), found in long_enough(enumerate(names, 1), read_runs, lambda line: say(line, progress)):
+        yield name, found
+
+
+def say(line: str, progress: Progress | None) -> None:
+    """A line on stderr, in place of how far the work is."""
+    if progress is not None:
+        progress.done()
+    print(line, file=sys.stderr)
 
 
 def read_one(
@@ -100,9 +119,7 @@ def read_one(
     hints = Hints(arguments.header_line, arguments.encoding)
     measurement = read(file, actuator, [*arguments.mapping, *by_run], needs=needs, hints=hints)
     if told := measurement.reading.told:
-        if progress is not None:
-            progress.done()
-        print(f"{Path(file).name}: {told}", file=sys.stderr)
+        say(f"{Path(file).name}: {told}", progress)
     return measurement
 
 

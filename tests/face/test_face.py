@@ -47,6 +47,16 @@ def test_units_are_compared_by_name():
         em.compare_units({"a": given["a"]})
 
 
+def test_one_of_several_that_is_too_short_is_left_out(recording, tmp_path):
+    short = tmp_path / "short.csv"
+    write_measurement(recording.selected((0.0, 0.005)), short)
+    with pytest.warns(UserWarning, match=r"short\.csv: has 51 samples; .*; left out"):
+        found = em.compare([recording, short], calibrate=False)
+    assert [one.name for one in found.recordings] == ["chirp"]
+    with pytest.raises(em.InputError, match=r"short\.csv: has 51 samples"):
+        em.compare(short)
+
+
 def test_what_is_fitted_is_not_held_out(recording, tmp_path):
     copy = tmp_path / "copy.csv"
     write_measurement(recording, copy)

@@ -7,6 +7,7 @@ without one the thesis's.  Every function raises InputError, with one line, for 
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -25,6 +26,7 @@ from ema_model.identification.run import ROBUST, Identification
 from ema_model.identification.run import identify as identified
 from ema_model.recordings import Measurement
 from ema_model.recordings.health.card import Health, health_of
+from ema_model.recordings.recording_set import long_enough
 from ema_model.simulation import plant
 from ema_model.simulation.run import Run
 from ema_model.simulation.sensors import Sensors
@@ -110,4 +112,9 @@ def identify(
 
 def _read(of: Recordings, actuator: Actuator) -> list[Measurement]:
     several = [of] if isinstance(of, str | os.PathLike | Measurement) else of
-    return [one if isinstance(one, Measurement) else recordings.read(one, actuator) for one in several]
+    found = long_enough(
+        several,
+        lambda one: one if isinstance(one, Measurement) else recordings.read(one, actuator),
+        lambda line: warnings.warn(line, stacklevel=5),
+    )
+    return [one for _, one in found]

@@ -20,6 +20,7 @@ from ema_model.errors import InputError
 from ema_model.faults import vector
 from ema_model.files.user_file import open_user_file
 from ema_model.recordings import Measurement, find_side_file, read
+from ema_model.recordings.recording_set import check_held_out
 from ema_model.simulation.plant import simulate
 from ema_model.simulation.run import Run
 from ema_model.simulation.sensors import Sensors
@@ -47,11 +48,13 @@ def given(task: Task) -> Given:
             [_read(file, actuator, task.recorded.mapping) for file in files]
             for files in (task.recorded.files, task.recorded.holdout)
         )
+        check_held_out(fitted, held)
         return Given(actuator, fitted, held)
     if task.simulated is None:
         return Given(actuator, [], [])
     source = task.simulated
     fitted, held = (recorded(source, runs, actuator) for runs in (source.runs, source.holdout))
+    check_held_out(fitted, held)
     return Given(actuator, fitted, held, vector(source.faults), effects_of(source.effects))
 
 

@@ -14,7 +14,7 @@ from ema_model.comparison.assemble import residuals_of
 from ema_model.comparison.result import Compared, Comparison, SignalError
 from ema_model.comparison.verdict import judge, judged
 from ema_model.effects import find
-from ema_model.errors import InputError, quoted
+from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.estimation import Calibration, Floor, after_fit, floor, of_unseen, taken_up
 from ema_model.estimation import calibrate as fit
 from ema_model.estimation.floor import twin_error
@@ -28,6 +28,7 @@ from ema_model.recordings import Measurement
 from ema_model.recordings.health.card import health_of
 from ema_model.recordings.prepared import prepared
 from ema_model.recordings.read import check_same_actuator
+from ema_model.recordings.recording_set import check_held_out
 from ema_model.recordings.side_file.read import stated
 from ema_model.simulation.one_stack import compile_behind
 
@@ -57,6 +58,7 @@ def compare(
     Raises InputError for recordings that cannot be compared.
     """
     tell = on_progress or (lambda text: None)
+    check_held_out(measurements, holdout)
     return _compare(measurements, actuator or load_actuator(), k, effects, calibrate, free, signals, holdout, tell)
 
 
@@ -156,7 +158,9 @@ def weights_of(signals: Sequence[str] | Mapping[str, float] | None, actuator: Ac
     known = {actuator.axes.signal(name): name for name in (*SIGNALS, "motor_speed_rad_s")}
     for name in signals:
         if name not in known:
-            raise InputError(f"no signal {quoted(name)!r} to compare; there are {', '.join(known)}")
+            raise InputError(
+                f"no signal {quoted(name)!r} to compare; there are {', '.join(known)}{did_you_mean(name, known)}"
+            )
     weights = signals if isinstance(signals, Mapping) else dict.fromkeys(signals, 1.0)
     for name, weight in weights.items():
         if not 0.0 < weight < np.inf:

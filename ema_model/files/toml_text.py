@@ -6,6 +6,7 @@ import re
 import tomllib
 from typing import Any
 
+MARK = "\ufeff"  # what editors of Windows put before a text in UTF-8
 # tomllib takes a time that grows with the square of a dotted key's parts: minutes for 100 kB of a.a.a.a….
 _MOST_PARTS = 30
 _PART = r"""(?: [\w-]+ | "[^"\n]*" | '[^'\n]*' ) [ \t]* \. [ \t]*"""
@@ -15,7 +16,8 @@ _LONG_NUMBER = re.compile(r"0[xob][0-9a-fA-F_]{1000}")
 
 
 def toml_of(text: str) -> dict[str, Any]:
-    """The document; ValueError, its text for a person, if it is none."""
+    """The document; ValueError, its text for a person, if it is none.  A byte order mark before it is no part of it."""
+    text = text.removeprefix(MARK)
     if _LONG_KEY.search(text):
         raise ValueError(f"a key has more than {_MOST_PARTS} parts")
     if _LONG_NUMBER.search(text):

@@ -10,7 +10,7 @@ from tomlkit.container import Container
 from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import InlineTable, Null, Table
 
-from ema_model.files.toml_text import toml_of
+from ema_model.files.toml_text import MARK, toml_of
 
 _FAILURES = (TOMLKitError, ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError)
 
@@ -20,6 +20,7 @@ def toml_text(document: Mapping[str, Any], over: str = "") -> str:
 
     An older text that is no TOML counts for nothing.
     """
+    over = over.removeprefix(MARK)
     if over.strip():
         try:
             toml_of(over)  # which knows what takes long

@@ -13,6 +13,7 @@ from ema_model.errors import InputError, quoted
 from ema_model.models.model import Window
 from ema_model.recordings import SIGNALS, Measurement
 from ema_model.recordings.noise import beating, held, is_of_grid
+from ema_model.recordings.read import WITHOUT_COMMAND
 from ema_model.simulation.pack import integral_at_start
 from ema_model.simulation.run import steps_per_sample
 
@@ -149,7 +150,8 @@ def cut(
 def input_of(measurement: Measurement, actuator: Actuator) -> str:
     """The signal that is put in: the command, in an open loop the current or torque; InputError without one."""
     if actuator.controller.kind != "open":
-        measurement.require("command_rad")
+        has_input = "current_A" in measurement or "motor_torque_Nm" in measurement
+        measurement.require("command_rad", without=WITHOUT_COMMAND if has_input else "")
         return "command_rad"
     found = [name for name in ("current_A", "motor_torque_Nm") if name in measurement]
     if not found:

@@ -7,7 +7,7 @@ in the motor's rad and moves in the user's m, and its gear ratio is in m/rad.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -58,6 +58,21 @@ class Axes:
         return {
             names.get(name, name): values for name, values in signals.items() if name in names or name not in foreign
         }
+
+    def of_other_axes(self, signals: Iterable[str]) -> tuple[str, ...]:
+        """Those of recordings' signals that only axes of the other kind have: what `inside` leaves out."""
+        return tuple(name for name in signals if not self.inside({name: None}))
+
+    def mismatch(self, needed: str, signals: Iterable[str]) -> str:
+        """What is wrong, where a recording has what is `needed` inside for the other kind of axis; else ""."""
+        other = next((name for name in (needed, linear_name(needed)) if name != self.signal(needed)), "")
+        if not other or other not in signals:
+            return ""
+        kind, own = KINDS if other == needed else KINDS[::-1]
+        return (
+            f"the recording's axis is {kind}, as {other} says, and the actuator's is {own}; "
+            "take an actuator of that axis, or correct [axes] in the actuator's file"
+        )
 
     def outside(self, signals: Mapping[str, Any]) -> dict[str, Any]:
         """Signals by the names that recordings have."""

@@ -25,6 +25,10 @@ _LONGEST_NAME = 1_000  # characters
 _NONE = ColumnMapping()
 
 
+class TooShort(InputError):
+    """A recording has fewer samples than a fit can use; one of several can be left out for that."""
+
+
 def choose_columns(
     path: str,
     header: Sequence[str],
@@ -115,10 +119,11 @@ def check_finite(path: str, arrays: Mapping[str, Array], place: Place) -> None:
 
 
 def check_length(path: str, samples: int) -> None:
-    """Raises InputError for fewer samples than a fit can use."""
+    """Raises TooShort for fewer samples than a fit can use."""
     if samples < FEWEST_SAMPLES:
         found = f"{samples} sample{'s' * (samples != 1)}"
-        raise refusal(path, f"has {found}; {FEWEST_SAMPLES} or more are expected, record for longer or faster")
+        line = refusal(path, f"has {found}; {FEWEST_SAMPLES} or more are expected, record for longer or faster")
+        raise TooShort(str(line))
 
 
 def check_needed(measurement: Measurement, *names: str) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from ema_model.errors import InputError
+from ema_model.errors import InputError, did_you_mean
 from ema_model.files.limits import FILE_BYTES, megabytes
 from ema_model.files.refusal import listed, reason, refusal, shown
 from ema_model.files.user_file import check_user_file
@@ -171,7 +171,8 @@ def _merged(
             by_side = side.mapping is not None and entry in side.mapping.entries and side.path
             asker = f", which {shown(Path(side.path).name, 100)} asks for" if by_side and side.path else ""
             missing = f"no column {shown(entry.column)!r} for {entry.signal}{asker}"
-            raise refusal(path, f"{missing}; correct the mapping (present: {listed(header)})")
+            meant = did_you_mean(entry.column, header)
+            raise refusal(path, f"{missing}; correct the mapping (present: {listed(header)}){meant}")
     return merged
 
 

@@ -45,6 +45,7 @@ class Measurement(InWords):
     )  # what else is known: the actuator's file, the sensors' accuracy, the kind
     reading: Reading = field(default_factory=Reading)  # which columns of its file it was read from, and what was made
     axes: Axes | None = None  # whose names inside the signals have; None: the names that files and people use
+    of_other_axes: tuple[str, ...] = ()  # names of signals that those axes do not have, and so this has not
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "signals", {name: _frozen(values) for name, values in self.signals.items()})
@@ -168,13 +169,20 @@ class Measurement(InWords):
         """The name in files of a signal, by its name here."""
         return name if self.axes is None else self.axes.signal(name)
 
-    def require(self, *names: str) -> None:
-        """Raises InputError if any of these signals is missing; it names them and those present."""
-        missing = [self.shown(name) for name in names if name not in self.signals]
+    def require(self, *names: str, without: str = "") -> None:
+        """Raises InputError if any of these signals is missing; it names them and those present.
+
+        without: what else can be done, for the end of the line.
+        """
+        missing = [name for name in names if name not in self.signals]
         if missing:
             where = shown(self.name, 100) or "the recording"
+            needed = f"{where}: column {', '.join(map(self.shown, missing))} is needed"
+            for name in missing if self.axes is not None else ():
+                if wrong := self.axes.mismatch(name, self.of_other_axes):
+                    raise InputError(f"{needed}; {wrong}")
             present = listed([self.shown(name) for name in self.signals])
-            raise InputError(f"{where}: column {', '.join(missing)} is needed; add it (present: {present})")
+            raise InputError(f"{needed}; add it (present: {present}){without and '; '}{without}")
 
     def resampled(self, period_s: float) -> Measurement:
         """The signals on a grid of equal steps that starts with the first sample (of each run).

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from ema_model.actuator import Actuator
 from ema_model.errors import InputError
+from ema_model.files.refusal import listed
 from ema_model.recordings.equivalent_current import with_current
 from ema_model.recordings.measurement import Measurement
 
@@ -20,7 +21,11 @@ def prepared(measurement: Measurement, actuator: Actuator) -> Measurement:
         if measurement.axes != actuator.axes:
             raise InputError(f"{measurement.name}: it was read for an actuator with other axes; read it for this one")
         return measurement
-    inside = replace(measurement, signals=actuator.axes.inside(measurement.signals), axes=actuator.axes)
+    axes = actuator.axes
+    others = axes.of_other_axes(measurement)
+    inside = replace(measurement, signals=axes.inside(measurement.signals), axes=axes, of_other_axes=others)
+    if others:
+        inside = inside.with_notes(f"left aside, as the actuator's axes are of another kind: {listed(others)}")
     made = with_current(inside, actuator.motor.pole_pairs, actuator.motor.rotor_offset_rad)
     if made is inside:
         return made

@@ -33,6 +33,10 @@ from ema_model.recordings.side_file.read import SideFile, find_side_file, read_s
 Needs = Sequence[Sequence[str]]  # of each group one signal, the first that there is; names inside
 COMMAND_ALONE: Needs = (("time_s",), ("command_rad",))
 INPUT_ALONE: Needs = (("time_s",), ("current_A", "motor_torque_Nm"))
+WITHOUT_COMMAND = (  # the end of a line that asks for one
+    "where no command was recorded, add --open-loop to compare or discover, "
+    'or choose an actuator with [controller] kind = "unknown"'
+)
 _MAKES_CURRENT = [*PHASES, "motor_position_rad"]
 _MOTION = ("motor_position_rad", "user_position_rad", "motor_speed_rad_s")
 
@@ -173,17 +177,24 @@ def _ask(path: str, actuator: Actuator, reading: Reading, header: Sequence[str],
         if not entry.unit:  # it may as well be of the kind that the actuator's axes have
             entry = replace(entry, signal=actuator.axes.signal(entry.signal))
         doubts |= {inside: (entry, why) for inside in actuator.axes.inside({entry.signal: 0})}
-    questions, options = [], []
+    questions, options, absent = [], [], []
     for name in dict.fromkeys(name for group in needs for name in _to_be_said(group, there, doubts)):
         entry, why = doubts.get(name) or (MappedColumn(actuator.axes.signal(name), "COLUMN"), "")
+        if not why:
+            absent.append(name)
         doubtful = f"{shown(entry.column)!r} may be {entry.signal}, but {why}"
         questions.append(doubtful if why else f"{entry.signal} is needed")
         in_name = unit_in_name(entry.column, entry.signal)
         stated = replace(entry, unit=entry.unit or SIGNALS[entry.signal].unit).text
         options.append(f"--map {shlex.quote(f'{entry.signal}={entry.column}' if in_name else stated)}")
     if questions:
+        for name in absent:
+            if wrong := actuator.axes.mismatch(name, [*header, *(entry.signal for entry in reading.mapping.entries)]):
+                raise refusal(path, f"{actuator.axes.signal(name)} is needed; {wrong}")
         found = f"say which column it is: {' '.join(options)} (the file has {listed(without_unit(header))})"
-        raise refusal(path, f"{'; '.join(questions)}; {found}")
+        is_of_model = "command_rad" in absent and needs != COMMAND_ALONE and not there.isdisjoint(INPUT_ALONE[1])
+        hint = f"; {WITHOUT_COMMAND}" if is_of_model else ""
+        raise refusal(path, f"{'; '.join(questions)}; {found}{hint}")
 
 
 def _to_be_said(group: Sequence[str], there: Collection[str], doubts: Collection[str]) -> list[str]:

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
 from ema_model.errors import InputError
 from ema_model.files.refusal import listed, refusal, shown
+from ema_model.recordings.checks import TooShort
 from ema_model.recordings.formats import FORMATS, robot_dataset
 from ema_model.recordings.measurement import Measurement
+
+File = TypeVar("File")
+Read = TypeVar("Read")
 
 _MARKS = frozenset("*?[")
 RUN = "#"  # between a file's name and the number of one of its runs
@@ -67,6 +72,29 @@ def _is_recording(path: Path) -> bool:
     return path.is_file() and path.suffix.lower() in FORMATS and not path.name.startswith(".")
 
 
+def long_enough(
+    files: Iterable[File], read: Callable[[File], Read], left_out: Callable[[str], object]
+) -> Iterator[tuple[File, Read]]:
+    """Each file with what is read of it; of several files, those that are too short are left out, with a line each.
+
+    Raises TooShort where none is long enough, and what else `read` raises.
+    """
+    short: list[TooShort] = []  # until one is long enough
+    is_any = False
+    for file in files:
+        try:
+            found = read(file)
+        except TooShort as error:
+            short.append(error)
+        else:
+            is_any = True
+            yield file, found
+        while is_any and short:
+            left_out(f"{short.pop(0)}; left out")
+    if short:
+        raise short[0] if len(short) == 1 else TooShort(f"{short[0]}; none of the {len(short)} recordings is longer")
+
+
 def column_of_runs(file: str) -> str:
     """The column that tells a file's recordings apart where its format has several in one, else ""."""
     return robot_dataset.EPISODE if robot_dataset.has_episodes(file) else ""
@@ -108,3 +136,21 @@ def held_out(measurements: Sequence[Measurement], rule: str) -> tuple[list[Measu
         [one for one, out in zip(measurements, taken) if not out],
         [one for one, out in zip(measurements, taken) if out],
     )
+
+
+def check_held_out(fitted: Sequence[Measurement], held: Sequence[Measurement]) -> None:
+    """InputError for a recording that is both fitted and held out, whatever its files are called.
+
+    It would say nothing of what the model does elsewhere.  Two are the same where they have the same signals, with the
+    same values at the same times.
+    """
+    for one in held:
+        for other in fitted:
+            if _is_same(one, other):
+                same = "" if one.name == other.name else f" (its content is that of {shown(other.name, 100)})"
+                both = f"{shown(one.name, 100)}: is both fitted and held out{same}"
+                raise InputError(f"{both}; hold out a recording that is not fitted")
+
+
+def _is_same(one: Measurement, other: Measurement) -> bool:
+    return set(one) == set(other) and all(np.array_equal(one[name], other[name]) for name in one)

@@ -9,6 +9,7 @@ from ema_model.actuator import Actuator
 from ema_model.identification.objective import Objective
 from ema_model.identification.run import Progress, identify
 from ema_model.recordings import Measurement
+from ema_model.recordings.recording_set import long_enough
 from ema_model.tracking.flight import Flight
 
 UNFIT = "the model does not fit this flight, whatever k"
@@ -39,8 +40,14 @@ def identify_all(
     actuator: Actuator,
     seed: int = 0,
     on_flight: Callable[[int, str], None] = lambda number, name: None,
+    left_out: Callable[[str], None] = lambda line: None,
 ) -> Iterator[Flight]:
-    """One after another; a recording that cannot be read raises InputError."""
-    for number, path in enumerate(paths):
+    """One after another; of several, one that is too short is left out.  Raises InputError for what cannot be read."""
+
+    def read_next(numbered: tuple[int, Path]) -> Measurement:
+        number, path = numbered
         on_flight(number, path.name)
-        yield identified(read(path), path.stem, actuator, seed)
+        return read(path)
+
+    for (_, path), recording in long_enough(enumerate(paths), read_next, left_out):
+        yield identified(recording, path.stem, actuator, seed)

@@ -17,6 +17,7 @@ from ema_model.quantities.interval import HALF_90
 from ema_model.recordings import Measurement
 from ema_model.recordings.prepared import prepared
 from ema_model.recordings.read import check_same_actuator
+from ema_model.recordings.recording_set import check_held_out
 from ema_model.units.block import Block, pooled, starts_at, unit_of
 from ema_model.units.block import linearised as linearised_at
 from ema_model.units.criteria import MISFIT, REFUSED, REFUSED_SHARE, SLOPE, TOLD, UNTOLD
@@ -50,7 +51,7 @@ def compare_units(
     """
     tell = on_progress or (lambda text: None)
     names = tuple(units)
-    check_units(units)
+    check_units(units, holdout)
     paths = default_free(actuator) if free is None else free
     paths = tuple(path_inside(path, actuator.tolerances, actuator.axes) for path in paths)
     if not paths:
@@ -88,14 +89,18 @@ def compare_units(
     return result
 
 
-def check_units(units: Mapping[str, Sequence[Measurement]]) -> None:
-    """InputError for one unit only, one without a recording, and recordings of several actuators."""
+def check_units(
+    units: Mapping[str, Sequence[Measurement]], holdout: Mapping[str, Sequence[Measurement]] | None = None
+) -> None:
+    """InputError for one unit only, one without a recording, and recordings that no comparison can take together."""
     if len(units) < 2:
         only = quoted(next(iter(units), ""), 60)
         raise InputError(f"one unit only ({only}): two or more are needed to compare; name others, or leave --by out")
     if empty := next((name for name, recordings in units.items() if not recordings), None):
         raise InputError(f"unit {quoted(empty, 60)}: no recording of it is left to fit; hold out fewer")
-    check_same_actuator([one for recordings in units.values() for one in recordings])
+    fitted, held = ([one for recordings in of.values() for one in recordings] for of in (units, holdout or {}))
+    check_same_actuator(fitted)
+    check_held_out(fitted, held)
 
 
 def _held_blocks(

@@ -12,12 +12,12 @@ from typing import Any
 
 from ema_model.actuator import Actuator, save_actuator
 from ema_model.comparison.summary import plain
-from ema_model.errors import InputError, quoted
+from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.files.limits import FILE_BYTES
 from ema_model.files.refusal import listed
 from ema_model.recordings import Measurement, read_header
 from ema_model.recordings.formats.text_layout import Hints
-from ema_model.recordings.recording_set import RUN, files_of, held_out, is_pattern
+from ema_model.recordings.recording_set import RUN, held_out, is_pattern
 from ema_model.units.folders import check_same_type
 from emaviz.cli import given, output
 
@@ -116,10 +116,9 @@ def _told(arguments: argparse.Namespace, result: object, document: dict[str, Any
 
 def read_units(arguments: argparse.Namespace, actuator: Actuator, progress: output.Progress) -> tuple[_Units, _Units]:
     """The recordings to fit and those held out, by unit; InputError where it is not clear whose one is."""
-    unseen = [file for text in arguments.holdout if not is_pattern(text) for file in files_of(text)]
+    given_files, unseen = given.files_to_read(arguments, in_folders=True)
     named = {Path(file).resolve() for file in unseen}
-    files = [file for text in arguments.files for file in files_of(text, in_folders=True)]
-    files = list(dict.fromkeys([*files, *unseen]))
+    files = list(dict.fromkeys([*given_files, *unseen]))
     check_same_type(files)
     column = _column(arguments, files)
     if column:
@@ -127,9 +126,8 @@ def read_units(arguments: argparse.Namespace, actuator: Actuator, progress: outp
         arguments.runs = column
     fitted: _Units = {}
     held: _Units = {}
-    for number, file in enumerate(files):
-        progress.show(f"reading {Path(file).name} ({number + 1} of {len(files)})")
-        for one in given.read_files([file], arguments, actuator, progress):
+    for file, found in given.read_each(files, arguments, actuator, progress):
+        for one in found:
             unit = f"{column} {one.name.rpartition(RUN)[2]}" if column else _unit_of(file, one.name, arguments.unit)
             (held if Path(file).resolve() in named else fitted).setdefault(unit, []).append(one)
     for text in arguments.unit:
@@ -163,7 +161,7 @@ def _column(arguments: argparse.Namespace, files: list[str]) -> str:
         return ""
     raise InputError(
         f"--by {quoted(arguments.by)}: {quoted(Path(files[0]).name)} has no such column (it has {listed(columns)}); "
-        "--by unit takes folders as units"
+        f"--by unit takes folders as units{did_you_mean(arguments.by, columns)}"
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,16 @@ from ema_model.quantities.axes import Axes
 from ema_model.recordings import Measurement, read
 from ema_model.recordings.formats.text_layout import Hints
 from ema_model.recordings.read import COMMAND_ALONE, INPUT_ALONE, Needs
-from ema_model.recordings.recording_set import column_of_runs, episodes_of, files_of, held_out, is_pattern, runs_of
+from ema_model.recordings.recording_set import (
+    check_held_out,
+    column_of_runs,
+    episodes_of,
+    files_of,
+    held_out,
+    is_pattern,
+    long_enough,
+    runs_of,
+)
 from ema_model.simulation.load_profile import LoadProfile
 from ema_model.simulation.run import Run
 from emaviz.cli.options import COMMAND_OR_FILE
@@ -30,15 +39,7 @@ def read_set(
     arguments: argparse.Namespace, actuator: Actuator, progress: Progress
 ) -> tuple[list[Measurement], list[Measurement]]:
     """The recordings to fit and those held out, cut to --from and --to; says on stderr what was assumed of columns."""
-    named = [text for text in arguments.holdout if not is_pattern(text)]
-    unseen = [file for text in named for file in files_of(text)]
-    places = [Path(file).resolve() for file in unseen]
-    given = [
-        file
-        for text in arguments.files
-        for file in files_of(text)
-        if file == text or Path(file).resolve() not in places  # what is named itself is fitted all the same
-    ]
+    given, unseen = files_to_read(arguments)
     if not given and arguments.files:
         raise InputError("--holdout takes out every recording; leave some to fit")
     fitted, held = (read_files(names, arguments, actuator, progress) for names in (given, unseen))
@@ -46,23 +47,61 @@ def read_set(
         if is_pattern(rule):
             fitted, taken = held_out(fitted, rule)
             held += taken
+    check_held_out(fitted, held)
     return fitted, held
+
+
+def files_to_read(arguments: argparse.Namespace, *, in_folders: bool = False) -> tuple[list[str], list[str]]:
+    """The files to fit and those that --holdout names, which are taken out of folders and patterns.
+
+    in_folders: as of `files_of`.  InputError for one that is named itself both times.
+    """
+    unseen = [file for text in arguments.holdout if not is_pattern(text) for file in files_of(text)]
+    places = {Path(file).resolve() for file in unseen}
+    given: list[str] = []
+    for text in arguments.files:
+        for file in files_of(text, in_folders=in_folders):
+            if Path(file).resolve() not in places:
+                given.append(file)
+            elif file == text:
+                raise InputError(
+                    f"{quoted(file)}: is named to be fitted and by --holdout; hold out a recording that is not fitted"
+                )
+    return given, unseen
 
 
 def read_files(
     names: Sequence[str], arguments: argparse.Namespace, actuator: Actuator, progress: Progress
 ) -> list[Measurement]:
     """One after another, cut into runs and to --from and --to; says on stderr what was assumed of columns."""
-    found: list[Measurement] = []
-    for i, name in enumerate(names):
-        progress.show(f"reading {Path(name).name} ({i + 1} of {len(names)})")
+    return [one for _, found in read_each(names, arguments, actuator, progress) for one in found]
+
+
+def read_each(
+    names: Sequence[str], arguments: argparse.Namespace, actuator: Actuator, progress: Progress
+) -> Iterator[tuple[str, list[Measurement]]]:
+    """The same by file; says on stderr which of several is too short, and leaves it out."""
+
+    def read_runs(numbered: tuple[int, str]) -> list[Measurement]:
+        number, name = numbered
+        progress.show(f"reading {Path(name).name} ({number} of {len(names)})")
         one = read_one(name, arguments, actuator, progress)
-        found += runs_of(one) if arguments.runs else episodes_of(one, name)
-    if arguments.start_s is None and arguments.stop_s is None:
-        return found
-    start = -math.inf if arguments.start_s is None else arguments.start_s
-    stop = math.inf if arguments.stop_s is None else arguments.stop_s
-    return [measurement.selected((start, stop)) for measurement in found]
+        found = runs_of(one) if arguments.runs else episodes_of(one, name)
+        if arguments.start_s is None and arguments.stop_s is None:
+            return found
+        start = -math.inf if arguments.start_s is None else arguments.start_s
+        stop = math.inf if arguments.stop_s is None else arguments.stop_s
+        return [measurement.selected((start, stop)) for measurement in found]
+
+    for (_, name), found in long_enough(enumerate(names, 1), read_runs, lambda line: say(line, progress)):
+        yield name, found
+
+
+def say(line: str, progress: Progress | None) -> None:
+    """A line on stderr, in place of how far the work is."""
+    if progress is not None:
+        progress.done()
+    print(line, file=sys.stderr)
 
 
 def read_one(
@@ -80,9 +119,7 @@ def read_one(
     hints = Hints(arguments.header_line, arguments.encoding)
     measurement = read(file, actuator, [*arguments.mapping, *by_run], needs=needs, hints=hints)
     if told := measurement.reading.told:
-        if progress is not None:
-            progress.done()
-        print(f"{Path(file).name}: {told}", file=sys.stderr)
+        say(f"{Path(file).name}: {told}", progress)
     return measurement
 
 

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
-import msgspec
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute
 
 from ema_model.files.limits import ARRAYS
 from ema_model.recordings.formats.channels import Channel, Log, NoLog
-from ema_model.recordings.formats.json import numbers_of_records
+from ema_model.recordings.formats.json import decoded, numbers_of_records
 
 pc: Any = pyarrow.compute  # its functions are made when it is imported
 _NAMES = "SeriesLines:names"
@@ -93,8 +92,8 @@ def _json(values: pa.Array, path: tuple[str, ...]) -> list[tuple[tuple[str, ...]
     """What JSON messages hold, a record each."""
     texts = [one.values.to_numpy().tobytes() for one in values]
     try:
-        records = msgspec.json.decode(b"[" + b",".join(texts) + b"]")
-    except (msgspec.DecodeError, RecursionError):
+        records = decoded(b"[" + b",".join(texts) + b"]")
+    except (ValueError, RecursionError):
         return []
     return [((*path, *inner), numbers) for inner, numbers in numbers_of_records(records)]
 

@@ -57,6 +57,9 @@ def test_patterns_tell_the_unit(bench):
     check(compared(bench, bench / "units", *given), "Ur")
 
 
+LEFT = "units/left/left_slow.csv"
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -68,6 +71,8 @@ def test_patterns_tell_the_unit(bench):
         (["units", "--unit", "left"], "NAME=GLOB"),
         (["units/none*.csv", "--by", "unit"], "check the pattern"),
         (["units", "--by", "unit", "--holdout", "left*"], "unit left: no recording of it is left"),
+        (["units", LEFT, "--by", "unit", "--holdout", LEFT], "left_slow.csv: is named to be fitted and by --holdout"),
+        (["units", "left.csv", "--by", "unit", "--holdout", LEFT], "left_slow: is both fitted and held out .*of left"),
         (["units", "--by", "unit", "--no-calibrate"], "--no-calibrate: has no meaning"),
         (["units", "--by", "unit", "--fault", "k1=0.2"], "--fault: has no meaning"),
         (["units", "--by", "unit", "--free", "motor.mass"], "motor.mass cannot be calibrated"),
@@ -79,6 +84,7 @@ def test_patterns_tell_the_unit(bench):
 def test_bad_input_is_one_clear_line(bench, arguments, words, capsys, monkeypatch):
     monkeypatch.chdir(bench)
     (bench / "empty").mkdir(exist_ok=True)
+    shutil.copy(LEFT, "left.csv")
     assert main(["compare", *arguments, "--actuator", "mine.toml"]) == 2
     told = capsys.readouterr().err
     assert told.count("\n") == 1 and "Traceback" not in told

@@ -9,6 +9,7 @@ import pytest
 from support.two_clocks import write_two_clocks
 
 from ema_model.actuator import load_actuator
+from ema_model.files.shipped import shipped_folder
 from ema_model.recordings.file import read_measurement
 from emaviz.cli import main
 from emaviz.recording import read
@@ -35,6 +36,10 @@ def rig(tmp_path_factory):
     return path, foreign
 
 
+SCREW = str(shipped_folder("actuators") / "ball_screw.toml")
+LINEAR = "the actuator's is linear; take an actuator of that axis, or correct [axes] in the actuator's file"
+ROTARY = LINEAR.replace("linear", "rotary")
+WITHOUT = "…; where no command was recorded, add --open-loop to compare or discover, or choose an actuator with"
 MAPPING = ["time_s=t[ms]", "command_rad=set[deg]", "motor_position_rad=motor", "current_A=iq[mA]"]
 
 
@@ -95,7 +100,10 @@ def test_options_reach_the_comparison(rig, tmp_path):
 def test_held_out_recordings_judge_the_calibrated_model_which_is_saved(rig, tmp_path, capsys):
     out, report, model = tmp_path / "r.json", tmp_path / "r.html", tmp_path / "calibrated.toml"
     kept = ["--save-actuator", str(model), "--report", str(report), "--json", str(out)]
-    held = ["--holdout", str(rig[0]), "--free", "motor.inertia_kgm2"]
+    other = tmp_path / "own.csv"
+    rows = np.genfromtxt(rig[0], delimiter=",", names=True, deletechars="")[1:]  # the same run, seen a sample later
+    np.savetxt(other, rows, delimiter=",", header=",".join(rows.dtype.names), comments="", fmt="%.10g")
+    held = ["--holdout", str(other), "--free", "motor.inertia_kgm2"]
     assert main(["compare", str(rig[0]), *held, "--to", "0.5", *kept]) == 0
     result = json.loads(out.read_text())
     (one,) = result["holdout"]
@@ -106,6 +114,40 @@ def test_held_out_recordings_judge_the_calibrated_model_which_is_saved(rig, tmp_
     assert line in capsys.readouterr().out and line in report.read_text(encoding="utf-8")
     inertia = result["calibration"]["parameters"]["motor.inertia_kgm2"]
     assert load_actuator(model).value("motor.inertia_kgm2") == inertia["value"] != inertia["initial"]
+
+
+MEANT = "; did you mean {!r}?".format
+
+
+@pytest.mark.parametrize(
+    ("rename", "arguments", "says"),
+    [
+        ({"time_s": "t"}, ["--map", "time_s=tt"], MEANT("t")),
+        ({"current_A": "iq_meas"}, ["--map", "current_A=iq_measured[A]"], MEANT("iq_meas")),
+        ({}, ["--map", "motor_sped_rad_s=x"], MEANT("motor_speed_rad_s")),
+        ({}, ["--signal", "curent_A"], MEANT("current_A")),
+        ({"current_A": "serial"}, ["--by", "seriel"], MEANT("serial")),
+        ({}, ["--actuator", SCREW], f"the recording's axis is rotary, as command_rad says, and {LINEAR}"),
+        (
+            {"time_s": "t [s]"},
+            ["--actuator", SCREW],
+            f"the recording's axis is rotary, as command_rad says, and {LINEAR}",
+        ),
+        ({"command_rad": "command_m"}, [], f"the recording's axis is linear, as command_m says, and {ROTARY}"),
+        ({"command_rad": ""}, [], f"command_rad is needed; add it (present: time_s, {WITHOUT}"),
+        ({"command_rad": "", "time_s": "t [s]"}, [], f"command_rad is needed; say which column it is: {WITHOUT}"),
+    ],
+)
+def test_a_line_says_what_was_meant_and_what_to_do(rig, tmp_path, capsys, rename, arguments, says):
+    rows = np.genfromtxt(rig[0], delimiter=",", names=True, deletechars="")[:200]
+    columns = {rename.get(name, name): rows[name] for name in rows.dtype.names if rename.get(name, name)}
+    path = tmp_path / "a.csv"
+    np.savetxt(path, np.column_stack([*columns.values()]), delimiter=",", header=",".join(columns), comments="")
+    assert main(["compare", str(path), *arguments]) == 2
+    said = capsys.readouterr().err
+    for part in says.split("…"):
+        assert part in said
+    assert said.count("\n") == 1
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gzip
 import re
+import shutil
 
 import numpy as np
 import pytest
@@ -117,6 +119,58 @@ def test_a_mistake_is_one_line(arguments, says, logs, tmp_path, monkeypatch, cap
     assert main(["compare", *arguments, "--actuator", str(logs / "mine.toml")]) == 2
     told = capsys.readouterr().err
     assert (says or "a folder without recordings; they end in .csv") in told and told.count("\n") == 1
+
+
+@pytest.mark.parametrize("verb", ["compare", "discover", "identify"])
+@pytest.mark.parametrize("again", ["itself", "link", "copy", "packed copy"])
+def test_what_is_fitted_is_not_held_out(verb, again, logs, tmp_path, capsys):
+    """Neither a file, nor a link to it, nor another with the same content."""
+    source, held = logs / "set" / "kp100_sine.csv", tmp_path / "held.csv"
+    if again == "itself":
+        held = source
+    elif again == "link":
+        held.symlink_to(source)
+    elif again == "copy":
+        shutil.copy(source, held)
+    else:
+        held = tmp_path / "held.csv.gz"
+        held.write_bytes(gzip.compress(source.read_bytes()))
+    assert main([verb, str(source), "--holdout", str(held), "--actuator", str(logs / "mine.toml")]) == 2
+    told = capsys.readouterr().err
+    assert told.count("\n") == 1 and "fitted and " in told and "hold out a recording that is not fitted" in told
+    assert source.stem in told or "held" in told
+
+
+def stub(source, path):
+    """The first 50 samples of a recording."""
+    path.write_text("".join(source.read_text().splitlines(keepends=True)[:51]))
+    return path
+
+
+@pytest.mark.parametrize("verb", ["compare", "compare --by unit"])
+def test_one_that_is_too_short_leaves_the_set(verb, logs, tmp_path, capsys):
+    shutil.copytree(logs / "set", tmp_path / "units" / "set")
+    for unit in ("set", "more") if "--by" in verb else ("set",):
+        for number, one in enumerate(sorted((logs / "set").glob("kp*.csv")), 1):
+            (tmp_path / "units" / unit).mkdir(exist_ok=True)
+            rows = one.read_text().splitlines(keepends=True)
+            (tmp_path / "units" / unit / one.name).write_text("".join(rows[: -number if unit == "more" else None]))
+    stub(logs / "set" / "kp100_sine.csv", tmp_path / "units" / "set" / "begun.csv")
+    given = tmp_path / "units" if "--by" in verb else tmp_path / "units" / "set"
+    result = compared(logs, given, *verb.split()[1:])
+    told = [line for line in capsys.readouterr().err.splitlines() if "left out" in line]
+    assert len(told) == 1 and "begun.csv: has 50 samples; 100 or more are expected" in told[0]
+    fitted = result["units"][1]["recordings"] if "--by" in verb else names(result["recordings"])
+    assert fitted == ["kp100_sine", "kp200_sine", "kp400_sine"]
+
+
+@pytest.mark.parametrize("several", [False, True])
+def test_where_all_are_too_short_nothing_is_left(several, logs, tmp_path, capsys):
+    stubs = [str(stub(logs / "set" / "kp100_sine.csv", tmp_path / f"{name}.csv")) for name in "ab"[: 1 + several]]
+    assert main(["compare", *stubs, "--actuator", str(logs / "mine.toml")]) == 2
+    told = capsys.readouterr().err
+    assert told.count("\n") == 1 and "a.csv: has 50 samples; 100 or more are expected" in told
+    assert ("none of the 2 recordings is longer" in told) == several
 
 
 def test_names_and_patterns(tmp_path):

@@ -47,6 +47,29 @@ def test_units_are_compared_by_name():
         em.compare_units({"a": given["a"]})
 
 
+def test_one_of_several_that_is_too_short_is_left_out(recording, tmp_path):
+    short = tmp_path / "short.csv"
+    write_measurement(recording.selected((0.0, 0.005)), short)
+    with pytest.warns(UserWarning, match=r"short\.csv: has 51 samples; .*; left out"):
+        found = em.compare([recording, short], calibrate=False)
+    assert [one.name for one in found.recordings] == ["chirp"]
+    with pytest.raises(em.InputError, match=r"short\.csv: has 51 samples"):
+        em.compare(short)
+
+
+def test_what_is_fitted_is_not_held_out(recording, tmp_path):
+    copy = tmp_path / "copy.csv"
+    write_measurement(recording, copy)
+    other = em.simulate("chirp", faults={"k1": 0.25}, noise_A=0.1, seed=1)
+    for same, line in ((recording, "chirp: is both fitted and held out"), (em.read(copy), "copy: is both .*of chirp")):
+        for analysis in (em.compare, em.discover):
+            with pytest.raises(em.InputError, match=line):
+                analysis(recording, holdout=same)
+        with pytest.raises(em.InputError, match=line):
+            em.compare_units({"a": recording, "b": other}, holdout={"b": same})
+    assert em.compare(recording, holdout=other, calibrate=False).holdout[0].name == "chirp"
+
+
 def test_results_show_themselves(recording):
     answer = em.identify(recording)
     assert str(answer) == repr(answer) and re.search(r"^k1 +0\.2[0-9]+ .*not healthy$", str(answer), re.M)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gzip
 import io
+import json
 import struct
 import zipfile
 import zlib
@@ -24,7 +26,7 @@ k = np.arange(float(N))
 GOOD = {"time_s": k / 1e3, "current_A": k}
 ADVICE = (
     "expected record check correct export save split store write name map rename remove sort cut choose fill add take "
-    "leave must widen".split()
+    "leave must widen pack".split()
 )
 
 
@@ -99,6 +101,15 @@ def mat(packed=False, **arrays):
     file = io.BytesIO()
     savemat(file, GOOD | arrays, do_compression=packed)
     return file.getvalue()
+
+
+def records(**columns):
+    return json.dumps({name: list(values) for name, values in (GOOD | columns).items()}).encode()
+
+
+def lines_of_json(**columns):
+    rows = zip(*(GOOD | columns).values())
+    return "\n".join(json.dumps(dict(zip(GOOD, row))) for row in rows).encode()
 
 
 def mat_header():
@@ -212,6 +223,21 @@ FILES = {
         "twice": (mat() + mat()[128:], "stands twice"),
         "bomb": (packed_zeros(20_000_000), "unpacks to over 10 MB"),
         "other_checksum": (mat(True)[:150] + b"\xff" + mat(True)[151:], "does not unpack"),
+    },
+    ".json": {
+        "nan": (records(current_A=but(6, np.nan)), "sample 7, column 'current_A': NaN"),
+        "infinite": (records(current_A=but(6, -np.inf)), "sample 7, column 'current_A': an infinite value"),
+        "nan_in_lines": (lines_of_json(current_A=but(6, np.nan)), "sample 7, column 'current_A': NaN"),
+        "nan_alone": (b"NaN", "holds no rows of numbers"),
+        "not_whole_with_nan": (records(current_A=but(6, np.nan))[:-9], "not a whole JSON file"),
+    },
+    ".csv.gz": {
+        "empty": (b"", "is empty"),
+        "text": (text(), "not a whole gzip file"),
+        "cut_short": (gzip.compress(text())[:-20], "not a whole gzip file"),
+        "cut_before_its_checksum": (gzip.compress(text())[:-4], "not a whole gzip file"),
+        "other_bytes_behind": (gzip.compress(text()) + bytes(20) + b"more", "not a whole gzip file"),
+        "zeros_alone": (bytes(512), "not a whole gzip file"),
     },
 }
 KINDS = [(suffix, kind) for suffix, kinds in FILES.items() for kind in kinds]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 
 import numpy as np
@@ -169,6 +170,26 @@ def test_an_episode_of_lerobot(tmp_path):
         *("action.hip", "action.knee", "observation.state.0", "observation.state.1", "timestamp", "task_index")
     ]
     np.testing.assert_array_equal(found["action.knee"], rows[:, 1])
+
+
+def test_gzip_filled_with_zeros_to_whole_blocks(tmp_path):
+    """As tapes and block devices give it back, and between parts that were packed one by one."""
+    rows = [f"{i / 1e3},{i}\n" for i in range(N)]
+    first, second = (gzip.compress("".join(part).encode()) for part in (["time_s,current_A\n", *rows[:70]], rows[70:]))
+    (tmp_path / "a.csv.gz").write_bytes(first + bytes(700) + second + bytes(3_000_000))
+    measurement = read_measurement(tmp_path / "a.csv.gz")
+    np.testing.assert_array_equal(measurement["current_A"], np.arange(N))
+
+
+@pytest.mark.parametrize("lines", [False, True])
+def test_nan_in_json_stands_only_where_it_is_not_used(lines, tmp_path):
+    """As Python's json writes what the sensor did not give."""
+    columns = {"time_s": k / 1e3, "current_A": np.sin(k), "spare": np.where(k == 3, np.nan, k)}
+    rows = [dict(zip(columns, row)) for row in zip(*(values.tolist() for values in columns.values()))]
+    text = "\n".join(map(json.dumps, rows)) if lines else json.dumps(rows)
+    (tmp_path / "a.json").write_text(text)
+    assert np.isnan(read_columns(tmp_path / "a.json")["spare"][3])
+    np.testing.assert_array_equal(read_measurement(tmp_path / "a.json")["current_A"], np.sin(k))
 
 
 def test_a_static_map_needs_no_time(tmp_path):

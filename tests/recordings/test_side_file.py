@@ -5,17 +5,21 @@ from __future__ import annotations
 
 import json
 import os
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from ema_model.actuator import load_actuator, parse_actuator, save_actuator, shipped
+from ema_model.campaign import load_plan
 from ema_model.errors import InputError
 from ema_model.recordings import (
     ColumnMapping,
     MappedColumn,
     SideFile,
+    change_side_file,
     find_side_file,
     read_side_file,
     side_path,
@@ -59,6 +63,27 @@ def test_what_it_says_reaches_the_measurement(tmp_path):
     assert measurement.time_s[0] == 0.05 and set(measurement["segment"]) == {0.0, 2.0}
     np.testing.assert_allclose(measurement["current_A"][:2], [0.45, 0.449])
     assert "the side file a.toml is used" in measurement.notes
+
+
+def test_a_byte_order_mark_is_no_part_of_toml(tmp_path):
+    """Windows' editors write one; what is read is the same, and it goes when the file is changed."""
+    mark = "\ufeff"
+    path = log(tmp_path / "a.csv")
+    side_path(path).write_text(mark + TEXT, encoding="utf-8")
+    side = read_side_file(side_path(path))
+    assert side.sampling == "mean" and read_measurement(path).samples == 300
+    change_side_file(side_path(path), side, window_s=(0.1, 0.2))
+    assert not side_path(path).read_text(encoding="utf-8").startswith(mark)
+    assert 'current_A = { column = "i"' in side_path(path).read_text(encoding="utf-8")
+    actuator = tmp_path / "b.toml"
+    text = "# mine\n" + shipped("odrive.toml")
+    actuator.write_text(mark + text, encoding="utf-8")
+    assert load_actuator(actuator) == replace(parse_actuator(text, actuator), text="")
+    save_actuator(load_actuator(actuator), actuator)
+    assert actuator.read_text(encoding="utf-8").startswith("# mine\n")
+    (tmp_path / "c.toml").write_text(mark + "x = 1", encoding="utf-8")
+    with pytest.raises(InputError, match=r"c\.toml: has no 'x'"):
+        load_plan(tmp_path / "c.toml")
 
 
 def test_given_entries_go_before(tmp_path):

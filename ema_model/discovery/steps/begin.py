@@ -21,6 +21,7 @@ from ema_model.models.stretches import fit_stretches
 from ema_model.recordings import Measurement
 from ema_model.recordings.prepared import prepared
 from ema_model.recordings.read import check_same_actuator
+from ema_model.recordings.recording_set import check_held_out
 from ema_model.simulation.one_stack import compile_library
 
 Progress = Callable[[str], None]
@@ -42,6 +43,7 @@ def begun(
     Raises InputError for recordings that cannot be compared.
     """
     check_same_actuator([*measurements, *holdout])
+    check_held_out(measurements, holdout)
     compile_library(actuator)
     actuator = with_delay_of_drive(actuator, measurements)
     is_open = actuator.controller.kind == "open"

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ema_model.errors import InputError
+from ema_model.errors import InputError, did_you_mean
 from ema_model.files.refusal import listed, shown
 from ema_model.quantities.signals import SIGNALS
 from ema_model.quantities.units import Unit, dimensions_of, find_unit, known_units
@@ -47,7 +47,7 @@ class MappedColumn:
 
     def __post_init__(self) -> None:
         if self.signal not in SIGNALS:
-            raise InputError(f"mapping: no signal {shown(self.signal)!r}; there are {', '.join(SIGNALS)}")
+            raise InputError(f"mapping: {_no_signal(self.signal)}")
         if not self.column:
             raise InputError(f"mapping of {self.signal}: the column's name is missing; {_FORM}")
         if self.sign not in (1, -1):
@@ -145,7 +145,7 @@ def _parsed(text: str, columns: Collection[str]) -> MappedColumn:
     if not equals or not signal or not right:
         raise InputError(f"mapping {shown(text)!r} is not understood; {_FORM}")
     if signal not in SIGNALS:
-        raise InputError(f"mapping {shown(text)!r}: no signal {shown(signal)!r}; there are {', '.join(SIGNALS)}")
+        raise InputError(f"mapping {shown(text)!r}: {_no_signal(signal)}")
     inside = re.fullmatch(r"(.+?)\s*\[([^\[\]]*)\]", right)
     if right in columns or not inside:
         return MappedColumn(signal, right, unit_in_name(right, signal))
@@ -177,6 +177,10 @@ def unit_in_name(column: str, signal: str) -> str:
     return next((unit.name for unit in units if unit), "")
 
 
+def _no_signal(name: str) -> str:
+    return f"no signal {shown(name)!r}; there are {', '.join(SIGNALS)}{did_you_mean(name, SIGNALS)}"
+
+
 def _number(text: str, name: str, value: str) -> float:
     try:
         return float(value)
@@ -206,7 +210,9 @@ def apply_mapping(table: Mapping[str, ArrayLike], mapping: ColumnMapping) -> tup
     """
     missing = [entry.column for entry in mapping.entries if entry.column not in table]
     if missing:
-        raise InputError(f"mapping: no column {shown(missing[0])!r}; present: {listed(table)}")
+        raise InputError(
+            f"mapping: no column {shown(missing[0])!r}; present: {listed(table)}{did_you_mean(missing[0], table)}"
+        )
     used = {entry.column for entry in mapping.entries}
     taken = {entry.signal for entry in mapping.entries}
     signals, notes = {}, []

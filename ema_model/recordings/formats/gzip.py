@@ -62,9 +62,14 @@ def _unpacked(path: str, max_bytes: int) -> Iterator[tuple[str, str]]:
     with tempfile.TemporaryDirectory() as folder:
         inner = os.path.join(folder, "unpacked" + os.path.splitext(packed)[1].lower())
         with open(path, "rb") as source, open(inner, "wb") as target:
-            unpacker, size = zlib.decompressobj(wbits=31), 0
+            unpacker, size, is_inside = zlib.decompressobj(wbits=31), 0, False
             while piece := source.read(_PIECE):
                 while piece:
+                    if not is_inside and size:  # blocks of a fixed length, as tapes have them, are filled with zeros
+                        piece = piece.lstrip(b"\0")
+                        if not piece:
+                            break
+                    is_inside = True
                     try:
                         unpacked = unpacker.decompress(piece, _PIECE)
                     except zlib.error:
@@ -75,8 +80,8 @@ def _unpacked(path: str, max_bytes: int) -> Iterator[tuple[str, str]]:
                     target.write(unpacked)
                     piece = unpacker.unconsumed_tail
                     if unpacker.eof:  # another packed part may follow
-                        piece, unpacker = unpacker.unused_data, zlib.decompressobj(wbits=31)
-            if size == 0:
+                        piece, unpacker, is_inside = unpacker.unused_data, zlib.decompressobj(wbits=31), False
+            if size == 0 or is_inside:
                 raise refusal(path, "is not a whole gzip file; pack it again")
         try:
             yield inner, packed

@@ -1,4 +1,8 @@
-"""HDF5, and MATLAB's version 7.3 with it: each dataset of one dimension is a column, of two a table, in any group."""
+"""HDF5, and MATLAB's version 7.3 with it: each dataset of one dimension is a column, of two a table, in any group.
+
+The format lets a file name others, from which its library would read: external links, external storage and virtual
+datasets.  A file that does so is refused, since whoever wrote it would choose which files of this machine are read.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from ema_model.errors import InputError
 from ema_model.files.limits import ARRAYS
+from ema_model.files.refusal import listed, refusal, shown
 from ema_model.recordings.formats.channels import Channel, Log, NoLog, is_table, table
 from ema_model.recordings.formats.logs import log_format
 
@@ -17,6 +23,9 @@ _UNIT = ("units", "unit", "Unit", "Units", "UNIT")
 _NAMES = ("columns", "column_names", "names", "labels", "channels")
 _MATLAB = "MATLAB_class"
 _TEXT = ("char", "string", "cell", "function_handle")
+_HARD, _EXTERNAL = 0, 64  # kinds of links (HDF5 specification, "Link Message")
+_SAME_FILE = "."  # as a virtual dataset names its own
+_FAILURES = (OSError, RuntimeError, KeyError, ValueError)
 
 
 @contextmanager
@@ -26,36 +35,84 @@ def opened(path: str, most_bytes: int) -> Iterator[Log]:
 
     try:
         file = h5py.File(path, "r", locking=False)
-    except (OSError, RuntimeError, ValueError, KeyError) as error:
-        raise NoLog(str(error).split("(")[0].strip() or "it does not open") from None
+    except _FAILURES as error:
+        raise NoLog(_reason(error) or "it does not open") from None
     with file:
-        yield _log(file, most_bytes)
+        _check_links(path, file)
+        yield _log(path, file, most_bytes)
 
 
-def _log(file: Any, most_bytes: int) -> Log:
+def _check_links(path: str, file: Any) -> None:
+    """Raises InputError for a link to another file.  Soft links lead along these, so that none leads out either."""
+    try:  # what the function returns ends the visit
+        name = file.id.links.visit(lambda name, link: name if link.type == _EXTERNAL else None, info=True)
+        target = "" if name is None else _text(file.id.links.get_val(name)[0])
+    except _FAILURES as error:
+        raise NoLog(_reason(error)) from None
+    if name is not None:
+        raise _elsewhere(path, f"link {shown(_text(name))!r}", target)
+
+
+def _check_storage(path: str, item: Any) -> bool:
+    """Raises InputError for a dataset whose numbers stand in another file; whether others of its own file hold them."""
+    try:
+        target, is_virtual = _stored_in(item), item.is_virtual
+    except _FAILURES as error:
+        raise NoLog(f"{shown(item.name)!r}: {_reason(error)}") from None
+    if target:
+        raise _elsewhere(path, f"dataset {shown(item.name)!r}", target)
+    return is_virtual
+
+
+def _check_all_storage(path: str, file: Any) -> None:
+    """Raises InputError for any dataset whose numbers stand in another file."""
+    import h5py
+
+    try:  # what the function returns ends the visit
+        found = file.visititems(lambda _, one: one if isinstance(one, h5py.Dataset) and _stored_in(one) else None)
+    except _FAILURES as error:
+        raise NoLog(_reason(error)) from None
+    if found is not None:
+        _check_storage(path, found)
+
+
+def _stored_in(item: Any) -> str:
+    """The other file that a dataset's numbers stand in; "" where they stand in its own."""
+    if item.external:
+        return str(item.external[0][0]) or "?"
+    sources = item.virtual_sources() if item.is_virtual else ()
+    return next((source.file_name or "?" for source in sources if source.file_name != _SAME_FILE), "")
+
+
+def _elsewhere(path: str, what: str, target: str) -> InputError:
+    leads = f"{what} leads to another file, {shown(target, 300)!r}, which is not read"
+    return refusal(path, f"{leads}; save the numbers in this file itself")
+
+
+def _log(path: str, file: Any, most_bytes: int) -> Log:
     import h5py
 
     channels: list[Channel] = []
     parameters: dict[str, float] = {}
     aside: list[str] = []
+    unresolved: list[str] = []
     seen = 0
+    is_searched = False
 
-    def walk(group: Any, path: tuple[str, ...]) -> None:
-        nonlocal seen
+    def walk(group: Any, above: tuple[str, ...], entered: tuple[Any, ...]) -> None:
+        nonlocal seen, is_searched
         for name in group:
             seen += 1
             if seen > ARRAYS:
                 raise NoLog(f"it holds over {ARRAYS} datasets")
             if name.startswith("#"):  # MATLAB's own
                 continue
-            try:
-                item = group.get(name)
-            except (OSError, RuntimeError, KeyError, ValueError) as error:
-                raise NoLog(f"{name[:40]!r}: {str(error).split('(')[0].strip()}") from None
-            here = (*path, name)
-            if isinstance(item, h5py.Group) and len(here) < _DEEPEST:
-                walk(item, here)
-            elif isinstance(item, h5py.Dataset):
+            here = (*above, name)
+            item = _item(group, name)
+            if isinstance(item, h5py.Dataset):
+                if _check_storage(path, item) and not is_searched:
+                    _check_all_storage(path, file)  # of which a virtual dataset may be made
+                    is_searched = True
                 found = _channels(item, here, most_bytes)
                 if isinstance(found, (int, float)):
                     parameters[".".join(here)] = found
@@ -63,13 +120,39 @@ def _log(file: Any, most_bytes: int) -> Log:
                     channels.extend(found)
                 else:
                     aside.append(".".join(here))
+            elif isinstance(item, h5py.Group):
+                if item in entered:
+                    unresolved.append(".".join(here))
+                elif len(here) < _DEEPEST:
+                    walk(item, here, (*entered, item))
+            elif item is None:
+                unresolved.append(".".join(here))
 
-    walk(file, ())
+    walk(file["/"], (), (file["/"],))
     for name in list(file.attrs)[:ARRAYS]:
         value = _attribute(file, name)
         if isinstance(value, (int, float, np.number)) and np.isfinite(float(value)):
             parameters[name] = float(value)
-    return Log(channels, parameters=parameters, left_aside=tuple(aside))
+    notes = (f"links that lead nowhere, or in a circle, are left out: {listed(unresolved)}",) if unresolved else ()
+    return Log(channels, parameters=parameters, notes=notes, left_aside=tuple(aside))
+
+
+def _item(group: Any, name: str) -> Any:
+    """What a link leads to; None for one by name that leads nowhere, NoLog for an object that cannot be read."""
+    try:
+        return group[name]
+    except _FAILURES as error:
+        try:
+            is_by_name = group.id.links.get_info(name.encode("utf-8", "surrogateescape")).type != _HARD
+        except _FAILURES:
+            is_by_name = False
+        if is_by_name:
+            return None
+        raise NoLog(f"{shown(name)!r}: {_reason(error)}") from None
+
+
+def _reason(error: Exception) -> str:
+    return str(error).split("(")[0].strip()
 
 
 def _channels(item: Any, path: tuple[str, ...], most_bytes: int) -> list[Channel] | float:
@@ -110,14 +193,14 @@ def _read(item: Any, most_bytes: int) -> Any:
         raise NoLog(f"{item.name[:40]!r} is larger than a measurement may be")
     try:
         return item[()]
-    except (OSError, RuntimeError, ValueError, KeyError) as error:
-        raise NoLog(f"{item.name[:40]!r}: {str(error).split('(')[0].strip()}") from None
+    except _FAILURES as error:
+        raise NoLog(f"{item.name[:40]!r}: {_reason(error)}") from None
 
 
 def _attribute(item: Any, name: str) -> Any:
     try:
         return item.attrs.get(name)
-    except (OSError, RuntimeError, ValueError, KeyError, TypeError, UnicodeError):
+    except (*_FAILURES, TypeError, UnicodeError):
         return None
 
 

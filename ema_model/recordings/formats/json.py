@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
@@ -27,8 +28,8 @@ def opened(path: str, most_bytes: int) -> Iterator[Log]:
         text = file.read()
     text = text.removeprefix(b"\xef\xbb\xbf").strip()
     try:
-        document = msgspec.json.decode(text)
-    except msgspec.DecodeError as error:
+        document = decoded(text)
+    except ValueError as error:
         document = _lines(text, error)
     except RecursionError:
         raise NoLog("it is nested too deeply") from None
@@ -47,14 +48,27 @@ def numbers_of_records(records: Sequence[Any]) -> list[tuple[tuple[str, ...], An
     return [(channel.path, np.asarray(channel.values())) for channel in found.channels]
 
 
+def decoded(text: bytes) -> Any:
+    """A document, also with the NaN and Infinity that Python writes and JSON has not; ValueError for what is none."""
+    try:
+        return msgspec.json.decode(text)
+    except msgspec.DecodeError:
+        if b"NaN" not in text and b"Infinity" not in text:
+            raise
+        return json.loads(text)
+
+
 def _lines(text: bytes, error: Exception) -> Any:
     """Records of which each has a line; what was wrong with the whole otherwise."""
     first = text.split(b"\n", 1)[0].strip()
     if not (first.startswith(b"{") and first.endswith(b"}")):
         raise NoLog(str(error)) from None
     try:
-        return msgspec.json.Decoder().decode_lines(text)
-    except (msgspec.DecodeError, RecursionError) as problem:
+        try:
+            return msgspec.json.Decoder().decode_lines(text)
+        except msgspec.DecodeError:
+            return [decoded(line) for line in text.splitlines() if line.strip()]
+    except (ValueError, RecursionError) as problem:
         raise NoLog(str(problem)) from None
 
 

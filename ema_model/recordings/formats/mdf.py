@@ -21,7 +21,8 @@ def opened(path: str, most_bytes: int) -> Iterator[Log]:
     from asammdf import MDF
 
     with broken_file():
-        file = MDF(path)
+        # Descriptions of buses may stand in other files, which would be read for what is of no use here.
+        file = MDF(path, process_bus_logging=False)  # type: ignore  its versions take it
     with file:
         with broken_file():
             log = _log(file, most_bytes)

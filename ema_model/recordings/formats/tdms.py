@@ -22,12 +22,13 @@ def opened(path: str, most_bytes: int) -> Iterator[Log]:
     import nptdms
 
     del most_bytes  # what is read is counted before
-    with broken_file():
-        file = nptdms.TdmsFile.open(path)
-    with file:
+    with open(path, "rb") as content:  # by a path the library would take what a .tdms_index beside it says
         with broken_file():
-            log = _log(file)
-        yield log
+            file = nptdms.TdmsFile.open(content)
+        with file:
+            with broken_file():
+                log = _log(file)
+            yield log
 
 
 def _log(file: Any) -> Log:

@@ -38,7 +38,7 @@ def discover_units(
     """
     tell = on_progress or (lambda text: None)
     held = holdout or {}
-    check_units(units)
+    check_units(units, held)
 
     def look(name: str, model: Actuator, most: int, candidates: Sequence[str] | None = None) -> Discovery:
         return discover(

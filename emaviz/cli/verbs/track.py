@@ -79,6 +79,7 @@ def _identified(
             actuator,
             arguments.seed,
             lambda number, name: progress.show(f"flight {number + 1} of {len(paths)}: {name}"),
+            lambda line: given.say(line, progress),
         )
     )
 
@@ -122,8 +123,7 @@ def _watch(
                     check_order(in_order([*flights, path]))
                     flights |= zip([path], _identified([path], arguments, actuator, progress))
                 except InputError as error:
-                    progress.done()
-                    print(f"{error}; left out", file=sys.stderr)
+                    given.say(f"{error}; left out", progress)
             if len(flights) < LEAST_FLIGHTS:
                 progress.show(f"{len(flights)} of the {LEAST_FLIGHTS} flights that a trend needs")
             elif any(path in flights for path in new):

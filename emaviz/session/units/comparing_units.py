@@ -11,6 +11,7 @@ from typing import Any
 from ema_model.actuator import Actuator, save_actuator
 from ema_model.errors import InputError, quoted
 from ema_model.recordings import Measurement, read
+from ema_model.recordings.recording_set import long_enough
 from ema_model.recordings.side_file.read import SideFile
 from ema_model.units.folders import check_same_type, units_in
 from ema_model.units.result import UnitsCompared
@@ -100,10 +101,7 @@ class ComparingUnits:
             from ema_model.units.compare import compare_units  # here, since it brings all of scipy's optimisers
 
             told: list[str] = []
-            given, unseen = (
-                {name: [self._read(file, actuator, run, told) for file in files] for name, files in part.items()}
-                for part in (fitted, held)
-            )
+            given, unseen = (self._read_all(part, actuator, run, told) for part in (fitted, held))
             found = compare_units(given, actuator, holdout=unseen, on_progress=run)
 
         def done() -> None:
@@ -112,6 +110,20 @@ class ComparingUnits:
             self.events.compared(found)
 
         return self.job.begin("Comparing units", work, done)
+
+    def _read_all(
+        self, units: Mapping[str, Sequence[Path]], actuator: Actuator, run: Run, told: list[str]
+    ) -> dict[str, list[Measurement]]:
+        """The units' recordings; of several, those that are too short are left out, and told."""
+
+        def left_out(line: str) -> None:
+            self.session.events.told("A recording is left out", line.replace(f"{self.folder.folder}/", ""))
+
+        found: dict[str, list[Measurement]] = {name: [] for name in units}
+        every = [(name, file) for name, files in units.items() for file in files]
+        for (name, _), one in long_enough(every, lambda of: self._read(of[1], actuator, run, told), left_out):
+            found[name].append(one)
+        return found
 
     def _read(self, file: Path, actuator: Actuator, run: Run, told: list[str]) -> Measurement:
         """One recording; the first guess at columns is told."""

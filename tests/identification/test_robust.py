@@ -122,6 +122,21 @@ def test_hidden_effect_raises_no_alarm_and_is_identified_once_added():
     assert answer.error_percent is not None and answer.error_percent <= 2.0
 
 
+def test_the_found_actuator_has_the_sigma_of_what_the_fit_moved():
+    hidden = {"cogging_torque": {"amplitude_Nm": 0.012, "order": 12.0, "phase_rad": 0.0}}
+    truth = faults.vector({"k2": 0.2})
+    recording = Sensors(0.1, 12).record(simulate_reference(Run(), ACTUATOR, truth, hidden), 4)
+    guessed = with_effect(ACTUATOR, "cogging_torque", {"amplitude_Nm": 0.01, "order": 12.0})
+    answer = identify(Objective([recording], guessed), seed=1, population=6, iterations=4)
+    found, path = answer.found_actuator, "effects.cogging_torque.amplitude_Nm"
+    sigma = answer.uncertainty.sigmas[path]
+    assert found.value(path) == answer.parameters[path] and abs(found.value(path) - 0.012) < 3.0 * sigma
+    assert found.tolerances[path].sigma == sigma < 0.2 * guessed.tolerances[path].sigma
+    assert np.array_equal(found.k, answer.k) and set(found.tolerances) == set(guessed.tolerances)
+    unmoved = {name for name, value in answer.parameters.items() if value == guessed.value(name)}
+    assert all(found.tolerances[name] == guessed.tolerances[name] for name in unmoved)
+
+
 @pytest.mark.long
 def test_unrecorded_load_and_two_recordings():
     truth = faults.vector({"k3": 0.3})

@@ -55,6 +55,10 @@ def _over(text: str, actuator: Actuator) -> str:
     except ValueError:  # what is to be replaced is none
         known, text = {}, actuator.text
     tables = as_spelt(tables_of(actuator), known)
+    said = known.get("model")
+    for name in keys.TABLES["model"]:  # one that says nothing may stand
+        if isinstance(said, Mapping) and said.get(name) == getattr(actuator, name):
+            tables["model"][name] = said[name]
     lines = _with_each_key_once(text.split("\n"), known, tables, actuator)
     if actuator.note and (note := f"# {actuator.note}") not in lines:
         lines = [note, *([] if lines[0].startswith("#") else [""]), *lines]

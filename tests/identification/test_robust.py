@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import norm
@@ -96,6 +98,14 @@ def test_healthy_is_healthy_and_tolerances_widen():
     for answer in (known, open_):
         assert answer.uncertainty.healthy and answer.uncertainty.alarms == () and answer.uncertainty.adequate
     assert np.ptp(open_.uncertainty.interval90[0]) > 3.0 * np.ptp(known.uncertainty.interval90[0])
+    assert not known.uncertainty.sigmas and set(open_.uncertainty.sigmas) == set(open_.parameters)
+    unmoved = {path for path, value in open_.parameters.items() if value == ACTUATOR.value(path)}
+    assert all(open_.found_actuator.tolerances[path] == ACTUATOR.tolerances[path] for path in unmoved)
+    path = "motor.inertia_kgm2"
+    moved = replace(open_, parameters={path: 1.31e-5}, uncertainty=replace(open_.uncertainty, sigmas={path: 1e-7}))
+    found = moved.found_actuator
+    assert found.value(path) == 1.31e-5 and np.array_equal(found.k, open_.k)
+    assert found.tolerances == {**ACTUATOR.tolerances, path: replace(ACTUATOR.tolerances[path], sigma=1e-7)}
 
 
 def test_polish_repairs_a_short_search():
@@ -122,6 +132,7 @@ def test_hidden_effect_raises_no_alarm_and_is_identified_once_added():
     assert answer.error_percent is not None and answer.error_percent <= 2.0
 
 
+@pytest.mark.long
 def test_the_found_actuator_has_the_sigma_of_what_the_fit_moved():
     hidden = {"cogging_torque": {"amplitude_Nm": 0.012, "order": 12.0, "phase_rad": 0.0}}
     truth = faults.vector({"k2": 0.2})

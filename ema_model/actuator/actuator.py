@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from typing import Any
@@ -30,6 +32,8 @@ from ema_model.faults import vector
 from ema_model.quantities.axes import Axes
 
 _OPEN_STEP_S = 5e-5  # what an actuator without chopping is simulated with
+_LEARNED = 0.9  # of a tolerance: a fit that leaves more of it learned nothing of the parameter
+_FITTED = "The sigma of each fitted parameter is 1 σ of what the fit found; its 90 % interval is value ± 1.645 sigma."
 
 
 @dataclass(frozen=True)
@@ -59,6 +63,7 @@ class Actuator:
     mapping: tuple[str, ...] = ()  # of its recordings' columns, as for --map
     rules: tuple[Rule, ...] = ()
     text: str = field(default="", compare=False, repr=False)  # of its file, whose comments stay when it is saved
+    note: str = field(default="", compare=False, repr=False)  # a comment for the head of its file
 
     @property
     def has_reference_model(self) -> bool:
@@ -157,6 +162,18 @@ class Actuator:
             else:
                 sections[section] = replace(sections.get(section, getattr(self, section)), **{names[0]: value})
         return replace(self, **sections)
+
+    def with_fitted_sigmas(self, sigmas: Mapping[str, float]) -> Actuator:
+        """A copy whose tolerances are the σ that a fit found, by path: the prior of the next fit.
+
+        A parameter keeps its tolerance where the fit learned nothing of it, or where its σ is no number above 0.
+        """
+        narrowed = {
+            path: replace(one, sigma=float(sigma))
+            for path, one in self.tolerances.items()
+            if (sigma := sigmas.get(path)) is not None and math.isfinite(sigma) and 0.0 < sigma < _LEARNED * one.sigma
+        }
+        return replace(self, tolerances={**self.tolerances, **narrowed}, note=_FITTED if narrowed else self.note)
 
     def for_recording(self, name: str) -> Actuator:
         """The actuator as it was in the recording of that name (`rules`)."""

@@ -7,11 +7,18 @@ from dataclasses import fields
 from ema_model.actuator.actuator import Actuator
 from ema_model.actuator.naming import on_axes
 from ema_model.actuator.parameters import SECTIONS
-from ema_model.actuator.unread import INVERSE, check_value_is_read, idle, unread
+from ema_model.actuator.unread import INVERSE, check_value_is_read, idle, settings_read, unread
 from ema_model.errors import InputError
 
 # In the Reference Model alone (MODEL: T 3.3): known well enough by their values, but no fit could learn of them.
 _REFERENCE_ONLY = ("inverter.hysteresis_band_A", "transmission.viscous_friction_Nms_rad")
+
+_OF_INVERSE = "it is of inverse dynamics, for an unknown controller"
+_OF_SETTINGS = {
+    "step_s": f"{INVERSE} takes no steps",
+    "filter_s": _OF_INVERSE,
+    "leaves_out_reversals": _OF_INVERSE,
+}
 
 
 def check_all_is_read(actuator: Actuator, where: str) -> None:
@@ -19,7 +26,6 @@ def check_all_is_read(actuator: Actuator, where: str) -> None:
 
     That is of values, tolerances, recordings' values, effects and settings.
     """
-    known = actuator.controller.kind != "unknown"
     for section in SECTIONS:
         for one in fields(SECTIONS[section]):
             if one.name != "kind":
@@ -34,11 +40,9 @@ def check_all_is_read(actuator: Actuator, where: str) -> None:
         )
     for name in actuator.effects:
         _check_effect_acts(actuator, name, where)
-    if not known and actuator.step_s != Actuator.step_s:
-        raise InputError(f"{where}: model.step_s: {INVERSE} takes no steps; leave it out")
-    for name in ("filter_s", "leaves_out_reversals"):
-        if known and getattr(actuator, name) != getattr(Actuator, name):
-            reason = "it is of inverse dynamics, for an unknown controller"
+    read = settings_read(actuator.controller.kind)
+    for name, reason in _OF_SETTINGS.items():
+        if name not in read and getattr(actuator, name) != getattr(Actuator, name):
             raise InputError(f"{where}: model.{name}: {reason}; leave it out")
     if actuator.has_reference_model:
         _check_reference_only(actuator, where)

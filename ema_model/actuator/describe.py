@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from ema_model.actuator.actuator import Actuator
@@ -15,6 +16,7 @@ from ema_model.actuator.file import actuator_of
 from ema_model.actuator.layout import WITHOUT_DRIVE, layout
 from ema_model.actuator.naming import on_axes
 from ema_model.actuator.parameters import SECTIONS, default_of, facts_of
+from ema_model.actuator.steps import usual_filter, usual_step
 from ema_model.actuator.unread import unread
 from ema_model.errors import InputError, quoted
 from ema_model.quantities.axes import Axes
@@ -63,27 +65,48 @@ def unanswered(path: str, axes: Axes) -> str:
     return "as if there were none" if guess == default_of(path) else f"guess {number(guess)}"
 
 
-def gear_of(text: str, where: str) -> float:
-    """The user's motion per the motor's, from '0.002', '1/500', '500:1', or '10 mm', which a screw moves in a turn.
+def number_of(text: str, where: str) -> float:
+    """A number that no tolerance can be given of; InputError, which begins with `where`."""
+    entry = entry_of(text, where)
+    if len(entry) > 1:
+        raise InputError(f"{where}: write a number without a tolerance, not {quoted(text)!r}")
+    return entry["value"]
 
+
+def gear_of(text: str, where: str) -> dict[str, Any]:
+    """The user's motion per the motor's as an entry of a file.
+
+    From '0.002', '1/500', '500:1', or '10 mm', which a screw moves in a turn; with a tolerance, '500:1 ± 1%'.
     InputError, which begins with `where`.
     """
-    if text.strip().endswith("mm"):
-        return 1e-3 * entry_of(text.strip().removesuffix("mm"), where)["value"] / math.tau
+    head = re.split(r"±|\+-|fixed", text.strip(), maxsplit=1)[0]
+    tail = text.strip().removeprefix(head)
+    head = head.strip()
+    value = None
+    if head.endswith("mm"):
+        value = 1e-3 * number_of(head.removesuffix("mm"), where) / math.tau
     for mark, is_inverse in (("/", False), (":", True)):
-        above, found, below = text.partition(mark)
+        above, found, below = head.partition(mark)
         if found:
-            one, other = (entry_of(part, where)["value"] for part in (above, below))
+            one, other = (number_of(part, where) for part in (above, below))
             if not (one > 0.0 and other > 0.0):
                 break
-            return other / one if is_inverse else one / other
-    return entry_of(text, where)["value"]
+            value = other / one if is_inverse else one / other
+    if value is None:
+        return entry_of(text, where)
+    entry = entry_of(f"{value!r} {tail}", where)
+    if "sigma" in entry:
+        raise InputError(f"{where}: write the tolerance of a ratio in %, as 500:1±1%; not {quoted(text)!r}")
+    return entry
 
 
-def described(document: Mapping[str, Any], controller: str, drive: str, where: str) -> Actuator:
+def described(
+    document: Mapping[str, Any], controller: str, drive: str, where: str, sample_rate_Hz: float | None = None
+) -> Actuator:
     """The actuator of these tables, as `actuator_of` reads them, with a guess for what they leave out.
 
     A value without a tolerance gets the usual one of its parameter, where it has one and a fit can learn of it.
+    sample_rate_Hz: of its recordings, by which the model's step and the filter are chosen, as far as it is known.
     Raises InputError, which begins with `where`, for what no such actuator can have.
     """
     tables: dict[str, Any] = {name: dict(t) if isinstance(t, Mapping) else t for name, t in document.items()}
@@ -96,16 +119,19 @@ def described(document: Mapping[str, Any], controller: str, drive: str, where: s
     silent = unread(controller, drive)
     for path in given:
         entry = tables[path.partition(".")[0]][on_axes(path, axes).name]
-        if isinstance(entry, dict) and path not in silent and not {"sigma", "tolerance", "free"} & set(entry):
+        learned = path not in silent and not (controller == "unknown" and path in _SIMULATED_ALONE)
+        if isinstance(entry, dict) and learned and not {"sigma", "tolerance", "free"} & set(entry):
             entry |= _usual_tolerance(path, axes, entry["value"])
     for path in sorted(needed(controller, drive), key=lambda path: bool(facts_of(path, axes).follows)):
         if path not in given:
-            _put(tables, path, axes, _guess(tables, path, axes))
+            guess = _guess(tables, path, axes)
+            alone = controller == "unknown" and path in _SIMULATED_ALONE
+            _put(tables, path, axes, {"value": guess["value"]} if alone else guess)
+    actuator = actuator_of(tables, where)
+    said = tables.get("model", {})
     if controller == "unknown":
-        for entry in (tables["motor"].get(on_axes(path, axes).name) for path in _SIMULATED_ALONE):
-            if isinstance(entry, dict):
-                entry.pop("tolerance", None)
-    return actuator_of(tables, where)
+        return actuator if "filter_s" in said else replace(actuator, filter_s=usual_filter(sample_rate_Hz))
+    return actuator if "step_s" in said else replace(actuator, step_s=usual_step(actuator, sample_rate_Hz))
 
 
 def actuator_axes(tables: Mapping[str, Any]) -> Axes:

@@ -13,6 +13,7 @@ from ema_model.actuator.keys import ENTRY, HEAD, TABLES
 from ema_model.actuator.layout import KINDS, USUAL, WITHOUT_DRIVE, layout
 from ema_model.actuator.naming import on_axes
 from ema_model.actuator.parameters import SECTIONS, Rule, Tolerance, check_stops, check_value
+from ema_model.actuator.steps import LONGEST_S, SHORTEST_S, reader_step
 from ema_model.actuator.unread import unread
 from ema_model.errors import InputError, quoted
 from ema_model.faults import vector
@@ -95,7 +96,7 @@ def actuator_of(document: dict[str, Any], where: str) -> Actuator:
         effects=_effects(tables["effects"], axes, tolerances, where),
         faults=_faults(tables["faults"], where),
         axes=axes,
-        step_s=_seconds(tables["model"], "step_s", _usual_step(kinds), where),
+        step_s=_seconds(tables["model"], "step_s", reader_step(**kinds), where),
         torque_known=_flag(tables["model"], "torque_known", True, where),
         filter_s=_seconds(tables["model"], "filter_s", 12e-3, where),
         leaves_out_reversals=_flag(tables["model"], "leaves_out_reversals", False, where),
@@ -230,16 +231,10 @@ def _axes(table: dict[str, Any], where: str) -> Axes:
     return Axes(*(_choice(table, key, "rotary", AXIS_KINDS, "axes", where) for key in ("motor", "user")))
 
 
-def _usual_step(kinds: dict[str, str]) -> float:
-    """Chopping takes steps of 10 µs; of a drive that has its current at once, only the motion is simulated."""
-    simulated = kinds["inverter"] == "current" and kinds["controller"] != "unknown"
-    return 5e-5 if simulated else Actuator.step_s
-
-
 def _seconds(table: dict[str, Any], name: str, usual: float, where: str) -> float:
     _check_keys(table, "model", "[model]", where)
     value = as_number(table.get(name, usual))
-    if not 1e-7 <= value <= 1.0:
+    if not SHORTEST_S <= value <= LONGEST_S:
         raise InputError(f"{where}: [model] {name} must lie between 1e-7 and 1 s, not {quoted(table[name], 40)!r}")
     return value
 

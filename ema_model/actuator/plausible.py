@@ -9,6 +9,7 @@ from ema_model.actuator.describe import is_guess
 from ema_model.actuator.layout import WITHOUT_DRIVE, layout
 from ema_model.actuator.naming import on_axes
 from ema_model.actuator.parameters import SECTIONS, default_of, facts_of
+from ema_model.actuator.steps import loop_rate
 from ema_model.actuator.unread import unread
 from ema_model.quantities.numbers import number
 
@@ -124,7 +125,7 @@ def _too_fast(actuator: Actuator) -> Iterator[str]:
                 f"{_shown(actuator, 'controller.speed_limit_rad_s')} is above {number(reached)} {unit}, "
                 "where the motor's back-EMF takes the whole supply"
             )
-    rate = controller.speed_gain_Nms_rad / motor.inertia_kgm2
+    rate = loop_rate(actuator)
     if rate * actuator.step_s > 0.5:
         gain = _shown(actuator, "controller.speed_gain_Nms_rad")
         yield f"{gain} makes a speed loop of {number(rate)} 1/s, too fast for steps of {number(actuator.step_s)} s"

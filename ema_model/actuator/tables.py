@@ -7,11 +7,10 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from ema_model.actuator.actuator import Actuator
-from ema_model.actuator.keys import TABLES
 from ema_model.actuator.layout import KINDS, WITHOUT_DRIVE, layout
 from ema_model.actuator.naming import on_axes
 from ema_model.actuator.parameters import SECTIONS
-from ema_model.actuator.unread import unread
+from ema_model.actuator.unread import settings_read, unread
 from ema_model.files.toml_write import inline
 
 if TYPE_CHECKING:
@@ -26,7 +25,7 @@ def tables_of(actuator: Actuator) -> dict[str, Any]:
         "name": inline(actuator.name),
         "description": inline(actuator.description),
         "axes": {"motor": axes.motor, "user": axes.user},
-        "model": {name: getattr(actuator, name) for name in TABLES["model"]},
+        "model": {name: getattr(actuator, name) for name in settings_read(actuator.controller.kind)},
         **{section: _section(actuator, section) for section in SECTIONS},
         **_given("effects", _effects(actuator)),
         **_given("faults", {name: float(value) for name, value in actuator.faults.items()}),

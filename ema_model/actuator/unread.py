@@ -104,6 +104,13 @@ def unread(controller: str, inverter: str) -> dict[str, str]:
     }
 
 
+def settings_read(controller: str) -> tuple[str, ...]:
+    """The keys of [model] that a model of this kind of controller reads."""
+    return (
+        ("filter_s", "leaves_out_reversals", "torque_known") if controller == "unknown" else ("step_s", "torque_known")
+    )
+
+
 def check_value_is_read(controller: str, inverter: str, axes: Axes, path: str, value: float, where: str) -> None:
     """Raises InputError with the reason for a value, other than the neutral one, that no model would read."""
     section, _, name = path.partition(".")

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +14,7 @@ from ema_model.actuator import keys
 from ema_model.actuator.actuator import Actuator
 from ema_model.actuator.layout import layout
 from ema_model.actuator.naming import on_axes
-from ema_model.actuator.parameters import SECTIONS, default_of, facts_of
+from ema_model.actuator.parameters import SECTIONS, default_of, facts_of, numbers
 from ema_model.actuator.tables import as_spelt, tables_of
 from ema_model.errors import InputError, quoted
 from ema_model.files.limits import TEXT_BYTES
@@ -22,6 +24,8 @@ from ema_model.files.whole_file import change_file
 from ema_model.quantities.axes import Axes
 
 _COMMENTS_AT = 64  # characters from the left
+_HEAD = re.compile(r"\[\s*([\w.-]+)\s*\]\s*(?:#.*)?")
+_OFFER = re.compile(r"#\s*(\w+)\s*=\s*(-?\d+(?:\.\d*)?(?:e[-+]?\d+)?)\s*(?:#.*)?")  # an entry that is a comment
 
 
 def save_actuator(actuator: Actuator, path: str | os.PathLike[str], *, with_comments: bool = False) -> None:
@@ -50,7 +54,44 @@ def _over(text: str, actuator: Actuator) -> str:
         known = toml_of(text)
     except ValueError:  # what is to be replaced is none
         known, text = {}, actuator.text
-    return toml_text(as_spelt(tables_of(actuator), known), text)
+    tables = as_spelt(tables_of(actuator), known)
+    said = known.get("model")
+    for name in keys.TABLES["model"]:  # one that says nothing may stand
+        if isinstance(said, Mapping) and said.get(name) == getattr(actuator, name):
+            tables["model"][name] = said[name]
+    lines = _with_each_key_once(text.split("\n"), known, tables, actuator)
+    if actuator.note and (note := f"# {actuator.note}") not in lines:
+        lines = [note, *([] if lines[0].startswith("#") else [""]), *lines]
+    return toml_text(tables, "\n".join(lines))
+
+
+def _with_each_key_once(
+    lines: list[str], known: Mapping[str, Any], tables: dict[str, Any], actuator: Actuator
+) -> list[str]:
+    """Lines in which no parameter stands both as an entry and as the comment that offers it at its default.
+
+    A comment whose parameter now has another value or a tolerance becomes the entry; else the comment is enough, and
+    tables, what is to be written, lose the entry.
+    """
+    kept, section, inside = [], "", {}
+    for line in lines:
+        if head := _HEAD.fullmatch(line.rstrip()):
+            section = head[1]
+            names = numbers(section) if section in SECTIONS else ()
+            inside = {on_axes(path, actuator.axes).name: path for path in (f"{section}.{name}" for name in names)}
+        offer = _OFFER.fullmatch(line.rstrip())
+        path = inside.get(offer[1]) if offer else None
+        if offer is None or path is None or float(offer[2]) != default_of(path):
+            kept.append(line)
+        elif offer[1] in known.get(section, {}) or offer[1] not in tables[section]:
+            kept += [] if offer[1] in tables[section] else [line]
+        elif _is_idle(actuator, path):
+            del tables[section][offer[1]]
+            kept.append(line)
+        else:
+            kept.append(line.lstrip("# "))
+            del inside[offer[1]]
+    return kept
 
 
 def commented(actuator: Actuator) -> str:

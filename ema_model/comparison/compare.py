@@ -114,7 +114,7 @@ def _compare(
         _compared(i, recordings[i], cards[i], plant, floors, before, after, actuator) for i in range(len(recordings))
     ]
     errors = _together(compared)
-    fitted_to = calibration if calibrate else None
+    fitted_to = calibration.as_result if calibrate else None
     pooled = [judged(window.measured.keys() & one.keys()) for window, one in zip(plant.windows, after)]
     known_to = spread(floors, pooled)
     judgement = judge(residuals, errors, fitted_to, actuator, [one.name for one in recordings], known_to)

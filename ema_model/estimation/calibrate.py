@@ -39,6 +39,12 @@ class Calibrated:
     z: float  # σ from the file's value
     at_bound: bool
 
+    @property
+    def sigma(self) -> float:
+        """1 σ of the value, in its unit."""
+        low, high = self.interval90
+        return 0.5 * (high - low) / HALF_90
+
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
@@ -66,6 +72,15 @@ class Calibration:
         """Where a fitted window began: the motor's angle and its place in the play, rad at the motor; 0 if unknown."""
         turned, play = (self.starts.get(f"{kind} {window}") for kind in ("turned", "play"))
         return 0.0 if turned is None else turned.value, 0.0 if play is None else play.value
+
+    @property
+    def as_result(self) -> Calibration:
+        """The same as a fit's result: the tolerances of its actuator are the σ found, and so are those of its file.
+
+        A parameter at a bound keeps its tolerance: its interval says nothing of where it would have gone.
+        """
+        sigmas = {name: one.sigma for name, one in self.parameters.items() if not one.at_bound}
+        return replace(self, actuator=self.actuator.with_fitted_sigmas(sigmas))
 
     @property
     def weighted_jacobian(self) -> Array:

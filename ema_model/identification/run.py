@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Generator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Any
 
@@ -75,6 +75,13 @@ class Identification(InWords):
     searched_k: Array | None = None  # (8,), where the search alone ended
     parameters: dict[str, float] = field(default_factory=dict)  # of the actuator, where the fit moved them beside k
     corrected_rmse: float = float("nan")  # A, with the model's own bias taken out
+
+    @property
+    def found_actuator(self) -> Actuator:
+        """The actuator with k as its faults, and the parameters that moved beside k at their values and found σ."""
+        fitted = self.actuator.with_values(self.parameters)
+        sigmas = {path: self.uncertainty.sigmas[path] for path in self.parameters if path in self.uncertainty.sigmas}
+        return replace(fitted.with_fitted_sigmas(sigmas), faults=faults.named(self.k))
 
     @property
     def error_percent(self) -> float | None:

@@ -8,6 +8,7 @@ tell their own spread roughly: what rests on it is widened as Student's t is bey
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -35,6 +36,7 @@ _INSEPARABLE = 0.9
 _WIDE = 0.03  # σ of a k below which it counts as known
 _ANY = 0.4  # width of an interval from which on a k is hardly known
 _LEAST_SPREAD = 0.02  # of a fit that left the base parameters where they were
+_AT_BOUND = 1e-6  # of x from its bound
 _SLIGHT = 2e-5  # least σ: as well as the models' steps in time let any k be told
 
 
@@ -60,6 +62,7 @@ class Uncertainty:
     unbounded: Array = field(default_factory=lambda: np.zeros(FAULTS))
     common: Array = field(default_factory=lambda: np.zeros((FAULTS, 0)))
     own: Array = field(default_factory=lambda: np.zeros((FAULTS, FAULTS)))
+    sigmas: dict[str, float] = field(default_factory=dict)  # of the parameters beside k, by path; none at a bound
 
 
 def uncertainty(found: Fitted, k: Array) -> Uncertainty:
@@ -67,7 +70,8 @@ def uncertainty(found: Fitted, k: Array) -> Uncertainty:
 
     Where other basins fit within the floor as well, intervals reach over all of them, and an alarm is one of each.
     """
-    best, *others = [_basin(found, k), *(_basin(one, one.k) for one in found.rivals)]
+    basins = [_basin(found, k), *(_basin(one, one.k) for one in found.rivals)]
+    best, *others = basins
     interval = best.interval90
     for one in others:
         lower, upper = zip(interval.T, one.interval90.T)
@@ -91,6 +95,7 @@ def uncertainty(found: Fitted, k: Array) -> Uncertainty:
         unbounded=best.free,
         common=best.common,
         own=best.own,
+        sigmas=_sigmas([found, *found.rivals], basins),
     )
 
 
@@ -129,6 +134,25 @@ def _basin(found: Fitted, k: Array) -> _Basin:
         bool(healthy and fit.adequate),
         () if healthy or not fit.adequate else _alarms(free, covariance),
     )
+
+
+def _sigmas(fits: Sequence[Fitted], basins: Sequence[_Basin]) -> dict[str, float]:
+    """1 σ of each parameter that moved beside the faults, in its unit; its interval reaches over all basins.
+
+    A misfit widens it as it widens k.
+    """
+    problem, x = fits[0].problem, fits[0].x
+    inside = (x > problem.low + _AT_BOUND) & (x < problem.high - _AT_BOUND)
+    sigmas = {}
+    for i, one in enumerate(problem.unknowns):
+        if one.kind != "parameter" or not inside[i]:
+            continue
+        halves = []
+        for fit, basin in zip(fits, basins):
+            wider = 1.0 if basin.fit.adequate else max(1.0, basin.fit.ratio)
+            halves.append(abs(fit.x[i] - x[i]) + HALF_90 * wider * np.sqrt(basin.of_x[i, i]))
+        sigmas[one.name] = float(one.sigma * max(halves) / HALF_90)
+    return sigmas
 
 
 def _covariance(found: Fitted) -> Array:
@@ -201,7 +225,7 @@ def _unbounded(found: Fitted) -> Array:
     slopes, residual = found.slopes[rows][:, moves], found.residual[rows]
     hessian = slopes.T @ slopes + np.diag(prior[moves] ** 2)
     gradient = slopes.T @ residual + (prior**2 * x)[moves]
-    at_bound = (x <= problem.low + 1e-6) | (x >= problem.high - 1e-6)
+    at_bound = (x <= problem.low + _AT_BOUND) | (x >= problem.high - _AT_BOUND)
     step = np.zeros(problem.count)
     if (at_bound & moves)[:FAULTS].any():  # elsewhere the fit is there already
         step[moves] = -np.linalg.solve(hessian + 1e-9 * np.diag(np.diag(hessian)), gradient)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ema_model.actuator import Actuator
+from ema_model.actuator.steps import coarsest_step
 from ema_model.commands.recorded import between
 from ema_model.errors import InputError, quoted
 from ema_model.models.model import Window
@@ -24,9 +25,6 @@ _SLOPE_SAMPLES = 10  # on either side of a start in mid-run, over which the spee
 _COARSE_S = 0.01  # the same of the user's encoder, which is coarse beside a motor's
 CONTEXT = ("load_torque_Nm", "temperature_C")
 BLOCK_S = 0.5e-3  # means over it take the chopping ripple away, which no low-fidelity model follows (MODEL §2)
-# Where something sticks, it does so at a step: with coarser ones the error is too rough to go downhill on (fits of a
-# hobby servo, a sample every 2 ms, ended up to 300 apart in χ² with steps of 0.5 ms, within 40 with 0.1 ms).
-_COARSEST_STEP_S, _COARSEST_SHARE = 1e-4, 0.05  # or of a sample's period, whichever is longer
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -90,7 +88,7 @@ def cut(
         raise InputError(f"{quoted(measurement.name)}: nothing to compare; one of {wanted} is needed")
     period = measurement.sample_period_s
     samples = max(1, round(block_s / period))
-    steps = steps_per_sample(period, min(actuator.step_s, max(_COARSEST_STEP_S, _COARSEST_SHARE * period)))
+    steps = steps_per_sample(period, min(actuator.step_s, coarsest_step(period)))
     step_s = period / steps
     values = {path: value for rule in actuator.rules_for(measurement.name) for path, value in rule.values.items()}
     windows = []

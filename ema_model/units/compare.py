@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ema_model.actuator import Actuator, Tolerance
+from ema_model.actuator import Actuator
 from ema_model.actuator.naming import on_axes, path_inside
 from ema_model.actuator.parameters import low_limit
 from ema_model.errors import InputError, quoted
@@ -31,6 +31,7 @@ Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 
 _HELD = 7_000_000  # of seeds, from fitted to held-out recordings' twins
+_OF_TYPE = "The sigma of each fitted parameter is 1 σ by which a further unit of the type may be off its value."
 _BESIDE = 4  # units that do not differ, beside which those that do are held out
 
 
@@ -245,11 +246,10 @@ def _low(path: str, actuator: Actuator) -> float:
 def _type_actuator(actuator: Actuator, of_type: Mapping[str, OfType]) -> Actuator:
     """With the type's means as values, and as tolerances how far a further unit may be from them."""
     told = {path: one for path, one in of_type.items() if one.told}
-    tolerances = {
-        path: Tolerance(told[path].sigma, one.free) if path in told else one
-        for path, one in actuator.tolerances.items()
-    }
-    return replace(actuator.with_values({path: one.mean for path, one in told.items()}), tolerances=tolerances)
+    sigmas = {path: one.sigma for path, one in told.items() if one.mean > _low(path, actuator)}
+    tolerances = {path: replace(one, sigma=sigmas.get(path, one.sigma)) for path, one in actuator.tolerances.items()}
+    fitted = actuator.with_values({path: one.mean for path, one in told.items()})
+    return replace(fitted, tolerances=tolerances, note=_OF_TYPE if sigmas else actuator.note)
 
 
 def _needs(

@@ -41,6 +41,7 @@ class Description:
     controller: str = next(iter(DRIVES))
     drive: str = ""  # one of `drives`; another stands for the usual one
     answers: Mapping[str, str] = field(default_factory=dict)  # by path: '1e-4', '1e-4 ± 5%', '0 ± 0.02', ''
+    sample_rate_Hz: float | None = None  # of the recordings that it is for
 
     @property
     def drives(self) -> tuple[str, ...]:
@@ -70,10 +71,9 @@ class Description:
         for one in self.questions:
             text = self.answers.get(one.path, "").strip()
             if text:
-                is_ratio = one.path == _GEAR and any(mark in text for mark in ("/", ":", "mm"))
-                entry = {"value": gear_of(text, one.title)} if is_ratio else entry_of(text, one.title)
+                entry = (gear_of if one.path == _GEAR else entry_of)(text, one.title)
                 document.setdefault(one.path.partition(".")[0], {})[on_axes(one.path, self.axes).name] = entry
-        actuator = described(document, self.controller, self._drive, document["name"])
+        actuator = described(document, self.controller, self._drive, document["name"], self.sample_rate_Hz)
         path = folder.place(document["name"] + ACTUATOR_SUFFIX)
         save_actuator(actuator, path, with_comments=True)
         return UPLOADED + folder.name_of(path), [*missing(actuator), *implausible(actuator)]

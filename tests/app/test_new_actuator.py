@@ -48,6 +48,18 @@ def test_every_kind_is_asked_what_its_file_must_say(controller, drive, tmp_path)
     assert actuator.controller.kind == controller and actuator.name == "New actuator"
 
 
+def test_step_and_filter_fit_the_recordings_that_are_open(tmp_path):
+    folder = DataFolder(tmp_path / "data")
+    for name, controller in (("servo", "position"), ("rig", "unknown")):
+        asked = [f"--name={name}", f"--controller={controller}", "--sample-rate=50"]
+        assert main(["actuator", "new", str(tmp_path / f"{name}.toml"), *asked]) == 0
+        Description(name, controller=controller, sample_rate_Hz=50.0).save(folder)
+        made = (tmp_path / "data" / "actuators" / f"{name}.toml").read_text()
+        assert made == (tmp_path / f"{name}.toml").read_text()
+    assert load_actuator(tmp_path / "servo.toml").step_s == 5e-4
+    assert load_actuator(tmp_path / "rig.toml").filter_s == 0.06
+
+
 def test_a_screw_is_said_by_its_lead(tmp_path):
     one = Description(axes=Axes(user="linear"), answers={"transmission.gear_ratio": "10 mm"})
     assert next(one.questions).unit == "m/rad"

@@ -6,6 +6,7 @@ import builtins
 import io
 import json
 import sys
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,7 +15,7 @@ import pytest
 from worked_actuators import BALL_SCREW, WORKED
 
 from ema_model.actuator import load_actuator, save_actuator
-from ema_model.actuator.keys import ENTRY, HEAD, TABLES
+from ema_model.actuator.keys import ENTRY, HEAD, KINDS, TABLES
 from ema_model.actuator.layout import WITHOUT_DRIVE, layout
 from ema_model.actuator.naming import on_axes
 from ema_model.actuator.parameters import SECTIONS, Facts, facts_of, numbers
@@ -88,6 +89,111 @@ def test_kinds_alone_make_a_file_whose_guesses_are_told(controller, drive, tmp_p
     assert not found["implausible"]
     save_actuator(actuator.with_values({"motor.inertia_kgm2": 2e-4}), path)
     assert not any("inertia" in line for line in check(path, capsys=capsys)["missing"])
+
+
+AXES_GIVEN = [(), ("--user=linear", "--lead-mm=10"), ("--motor=linear", "--user=linear")]
+DRIVES_GIVEN = [(), *((f"--drive={one}",) for one in (*KINDS["inverter"], "unknown"))]
+
+
+@pytest.mark.parametrize("rate", [(), ("--sample-rate=50",), ("--sample-rate=2",), ("--sample-rate=20000",)], ids=str)
+@pytest.mark.parametrize("axes", AXES_GIVEN, ids=str)
+@pytest.mark.parametrize("controller", KINDS["controller"])
+def test_every_file_that_is_written_passes_its_own_check(controller, axes, rate, tmp_path, capsys):
+    """Of every pair of controller and drive, with all that may be said of it or nothing."""
+    for number, drive in enumerate(DRIVES_GIVEN):
+        path = tmp_path / f"{number}.toml"
+        if new(path, f"--controller={controller}", *drive, *axes, *rate) == 2:
+            assert "[inverter]" in capsys.readouterr().err and not path.exists()
+            continue
+        written = capsys.readouterr().out
+        if drive and drive[0] != "--drive=unknown" and f'kind = "{drive[0][8:]}"' not in path.read_text():
+            assert f"! {drive[0].replace('=', ' ')} is left out" in written
+        if f"controller {controller}," not in written:
+            assert f"! --controller {controller} is left out" in written
+        actuator = load_actuator(path)
+        check(path, capsys=capsys)
+        shown = actuator.axes
+        kinds = {"controller": actuator.controller.kind, "inverter": actuator.inverter.kind}
+        silent = unread(**kinds)
+        every = [f"{section}.{name}" for section in SECTIONS for one in layout(section, kinds) for name in one]
+        values = {
+            path: actuator.value(path) for path in every if path not in silent and abs(actuator.value(path)) < 1e8
+        }
+        said = [f"--set={on_axes(one, shown).path}={value!r}" for one, value in values.items()]
+        said = [one for one in said if not (axes and "gear_ratio" in one)]
+        again = tmp_path / f"{number}_said.toml"
+        assert new(again, f"--controller={controller}", *drive, *axes, *rate, *said) == 0, capsys.readouterr().err
+        assert replace(load_actuator(again), name=actuator.name, tolerances={}) == replace(actuator, tolerances={})
+        check(again, capsys=capsys)
+
+
+def settings_of(path) -> dict:
+    return tomllib.loads(path.read_text(encoding="utf-8"))["model"]
+
+
+@pytest.mark.parametrize(
+    ("options", "step_s"),
+    [
+        (["--controller=position", "--drive=voltage"], 5e-4),
+        (["--controller=position", "--drive=current"], 5e-4),
+        (["--controller=position", "--drive=voltage", "--sample-rate=50"], 5e-4),
+        (["--controller=position", "--drive=voltage", "--sample-rate=500"], 1e-4),
+        (["--controller=position", "--drive=voltage", "--set=controller.gain_1_rad=1e4"], 1e-5),
+        (["--controller=position", "--drive=voltage", "--set=motor.inertia_kgm2=1e-6"], 5e-5),
+        (["--controller=position", "--drive=voltage", "--set=model.step_s=2e-5"], 2e-5),
+        (["--controller=cascade", "--drive=current"], 5e-5),
+        (["--controller=cascade", "--drive=current", "--set=controller.speed_gain_Nms_rad=0.5"], 2e-5),
+        (["--controller=cascade", "--drive=hysteresis"], 1e-5),
+        (["--controller=open"], 5e-5),
+    ],
+)
+def test_the_step_fits_the_loop_and_the_sampling(options, step_s, tmp_path, capsys):
+    path = tmp_path / "mine.toml"
+    assert new(path, *options) == 0
+    assert settings_of(path) == {"step_s": step_s, "torque_known": True}
+    assert load_actuator(path).step_s == step_s
+
+
+@pytest.mark.parametrize(("rate", "filter_s"), [(None, 0.012), (1000, 0.012), (50, 0.06), (30, 0.1), (1, 1.0)])
+def test_the_filter_fits_the_sampling(rate, filter_s, tmp_path, capsys):
+    path = tmp_path / "mine.toml"
+    assert new(path, "--controller=unknown", *([f"--sample-rate={rate}"] if rate else [])) == 0
+    assert settings_of(path) == {"filter_s": filter_s, "leaves_out_reversals": False, "torque_known": True}
+
+
+def test_a_servo_moves_at_its_step_as_at_one_ten_times_smaller(tmp_path, capsys):
+    """A hobby servo with friction, read by an encoder of 4096 steps a turn: apart by less than one of them."""
+    values = {"torque_constant_Nm_A": 1, "inertia_kgm2": 5e-3, "viscous_friction_Nms_rad": 0.05}
+    values |= {"static_friction_Nm": 0.06, "dynamic_friction_Nm": 0.05}
+    said = [f"--set=motor.{name}={value}" for name, value in values.items()]
+    path = tmp_path / "servo.toml"
+    more = ["--set=controller.gain_1_rad=5", "--set=inverter.bus_voltage_V=6", "--sample-rate=50"]
+    assert new(path, "--controller=position", "--drive=voltage", *said, *more) == 0
+    servo = load_actuator(path)
+    run = Run(command("chirp", {"amplitude_rad": 1.0, "final_Hz": 4.0}), 3.0, 100.0)
+    coarse, fine = (simulate_monitor(run, one) for one in (servo, replace(servo, step_s=0.1 * servo.step_s)))
+    apart = np.abs(coarse["user_position_rad"] - fine["user_position_rad"])
+    assert servo.step_s == 5e-4 and np.ptp(fine["user_position_rad"]) > 1.0
+    assert np.sqrt(np.mean(apart**2)) < 2 * np.pi / 4096
+
+
+def test_nothing_that_is_given_is_left_out_silently(tmp_path, capsys):
+    path = tmp_path / "mine.toml"
+    held = "--set=motor.static_friction_Nm=0.09"
+    for text, sigma in (("±20%", 0.018), ("±0.02", 0.02), ("", None)):
+        assert new(path, "--force", "--controller=unknown", held + text) == 0
+        tolerance = load_actuator(path).tolerances.get("motor.static_friction_Nm")
+        assert (tolerance and tolerance.sigma) == (sigma and pytest.approx(sigma))
+    capsys.readouterr()
+    out = tmp_path / "new.json"
+    assert new(path, "--force", "--controller=unknown", "--drive=voltage", "--json", str(out)) == 0
+    line = "--drive voltage is left out: inverse dynamics has none"
+    assert f"! {line}" in capsys.readouterr().out and json.loads(out.read_text())["notes"] == [line]
+    assert new(path, "--force", "--controller=position") == 0
+    assert "--drive is not given: voltage, " in capsys.readouterr().out
+    assert load_actuator(path).inverter.kind == "voltage"
+    assert new(path, "--force", "--controller=position", "--gear=500:1 ± 1%") == 0
+    assert load_actuator(path).tolerances["transmission.gear_ratio"].sigma == pytest.approx(2e-5)
 
 
 def test_questions_on_a_terminal_make_the_same_file(tmp_path, capsys, monkeypatch):
@@ -189,6 +295,17 @@ def test_what_a_recording_cannot_tell_is_told(tmp_path, capsys):
         (["--controller=unknown", "--gear=0/1"], "--gear"),
         (["--controller=unknown", "--gear=1", "--lead-mm=10"], "give one of them"),
         (["--controller=unknown", "--set=model.step=1"], "[model] has no 'step'"),
+        (["--controller=position", "--set=model.step_s=1e-4±5%"], "--set model.step_s: write a number without"),
+        (["--controller=unknown", "--set=faults.k1=0.3±0.1"], "--set faults.k1: write a number without a tolerance"),
+        (["--controller=unknown", "--where=*a*:motor.inertia_kgm2=1±5%"], "write a number without a tolerance"),
+        (["--controller=unknown", "--gear=500:1±0.1"], "write the tolerance of a ratio in %"),
+        (["--controller=unknown", "--gear=2", "--set=transmission.gear_ratio=3"], "gear_ratio is given twice"),
+        (["--controller=unknown", *["--set=motor.inertia_kgm2=3"] * 2], "motor.inertia_kgm2 is given twice"),
+        (["--controller=unknown", *["--effect=cogging_torque:order=3"] * 2], "effects.cogging_torque is given twice"),
+        (
+            ["--controller=unknown", "--effect=cogging_torque:order=3", "--set=effects.cogging_torque.order=4"],
+            "no effect 'cogging_torque.order'",
+        ),
     ],
 )
 def test_a_mistake_is_one_line(options, says, tmp_path, capsys):

@@ -113,7 +113,11 @@ def test_held_out_recordings_judge_the_calibrated_model_which_is_saved(rig, tmp_
     line = "own was not fitted; the calibrated model is off by: equivalent current "
     assert line in capsys.readouterr().out and line in report.read_text(encoding="utf-8")
     inertia = result["calibration"]["parameters"]["motor.inertia_kgm2"]
-    assert load_actuator(model).value("motor.inertia_kgm2") == inertia["value"] != inertia["initial"]
+    saved, (low, high) = load_actuator(model), inertia["interval90"]
+    assert saved.value("motor.inertia_kgm2") == inertia["value"] != inertia["initial"]
+    assert saved.tolerances["motor.inertia_kgm2"].sigma == pytest.approx((high - low) / 2 / 1.645, rel=1e-4)
+    unfitted = {path: one for path, one in load_actuator().tolerances.items() if path != "motor.inertia_kgm2"}
+    assert {path: saved.tolerances[path] for path in unfitted} == unfitted
 
 
 MEANT = "; did you mean {!r}?".format

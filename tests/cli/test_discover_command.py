@@ -33,7 +33,11 @@ def test_effect_is_found_and_the_model_saved(rig, tmp_path, capsys):
     assert result["schema"] == 1 and result["verdict"] == "effects_found"
     assert [one["name"] for one in result["effects"]] == ["cogging_torque"]
     assert result["ladder"][-1]["holdout_rmse"] < result["ladder"][0]["holdout_rmse"]
-    assert load_actuator(better).effects["cogging_torque"]["order"] == 12.0
+    model = load_actuator(better)
+    low, high = result["effects"][0]["parameters"]["amplitude_Nm"]["interval90"]
+    assert model.effects["cogging_torque"]["order"] == 12.0
+    sigma = model.tolerances["effects.cogging_torque.amplitude_Nm"].sigma
+    assert sigma == pytest.approx((high - low) / 2 / 1.645, rel=1e-3)
     saved, last = result["saved_actuator"], result["ladder"][-1]
     assert saved["file"] == str(better) and saved["verified_rmse"] == pytest.approx(last["rmse"], rel=0.01)
     assert saved["verified_holdout_rmse"] == pytest.approx(last["holdout_rmse"], rel=0.01)

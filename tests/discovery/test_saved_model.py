@@ -13,6 +13,7 @@ from ema_model.actuator import load_actuator, save_actuator
 from ema_model.commands import command
 from ema_model.comparison import compare
 from ema_model.discovery import as_dict, discover, verified
+from ema_model.discovery.model_fit import with_effect
 from ema_model.discovery.words import verification
 from ema_model.faults import vector
 from ema_model.simulation.run import Run, simulate_reference
@@ -67,6 +68,51 @@ def test_the_saved_model_reaches_the_last_rung_of_the_ladder(saved):
             assert error.rmse == pytest.approx(last.signals[name], rel=0.02)
     unseen = compare(recordings()[2:], again, calibrate=False)
     assert unseen.signals["current_A"].rmse == pytest.approx(last.holdout_signals["current_A"], rel=0.02)
+
+
+def test_the_saved_tolerances_are_what_was_found(saved):
+    """The fault has none: a k may be anywhere in 0 … 1 at the next fit, too."""
+    found, again = improved(), load_actuator(saved)
+    parameters = found.calibration.parameters
+    amplitude = parameters["effects.cogging_torque.amplitude_Nm"]
+    low, high = amplitude.interval90
+    assert amplitude.sigma == pytest.approx((high - low) / 2 / 1.645) and amplitude.sigma < 0.1 * amplitude.value
+    assert again.faults == {"k1": found.faults["k1"].value}
+    told = 0
+    for path, one in again.tolerances.items():
+        before = ACTUATOR.tolerances.get(path)
+        if path not in parameters or (before and parameters[path].sigma >= 0.9 * before.sigma):
+            assert one.sigma == pytest.approx(before.sigma)
+        else:
+            told += 1
+            assert one.sigma == pytest.approx(parameters[path].sigma)
+    assert told >= 5 and "effects.cogging_torque.phase_rad" in again.tolerances
+
+
+def test_a_fit_with_the_saved_tolerances_counts_what_was_known(tmp_path):
+    """Twice the same information: each σ falls by √2; of a recording that tells nothing more, none would."""
+    guessed = with_effect(replace(ACTUATOR, faults=FAULT), "cogging_torque", {"amplitude_Nm": 0.018, "order": 12.0})
+    free = ["effects.cogging_torque.amplitude_Nm", "motor.inertia_kgm2", "transmission.backlash_rad"]
+    first = compare(recordings()[:1], guessed, free=free).calibration
+    save_actuator(first.actuator, tmp_path / "first.toml")
+    again = load_actuator(tmp_path / "first.toml")
+    second = compare(recordings()[:1], again, free=free).calibration
+    for path in free:
+        known, sigma = first.parameters[path], again.tolerances[path].sigma
+        assert sigma == pytest.approx(known.sigma) and sigma < 0.5 * guessed.tolerances[path].sigma
+        assert second.parameters[path].sigma == pytest.approx(sigma / 2**0.5, rel=0.1)
+        assert abs(second.parameters[path].value - known.value) < 0.5 * sigma
+
+
+@pytest.mark.long
+def test_an_effect_that_the_file_knows_closely_is_found_at_another_strength(saved):
+    stronger = {"cogging_torque": {"amplitude_Nm": 0.035, "order": 12.0}}
+    given = [recorded(CHIRP, stronger, 10), recorded(SINE, stronger, 9)]
+    found = discover(given, load_actuator(saved), candidates=("cogging_torque",), most_effects=1)
+    assert found.verdict == "effects_found" and found.calibration.converged and not found.faults
+    amplitude = found.effects[0].parameters["amplitude_Nm"]
+    assert amplitude.value == pytest.approx(0.035, abs=3.0 * amplitude.sigma)
+    assert found.actuator.tolerances["effects.cogging_torque.amplitude_Nm"].sigma == amplitude.sigma
 
 
 @pytest.mark.long

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import norm
@@ -96,6 +98,14 @@ def test_healthy_is_healthy_and_tolerances_widen():
     for answer in (known, open_):
         assert answer.uncertainty.healthy and answer.uncertainty.alarms == () and answer.uncertainty.adequate
     assert np.ptp(open_.uncertainty.interval90[0]) > 3.0 * np.ptp(known.uncertainty.interval90[0])
+    assert not known.uncertainty.sigmas and set(open_.uncertainty.sigmas) == set(open_.parameters)
+    unmoved = {path for path, value in open_.parameters.items() if value == ACTUATOR.value(path)}
+    assert all(open_.found_actuator.tolerances[path] == ACTUATOR.tolerances[path] for path in unmoved)
+    path = "motor.inertia_kgm2"
+    moved = replace(open_, parameters={path: 1.31e-5}, uncertainty=replace(open_.uncertainty, sigmas={path: 1e-7}))
+    found = moved.found_actuator
+    assert found.value(path) == 1.31e-5 and np.array_equal(found.k, open_.k)
+    assert found.tolerances == {**ACTUATOR.tolerances, path: replace(ACTUATOR.tolerances[path], sigma=1e-7)}
 
 
 def test_polish_repairs_a_short_search():
@@ -120,6 +130,22 @@ def test_hidden_effect_raises_no_alarm_and_is_identified_once_added():
     answer = identify(Objective([recording], guessed), seed=1, truth=truth)
     assert answer.uncertainty.adequate and "k2" in answer.uncertainty.alarms
     assert answer.error_percent is not None and answer.error_percent <= 2.0
+
+
+@pytest.mark.long
+def test_the_found_actuator_has_the_sigma_of_what_the_fit_moved():
+    hidden = {"cogging_torque": {"amplitude_Nm": 0.012, "order": 12.0, "phase_rad": 0.0}}
+    truth = faults.vector({"k2": 0.2})
+    recording = Sensors(0.1, 12).record(simulate_reference(Run(), ACTUATOR, truth, hidden), 4)
+    guessed = with_effect(ACTUATOR, "cogging_torque", {"amplitude_Nm": 0.01, "order": 12.0})
+    answer = identify(Objective([recording], guessed), seed=1, population=6, iterations=4)
+    found, path = answer.found_actuator, "effects.cogging_torque.amplitude_Nm"
+    sigma = answer.uncertainty.sigmas[path]
+    assert found.value(path) == answer.parameters[path] and abs(found.value(path) - 0.012) < 3.0 * sigma
+    assert found.tolerances[path].sigma == sigma < 0.2 * guessed.tolerances[path].sigma
+    assert np.array_equal(found.k, answer.k) and set(found.tolerances) == set(guessed.tolerances)
+    unmoved = {name for name, value in answer.parameters.items() if value == guessed.value(name)}
+    assert all(found.tolerances[name] == guessed.tolerances[name] for name in unmoved)
 
 
 @pytest.mark.long

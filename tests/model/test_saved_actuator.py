@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -137,3 +138,62 @@ def test_mistakes_are_one_clear_line(tmp_path, change, says):
     with pytest.raises(InputError) as error:
         load_actuator(path)
     assert says in str(error.value) and "\n" not in str(error.value)
+
+
+def noted(text: str) -> list[str]:
+    return [line for line in text.splitlines() if "1 σ of what the fit found" in line]
+
+
+def test_found_sigmas_are_saved_and_the_others_stay(tmp_path):
+    """Of base parameters, effects of the catalogue, expressions and curves alike; a file says each key once."""
+    curve = torque_curve(np.array([0.1, -0.2, 0.05, 0.1]), 0.0, 1.0, "omega", "1")
+    torques = [user_torque("c*sin(3*theta)"), user_torque("d*omega")]
+    (tmp_path / "screw.toml").write_text(LINEAR, encoding="utf-8")
+    given = load_actuator(tmp_path / "screw.toml")
+    own = {one.name: {p.name: p.default for p in one.parameters} for one in (curve, *torques)}
+    free = {f"effects.{name}.{parameter}": Tolerance(0.5, True) for name, its in own.items() for parameter in its}
+    given = replace(given, effects={**given.effects, **own}, tolerances={**given.tolerances, **free})
+    sigmas = {path: 0.1 * one.sigma * (1.0 + 0.01 * i) for i, (path, one) in enumerate(given.tolerances.items())}
+    found = given.with_fitted_sigmas(sigmas | {"k1": 0.1})
+    assert {path: one.sigma for path, one in found.tolerances.items()} == sigmas
+    save_actuator(found, tmp_path / "found.toml")
+    again = load_actuator(tmp_path / "found.toml")
+    assert again == found and again.tolerances["transmission.backlash_rad"].free is False
+    text = (tmp_path / "found.toml").read_text(encoding="utf-8")
+    assert len(noted(text)) == 1 and "1.645" in noted(text)[0]
+    save_actuator(again.with_fitted_sigmas({"motor.inertia_kgm2": 1e-7}), tmp_path / "found.toml")
+    text = (tmp_path / "found.toml").read_text(encoding="utf-8")
+    assert (
+        len(noted(text)) == 1 and load_actuator(tmp_path / "found.toml").tolerances["motor.inertia_kgm2"].sigma == 1e-7
+    )
+    heads = ("name", "inertia_kgm2", "backlash_m", "stiffness_N_m", "offset_N")
+    assert [sum(line.startswith(f"{key} =") for line in text.splitlines()) for key in heads] == [1] * 5
+
+
+@pytest.mark.parametrize("sigma", [0.0, -1e-6, float("nan"), float("inf"), 0.95e-5, 1e-4])
+def test_what_is_no_sigma_and_what_a_fit_learned_nothing_of_keeps_the_files_tolerance(sigma, tmp_path):
+    (tmp_path / "screw.toml").write_text(LINEAR, encoding="utf-8")
+    given = load_actuator(tmp_path / "screw.toml")
+    found = given.with_fitted_sigmas({"motor.inertia_kgm2": sigma})
+    assert found == given
+    save_actuator(found, tmp_path / "found.toml")
+    text = (tmp_path / "found.toml").read_text(encoding="utf-8")
+    assert "inertia_kgm2 = { value = 1e-4, tolerance = 0.1 }" in text and not noted(text)
+
+
+def test_a_key_that_a_comment_offers_stands_once(tmp_path):
+    """As in the files that are made with comments, in which what stands at its default is a comment."""
+    path = tmp_path / "servo.toml"
+    actuator = replace(load_actuator(SHIPPED[-1]), text="")
+    save_actuator(replace(actuator, tolerances={}), path, with_comments=True)
+    offers = [line for line in path.read_text(encoding="utf-8").splitlines() if re.match(r"# \w+ = ", line)]
+    assert any(line.startswith("# gear_ratio = 1.0 ") for line in offers) and len(offers) > 5
+    given = load_actuator(path).with_values({"transmission.gear_ratio": 0.1507})
+    found = replace(given, tolerances={"sensors.current_bias_A": Tolerance(0.5, True)})
+    for _ in range(2):
+        save_actuator(found, path)
+        text = path.read_text(encoding="utf-8")
+        sections = [re.findall(r"^(?:# )?(\w+) = ", part, re.M) for part in text.split("\n[")]
+        assert all(len(its) == len(set(its)) for its in sections), sections
+        assert "how far the user moves" in next(line for line in text.splitlines() if line.startswith("gear_ratio"))
+        assert load_actuator(path) == found

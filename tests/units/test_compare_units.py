@@ -76,7 +76,9 @@ def test_the_type_is_an_actuator_file(differing, tmp_path):
     save_actuator(differing.type_actuator, tmp_path / "type.toml")
     again = load_actuator(tmp_path / "type.toml")
     assert again.value(BACKLASH) == pytest.approx(differing.of_type[BACKLASH].mean)
+    assert again.tolerances[BACKLASH].sigma == pytest.approx(differing.of_type[BACKLASH].sigma)
     assert again.tolerances[BACKLASH].sigma < 0.5 * ACTUATOR.tolerances[BACKLASH].sigma
+    assert "# The sigma of each fitted parameter is 1 σ by which a further unit" in again.text
     nothing = [path for path, one in differing.of_type.items() if not one.told]
     assert all(again.tolerances[path].sigma == ACTUATOR.tolerances[path].sigma for path in nothing)
 

@@ -40,7 +40,7 @@ def with_intervals(data: Data, found: Fit) -> Calibration:
     wider = np.sqrt(np.maximum(1.0 + (most**2 - 1.0) * by_file / variance, _by_pieces(data, found) / variance))
     told = calibrated(problem, calibration.x, covariance * np.outer(wider, wider), most)
     parameters = {n: replace(one, interval90=told[n].interval90) for n, one in calibration.parameters.items()}
-    return replace(calibration, parameters=parameters)
+    return replace(calibration, parameters=parameters).as_result
 
 
 def covariance_of(jacobian: Array) -> Array:

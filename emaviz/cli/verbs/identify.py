@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from ema_model import faults
 from ema_model.actuator import Actuator, save_actuator
 from ema_model.actuator.naming import on_axes
 from ema_model.actuator.readings import readings
@@ -91,8 +89,7 @@ def run(arguments: argparse.Namespace) -> int:
         recorder.finish(answer)
     holdout_rmse = None if held is None else _finite(held(answer.k)[0])
     if arguments.save_actuator:
-        found = replace(actuator.with_values(answer.parameters), faults=faults.named(answer.k))
-        save_actuator(found, arguments.save_actuator)
+        save_actuator(answer.found_actuator, arguments.save_actuator)
     document = result(answer, actuator, holdout_rmse)
     output.write_json(arguments, document)
     print(answer)

@@ -14,7 +14,7 @@ from ema_model.quantities.axes import Axes
 from ema_model.text import COLOURS
 from emaviz.page.page import Page
 from emaviz.page.style import LONG_LABELS
-from emaviz.session.data_folder import DataFolder
+from emaviz.session.compare.comparing import Comparing
 from emaviz.session.new_actuator import Description, Question
 from emaviz.text.html import Html, HtmlPiece, add_html, html, joined
 
@@ -25,8 +25,8 @@ _BELOW = Html('style="padding:0 10px 8px;margin-top:-6px;font-size:12px;line-hei
 class NewActuator:
     """A folder of the Compare tab.  take(name) chooses the actuator that was made; it runs on the screen's thread."""
 
-    def __init__(self, page: Page, folder: DataFolder, take: Callable[[str], None]) -> None:
-        self._page, self._folder, self._take = page, folder, take
+    def __init__(self, page: Page, comparing: Comparing, take: Callable[[str], None]) -> None:
+        self._page, self._comparing, self._take = page, comparing, take
         self._fields: dict[str, Any] = {}  # by the parameter's path
         self._about: list[HtmlPiece] = []
         gui = page.server.gui
@@ -54,6 +54,7 @@ class NewActuator:
             str(self._controller.value),
             str(self._drive.value),
             {path: str(field.value) for path, field in self._fields.items()},
+            self._comparing.sample_rate_Hz,
         )
 
     def _ask(self) -> None:
@@ -82,7 +83,7 @@ class NewActuator:
         self._page.checked(self._save, self._button)
 
     def _save(self) -> None:
-        name, doubts = self._description().save(self._folder)
+        name, doubts = self._description().save(self._comparing.folder)
         self._take(name)
         lines = joined(html('<div style="color:{}">▲ {}</div>', COLOURS["warning"], line) for line in doubts)
         self._told.content = html("<div {}><b>{}</b> is made, and chosen above.{}</div>", _BOX, name, lines)
@@ -90,7 +91,8 @@ class NewActuator:
 
 _HOW = html(
     "A number, or one with its tolerance, 1 σ: <code>1e-4 ± 5%</code>, <code>0 ± 0.02</code>; <code>3.5 fixed</code> "
-    "is not calibrated. What is left empty is guessed."
+    "is not calibrated. What is left empty is guessed. The model's step and the filter of a measured motion fit the "
+    "loop, and the sampling of the measurements that are open."
 )
 
 

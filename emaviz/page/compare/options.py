@@ -31,7 +31,7 @@ class AskedControls:
                 "Actuator", comparing.actuators(), initial_value=comparing.session.actuator.name
             )
             uploads.add_button("Upload an actuator file", ACTUATOR_SUFFIX, icon=viser.Icon.UPLOAD, color="gray")
-            NewActuator(page, comparing.folder, self.choose)
+            NewActuator(page, comparing, self.choose)
             self._calibrate = gui.add_checkbox("Calibrate it first", comparing.calibrate)
             self._free_folder = gui.add_folder("What the calibration may move", expand_by_default=False)
         self._free: list[Any] = []

@@ -66,6 +66,13 @@ class Comparing:
         """Whether a comparison goes on."""
         return self.job.running
 
+    @property
+    def sample_rate_Hz(self) -> float | None:
+        """Of the slowest recording that is open; None without one."""
+        found = [one.measurement.sample_period_s for one in self.opened.values() if one.measurement is not None]
+        periods = [period for period in found if period > 0.0]  # a static map has none
+        return 1.0 / max(periods) if periods else None
+
     # --- files ------------------------------------------------------------------------------------------------------
 
     def add(self, name: str) -> None:

@@ -8,6 +8,7 @@ from ema_model.actuator import Actuator, load_actuator
 from ema_model.actuator.layout import WITHOUT_DRIVE
 from ema_model.actuator.naming import on_axes
 from ema_model.actuator.plausible import implausible, missing
+from ema_model.actuator.steps import usual_filter
 from ema_model.comparison import compare
 from ema_model.estimation.identifiable import told
 from ema_model.quantities.titles import in_sentence
@@ -55,6 +56,12 @@ def _beside(actuator: Actuator, arguments: argparse.Namespace) -> dict[str, list
     calibration = result.calibration
     if calibration is None:
         return {}
+    filter_s = usual_filter(1.0 / recording.sample_period_s) if recording.sample_period_s > 0.0 else 0.0
+    if actuator.controller.kind == "unknown" and actuator.filter_s < 0.99 * filter_s:
+        strange.append(
+            f"model.filter_s = {actuator.filter_s:g} s is shorter than three samples of {recording.name} "
+            f"({recording.sample_period_s:g} s apart); write {filter_s:g}"
+        )
     if not calibration.converged:
         strange.append("the calibration did not converge: the parameters begin too far off, or are too many")
     for path in calibration.outside_tolerance:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ema_model.actuator import save_actuator
-from ema_model.actuator.describe import described, entry_of, gear_of
+from ema_model.actuator.describe import DRIVES, described, entry_of, gear_of, number_of
 from ema_model.actuator.keys import KINDS
 from ema_model.actuator.plausible import implausible, missing
 from ema_model.effects.user.entries import kind_of
@@ -17,7 +17,7 @@ from ema_model.errors import InputError, quoted
 from ema_model.quantities.axes import KINDS as AXES
 from emaviz.cli import files, given, options, output
 from emaviz.cli.numbers import FINITE
-from emaviz.cli.verbs.actuator.questions import ask
+from emaviz.cli.verbs.actuator.questions import SAMPLE_RATE, ask
 
 HELP = "write an actuator file with comments, from options or from answers on the terminal"
 PLACE = 1
@@ -46,6 +46,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         dest="settings",
         help="a parameter, with its tolerance where it is known: motor.inertia_kgm2=1e-4±5%%; repeat for more",
     )
+    parser.add_argument(
+        "--sample-rate",
+        type=SAMPLE_RATE,
+        metavar="Hz",
+        help="of the recordings that it is for: the model's step, and the filter of a measured motion, fit it",
+    )
     options.add_effects(parser)
     options.add_mapping(parser)
     parser.add_argument(
@@ -64,27 +70,38 @@ def run(arguments: argparse.Namespace) -> int:
     document = _document(arguments)
     if arguments.controller is None and sys.stdin.isatty():
         ask(document, arguments)
-    controller, drive = _kinds(arguments)
-    actuator = described(document, controller, drive, _HERE)
+    controller, drive, notes = _kinds(arguments)
+    actuator = described(document, controller, drive, _HERE, arguments.sample_rate)
     save_actuator(actuator, arguments.file, with_comments=True)
-    found = {"missing": list(missing(actuator)), "implausible": list(implausible(actuator))}
+    found = {"notes": notes, "missing": list(missing(actuator)), "implausible": list(implausible(actuator))}
     print(f"{arguments.file}: {actuator.name}, controller {controller}, {len(actuator.tolerances)} parameters to fit")
-    for line in (*found["missing"], *found["implausible"]):
+    for line in (line for lines in found.values() for line in lines):
         print(f"! {line}")
     output.write_json(arguments, {"file": arguments.file, "name": actuator.name, **found})
     return 0
 
 
-def _kinds(arguments: argparse.Namespace) -> tuple[str, str]:
-    """The kinds of controller and drive: what is not known of a loop is left to inverse dynamics."""
-    if arguments.controller is None:
+def _kinds(arguments: argparse.Namespace) -> tuple[str, str, list[str]]:
+    """The kinds of controller and drive, and a line for each that the options say otherwise or not at all.
+
+    What is not known of a loop is left to inverse dynamics.
+    """
+    controller, drive = arguments.controller, arguments.drive
+    if controller is None:
         raise InputError(f"{_HERE}: say --controller {', '.join(KINDS['controller'])}; unknown is always an answer")
-    drive = arguments.drive or "unknown"
-    if arguments.controller == "cascade":
-        return "cascade", "current" if drive == "unknown" else drive
-    if arguments.controller == "position" and drive != "unknown":
-        return "position", drive
-    return "open" if arguments.controller == "open" else "unknown", "current"
+    drives = DRIVES[controller]
+    if not drives:
+        reason = "the recorded current or torque is put in" if controller == "open" else "inverse dynamics has none"
+        left_out = drive not in (None, "unknown")
+        return controller, "current", [f"--drive {drive} is left out: {reason}"] if left_out else []
+    if drive is None:
+        return controller, drives[0], [f"--drive is not given: {drives[0]}, {KINDS['inverter'][drives[0]]}, is taken"]
+    if drive == "unknown" and controller == "cascade":
+        return controller, "current", [f"--drive is unknown: current, {KINDS['inverter']['current']}, is taken"]
+    if drive == "unknown":
+        line = f"--controller {controller} is left out: nothing tells what its output does where the drive is unknown"
+        return "unknown", "current", [line]
+    return controller, drive, []
 
 
 def _document(arguments: argparse.Namespace) -> dict[str, Any]:
@@ -97,12 +114,11 @@ def _document(arguments: argparse.Namespace) -> dict[str, Any]:
         section, dot, name = path.strip().partition(".")
         if not (separator and dot and name):
             raise InputError(f"--set {quoted(text)}: write it as section.name=value, e.g. motor.inertia_kgm2=1e-4±5%")
-        document.setdefault(section, {})[name] = _setting(section, value, f"--set {quoted(path)}")
+        _put(document, section, name, _setting(section, value, f"--set {quoted(path)}"), f"--set {quoted(path)}")
     if (gear := _gear(arguments)) is not None:
-        document.setdefault("transmission", {})["gear_ratio"] = {"value": gear}
-    effects = dict(_effect(text) for text in arguments.effect)
-    if effects:
-        document["effects"] = effects
+        _put(document, "transmission", "gear_ratio", gear, "--gear" if arguments.gear else "--lead-mm")
+    for name, table in map(_effect, arguments.effect):
+        _put(document, "effects", name, table, f"--effect {quoted(name)}")
     recordings: dict[str, Any] = {"mapping": list(arguments.mapping)} if arguments.mapping else {}
     if arguments.where:
         recordings["where"] = [_rule(text) for text in arguments.where]
@@ -111,21 +127,28 @@ def _document(arguments: argparse.Namespace) -> dict[str, Any]:
     return document
 
 
+def _put(document: dict[str, Any], section: str, name: str, entry: Any, where: str) -> None:
+    table = document.setdefault(section, {})
+    if not isinstance(table, dict):
+        raise InputError(f"{where}: {quoted(section)} is no section of an actuator file")
+    if name in table:
+        raise InputError(f"{where}: {quoted(section)}.{quoted(name)} is given twice; leave one of them out")
+    table[name] = entry
+
+
 def _setting(section: str, text: str, where: str) -> Any:
-    if section == "model":
-        known = {"true": True, "false": False}
-        return known[text] if text in known else entry_of(text, where)["value"]
-    return entry_of(text, where)["value"] if section == "faults" else entry_of(text, where)
+    known = {"true": True, "false": False}
+    if section == "model" and text in known:
+        return known[text]
+    return number_of(text, where) if section in ("model", "faults") else entry_of(text, where)
 
 
-def _gear(arguments: argparse.Namespace) -> float | None:
+def _gear(arguments: argparse.Namespace) -> dict[str, Any] | None:
     if arguments.lead_mm is not None:
         if arguments.gear is not None:
             raise InputError("--gear and --lead-mm say the same; give one of them")
-        return 1e-3 * arguments.lead_mm / (2.0 * math.pi)
-    if arguments.gear is None:
-        return None
-    return gear_of(arguments.gear, "--gear")
+        return {"value": 1e-3 * arguments.lead_mm / math.tau}
+    return None if arguments.gear is None else gear_of(arguments.gear, "--gear")
 
 
 def _effect(text: str) -> tuple[str, dict[str, Any]]:
@@ -137,13 +160,14 @@ def _effect(text: str) -> tuple[str, dict[str, Any]]:
         where = f"--effect {quoted(name)}: {quoted(key)}"
         if not separator:
             raise InputError(f"{where}: write it as name=value")
+        if key in table:
+            raise InputError(f"{where}: is given twice; leave one of them out")
         if kind_of(name) and key in _TEXTS:
             table[key] = value
         elif kind_of(name) and key == "values":
             table[key] = [entry_of(one, where) for one in given.split_at_commas(value.strip("[]"))]
         else:
-            entry = entry_of(value, where)
-            table[key] = entry["value"] if kind_of(name) == "torque_curve" else entry
+            table[key] = (number_of if kind_of(name) == "torque_curve" else entry_of)(value, where)
     return name, table
 
 
@@ -156,5 +180,5 @@ def _rule(text: str) -> dict[str, Any]:
     values = {}
     for part in given.split_at_commas(rest):
         path, _, value = part.partition("=")
-        values[path.strip()] = entry_of(value, f"--where {quoted(path)}")["value"]
+        values[path.strip()] = number_of(value, f"--where {quoted(path)}")
     return {"match": pattern, "set": values}

@@ -5,12 +5,16 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from ema_model.actuator.describe import DRIVES, actuator_axes, asked, entry_of, unanswered
+from ema_model.actuator.describe import DRIVES, actuator_axes, asked, entry_of, gear_of, unanswered
 from ema_model.actuator.keys import KINDS
 from ema_model.actuator.naming import on_axes
 from ema_model.actuator.parameters import facts_of
 from ema_model.errors import InputError
 from ema_model.quantities.axes import KINDS as AXES
+from emaviz.cli.numbers import Number
+
+SAMPLE_RATE = Number(1e-3, 1e9)  # Hz
+_GEAR = "transmission.gear_ratio"
 
 
 def ask(document: dict[str, Any], arguments: argparse.Namespace) -> None:
@@ -21,11 +25,13 @@ def ask(document: dict[str, Any], arguments: argparse.Namespace) -> None:
             axes[side] = _choice(about, dict.fromkeys(AXES, ""))
     arguments.controller = _choice("Which controller", KINDS["controller"])
     drives = DRIVES[arguments.controller]
-    if drives and arguments.drive is None:
+    if drives and arguments.drive not in drives:
         arguments.drive = _choice("Which drive", {name: KINDS["inverter"][name] for name in drives})
+    if arguments.sample_rate is None:
+        arguments.sample_rate = _sample_rate()
     print("Now the parameters: a number, with its tolerance if you know it (1e-4 ± 5%); Enter for what you don't know.")
     shown = actuator_axes(document)
-    for path in asked(arguments.controller, arguments.drive or "current"):
+    for path in asked(arguments.controller, arguments.drive if drives else "current"):
         section, name = path.partition(".")[0], on_axes(path, shown).name
         if name not in document.get(section, {}) and (entry := _number(path, shown)) is not None:
             document.setdefault(section, {})[name] = entry
@@ -44,6 +50,17 @@ def _choice(question: str, choices: dict[str, str]) -> str:
         print(f"  one of {', '.join(choices)}, please")
 
 
+def _sample_rate() -> float | None:
+    while True:
+        text = input("How many samples a second have its recordings, Hz [not known] ").strip()
+        if not text:
+            return None
+        try:
+            return SAMPLE_RATE(text)
+        except argparse.ArgumentTypeError as error:
+            print(f"  {error}")
+
+
 def _number(path: str, axes: Any) -> dict[str, Any] | None:
     named, facts, usual = on_axes(path, axes), facts_of(path, axes), unanswered(path, axes)
     while True:
@@ -51,6 +68,6 @@ def _number(path: str, axes: Any) -> dict[str, Any] | None:
         if not text:
             return None
         try:
-            return entry_of(text, "not a number")
+            return (gear_of if path == _GEAR else entry_of)(text, "not a number")
         except InputError as error:
             print(f"  {error}")

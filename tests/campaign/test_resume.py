@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import os
 import signal
+import sys
 
 import pytest
 from processes import begun, children_of, cluster, ended, kill, rows_of, wait_for
@@ -52,6 +55,28 @@ def test_a_worker_and_then_the_client_are_killed(tmp_path, expected):
     assert {name: whole[name] for name in kept} == kept  # to the second in which they were computed
     assert "0 computed now" in ended(begun(plan, "--out", out))
     assert {*load_plan(plan).tasks[0].as_json()} and (out / "plan.toml").exists()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere a worker that is stopped cannot end itself")
+def test_a_client_that_is_killed_leaves_no_worker_and_the_same_line_goes_on(tmp_path):
+    """Its worker is held in the middle of a task, which it could not end by itself."""
+    out = tmp_path / "out"
+    line = cheap(tmp_path, 6), "--out", out, "--workers", "1"
+    client = begun(*line)
+    wait_for(lambda: rows_of(out) >= 1)
+    [worker] = children_of(client.pid)
+    os.kill(worker, signal.SIGSTOP)
+    try:
+        kill(client.pid)
+        client.wait()
+        wait_for(lambda: not alive(worker), 10.0)
+    finally:
+        with contextlib.suppress(ProcessLookupError):
+            kill(worker)
+        client.communicate()
+    kept = rows_of(out)
+    assert f"{6 - kept} computed now, {kept} were there" in ended(begun(*line))
+    assert rows_of(out) == len(rows_by_name(out)) == 6
 
 
 def alive(pid):

@@ -72,7 +72,8 @@ class Progress:
         self._started = self._shown = clock()
         self._drawn = False
         self._said: tuple[str, float | None] = ("", None)
-        self._over: threading.Event | None = None  # of the thread that writes while nothing new is said
+        self._over = threading.Event()  # for the thread that writes while nothing new is said
+        self._writer: threading.Thread | None = None
         self._writing = threading.Lock()
 
     def show(self, text: str, share: float | None = None) -> None:
@@ -103,15 +104,16 @@ class Progress:
 
     def done(self) -> None:
         """Takes the line away; nothing more is said until the next `show`."""
-        if self._over is not None:
+        if self._writer is not None:  # it ends here: one that Python finds at its own end can abort the process
             self._over.set()
-            self._over = None
+            self._writer.join(1.0)
+            self._writer = None
         if self._drawn:
             print("\r\x1b[K", end="", file=sys.stderr, flush=True)
             self._drawn = False
 
     def _keep_logging(self) -> None:
-        if self._over is not None:
+        if self._writer is not None:
             return
         self._over = over = threading.Event()
 
@@ -119,7 +121,8 @@ class Progress:
             while not over.wait(1.0):
                 self.log()
 
-        threading.Thread(target=repeat, name="progress", daemon=True).start()
+        self._writer = threading.Thread(target=repeat, name="progress", daemon=True)
+        self._writer.start()
 
 
 def _plain(value: Any) -> Any:

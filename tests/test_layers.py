@@ -14,7 +14,7 @@ import pytest
 PROJECT = Path(__file__).parents[1]
 FLOORS = {
     "ema_model": [
-        ["errors", "kernel_cache", "members", "text"],
+        ["child_processes", "errors", "kernel_cache", "members", "text"],
         ["files", "quantities"],
         ["physics", "faults"],
         ["effects", "kernels", "commands"],

@@ -33,6 +33,7 @@ _SCHEMA = 1
 _MOST_PARTS = 200  # small ones of a kind, before they are joined
 _SMALL_BYTES = 2_000_000
 _TRIES = 20  # to read parts that are being joined
+_ENDING_S = 1.0  # in which a writer that was just killed may still be ending
 
 
 @dataclass(frozen=True)
@@ -101,7 +102,7 @@ class Store:
         return store
 
     def _own(self) -> None:
-        self._lock = FileLock.acquire(self.folder / ".lock")
+        self._lock = FileLock.acquire(self.folder / ".lock", _ENDING_S)
         if self._lock is None:
             raise refusal(self.folder, "another campaign is writing there; wait for its end, or name another folder")
         remove_abandoned(self.folder)

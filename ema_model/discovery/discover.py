@@ -30,6 +30,10 @@ from ema_model.recordings import Measurement
 Progress = Callable[[str], None]
 
 
+class _Stopped(Exception):
+    """What was found so far shall be the answer."""
+
+
 def discover(
     measurements: Sequence[Measurement],
     actuator: Actuator | None = None,
@@ -39,25 +43,40 @@ def discover(
     candidates: Sequence[str] | None = None,
     most_effects: int = 3,
     on_progress: Progress | None = None,
+    stop: Callable[[], bool] = lambda: False,
 ) -> Discovery:
     """The missing effects of recordings of one actuator, added to its model one after another.
 
     holdout: recordings that are not fitted and must improve as well; candidates: effects to consider, all of the
-    catalogue's without it.  on_progress is told what goes on, and may raise to stop.
+    catalogue's without it.  on_progress is told what goes on, and may raise to stop.  stop() is asked as often once
+    the model is calibrated; where it is true, what was added so far is the answer, with the verdict "interrupted".
     Raises InputError for recordings that cannot be compared.
     """
-    tell = on_progress or (lambda text: None)
-    story = begun(measurements, actuator or load_actuator(), holdout, signals, tell)
+    progress = on_progress or (lambda text: None)
+
+    def go_on() -> None:
+        if stop():
+            raise _Stopped
+
+    def tell(text: str) -> None:
+        progress(text)
+        go_on()
+
+    story = begun(measurements, actuator or load_actuator(), holdout, signals, progress)
     if not story.repeatable:
         return result_of(story)
-    walked = walk(story, tell, candidates=candidates, most_effects=most_effects)
-    experiment = None
-    if walked.rivals:
-        tell("looking for a test that tells the rivals apart")
-        first, second = walked.rivals[:2]
-        experiment = next_experiment(story.data, first, second)
-        if experiment is None:
-            story.warnings.append(untold(first.candidate.name, second.candidate.name))
+    try:
+        go_on()
+        walked = walk(story, tell, candidates=candidates, most_effects=most_effects)
+        experiment = None
+        if walked.rivals:
+            tell("looking for a test that tells the rivals apart")
+            first, second = walked.rivals[:2]
+            experiment = next_experiment(story.data, first, second)
+            if experiment is None:
+                story.warnings.append(untold(first.candidate.name, second.candidate.name))
+    except _Stopped:
+        return result_of(story, interrupted=True)
     return result_of(story, walked.candidates, walked.unknown, experiment)
 
 
@@ -66,8 +85,10 @@ def result_of(
     candidates: Sequence[Candidate] = (),
     unknown: Explanation | None = None,
     experiment: Experiment | None = None,
+    *,
+    interrupted: bool = False,
 ) -> Discovery:
-    """What a story comes to; unknown: what its last model leaves."""
+    """What a story comes to; unknown: what its last model leaves; interrupted: before its end."""
     calibration = with_intervals(story.data, story.current)
     events = left_by(story.data, story.without_curve).events
     names = named_in(story)
@@ -78,7 +99,7 @@ def result_of(
     freed = [one for one in added if one.stands_for]
     told = {*names, *(rival for one in named for rival in one.same_as)}  # refused at an earlier step, or not
     return Discovery(
-        verdict=verdict_of(story, named, unknown),
+        verdict=verdict_of(story, named, unknown, interrupted),
         calibration=calibration,
         effects=named,
         ladder=story.ladder,

@@ -22,7 +22,15 @@ from ema_model.text import InWords
 
 Array = NDArray[np.float64]
 
-VERDICTS = ("effects_found", "adequate", "partly_explained", "unknown_effect", "not_converged", "not_repeatable")
+VERDICTS = (
+    "effects_found",
+    "adequate",
+    "partly_explained",
+    "unknown_effect",
+    "not_converged",
+    "not_repeatable",
+    "interrupted",
+)
 
 
 @dataclass(frozen=True)

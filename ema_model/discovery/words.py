@@ -28,6 +28,7 @@ VERDICTS = {
     "unknown_effect": "something is missing that none of the known effects explains",
     "not_converged": "the calibration has not converged; what looks like missing physics may be an unfinished fit",
     "not_repeatable": "the run does not repeat itself, so that a comparison over time means nothing",
+    "interrupted": "the search was cut off before it had added anything",
 }
 _MOVED, _MOST_MOVED = 0.5, 3  # σ of a tolerance, from which on a parameter's own value is worth a word; of those
 _HARDLY = 0.02  # of the held-out error: what moves it by less is hardly seen there
@@ -60,6 +61,8 @@ def so_far(found: Discovery) -> str:
 
 def _answer(found: Discovery) -> str:
     faulty = _faulty(found)
+    if found.verdict == "interrupted" and (has := [text for text in (_named(found), faulty) if text]):
+        return f"The search was cut off. Found so far: {all_of(has)}."
     if found.verdict == "effects_found":
         return f"The model lacks {_named(found)}{f', and the actuator has {faulty}' if faulty else ''}."
     if found.verdict == "adequate" and faulty:

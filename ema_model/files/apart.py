@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ema_model.child_processes import start_python
 from ema_model.errors import InputError
 
 Array = NDArray[np.float64]
@@ -39,7 +40,7 @@ def ask(function: str, *arguments: Any, most_bytes: int, patience_s: float) -> A
     large is given up.
     """
     request = {"function": function, "arguments": arguments, "most_bytes": most_bytes + _GROUND}
-    request["most_seconds"] = 2.0 * patience_s  # of computing on all cores, should nobody be left to end it
+    request["most_seconds"] = 2.0 * patience_s  # of computing on all cores
     with _lock:
         process = _started()
         assert process.stdin is not None and process.stdout is not None
@@ -84,10 +85,9 @@ def _started() -> subprocess.Popen[bytes]:
     global _process, _owner
     if _process is None or _owner != os.getpid() or _process.poll() is not None:
         same = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path)), "OPENBLAS_NUM_THREADS": "1"}
-        command = [sys.executable, "-c", "from ema_model.files.working_apart import work; work()"]
-        pipe = subprocess.PIPE
-        _process = subprocess.Popen(
-            command, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL, env=same, start_new_session=True
+        program = ["-c", "from ema_model.files.working_apart import work; work()"]
+        _process = start_python(
+            program, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=same, start_new_session=True
         )
         _owner = os.getpid()
     return _process

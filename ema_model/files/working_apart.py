@@ -9,20 +9,29 @@ import sys
 import time
 import warnings
 from pathlib import Path
+from queue import SimpleQueue
 from typing import Any
 
 import numpy as np
 
+from ema_model.child_processes import end_with_parent
 from ema_model.errors import InputError, quoted
 
 
 def work() -> None:
-    """Answers until nobody asks any more."""
+    """Answers until whoever asks has ended."""
+    requests = SimpleQueue[bytes]()
+
+    def receive() -> None:
+        for line in sys.stdin.buffer:
+            requests.put(line)
+
+    end_with_parent(receive)
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # libraries print
     warnings.simplefilter("ignore")
-    for line in sys.stdin.buffer:
-        request = json.loads(line)
+    while True:
+        request = json.loads(requests.get())
         _bound(request["most_bytes"], request["most_seconds"])
         result: dict[str, Any] = {}
         arrays = []
@@ -45,7 +54,7 @@ def work() -> None:
 
 
 def _bound(most_bytes: int, most_seconds: float) -> None:
-    """No more memory than that, and no more of computing, though nobody should wait any longer.
+    """No more memory than that, and no more of computing.
 
     Where the system does not know such bounds, whoever asks ends the process when its patience does.
     """

@@ -29,6 +29,7 @@ Array = NDArray[np.float64]
 
 ROBUST = "robust"
 ALGORITHMS: dict[str, str] = {ROBUST: "Robust"} | {name: one.title for name, one in OPTIMISERS.items()}  # by name
+SEARCH_SHARE = 0.6  # of an identification's time, about; model bias and intervals take the rest
 _ROUGH = 0.7  # of a metaheuristic's iterations, which may be simulated at longer steps
 _LONG = 20  # iterations, from which on this is worth looking at
 _NEARLY = 0.02  # of the fitness, by which these may change it

@@ -2,7 +2,8 @@
 
     python -m ema_model.simulation.precompile urgent traces+reduced+cascade+torsional_compliance …
 
-compiles kernels of stacks into the cache, where `find_stack`'s kernels are found on their first call.
+compiles kernels of stacks into the cache, where `find_stack`'s kernels are found on their first call.  It ends when
+its input closes, as that of `compile_ahead`'s does with the process that asked.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from ema_model.actuator import load_actuator
+from ema_model.child_processes import end_with_parent, start_python
 from ema_model.faults import HEALTHY
 from ema_model.kernel_cache.folder import cache_folder
 from ema_model.physics.rows import LANES
@@ -41,8 +43,8 @@ _running: list[_Job] = []
 def compile_ahead(kernels: Iterable[tuple[Stack, str]], *, urgent: bool = True) -> None:
     """Begins to compile kernels of stacks where the cache lacks them; returns at once.  Effects are the catalogue's.
 
-    What is not urgent takes only the time that nobody else wants, waits for no other (it is asked for again), and is
-    finished even when this process ends.  EMAVIZ_COMPILE_AHEAD=0 leaves all to this process.
+    What is not urgent takes only the time that nobody else wants, and waits for no other (it is asked for again).
+    What is not done when this process ends is given up.  EMAVIZ_COMPILE_AHEAD=0 leaves all to this process.
     """
     missing = [one for one in kernels if not is_compiled(*one) and not _is_coming(*one)]
     if not missing or (_running and not urgent):
@@ -52,9 +54,8 @@ def compile_ahead(kernels: Iterable[tuple[Stack, str]], *, urgent: bool = True) 
     package = str(Path(__file__).parents[2])
     paths = os.pathsep.join(filter(None, [package, os.environ.get("PYTHONPATH")]))
     names = ["+".join((kernel, one.circuit, one.controller, *one.effects)) for one, kernel in missing]
-    process = subprocess.Popen(
-        [sys.executable, "-m", __name__, "urgent" if urgent else "behind", *names],
-        stdin=subprocess.DEVNULL,
+    process = start_python(
+        ["-m", __name__, "urgent" if urgent else "behind", *names],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
         env={**os.environ, "PYTHONPATH": paths, "EMAVIZ_CACHE_DIR": str(cache_folder().parents[1])},
@@ -103,6 +104,7 @@ def compile_here(stack: Stack, kernel: str) -> None:
 
 
 if __name__ == "__main__":
+    end_with_parent()
     if sys.argv[1] == "behind" and hasattr(os, "nice"):
         os.nice(15)
     for text in sys.argv[2:]:

@@ -55,7 +55,7 @@ def run(arguments: argparse.Namespace, actuator: Actuator) -> int:
 
     _refuse(arguments, _NOT_OF_UNITS)
     actuator = replace(actuator, effects={**actuator.effects, **given.effects_of(arguments, actuator.axes)})
-    progress = output.Progress()
+    progress = output.Progress(arguments)
     try:
         fitted, held = read_units(arguments, actuator, progress)
         result = compare_units(
@@ -76,7 +76,7 @@ def run_discovery(arguments: argparse.Namespace, actuator: Actuator, signals: tu
     from ema_model.units.discovery import as_dict, discover_units
 
     _refuse(arguments, ["record"])
-    progress = output.Progress()
+    progress = output.Progress(arguments)
     try:
         fitted, held = read_units(arguments, actuator, progress)
         result = discover_units(

@@ -1,4 +1,7 @@
-"""Ctrl-C ends the program, whatever it is doing: importing, compiling, waiting, or ending already."""
+"""Ctrl-C ends the program, whatever it is doing: importing, compiling, waiting, or ending already.
+
+A command that has a part of its answer by then prints and writes that first.
+"""
 
 from __future__ import annotations
 
@@ -8,28 +11,65 @@ import signal
 import sys
 import threading
 from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
 
 EXIT_CODE = 130  # as shells have it: 128 + SIGINT
 _GRACE_S = 1.5  # to close recordings and remove drafts
+_ANSWER_S = 60.0  # the same where a part of the answer is to be made and written, on a busy machine
+
+
+@dataclass
+class _State:
+    """Of the interrupts of this process."""
+
+    came: bool = False
+    has_answer: bool = False  # a part of it, should an interrupt come now
+    is_raised: bool = True
+
+
+_state = _State()
+
+
+class PartialAnswer:
+    """While a command computes its answer: how much an interrupt leaves of it."""
+
+    def __enter__(self) -> PartialAnswer:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        _state.is_raised, _state.has_answer = True, _state.came and _state.has_answer
+
+    def grows(self) -> None:
+        """There is a part: from now on an interrupt leaves a minute, not two seconds, to print and write it."""
+        _state.has_answer = True
+
+    def is_interrupted(self) -> bool:
+        """The same; and from the first question on an interrupt is not raised, so that it breaks no step.
+
+        That holds for `until_interrupted`; without it Python raises every interrupt.
+        """
+        _state.has_answer, _state.is_raised = True, False
+        return _state.came
 
 
 def until_interrupted(run: Callable[[], int]) -> int:
     """Runs the program and returns its exit code; an interrupt ends the whole process instead, within two seconds.
 
     It is raised once, as KeyboardInterrupt.  A second one ends the process at once, and so does the first after a
-    while: native code holds it up, and callbacks swallow it.  Where interrupts are ignored, they stay ignored.
+    while: native code holds it up, and callbacks swallow it.  A `PartialAnswer` makes that while longer.  Where
+    interrupts are ignored, they stay ignored.
     """
     if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
         return run()
-    seen = False
 
     def interrupted(*_: object) -> None:
-        nonlocal seen
-        if not seen:
-            seen = True
+        if not _state.came:
+            _state.came = True
             # What breaks from now on, in any thread, breaks because the program ends.
             sys.excepthook = sys.unraisablehook = threading.excepthook = _silent
-            raise KeyboardInterrupt
+            if _state.is_raised:
+                raise KeyboardInterrupt
 
     signal.signal(signal.SIGINT, interrupted)
     code = EXIT_CODE
@@ -37,11 +77,14 @@ def until_interrupted(run: Callable[[], int]) -> int:
         _start_watch()
         code = run()
     except BaseException:
-        if not seen:
+        if not _state.came:
             raise
-    if seen:
+    if _state.came:
         # The interpreter's own way to end waits for threads, and takes the ground from those that compile.
         atexit._run_exitfuncs()
+        for stream in (sys.stdout, sys.stderr):
+            with suppress(OSError, ValueError, AttributeError):
+                stream.flush()
         os._exit(code)
     return code
 
@@ -61,7 +104,9 @@ def _start_watch() -> None:
 
 def _watch(receiving: int) -> None:
     _wait(receiving)
-    late = threading.Timer(_GRACE_S, os._exit, (EXIT_CODE,))
+    if _state.has_answer and sys.stderr.isatty():
+        print("\r\x1b[Kwriting what was found so far; Ctrl-C ends it at once", file=sys.stderr, flush=True)
+    late = threading.Timer(_ANSWER_S if _state.has_answer else _GRACE_S, os._exit, (EXIT_CODE,))
     late.daemon = True
     late.start()
     _wait(receiving)

@@ -1,10 +1,15 @@
-"""What every command says: JSON with its provenance, and progress on a terminal."""
+"""What every command says: JSON with its provenance, and progress on a terminal or in a log."""
 
 from __future__ import annotations
 
+import argparse
 import json
 import sys
+import threading
 import time
+from collections.abc import Callable
+from contextlib import suppress
+from datetime import timedelta
 from typing import Any
 
 import numba
@@ -13,6 +18,9 @@ import numpy as np
 from ema_model.errors import InputError
 from ema_model.files.whole_file import whole_file
 from emaviz import __version__
+from emaviz.text.time_left import time_left
+
+_LINE_EVERY_S = 10.0  # of a log
 
 
 def write_json(arguments: Any, result: dict[str, Any]) -> None:
@@ -43,26 +51,78 @@ def configuration(arguments: Any) -> dict[str, Any]:
     return {name: value for name, value in vars(arguments).items() if name != "run"}
 
 
+def say_not_written(arguments: Any, *options: str) -> None:
+    """Says which of these options have no file, since the command was interrupted."""
+    given = [f"--{name.replace('_', '-')}" for name in options if getattr(arguments, name)]
+    if given:
+        print(f"{', '.join(given)}: not written, since the answer is not whole")
+
+
 class Progress:
-    """A line on stderr that says how far a long command is; silent off a terminal and in the first second."""
+    """Says on stderr how far a long command is, unless it has --quiet.
 
-    def __init__(self) -> None:
-        self._started = self._shown = time.monotonic()
+    On a terminal it is one line that changes, from the first second on; elsewhere a new line every ten seconds, with
+    the time since the command began and, where that can be said, about how long it will still take.
+    """
+
+    def __init__(self, arguments: argparse.Namespace, clock: Callable[[], float] = time.monotonic) -> None:
+        """clock(): s, of any zero."""
+        self._quiet = getattr(arguments, "quiet", False)
+        self._clock = clock
+        self._started = self._shown = clock()
         self._drawn = False
+        self._said: tuple[str, float | None] = ("", None)
+        self._over = threading.Event()  # for the thread that writes while nothing new is said
+        self._writer: threading.Thread | None = None
+        self._writing = threading.Lock()
 
-    def show(self, text: str) -> None:
-        """Replaces the line, ten times a second at most."""
-        now = time.monotonic()
-        if not sys.stderr.isatty() or now - self._started < 1.0 or now - self._shown < 0.1:
+    def show(self, text: str, share: float | None = None) -> None:
+        """Replaces the line, ten times a second at most; share: of the whole work that is done, 0 … 1, if known."""
+        if self._quiet:
+            return
+        self._said = text, share
+        if not sys.stderr.isatty():
+            self.log()
+            self._keep_logging()
+            return
+        now = self._clock()
+        if now - self._started < 1.0 or now - self._shown < 0.1:
             return
         self._shown, self._drawn = now, True
         print(f"\r\x1b[K{text}", end="", file=sys.stderr, flush=True)
 
+    def log(self) -> None:
+        """Writes what was said last as a line of its own, if the last line was ten seconds ago."""
+        with self._writing, suppress(OSError, ValueError):  # a log that is full or closed ends no computing
+            now = self._clock()
+            if now - self._shown < _LINE_EVERY_S:
+                return
+            self._shown = now
+            (text, share), elapsed_s = self._said, now - self._started
+            left = "" if share is None else time_left(elapsed_s, share)
+            print(f"[{timedelta(seconds=int(elapsed_s))}] {text}{left and f', {left}'}", file=sys.stderr, flush=True)
+
     def done(self) -> None:
-        """Takes the line away."""
+        """Takes the line away; nothing more is said until the next `show`."""
+        if self._writer is not None:  # it ends here: one that Python finds at its own end can abort the process
+            self._over.set()
+            self._writer.join(1.0)
+            self._writer = None
         if self._drawn:
             print("\r\x1b[K", end="", file=sys.stderr, flush=True)
             self._drawn = False
+
+    def _keep_logging(self) -> None:
+        if self._writer is not None:
+            return
+        self._over = over = threading.Event()
+
+        def repeat() -> None:
+            while not over.wait(1.0):
+                self.log()
+
+        self._writer = threading.Thread(target=repeat, name="progress", daemon=True)
+        self._writer.start()
 
 
 def _plain(value: Any) -> Any:

@@ -45,6 +45,10 @@ def add_verbs(to: Any, package: str, verbs: Iterable[str], run: str) -> None:
     for name, verb in sorted(modules.items(), key=lambda one: one[1].PLACE):
         sub = to.add_parser(name, help=verb.HELP, description=verb.HELP)
         verb.add_arguments(sub)
+        # Without a default: one of `emaviz actuator` would undo what its own verb was given.
+        sub.add_argument(
+            "-q", "--quiet", action="store_true", default=argparse.SUPPRESS, help="say nothing of how far it is"
+        )
         sub.set_defaults(**{run: partial(_run, verb, sub)})
 
 

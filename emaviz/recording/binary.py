@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
 
+from ema_model.child_processes import start_program
 from emaviz.recording.errors import RecordingError
 
 
@@ -38,7 +39,7 @@ def started(*arguments: str, output: IO[bytes] | None = None) -> Iterator[subpro
         settings.parent.mkdir()
         settings.write_text(json.dumps({"analytics_enabled": False, "analytics_id": "none", "metadata": {}}))
         environment = os.environ | {"XDG_CONFIG_HOME": folder, "NO_COLOR": "1"}
-        process = subprocess.Popen(
+        process = start_program(
             [str(rerun_binary()), *arguments],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL if output is None else output,

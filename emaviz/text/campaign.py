@@ -30,6 +30,13 @@ def progress_table(store: Store) -> str:
     return f"{store.header.title}: {state}\n{made_with(store)}\n\n{_aligned([heads, *lines])}"
 
 
+def interrupted(store: Store) -> str:
+    """What a campaign has that was interrupted."""
+    groups = store.progress().values()
+    rows, tasks = (sum(one[of] for one in groups) for of in ("rows", "tasks"))
+    return f"{store.folder}: interrupted, {rows} of {tasks} tasks have a row; the same line goes on from there"
+
+
 def report_text(store: Store) -> str:
     """The tables in Markdown, with the version and the commit that they were made with."""
     parts = [f"## {store.header.title}", *filter(None, [store.header.about]), f"Made with {made_with(store)}."]

@@ -25,7 +25,7 @@ def environment(**more: str) -> dict[str, str]:
 def begun(*arguments: object, **more: str) -> subprocess.Popen[str]:
     """`emaviz campaign …` in a process."""
     return subprocess.Popen(
-        [sys.executable, "-m", "emaviz", "campaign", *map(str, arguments)],
+        [sys.executable, "-m", "emaviz", "campaign", *map(str, arguments), "--quiet"],
         env=environment(**more),
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import os
 import signal
+import sys
 
 import pytest
 from processes import begun, children_of, cluster, ended, kill, rows_of, wait_for
@@ -54,6 +57,28 @@ def test_a_worker_and_then_the_client_are_killed(tmp_path, expected):
     assert {*load_plan(plan).tasks[0].as_json()} and (out / "plan.toml").exists()
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere a worker that is stopped cannot end itself")
+def test_a_client_that_is_killed_leaves_no_worker_and_the_same_line_goes_on(tmp_path):
+    """Its worker is held in the middle of a task, which it could not end by itself."""
+    out = tmp_path / "out"
+    line = cheap(tmp_path, 6), "--out", out, "--workers", "1"
+    client = begun(*line)
+    wait_for(lambda: rows_of(out) >= 1)
+    [worker] = children_of(client.pid)
+    os.kill(worker, signal.SIGSTOP)
+    try:
+        kill(client.pid)
+        client.wait()
+        wait_for(lambda: not alive(worker), 10.0)
+    finally:
+        with contextlib.suppress(ProcessLookupError):
+            kill(worker)
+        client.communicate()
+    kept = rows_of(out)
+    assert f"{6 - kept} computed now, {kept} were there" in ended(begun(*line))
+    assert rows_of(out) == len(rows_by_name(out)) == 6
+
+
 def alive(pid):
     import psutil
 
@@ -66,9 +91,11 @@ def test_an_interrupt_keeps_the_rows_and_leaves_no_worker(tmp_path):
     wait_for(lambda: rows_of(out) >= 1)
     workers = children_of(client.pid)
     client.send_signal(signal.SIGINT)
-    assert ended(client, 130) == ""
+    told = ended(client, 130)
     wait_for(lambda: not any(alive(pid) for pid in workers))
-    assert 1 <= rows_of(out) < 200
+    rows = rows_of(out)
+    assert 1 <= rows < 200
+    assert told == f"{out}: interrupted, {rows} of 200 tasks have a row; the same line goes on from there\n"
 
 
 @pytest.mark.long

@@ -1,8 +1,10 @@
-"""Ctrl-C ends the program at any moment: exit code 130, and no traceback."""
+"""Ctrl-C ends the program at any moment: exit code 130, no traceback, and what was found so far."""
 
 from __future__ import annotations
 
+import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -13,6 +15,7 @@ import pytest
 from support.representative import first_of
 
 from emaviz.cli import main
+from emaviz.recording import read
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="sends an interrupt")
 
@@ -179,6 +182,129 @@ sys.exit(until_interrupted(run))
 
 def test_what_is_open_is_closed_first(running):
     assert interrupted(running(CLOSING)) == ("closed\nat exit\n", "")
+
+
+# Commands that say "ready" once they have a part of their answer, and go on for long.
+IDENTIFY = """
+import sys, time
+from ema_model.identification import run
+engine = run.identify
+
+def identify(*arguments, on_iteration, **options):
+    def after(at):
+        on_iteration(at)
+        if at.iteration == 2:
+            print("ready", flush=True)
+            time.sleep(60)
+    return engine(*arguments, on_iteration=after, **options)
+
+run.identify = identify
+"""
+DISCOVER = """
+import sys, time
+import ema_model.discovery
+engine = ema_model.discovery.discover
+
+def discover(*arguments, on_progress, stop, **options):
+    def said(text):
+        on_progress(text)
+        if text.startswith("scoring"):
+            print("ready", flush=True)
+            while not stop():
+                time.sleep(0.01)
+    return engine(*arguments, on_progress=said, stop=stop, candidates=["cogging_torque"], **options)
+
+ema_model.discovery.discover = discover
+"""
+TRACK = """
+import sys, time
+from ema_model.lives import drawn, worn_life
+from ema_model.tracking import identify
+
+def identify_all(*_):
+    yield from drawn(worn_life("linear", 1))[:{flights}]
+    print("ready", flush=True)
+    time.sleep(60)
+
+identify.identify_all = identify_all
+"""
+PROGRAM = """
+from emaviz.__main__ import program
+sys.exit(program())
+"""
+
+
+@pytest.fixture
+def cut_off(process_of, tmp_path):
+    """What a command prints that is interrupted once it has a part of its answer, and what it writes."""
+
+    def cut_off(code, *arguments):
+        process = process_of("-c", code + PROGRAM, *arguments, "--quiet", "--json", "found.json", PYTHONUNBUFFERED="")
+        assert process.stdout.readline() == "ready\n"
+        out, said = interrupted(process)
+        assert said == ""
+        written = tmp_path / "found.json"
+        return out, json.loads(written.read_text()) if written.exists() else None
+
+    return cut_off
+
+
+def test_an_identification_that_is_interrupted_says_its_best_so_far(cut_off, tmp_path):
+    line = ["identify", "--algorithm", "do", "--population", "4", "--duration", "0.05"]
+    out, found = cut_off(IDENTIFY, *line, "--record", "out.rrd", "--report", "out.html")
+    assert out.startswith("Interrupted at iteration 2 of 150 of Dandelion: the best k so far")
+    assert f"k1  {found['k'][0]:.4f}" in out and "--report: not written" in out
+    assert found["interrupted"] and found["k_interval90"] is None
+    assert found["rmse"] == found["history"]["rmse"][-1] and len(found["history"]["k"]) == 3
+    assert read(tmp_path / "out.rrd").complete
+
+
+def test_a_discovery_that_is_interrupted_says_what_it_has_so_far(cut_off, recording):
+    out, found = cut_off(DISCOVER, "discover", str(recording))
+    assert found["verdict"] == "interrupted" and [one["kind"] for one in found["ladder"]] == ["calibrated"]
+    assert found["calibration"]["parameters"] and found["effects"] == []
+    assert out.startswith("interrupted") and "error ladder" in out
+
+
+@pytest.mark.parametrize("flights", [12, 3])
+def test_a_tracking_that_is_interrupted_says_what_the_flights_so_far_say(cut_off, recording, tmp_path, flights):
+    (tmp_path / "unit").mkdir()
+    for number in range(50):
+        shutil.copy(recording, tmp_path / "unit" / f"flight_{number}.csv")
+    out, found = cut_off(TRACK.format(flights=flights), "track", "unit")
+    assert out.startswith(f"Interrupted: {flights} of 50 flights are identified.")
+    if flights == 3:
+        assert "A trend needs" in out and "--json: not written" in out and found is None
+    else:
+        assert found["interrupted"] and (found["flights_identified"], found["flights_named"]) == (12, 50)
+        assert "k1" in found["faults"]
+
+
+WRITING = """
+import sys, time
+from emaviz.cli.interrupt import PartialAnswer, until_interrupted
+
+def run():
+    try:
+        with PartialAnswer() as answer:
+            answer.grows()
+            print("ready", flush=True)
+            time.sleep(60)
+    except KeyboardInterrupt:
+        time.sleep(2.5)
+        print("written")
+    return 130
+
+sys.exit(until_interrupted(run))
+"""
+
+
+def test_a_part_of_an_answer_has_time_to_be_written(running):
+    assert interrupted(running(WRITING)) == ("written\n", "")
+
+
+def test_a_part_of_an_answer_leaves_a_second_interrupt_its_way(running):
+    assert interrupted(running(WRITING), times=2) == ("", "")
 
 
 def test_a_caller_of_main_keeps_its_own_handling(tmp_path, monkeypatch):

@@ -106,6 +106,14 @@ def test_without_a_verdict_yet_it_says_what_the_model_has(lacking):
     assert bare.startswith("The calibrated model's error is ")
 
 
+def test_one_that_was_cut_off_says_so_with_what_it_has(lacking):
+    bare, added = (result_of(story, interrupted=True) for story in lacking)
+    assert headline(bare) == "The search was cut off before it had added anything."
+    assert headline(added) == "The search was cut off. Found so far: load-dependent friction."
+    assert as_dict(added)["verdict"] == "interrupted" and len(added.ladder) == len(bare.ladder) + 1
+    assert str(added).startswith("interrupted: The search was cut off.")
+
+
 @pytest.mark.parametrize(
     ("unseen", "how", "at_floor"),
     [(1.4, None, True), (4.8, None, False), (4.8, "unknown", False), (4.8, "sign", True), (None, None, True)],

@@ -1,7 +1,7 @@
 """Processes of this machine.
 
 Each has a pipe of its own, so that it is known what a process that dies had; it alone is lost, and given to another.
-They end with this process, however it ends: their pipes close.
+They end with this process, however it ends.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from typing import Any
 from ema_model.campaign.execute import ENVIRONMENT, OtherVersion
 from ema_model.campaign.schedulers.scheduler import MOST_DEATHS, Died, Outcome
 from ema_model.campaign.task import Task
+from ema_model.child_processes import end_with_parent, on_lasting_thread
 from ema_model.errors import InputError
 
 _AHEAD = 2  # tasks that a process has: the one that it computes, and the next; the last ones go to whoever is free
@@ -88,7 +89,7 @@ class _Process:
         self.connection, theirs = context.Pipe()
         self._process = context.Process(target=_serve, args=(theirs, version), daemon=True)
         with _environment():
-            self._process.start()
+            on_lasting_thread(self._process.start)
         theirs.close()  # so that ours tells when the process has ended
         self.tasks: deque[Task] = deque()
         self.began = self.retiring = self.ended = False
@@ -139,6 +140,9 @@ class _Process:
 def _serve(connection: Connection, version: dict[str, str]) -> None:
     """What a worker does: rows for tasks, until its pipe closes."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the one that began it hears the interrupt, too, and ends it
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    end_with_parent(parent.join)
     from ema_model.campaign.execute import execute
 
     with suppress(EOFError, OSError):

@@ -10,8 +10,10 @@ from ema_model.discovery.result import Added, misses_unseen
 from ema_model.discovery.steps.path import Story
 
 
-def verdict_of(story: Story, named: Sequence[Added], unknown: Explanation | None) -> str:
+def verdict_of(story: Story, named: Sequence[Added], unknown: Explanation | None, interrupted: bool = False) -> str:
     """One of `VERDICTS`; named: the library's effects in the last model; unknown: what the last model leaves."""
+    if interrupted:
+        return "interrupted"
     if not story.repeatable:
         return "not_repeatable"
     done = explains_all(story) and story.transmission_seen is None

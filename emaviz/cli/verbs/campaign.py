@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import re
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 from ema_model.campaign import Status, Store, duration, estimate_s, load_plan, plan_path, run_plan, scheduler
@@ -12,8 +13,9 @@ from ema_model.campaign.plan import Plan
 from ema_model.errors import InputError
 from ema_model.files.refusal import shown
 from emaviz.cli import files, options, output
+from emaviz.cli.interrupt import PartialAnswer
 from emaviz.cli.numbers import whole
-from emaviz.text.campaign import progress_table, report_text
+from emaviz.text.campaign import interrupted, progress_table, report_text
 
 HELP = "compute the many tasks of a plan, in processes or on a Dask cluster; status and report of one"
 PLACE = 11
@@ -62,16 +64,21 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _run(plan: Plan, arguments: argparse.Namespace) -> int:
-    progress = output.Progress()
+    progress = output.Progress(arguments)
     progress.show("beginning")
     try:
-        status = run_plan(
-            plan,
-            arguments.out,
-            scheduler(arguments.scheduler, arguments.workers),
-            retry=arguments.retry,
-            on_progress=_Told(progress, arguments.scheduler),
-        )
+        workers = scheduler(arguments.scheduler, arguments.workers)
+        told = _Told(progress, arguments.scheduler)
+        with PartialAnswer() as rows:
+            rows.grows()
+            status = run_plan(plan, arguments.out, workers, retry=arguments.retry, on_progress=told)
+    except KeyboardInterrupt:
+        progress.done()
+        with suppress(InputError):  # there is no folder yet
+            store = Store(arguments.out)
+            print(interrupted(store), flush=True)
+            output.write_json(arguments, {"interrupted": True, **_numbers(store)})
+        raise
     finally:
         progress.done()
     print(_ended(status, arguments.out))

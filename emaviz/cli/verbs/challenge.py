@@ -37,7 +37,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise InputError(f"no challenge {quoted(arguments.name)}; there are {', '.join(known)}")
     one = known[arguments.name]
     if arguments.out:
-        _write(one, Path(arguments.out))
+        _write(one, Path(arguments.out), arguments)
     elif not arguments.reveal:
         print(f"{one.title}\n\n{one.story}\n\n--out DIR writes its recordings, --reveal opens the seal")
     if arguments.reveal:
@@ -45,13 +45,13 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _write(one: Challenge, where: Path) -> None:
+def _write(one: Challenge, where: Path, arguments: argparse.Namespace) -> None:
     if one.kind == EFFECTS:
         command = _copy(one, where)
     else:
-        progress = output.Progress()
+        progress = output.Progress(arguments)
         try:
-            made.make(one, where, lambda text, share: progress.show(text))
+            made.make(one, where, progress.show)
         finally:
             progress.done()
         command = made.command(one, str(where))

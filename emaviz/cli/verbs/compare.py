@@ -44,7 +44,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise InputError("--save-actuator writes what the calibration found; leave --no-calibrate out")
     if by_unit.is_asked(arguments):
         return by_unit.run(arguments, actuator)
-    progress = output.Progress()
+    progress = output.Progress(arguments)
     try:
         measurements, held = given.read_set(arguments, actuator, progress)
         result = compare(
@@ -58,6 +58,19 @@ def run(arguments: argparse.Namespace) -> int:
             holdout=held,
             on_progress=progress.show,
         )
+    finally:
+        progress.done()
+    if result.calibration is not None and arguments.save_actuator:
+        save_actuator(result.calibration.actuator, arguments.save_actuator)
+    output.write_json(arguments, as_dict(result))
+    print(result, flush=True)
+    _write(result, arguments, progress)
+    return 0
+
+
+def _write(result: Comparison, arguments: argparse.Namespace, progress: output.Progress) -> None:
+    """The recording and the report, last: if one fails or is interrupted, the answer is there."""
+    try:
         if arguments.record:
             progress.show("recording")
             _record(result, arguments)
@@ -68,11 +81,6 @@ def run(arguments: argparse.Namespace) -> int:
             write_report(result, arguments.report)
     finally:
         progress.done()
-    if result.calibration is not None and arguments.save_actuator:
-        save_actuator(result.calibration.actuator, arguments.save_actuator)
-    output.write_json(arguments, as_dict(result))
-    print(result)
-    return 0
 
 
 def _record(result: Comparison, arguments: argparse.Namespace) -> None:

@@ -9,6 +9,7 @@ from ema_model.comparison.summary import plain
 from ema_model.discovery import Discovery, as_dict, discover, verified
 from ema_model.discovery.words import verification
 from emaviz.cli import by_unit, files, given, options, output
+from emaviz.cli.interrupt import EXIT_CODE, PartialAnswer
 from emaviz.cli.numbers import whole
 
 HELP = "find the physical effects that the model lacks, and add them"
@@ -28,24 +29,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Reads, discovers, writes and prints."""
+    """Reads, discovers, writes and prints; once interrupted, what was found so far."""
     actuator = given.actuator_of(arguments)
     signals = _CURRENT_ONLY if arguments.signals == "current" else None
     if by_unit.is_asked(arguments):
         return by_unit.run_discovery(arguments, actuator, signals)
-    progress = output.Progress()
+    progress = output.Progress(arguments)
     try:
         fitted, held = given.read_set(arguments, actuator, progress)
-        found = discover(
-            fitted,
-            actuator,
-            holdout=held,
-            signals=signals,
-            most_effects=arguments.max_effects,
-            on_progress=progress.show,
-        )
+        with PartialAnswer() as answer:
+            found = discover(
+                fitted,
+                actuator,
+                holdout=held,
+                signals=signals,
+                most_effects=arguments.max_effects,
+                on_progress=progress.show,
+                stop=answer.is_interrupted,
+            )
         told, document = str(found), as_dict(found)
-        if arguments.save_actuator:
+        is_whole = found.verdict != "interrupted"
+        if arguments.save_actuator and is_whole:
             save_actuator(found.actuator, arguments.save_actuator)
             progress.show("simulating the saved model")
             saved = verified(found, arguments.save_actuator)
@@ -59,8 +63,10 @@ def run(arguments: argparse.Namespace) -> int:
         progress.done()
     output.write_json(arguments, plain(document))
     print(told)
+    if not is_whole:
+        output.say_not_written(arguments, "save_actuator")
     _write(found, arguments)
-    return 0
+    return 0 if is_whole else EXIT_CODE
 
 
 def _write(found: Discovery, arguments: argparse.Namespace) -> None:

@@ -9,16 +9,25 @@ import numpy as np
 
 from ema_model.actuator import Actuator, save_actuator
 from ema_model.actuator.naming import on_axes
-from ema_model.actuator.readings import readings
+from ema_model.actuator.readings import readings, sentences
 from ema_model.discovery.model_fit import with_effect
 from ema_model.errors import InputError
 from ema_model.identification.objective import Objective
-from ema_model.identification.run import ALGORITHMS, ROBUST, Identification, Progress, identify
+from ema_model.identification.run import (
+    ALGORITHMS,
+    ROBUST,
+    SEARCH_SHARE,
+    Identification,
+    Progress,
+    algorithm_title,
+    identify,
+)
 from ema_model.quantities.numbers import amount
 from ema_model.recordings import Measurement
 from ema_model.simulation.plant import FITNESSES, simulated
 from ema_model.simulation.sensors import Sensors
 from emaviz.cli import files, given, options, output
+from emaviz.cli.interrupt import PartialAnswer
 from emaviz.cli.numbers import whole
 
 HELP = "find the faults k1 … k8 of recordings, or of a simulated actuator"
@@ -45,12 +54,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Fits, records and prints."""
+    """Fits, prints and records; once interrupted, the best so far."""
     actuator = given.actuator_of(arguments)
     for name, settings in given.effects_of(arguments, actuator.axes).items():
         actuator = with_effect(actuator, name, settings)
     truth = given.faults_of(arguments) if arguments.fault or not arguments.files else None
-    progress = output.Progress()
+    progress = output.Progress(arguments)
     try:
         measurements, unseen = _recordings(arguments, actuator, truth, progress)
     finally:
@@ -61,32 +70,42 @@ def run(arguments: argparse.Namespace) -> int:
 
     objective, held = fitness(measurements), fitness(unseen) if unseen else None
     recorder = _Recorder(arguments, measurements, objective, truth) if arguments.record else None
+    partial, history = PartialAnswer(), list[Progress]()
 
     def on_iteration(at: Progress) -> None:
-        progress.show(f"{at.algorithm} {at.iteration}/{at.iterations}  rmse {at.rmse:.4f} A")
+        history.append(at)
+        partial.grows()
+        share = SEARCH_SHARE * at.iteration / max(at.iterations, 1)
+        progress.show(f"{at.algorithm} {at.iteration}/{at.iterations}  rmse {at.rmse:.4f} A", share)
         if recorder is not None:
             recorder.iteration(at)
 
+    def on_fit(text: str, share: float) -> None:
+        progress.show(text, SEARCH_SHARE + (1.0 - SEARCH_SHARE) * share)
+
     try:
-        answer = identify(
-            objective,
-            arguments.algorithm,
-            population=arguments.population,
-            iterations=arguments.iterations,
-            seed=arguments.seed,
-            truth=truth,
-            parameters_known=not arguments.files,
-            polish=arguments.polish,
-            on_iteration=on_iteration,
-        )
-    except BaseException:
+        with partial:
+            answer = identify(
+                objective,
+                arguments.algorithm,
+                population=arguments.population,
+                iterations=arguments.iterations,
+                seed=arguments.seed,
+                truth=truth,
+                parameters_known=not arguments.files,
+                polish=arguments.polish,
+                on_iteration=on_iteration,
+                on_fit=on_fit,
+            )
+    except BaseException as error:
+        if isinstance(error, KeyboardInterrupt) and history:
+            progress.done()
+            _say_so_far(history, actuator, arguments)
         if recorder is not None:
             recorder.close()
         raise
     finally:
         progress.done()
-    if recorder is not None:
-        recorder.finish(answer)
     holdout_rmse = None if held is None else _finite(held(answer.k)[0])
     if arguments.save_actuator:
         save_actuator(answer.found_actuator, arguments.save_actuator)
@@ -97,6 +116,8 @@ def run(arguments: argparse.Namespace) -> int:
         print("the model diverges on what was not fitted")
     elif holdout_rmse is not None:
         print(f"rmse {amount(holdout_rmse, 'A')} on what was not fitted: {', '.join(one.name for one in unseen)}")
+    if recorder is not None:
+        recorder.finish(answer)
     if arguments.report:
         from emaviz.report import write_identification_report  # plotly takes a second to import
 
@@ -135,6 +156,31 @@ def result(answer: Identification, actuator: Actuator, holdout_rmse: float | Non
     if answer.truth is not None:
         document |= {"truth": answer.truth, "error_percent": answer.error_percent}
     return document
+
+
+def _say_so_far(history: list[Progress], actuator: Actuator, arguments: argparse.Namespace) -> None:
+    """Writes and prints the best of a search that was interrupted, and how it came there."""
+    last = history[-1]
+    document = {
+        "interrupted": True,
+        "iteration": last.iteration,
+        "iterations": last.iterations,
+        "k": last.k,
+        "k_interval90": None,
+        "physical": readings(last.k, actuator),
+        "rmse": last.rmse,
+        "evaluations": last.evaluations,
+        "elapsed_s": last.elapsed_s,
+        "algorithm": last.algorithm,
+        "history": {"rmse": [at.rmse for at in history], "k": [at.k for at in history]},
+    }
+    output.write_json(arguments, document)
+    where = f"at iteration {last.iteration} of {last.iterations} of {algorithm_title(last.algorithm)}"
+    print(f"Interrupted {where}: the best k so far, which no fit has refined, without intervals.")
+    for name, value, phrase in zip(faults.NAMES, last.k, sentences(last.k, actuator)):
+        print(f"  {name}  {value:.4f}  {phrase}")
+    print(f"rmse {amount(last.rmse, 'A')}, {last.evaluations} simulations in {last.elapsed_s:.1f} s")
+    output.say_not_written(arguments, "report", "save_actuator")
 
 
 def _recordings(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from contextlib import suppress
 from pathlib import Path
 
 from ema_model.actuator import load_actuator
@@ -12,7 +13,9 @@ from ema_model.campaign.thesis import Evaluation
 from ema_model.campaign.thesis.responses import drawn
 from ema_model.errors import InputError
 from emaviz.cli import files, options, output
+from emaviz.cli.interrupt import PartialAnswer
 from emaviz.cli.numbers import whole
+from emaviz.text.campaign import interrupted
 from emaviz.text.reproduce import aligned, answer, short_table
 
 HELP = "compute the thesis's evaluation anew, and set its numbers beside ours"
@@ -38,11 +41,19 @@ def run(arguments: argparse.Namespace) -> int:
     plan = load_plan(plan_path(arguments.plan or ("thesis_quick" if arguments.quick else "thesis")))
     if "identify" not in {task.kind for task in plan.tasks}:
         raise InputError(f"{arguments.plan}: identifies nothing, so that nothing stands beside the thesis")
-    progress = output.Progress()
+    progress = output.Progress(arguments)
     progress.show("beginning")
     try:
         workers = scheduler(None, arguments.workers)
-        status = run_plan(plan, arguments.out, workers, on_progress=lambda at: progress.show(at.text))
+        try:
+            with PartialAnswer() as rows:
+                rows.grows()
+                status = run_plan(plan, arguments.out, workers, on_progress=lambda at: progress.show(at.text))
+        except KeyboardInterrupt:
+            progress.done()
+            with suppress(InputError):  # there is no folder yet
+                print(interrupted(Store(arguments.out)), flush=True)
+            raise
         found = Evaluation(Store(arguments.out))
         progress.show("simulating the responses")
         responses = drawn(load_actuator())

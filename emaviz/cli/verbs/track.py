@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from ema_model.actuator import Actuator
@@ -19,6 +19,7 @@ from ema_model.tracking.order import check_enough, check_order, flights_in, in_o
 from ema_model.tracking.summary import as_dict
 from ema_model.tracking.track import check_thresholds, track
 from emaviz.cli import files, given, options, output
+from emaviz.cli.interrupt import PartialAnswer
 
 HELP = "follow k over the flights of one unit: what drifts, and what life remains"
 PLACE = 6
@@ -54,16 +55,34 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Identifies each flight, follows k, writes and prints; again for each that arrives, if it shall watch."""
+    """Identifies each flight, follows k, writes and prints; again for each that arrives, if it shall watch.
+
+    Once interrupted, what the flights so far say.
+    """
     thresholds = _thresholds(arguments.threshold)
     actuator = given.actuator_of(arguments)
-    progress = output.Progress()
+    progress = output.Progress(arguments)
     try:
         if arguments.watch:
             _watch(arguments, actuator, thresholds, progress)
         else:
             paths = _paths(arguments.files)
-            _tell(_identified(paths, arguments, actuator, progress), arguments, actuator, thresholds, progress)
+            flights: list[Flight] = []
+            try:
+                with PartialAnswer() as answer:
+                    for flight in _identified(paths, arguments, actuator, progress):
+                        flights.append(flight)
+                        answer.grows()
+            except KeyboardInterrupt:
+                progress.done()
+                print(f"Interrupted: {len(flights)} of {len(paths)} flights are identified.", flush=True)
+                if sum(not one.excluded for one in flights) >= LEAST_FLIGHTS:
+                    _tell(flights, arguments, actuator, thresholds, progress, of=len(paths))
+                else:
+                    print(f"A trend needs {LEAST_FLIGHTS} usable flights or more.")
+                    output.say_not_written(arguments, "record", "report", "json")
+                raise
+            _tell(flights, arguments, actuator, thresholds, progress)
     finally:
         progress.done()
     return 0
@@ -71,16 +90,14 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _identified(
     paths: Sequence[Path], arguments: argparse.Namespace, actuator: Actuator, progress: output.Progress
-) -> list[Flight]:
-    return list(
-        identify_all(
-            paths,
-            lambda path: given.read_one(str(path), arguments, actuator, progress),
-            actuator,
-            arguments.seed,
-            lambda number, name: progress.show(f"flight {number + 1} of {len(paths)}: {name}"),
-            lambda line: given.say(line, progress),
-        )
+) -> Iterator[Flight]:
+    return identify_all(
+        paths,
+        lambda path: given.read_one(str(path), arguments, actuator, progress),
+        actuator,
+        arguments.seed,
+        lambda number, name: progress.show(f"flight {number + 1} of {len(paths)}: {name}", number / len(paths)),
+        lambda line: given.say(line, progress),
     )
 
 
@@ -90,8 +107,14 @@ def _tell(
     actuator: Actuator,
     thresholds: Mapping[str, float],
     progress: output.Progress,
+    of: int | None = None,
 ) -> None:
+    """Writes and prints what flights say; of: as many as there would have been without an interrupt."""
     result = track(flights, thresholds, arguments.seed)
+    progress.done()
+    cut_off = {} if of is None else {"interrupted": True, "flights_identified": len(flights), "flights_named": of}
+    output.write_json(arguments, as_dict(result) | cut_off)
+    print(result, flush=True)
     if arguments.record:
         from emaviz.recording.tracking import write_tracking  # rerun takes a second to import
 
@@ -100,9 +123,6 @@ def _tell(
         from emaviz.report import write_tracking_report  # plotly takes a second to import
 
         write_tracking_report(result, actuator.name, arguments.report)
-    progress.done()
-    output.write_json(arguments, as_dict(result))
-    print(result, flush=True)
 
 
 def _watch(

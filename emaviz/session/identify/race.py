@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ema_model.actuator import Actuator
 from ema_model.faults import performance_coefficient
 from ema_model.identification.objective import Objective
-from ema_model.identification.run import Identification, Progress, steps
+from ema_model.identification.run import SEARCH_SHARE, Identification, Progress, steps
 from ema_model.quantities.numbers import amount
 from ema_model.recordings import Measurement
 from ema_model.simulation import plant
@@ -27,7 +27,6 @@ OpenFile = Callable[[str], Measurement]  # by the name of a file in the data fol
 MOST_FRAMES = 200  # of a swarm, kept to look at again
 _LOOK_S = 0.01  # whether a file is read; sliders are answered in between
 _CURRENT_EVERY = 4  # iterations
-_SEARCH_SHARE = 0.6  # of an identification's time, about; model bias and intervals take the rest
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,8 +59,8 @@ class Track:
         if self.answer is not None:
             return 1.0
         if self.fitting is not None:
-            return _SEARCH_SHARE + (1.0 - _SEARCH_SHARE) * min(self.fitting[1], 0.99)
-        return _SEARCH_SHARE * len(self.rmse) / (self.iterations + 1.0)
+            return SEARCH_SHARE + (1.0 - SEARCH_SHARE) * min(self.fitting[1], 0.99)
+        return SEARCH_SHARE * len(self.rmse) / (self.iterations + 1.0)
 
     @property
     def errors(self) -> list[float]:

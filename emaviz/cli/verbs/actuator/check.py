@@ -42,7 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _beside(actuator: Actuator, arguments: argparse.Namespace) -> dict[str, list[str]]:
     """What the recording and a calibration by it say."""
-    progress = output.Progress()
+    progress = output.Progress(arguments)
     try:
         recording = read(arguments.recording, actuator, arguments.mapping)
         result = compare([recording], actuator, on_progress=progress.show)

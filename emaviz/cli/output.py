@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import json
+import logging
+import re
 import sys
 import time
 from typing import Any
 
-import numba
 import numpy as np
 
 from ema_model.errors import InputError
 from ema_model.files.whole_file import whole_file
 from emaviz import __version__
+
+_LOG = logging.getLogger("emaviz")
 
 
 def write_json(arguments: Any, result: dict[str, Any]) -> None:
@@ -23,6 +26,8 @@ def write_json(arguments: Any, result: dict[str, Any]) -> None:
     path = arguments.json
     if path is None:
         return
+    import numba  # takes a third of a second
+
     document = {
         "schema": 1,
         "versions": {"emaviz": __version__, "numpy": np.__version__, "numba": numba.__version__},
@@ -43,20 +48,40 @@ def configuration(arguments: Any) -> dict[str, Any]:
     return {name: value for name, value in vars(arguments).items() if name != "run"}
 
 
+def be_verbose() -> logging.Logger:
+    """What says on stderr what is done, a line each with the time of day."""
+    handler = logging.StreamHandler()
+    handler.setFormatter(logging.Formatter("%(asctime)s %(message)s", "%H:%M:%S"))
+    _LOG.handlers = [handler]
+    _LOG.setLevel(logging.INFO)
+    return _LOG
+
+
 class Progress:
     """A line on stderr that says how far a long command is; silent off a terminal and in the first second."""
 
     def __init__(self) -> None:
         self._started = self._shown = time.monotonic()
         self._drawn = False
+        self._what = ""
 
     def show(self, text: str) -> None:
         """Replaces the line, ten times a second at most."""
         now = time.monotonic()
+        if _LOG.isEnabledFor(logging.INFO):
+            self._log(text, now)
+            return
         if not sys.stderr.isatty() or now - self._started < 1.0 or now - self._shown < 0.1:
             return
         self._shown, self._drawn = now, True
         print(f"\r\x1b[K{text}", end="", file=sys.stderr, flush=True)
+
+    def _log(self, text: str, now: float) -> None:
+        """Each thing that begins, and how far it is once a second."""
+        what = re.sub(r"[-+.\d]+", "", text)
+        if what != self._what or now - self._shown >= 1.0:
+            self._what, self._shown = what, now
+            _LOG.info("%s", text)
 
     def done(self) -> None:
         """Takes the line away."""

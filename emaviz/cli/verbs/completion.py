@@ -97,7 +97,8 @@ def _fish(levels: list[_Level]) -> Iterator[str]:
         for one in level.actions:
             names = " ".join(f"-l {n[2:]}" if n.startswith("--") else f"-s {n[1:]}" for n in one.option_strings)
             takes = f"-x -a {quote(' '.join(_choices(one)))}" if one.choices else "" if one.nargs == 0 else "-r"
-            yield f"{start} {names} {takes} -d {quote((one.help or "").replace("%%", "%"))}"
+            text = (one.help or "").replace("%%", "%")
+            yield f"{start} {names} {takes} -d {quote(text)}"
 
 
 _SHELLS: dict[str, Callable[[list[_Level]], Iterator[str]]] = {"bash": _bash, "zsh": _zsh, "fish": _fish}

@@ -6,6 +6,8 @@ terminal's text round.  `quoted` shortens one piece; what quotes foreign text ca
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 MOST_QUOTED = 300  # characters of any one piece of foreign text
 _LONGEST_LINE = 1000  # of whole lines; each is shorter where its pieces are quoted
 _KEPT = 300  # of either end of a longer one
@@ -27,6 +29,14 @@ def quoted(value: object, most: int = MOST_QUOTED) -> str:
     # Cut first: what is cut off may be as long as a file.  A sign that was made visible can be several characters.
     shown = _visible(text[: most + 1])
     return shown if len(shown) <= most else shown[: most - 1] + "…"
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """ "; did you mean 'x'?" where one of the known names is like this one, else ""; to end the line of a refusal."""
+    from difflib import get_close_matches  # takes a while to import, and few need it
+
+    like = get_close_matches(str(name)[:MOST_QUOTED], list(known), n=1, cutoff=0.6)
+    return f"; did you mean {quoted(like[0])!r}?" if like else ""
 
 
 def _ends(line: str) -> str:

@@ -14,7 +14,7 @@ from ema_model.comparison.assemble import residuals_of
 from ema_model.comparison.result import Compared, Comparison, SignalError
 from ema_model.comparison.verdict import judge, judged
 from ema_model.effects import find
-from ema_model.errors import InputError, quoted
+from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.estimation import Calibration, Floor, after_fit, floor, of_unseen, taken_up
 from ema_model.estimation import calibrate as fit
 from ema_model.estimation.floor import twin_error
@@ -24,6 +24,7 @@ from ema_model.faults import named
 from ema_model.models import Model, Window, model_for
 from ema_model.models.delay_of_drive import with_delay_of_drive
 from ema_model.models.stretches import evaluation_stretches, fit_stretches
+from ema_model.quantities.numbers import check_number
 from ema_model.recordings import Measurement
 from ema_model.recordings.health.card import health_of
 from ema_model.recordings.prepared import prepared
@@ -156,9 +157,12 @@ def weights_of(signals: Sequence[str] | Mapping[str, float] | None, actuator: Ac
     known = {actuator.axes.signal(name): name for name in (*SIGNALS, "motor_speed_rad_s")}
     for name in signals:
         if name not in known:
-            raise InputError(f"no signal {quoted(name)!r} to compare; there are {', '.join(known)}")
+            raise InputError(
+                f"no signal {quoted(name)!r} to compare; there are {', '.join(known)}{did_you_mean(name, known)}"
+            )
     weights = signals if isinstance(signals, Mapping) else dict.fromkeys(signals, 1.0)
     for name, weight in weights.items():
+        check_number(weight, f"the weight of {name}")
         if not 0.0 < weight < np.inf:
             raise InputError(f"the weight of {name} must be a number above 0, not {weight:g}")
     return {known[name]: weight for name, weight in weights.items()}

@@ -8,16 +8,11 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from ema_model.actuator import save_actuator
-from ema_model.actuator.describe import described, entry_of, gear_of
-from ema_model.actuator.keys import KINDS
-from ema_model.actuator.plausible import implausible, missing
-from ema_model.effects.user.entries import kind_of
 from ema_model.errors import InputError, quoted
+from ema_model.members import stated_in
 from ema_model.quantities.axes import KINDS as AXES
-from emaviz.cli import files, given, options, output
+from emaviz.cli import files, options
 from emaviz.cli.numbers import FINITE
-from emaviz.cli.verbs.actuator.questions import ask
 
 HELP = "write an actuator file with comments, from options or from answers on the terminal"
 PLACE = 1
@@ -27,6 +22,7 @@ _TEXTS = ("expression", "variable", "modulator")  # of a user's effect
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The kinds, the values that are known, effects, and how recordings are read."""
+    kinds = stated_in("ema_model.actuator.keys", "KINDS")
     parser.add_argument("file", type=files.SAVED_ACTUATOR, metavar="FILE.toml", help="the file to write")
     parser.add_argument("--name", help="what the actuator is called; without it, the file's name")
     parser.add_argument("--description", default="", help="a sentence about it")
@@ -34,9 +30,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--user", choices=AXES, help="whether what it moves turns or slides; rotary without it")
     parser.add_argument("--gear", metavar="RATIO", help="user's motion per motor's: 0.002, 1/500 or 500:1")
     parser.add_argument("--lead-mm", type=FINITE, metavar="mm", help="of a screw, per turn of the motor")
-    parser.add_argument("--controller", choices=tuple(KINDS["controller"]), help="unknown: inverse dynamics")
+    parser.add_argument("--controller", choices=tuple(kinds["controller"]), help="unknown: inverse dynamics")
     parser.add_argument(
-        "--drive", choices=(*KINDS["inverter"], "unknown"), help="what the controller's output acts through"
+        "--drive", choices=(*kinds["inverter"], "unknown"), help="what the controller's output acts through"
     )
     parser.add_argument(
         "--set",
@@ -61,6 +57,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Asks for what no option says where a terminal is there, guesses the rest, and writes the file."""
+    from ema_model.actuator import save_actuator
+    from ema_model.actuator.describe import described
+    from ema_model.actuator.plausible import implausible, missing
+    from emaviz.cli import output
+    from emaviz.cli.verbs.actuator.questions import ask
+
     document = _document(arguments)
     if arguments.controller is None and sys.stdin.isatty():
         ask(document, arguments)
@@ -77,6 +79,8 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _kinds(arguments: argparse.Namespace) -> tuple[str, str]:
     """The kinds of controller and drive: what is not known of a loop is left to inverse dynamics."""
+    from ema_model.actuator.keys import KINDS
+
     if arguments.controller is None:
         raise InputError(f"{_HERE}: say --controller {', '.join(KINDS['controller'])}; unknown is always an answer")
     drive = arguments.drive or "unknown"
@@ -112,6 +116,8 @@ def _document(arguments: argparse.Namespace) -> dict[str, Any]:
 
 
 def _setting(section: str, text: str, where: str) -> Any:
+    from ema_model.actuator.describe import entry_of
+
     if section == "model":
         known = {"true": True, "false": False}
         return known[text] if text in known else entry_of(text, where)["value"]
@@ -125,11 +131,17 @@ def _gear(arguments: argparse.Namespace) -> float | None:
         return 1e-3 * arguments.lead_mm / (2.0 * math.pi)
     if arguments.gear is None:
         return None
+    from ema_model.actuator.describe import gear_of
+
     return gear_of(arguments.gear, "--gear")
 
 
 def _effect(text: str) -> tuple[str, dict[str, Any]]:
     """The table of --effect NAME:param=value±tolerance,…"""
+    from ema_model.actuator.describe import entry_of
+    from ema_model.effects.user.entries import kind_of
+    from emaviz.cli import given
+
     name, _, rest = text.partition(":")
     table: dict[str, Any] = {}
     for part in given.split_at_commas(rest):
@@ -148,6 +160,9 @@ def _effect(text: str) -> tuple[str, dict[str, Any]]:
 
 
 def _rule(text: str) -> dict[str, Any]:
+    from ema_model.actuator.describe import entry_of
+    from emaviz.cli import given
+
     pattern, separator, rest = text.partition(":")
     if not separator or not rest:
         raise InputError(f"--where {quoted(text)}: write it as PATTERN:section.name=value,… or PATTERN:map")

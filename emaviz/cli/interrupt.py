@@ -17,7 +17,7 @@ from dataclasses import dataclass
 EXIT_CODE = 130  # as shells have it: 128 + SIGINT
 _END = b"\0"  # no signal's number
 _GRACE_S = 1.5  # to close recordings and remove drafts
-_ANSWER_S = 30.0  # the same where a part of the answer is to be made and written, on a busy machine
+_ANSWER_S = 60.0  # the same where a part of the answer is to be made and written, on a busy machine
 
 
 @dataclass
@@ -42,7 +42,7 @@ class PartialAnswer:
         _state.is_raised, _state.has_answer = True, _state.came and _state.has_answer
 
     def grows(self) -> None:
-        """There is a part: from now on an interrupt leaves half a minute, not two seconds, to print and write it."""
+        """There is a part: from now on an interrupt leaves a minute, not two seconds, to print and write it."""
         _state.has_answer = True
 
     def is_interrupted(self) -> bool:

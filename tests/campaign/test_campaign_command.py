@@ -48,7 +48,7 @@ def folder(made, tmp_path):
 
 
 def told(arguments, capsys):
-    assert main([str(one) for one in arguments]) == 2
+    assert main([*map(str, arguments), "--quiet"]) == 2
     line = capsys.readouterr().err
     assert line.startswith("emaviz: ") and line.count("\n") == 1 and line.rstrip().isprintable(), line
     return line
@@ -192,7 +192,7 @@ class Losing(Here):
 def test_workers_that_are_gone_are_told_once(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(campaign, "scheduler", lambda address, workers: Losing())
     plan = cheap(tmp_path, 2)
-    arguments = ["campaign", plan, "--out", tmp_path / "o", "--scheduler", "tcp://127.0.0.1:1"]
+    arguments = ["campaign", plan, "--out", tmp_path / "o", "--scheduler", "tcp://127.0.0.1:1", "--quiet"]
     assert main([str(one) for one in arguments]) == 0
     out, err = capsys.readouterr()
     assert "2 tasks, 2 computed now" in out

@@ -37,7 +37,7 @@ _starter: ThreadPoolExecutor | None = None
 _owner = 0  # the process whose thread that is; a forked one has no such thread
 
 
-def start_python(arguments: Sequence[str], **options: Any) -> subprocess.Popen[bytes]:
+def start_python(arguments: Sequence[str], **options: Any) -> subprocess.Popen[Any]:
     """Starts Python with these arguments, whose program calls `end_with_parent`; its input stays open for this process.
 
     options: as of `subprocess.Popen`.

@@ -7,7 +7,6 @@ terminal's text round.  `quoted` shortens one piece; what quotes foreign text ca
 from __future__ import annotations
 
 from collections.abc import Iterable
-from difflib import get_close_matches
 
 MOST_QUOTED = 300  # characters of any one piece of foreign text
 _LONGEST_LINE = 1000  # of whole lines; each is shorter where its pieces are quoted
@@ -33,8 +32,10 @@ def quoted(value: object, most: int = MOST_QUOTED) -> str:
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """The end of a line that refuses a name: "; did you mean 'x'?" with the known name most like it, else ""."""
-    like = get_close_matches(name, known, n=1, cutoff=0.6)
+    """ "; did you mean 'x'?" where one of the known names is like this one, else ""; to end the line of a refusal."""
+    from difflib import get_close_matches  # takes a while to import, and few need it
+
+    like = get_close_matches(str(name)[:MOST_QUOTED], list(known), n=1, cutoff=0.6)
     return f"; did you mean {quoted(like[0])!r}?" if like else ""
 
 

@@ -9,7 +9,8 @@ from types import SimpleNamespace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ema_model.errors import InputError, quoted
+from ema_model.errors import InputError, did_you_mean, quoted
+from ema_model.quantities.numbers import check_number
 from ema_model.quantities.titles import in_sentence
 
 _LEAST_TURNS = 0.02  # less, and the three-phase model diverges when two phases are shorted
@@ -86,7 +87,8 @@ def vector(settings: dict[str, float]) -> NDArray[np.float64]:
     k = HEALTHY.copy()
     for name, value in settings.items():
         if name not in NAMES:
-            raise InputError(f"no fault {quoted(name)!r}; faults are k1 … k8")
+            raise InputError(f"no fault {quoted(name)!r}; faults are k1 … k8{did_you_mean(name, NAMES)}")
+        check_number(value, f"fault {name}")
         if not 0.0 <= value <= 1.0:  # also NaN
             raise InputError(f"fault {name} = {value:g} is outside 0 … 1")
         k[NAMES.index(name)] = value

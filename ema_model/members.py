@@ -6,8 +6,11 @@ is adding a file.
 
 from __future__ import annotations
 
+import ast
 import importlib
 import pkgutil
+from collections.abc import Iterator
+from pathlib import Path
 from types import ModuleType
 from typing import Any, TypeVar
 
@@ -15,9 +18,49 @@ Base = TypeVar("Base")
 
 
 def names(package: str, *, files: bool = True, folders: bool = True) -> list[str]:
-    """The files and folders of a package, in alphabetical order; none of them is imported."""
-    found = pkgutil.iter_modules(importlib.import_module(package).__path__)
+    """The files and folders of a package, in alphabetical order; neither they nor the package are imported."""
+    found = pkgutil.iter_modules(map(str, _places(package)))
     return sorted(one.name for one in found if (folders if one.ispkg else files))
+
+
+def stated(package: str, fact: str) -> dict[str, Any]:
+    """The literal that each file of a package assigns to this name, in the file or in its class, by the file's name.
+
+    The sources are read and nothing is imported, for whoever only lists names and must answer at once.  A value that is
+    no literal is `...`; files that do not assign the name are left out.
+    """
+    found = {}
+    for path in sorted(path for place in _places(package) for path in place.glob("[!_]*.py")):
+        source = path.read_text(encoding="utf-8")
+        if fact in source and (values := list(_assigned(ast.parse(source), fact))):
+            found[path.stem] = values[0]
+    return found
+
+
+def stated_in(module: str, fact: str) -> Any:
+    """The same of one file: the literal that it assigns to this name."""
+    package, _, name = module.rpartition(".")
+    (path,) = (place / f"{name}.py" for place in _places(package))
+    return next(_assigned(ast.parse(path.read_text(encoding="utf-8")), fact))
+
+
+def _places(package: str) -> list[Path]:
+    top, *folders = package.split(".")
+    # Only the top is imported, which holds nothing: a package below may take a second.
+    return [Path(place, *folders) for place in importlib.import_module(top).__path__]
+
+
+def _assigned(body: ast.Module | ast.ClassDef, fact: str) -> Iterator[Any]:
+    for node in body.body:
+        if isinstance(node, ast.ClassDef):
+            yield from _assigned(node, fact)
+        elif isinstance(node, ast.Assign | ast.AnnAssign) and node.value is not None:
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            if any(isinstance(target, ast.Name) and target.id == fact for target in targets):
+                try:
+                    yield ast.literal_eval(node.value)
+                except ValueError:
+                    yield ...
 
 
 def members(package: str, fact: str, *, files: bool = True, folders: bool = False) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from ema_model.actuator.naming import on_axes
 from ema_model.actuator.parameters import SECTIONS, Rule, Tolerance, check_stops, check_value
 from ema_model.actuator.steps import LONGEST_S, SHORTEST_S, reader_step
 from ema_model.actuator.unread import unread
-from ema_model.errors import InputError, quoted
+from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.faults import vector
 from ema_model.files.limits import TEXT_BYTES
 from ema_model.files.shipped import shipped_folder
@@ -135,7 +135,8 @@ def _effects(
     given: dict[str, Any], axes: Axes, tolerances: dict[str, Tolerance], where: str
 ) -> dict[str, dict[str, float]]:
     """The effects that belong to the actuator's model, checked by the catalogue."""
-    # the catalogue's kernels need not be loaded for an actuator without effects
+    if not given:  # the catalogue's kernels need not be loaded for an actuator without effects
+        return {}
     from ema_model.effects import find
     from ema_model.effects.user.entries import kind_of, read_entries
 
@@ -154,7 +155,9 @@ def _effects(
         values = {}
         for shown, entry in table.items():
             if shown not in names:
-                raise InputError(f"{where}: {inside} has no {quoted(shown)!r}; it has {', '.join(names)}")
+                raise InputError(
+                    f"{where}: {inside} has no {quoted(shown)!r}; it has {', '.join(names)}{did_you_mean(shown, names)}"
+                )
             value, tolerance = _number_and_tolerance(f"effects.{quoted(given_name)}", quoted(shown), entry, where)
             values[names[shown]] = value
             if tolerance is not None:

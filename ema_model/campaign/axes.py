@@ -17,7 +17,7 @@ from ema_model.actuator import Actuator
 from ema_model.campaign import draws
 from ema_model.campaign.given import effects_of
 from ema_model.effects import CATALOGUE
-from ema_model.errors import InputError, quoted
+from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.files.refusal import listed
 from ema_model.quantities.numbers import as_number
 
@@ -195,7 +195,9 @@ def _names(entry: Any) -> list[str]:
         return [name for name, effect in CATALOGUE.items() if not effect.duplicates and name != "pendulum_load"]
     for name in _list(entry):
         if name not in CATALOGUE:
-            raise InputError(f"no effect {quoted(name, 60)!r}; effects are {', '.join(CATALOGUE)}")
+            raise InputError(
+                f"no effect {quoted(name, 60)!r}; effects are {', '.join(CATALOGUE)}{did_you_mean(name, CATALOGUE)}"
+            )
     return entry
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from ema_model.commands.command import Command
 from ema_model.commands.recorded import Recorded
-from ema_model.errors import InputError, quoted
+from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.members import classes
 
 __all__ = ["COMMANDS", "Command", "Recorded", "command"]
@@ -27,13 +27,16 @@ COMMANDS: dict[str, type[Command]] = {
 def command(name: str, settings: Mapping[str, Any] | None = None) -> Command:
     """The command of that name with some settings changed; text values are read as the setting's type."""
     if name not in COMMANDS:
-        raise InputError(f"no command {quoted(name)!r}; commands are {', '.join(COMMANDS)}, or a recording's file")
+        like = did_you_mean(name, COMMANDS)
+        names = ", ".join(COMMANDS)
+        raise InputError(f"no command {quoted(name)!r}; commands are {names}, or a recording's file{like}")
     cls = COMMANDS[name]
     known = {f.name: f.default for f in fields(cls)}
     read: dict[str, Any] = {}
     for setting, value in (settings or {}).items():
         if setting not in known:
-            raise InputError(f"{name} has no setting {quoted(setting)!r}; it has {', '.join(known)}")
+            like = did_you_mean(setting, known)
+            raise InputError(f"{name} has no setting {quoted(setting)!r}; it has {', '.join(known)}{like}")
         read[setting] = _number(name, setting, value, known[setting])
     return cls(**read)
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.errors import InputError
+from ema_model.quantities.numbers import check_number
 
 Array = NDArray[np.floating]
 
@@ -34,7 +35,8 @@ class Command(ABC):
     def __post_init__(self) -> None:
         for f in fields(self):
             value = getattr(self, f.name)
-            if isinstance(value, int | float):
+            if isinstance(f.default, int | float):
+                check_number(value, f"{self.name}: {f.name}")
                 if not math.isfinite(value):
                     raise InputError(f"{self.name}: {f.name} must be a finite number, not {value}")
                 never_negative = f.name.endswith(("_Hz", "time_s"))

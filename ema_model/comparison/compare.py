@@ -24,6 +24,7 @@ from ema_model.faults import named
 from ema_model.models import Model, Window, model_for
 from ema_model.models.delay_of_drive import with_delay_of_drive
 from ema_model.models.stretches import evaluation_stretches, fit_stretches
+from ema_model.quantities.numbers import check_number
 from ema_model.recordings import Measurement
 from ema_model.recordings.health.card import health_of
 from ema_model.recordings.prepared import prepared
@@ -163,6 +164,7 @@ def weights_of(signals: Sequence[str] | Mapping[str, float] | None, actuator: Ac
             )
     weights = signals if isinstance(signals, Mapping) else dict.fromkeys(signals, 1.0)
     for name, weight in weights.items():
+        check_number(weight, f"the weight of {name}")
         if not 0.0 < weight < np.inf:
             raise InputError(f"the weight of {name} must be a number above 0, not {weight:g}")
     return {known[name]: weight for name, weight in weights.items()}

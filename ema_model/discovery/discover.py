@@ -25,6 +25,8 @@ from ema_model.discovery.steps.step import refreshed
 from ema_model.discovery.steps.verdict import explains_all, verdict_of
 from ema_model.discovery.steps.walking import named_in, walk
 from ema_model.effects import CATALOGUE
+from ema_model.errors import InputError, quoted
+from ema_model.quantities.numbers import as_number
 from ema_model.recordings import Measurement
 
 Progress = Callable[[str], None]
@@ -52,6 +54,8 @@ def discover(
     the model is calibrated; where it is true, what was added so far is the answer, with the verdict "interrupted".
     Raises InputError for recordings that cannot be compared.
     """
+    if not as_number(most_effects) >= 0.0:
+        raise InputError(f"most_effects must be a number from 0 on, not {quoted(repr(most_effects), 40)}")
     progress = on_progress or (lambda text: None)
 
     def go_on() -> None:

@@ -6,11 +6,10 @@ To add an effect, add a file with an `EFFECT`: the models, the command line, the
 from __future__ import annotations
 
 from dataclasses import replace
-from difflib import get_close_matches
 from typing import TypeVar
 
 from ema_model.effects.effect import Effect, Parameter
-from ema_model.errors import InputError
+from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.members import members
 from ema_model.quantities.axes import ROTARY, Axes
 from ema_model.quantities.sides import MOTOR, NEITHER, USER
@@ -26,7 +25,7 @@ _OF_THE_USER: dict[str, Effect] = {}  # made at run time by `ema_model.effects.u
 
 
 def find(name: str, axes: Axes = ROTARY) -> Effect:
-    """The effect of that name, of the catalogue or registered, on these axes; InputError names those like it.
+    """The effect of that name, of the catalogue or registered, on these axes; InputError names one like it.
 
     A model may hold an effect several times, as cogging at several orders: the second is `cogging_torque_2`.
     """
@@ -34,9 +33,8 @@ def find(name: str, axes: Axes = ROTARY) -> Effect:
     if effect is None:
         again = CATALOGUE.get(catalogue_name(name))
         if again is None:
-            like = get_close_matches(str(name), CATALOGUE, 3, 0.5)
-            known = f"did you mean {' or '.join(like)}?" if like else f"`emaviz effects` lists the {len(CATALOGUE)}"
-            raise InputError(f"no effect {name!r}; {known}")
+            like = did_you_mean(name, CATALOGUE) or f"; `emaviz effects` lists the {len(CATALOGUE)}"
+            raise InputError(f"no effect {quoted(name)!r}{like}")
         effect = replace(again, name=name)
     return effect.on(axes)
 

@@ -7,8 +7,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from ema_model.errors import InputError, quoted
+from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.quantities.axes import ROTARY, Axes
+from ema_model.quantities.numbers import check_number
 from ema_model.quantities.si import linear_unit
 from ema_model.quantities.sides import MOTOR, NEITHER, USER, Side
 from ema_model.quantities.titles import labelled, parameter_title, unit_of
@@ -139,6 +140,7 @@ class Parameter:
 
     def check(self, value: float, where: str) -> None:
         """Raises InputError for a value out of its range, or one that is not whole where it must be."""
+        check_number(value, f"{where}: {self.shown}")
         if not (math.isfinite(value) and self.low <= value <= self.high):
             raise InputError(f"{where}: {self.shown} = {value:g} is outside {self.low:g} … {self.high:g}")
         if self.integer and value != round(value):
@@ -224,15 +226,19 @@ class Effect:
         names = {parameter.shown: parameter.name for parameter in self.parameters}
         for name in given:
             if name not in names:
-                raise InputError(f"effect {self.name} has no parameter {quoted(name)!r}; it has {', '.join(names)}")
+                raise InputError(self._no_parameter(name))
         return {names[name]: value for name, value in given.items()}
+
+    def _no_parameter(self, name: str) -> str:
+        names = [parameter.shown for parameter in self.parameters]
+        like = did_you_mean(name, names)
+        return f"effect {self.name} has no parameter {quoted(name)!r}; it has {', '.join(names)}{like}"
 
     def settings(self, given: dict[str, float]) -> dict[str, float]:
         """All parameters, in order, those not given at their default; InputError for names and values."""
         known = {parameter.name: parameter for parameter in self.parameters}
         for name, value in given.items():
             if name not in known:
-                shown = ", ".join(parameter.shown for parameter in self.parameters)
-                raise InputError(f"effect {self.name} has no parameter {name!r}; it has {shown}")
+                raise InputError(self._no_parameter(name))
             known[name].check(value, f"effect {self.name}")
         return {name: float(given.get(name, p.default)) for name, p in known.items()}

@@ -19,7 +19,7 @@ from ema_model.actuator import Actuator
 from ema_model.actuator.naming import on_axes
 from ema_model.actuator.parameters import low_limit
 from ema_model.effects import find
-from ema_model.errors import InputError
+from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.estimation.floor import POSITIONS, Floor
 from ema_model.faults import NAMES
 from ema_model.models import Model
@@ -107,8 +107,11 @@ def _fault(actuator: Actuator, place: int) -> Unknown:
 
 def _parameter(actuator: Actuator, name: str) -> Unknown:
     if name not in actuator.tolerances:
-        known = ", ".join(on_axes(path, actuator.axes).path for path in actuator.tolerances)
-        raise InputError(f"{name} cannot be calibrated: the actuator's file gives it no tolerance; free may be {known}")
+        known = [on_axes(path, actuator.axes).path for path in actuator.tolerances]
+        raise InputError(
+            f"{quoted(name)} cannot be calibrated: the actuator's file gives it no tolerance; "
+            f"free may be {', '.join(known)}{did_you_mean(name, [*NAMES, *known])}"
+        )
     nominal, sigma = actuator.value(name), actuator.tolerances[name].sigma
     low, high = low_limit(name, actuator.controller.kind), math.inf
     if name.startswith("effects."):

@@ -20,6 +20,7 @@ from ema_model.identification.optimisers import OPTIMISERS, Optimiser, create
 from ema_model.identification.search import search
 from ema_model.identification.uncertainty import Uncertainty, uncertainty
 from ema_model.physics.rows import LANES
+from ema_model.quantities.numbers import as_number, check_seed
 from ema_model.simulation.one_stack import stack_at_hand
 from ema_model.simulation.precompile import compile_ahead, compile_here, wait_for
 from ema_model.stacks import Stack
@@ -113,6 +114,7 @@ def steps(
     they do not move and their tolerances do not widen the intervals.  settings: the algorithm's own.
     Raises InputError for an unknown algorithm or impossible settings.
     """
+    check_seed(seed)
     prepared = cache(lambda: setting(objective, parameters_known=parameters_known))
     if algorithm == ROBUST:
         if settings:
@@ -247,7 +249,8 @@ def _robust(
 
 
 def _check_size(what: str, value: int, least: int) -> None:
-    if value != int(value) or value < least:
+    number = as_number(value)
+    if not (number >= least and number.is_integer()):
         raise InputError(f"{what} must be a whole number of at least {least}, got {quoted(value)}")
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ema_model.errors import InputError, quoted
 from ema_model.quantities.si import BY_SHOWN
 
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -28,6 +29,21 @@ def as_number(value: Any) -> float:
         return math.nan if isinstance(value, bool | str) else float(value)
     except (TypeError, ValueError, OverflowError):
         return math.nan
+
+
+def check_number(value: Any, what: str) -> None:
+    """InputError for what is no number at all; NaN and infinity are left to the check of the range.
+
+    what: the name in the error, "the sample rate".
+    """
+    if math.isnan(as_number(value)) and not isinstance(value, float | np.floating):
+        raise InputError(f"{what} must be a number, not {quoted(repr(value), 40)}")
+
+
+def check_seed(value: Any) -> None:
+    """InputError for what cannot begin random numbers."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 0:
+        raise InputError(f"the seed must be a whole number from 0 on, not {quoted(repr(value), 40)}")
 
 
 def number(value: float, digits: int = 3) -> str:

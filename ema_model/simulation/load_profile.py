@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ema_model.errors import InputError, quoted
+from ema_model.errors import InputError, did_you_mean, quoted
+from ema_model.quantities.numbers import check_number
 
 Array = NDArray[np.float64]
 
@@ -19,7 +20,7 @@ class LoadProfile:
     """Shares of the run's load torque over time.
 
     time_s: when a step comes, and how long a chirp's frequency rises; frequency_Hz: of a sine, and where a chirp ends.
-    Raises InputError for a shape that does not exist and for numbers that make no sense.
+    Raises InputError for a shape that does not exist, for what is no number and for numbers that make no sense.
     """
 
     shape: str = "constant"
@@ -28,9 +29,13 @@ class LoadProfile:
 
     def __post_init__(self) -> None:
         if self.shape not in SHAPES:
-            raise InputError(f"the load's shape must be one of {', '.join(SHAPES)}, not {quoted(self.shape, 40)!r}")
+            like = did_you_mean(self.shape, SHAPES)
+            raise InputError(
+                f"the load's shape must be one of {', '.join(SHAPES)}, not {quoted(self.shape, 40)!r}{like}"
+            )
         for name in ("time_s", "frequency_Hz"):
             value = getattr(self, name)
+            check_number(value, f"the load's {name}")
             if not (math.isfinite(value) and value > 0.0):
                 raise InputError(f"the load's {name} must be above 0, not {value:g}")
 
@@ -69,10 +74,5 @@ def _chirp(time_s: Array, profile: LoadProfile) -> Array:
     return np.sin(2.0 * np.pi * cycles)
 
 
-_SHAPES: dict[str, Callable[[Array, LoadProfile], Array]] = {
-    "constant": _constant,
-    "step": _step,
-    "sine": _sine,
-    "chirp": _chirp,
-}
-SHAPES = tuple(_SHAPES)
+SHAPES = ("constant", "step", "sine", "chirp")
+_SHAPES: dict[str, Callable[[Array, LoadProfile], Array]] = dict(zip(SHAPES, (_constant, _step, _sine, _chirp)))

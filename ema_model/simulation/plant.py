@@ -16,8 +16,8 @@ from ema_model.simulation import precompile as ahead
 from ema_model.simulation.one_stack import library_stack, own_stack, stack_at_hand
 from ema_model.simulation.run import Run, simulate_monitor, simulate_reference
 
-_RATE_HZ = {"filtered": 10_000.0, "raw": 100_000.0}  # of what is identified, by the fitness that it is for
-FITNESSES = tuple(_RATE_HZ)
+FITNESSES = ("filtered", "raw")
+_RATE_HZ = dict(zip(FITNESSES, (10_000.0, 100_000.0)))  # of what is identified, by the fitness that it is for
 
 
 def can_be_explored(actuator: Actuator) -> bool:

@@ -15,6 +15,7 @@ from ema_model.effects import find
 from ema_model.errors import InputError, quoted
 from ema_model.physics.rows import LANES
 from ema_model.quantities.axes import Axes
+from ema_model.quantities.numbers import check_number
 from ema_model.recordings import Measurement
 from ema_model.simulation.load_profile import LoadProfile, RecordedLoad
 from ema_model.simulation.one_stack import stack_at_hand
@@ -48,6 +49,9 @@ class Run:
     load: LoadProfile | RecordedLoad = field(default_factory=LoadProfile)  # how that goes over time
 
     def __post_init__(self) -> None:
+        check_number(self.duration_s, "the duration")
+        check_number(self.sample_rate_Hz, "the sample rate")
+        check_number(self.load_torque_Nm, "the load torque")
         if not 1e-3 <= self.duration_s <= _LONGEST_S:
             raise InputError(f"the duration must lie between 0.001 and {_LONGEST_S:g} s, not {self.duration_s:g}")
         if not SLOWEST_HZ <= self.sample_rate_Hz <= FASTEST_HZ:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ema_model.errors import InputError
+from ema_model.quantities.numbers import check_number, check_seed
 from ema_model.recordings import Measurement
 
 _USER_STEP_RAD = 1e-6
@@ -20,13 +21,19 @@ class Sensors:
     encoder_bits: int = 0  # per motor turn
 
     def __post_init__(self) -> None:
+        check_number(self.current_noise_A, "the current noise")
+        check_number(self.encoder_bits, "the encoder's bits")
         if not 0.0 <= self.current_noise_A < 1e3:
             raise InputError(f"the current noise must lie between 0 and 1000 A rms, not {self.current_noise_A:g}")
         if not 0 <= self.encoder_bits <= 32:
             raise InputError(f"the encoder must have 0 (perfect) to 32 bits, not {self.encoder_bits}")
 
     def record(self, measurement: Measurement, seed: int) -> Measurement:
-        """The measurement as these sensors would record it; reproducible by the seed."""
+        """The measurement as these sensors would record it; reproducible by the seed.
+
+        InputError for a seed that is no whole number.
+        """
+        check_seed(seed)
         random = np.random.default_rng(seed)
         changed = {}
         if self.current_noise_A:

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model import faults
-from ema_model.errors import InputError, quoted
+from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.estimation.unknowns import ECCENTRICITY
 from ema_model.quantities.interval import HALF_90
+from ema_model.quantities.numbers import check_number
 from ema_model.tracking.criteria import LEAST_FLIGHTS, LONGEST, MISFIT_SHARE, MISFIT_WINDOW, WORN_BEFORE
 from ema_model.tracking.flight import Flight
 from ema_model.tracking.remaining import remaining
@@ -32,9 +33,12 @@ def check_thresholds(thresholds: Mapping[str, float]) -> None:
     """InputError for a k that is none, that is an angle, or for a threshold that health has passed."""
     for name, value in thresholds.items():
         if name not in faults.NAMES:
-            raise InputError(f"threshold {quoted(name)}: no such fault; faults are {', '.join(TRACKED)}")
+            raise InputError(
+                f"threshold {quoted(name)}: no such fault; faults are {', '.join(TRACKED)}{did_you_mean(name, TRACKED)}"
+            )
         if name not in TRACKED:
             raise InputError(f"threshold {name}: is the direction of k6, and no wear; give k6 a threshold")
+        check_number(value, f"threshold {name}")
         if not 0.0 <= value <= 1.0 or value == faults.BY_NAME[name].healthy:
             raise InputError(f"threshold {name} = {value:g}: must lie in 0 … 1, away from the healthy value")
 

@@ -27,27 +27,6 @@ _WORD = {"calibrate": "--no-calibrate", "signals": "--signal"}
 _Units = dict[str, list[Measurement]]
 
 
-def add_units(parser: argparse.ArgumentParser) -> None:
-    """--by and --unit"""
-    parser.add_argument(
-        "--by",
-        metavar="unit|COLUMN",
-        help="take units beside each other: a unit is a folder of recordings, or a number in a column of that name",
-    )
-    parser.add_argument(
-        "--unit",
-        action="append",
-        default=[],
-        metavar="NAME=GLOB",
-        help="the recordings of one unit, by their names or paths: left='*left*'; repeat for each unit",
-    )
-
-
-def is_asked(arguments: argparse.Namespace) -> bool:
-    """Whether units are to be compared."""
-    return bool(arguments.by or arguments.unit)
-
-
 def run(arguments: argparse.Namespace, actuator: Actuator) -> int:
     """Reads, compares the units, writes and prints."""
     from ema_model.units.compare import compare_units

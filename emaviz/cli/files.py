@@ -13,15 +13,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Generic, NamedTuple, TypeVar
 
-import emaviz.formats  # noqa: F401  they join the family
+# What reads recordings takes a while to import: it is imported where it is asked.
 from ema_model.errors import InputError
 from ema_model.files.refusal import shown
 from ema_model.files.user_file import check_user_file
-from ema_model.files.whole_file import remove_abandoned
-from ema_model.recordings import side_path
-from ema_model.recordings.formats import WRITTEN
-from ema_model.recordings.recording_set import files_of, is_pattern
-from ema_model.recordings.side_file.read import OF_A_FOLDER
 
 
 @dataclass(frozen=True)
@@ -42,12 +37,22 @@ class Input:
 class Output:
     """The type of an option that names a file to write."""
 
-    suffixes: tuple[str, ...]
+    ends_in: tuple[str, ...] = ()  # none: as measurements are written
     is_kept: bool = True  # one that exists is replaced with --force only
     has_side_file: bool = False
 
     def __call__(self, text: str) -> str:
         return text
+
+    @property
+    def suffixes(self) -> tuple[str, ...]:
+        """One of these ends the name."""
+        if self.ends_in:
+            return self.ends_in
+        import emaviz.formats  # noqa: F401  they join the family
+        from ema_model.recordings.formats import WRITTEN
+
+        return tuple(WRITTEN)
 
     def suffix_of(self, path: Path) -> str:
         """As it is compared: of measurements' alone, readers take capitals."""
@@ -65,13 +70,19 @@ class Folder:
 RECORDING = Input("the file of a measurement", has_side_file=True)
 RECORDINGS = replace(RECORDING, several=True)
 UNITS = replace(RECORDINGS, in_folders=True)
-HELD_OUT = replace(RECORDINGS, is_file=lambda text: not is_pattern(text))
+HELD_OUT = replace(RECORDINGS, is_file=lambda text: not _is_pattern(text))
 ACTUATOR = Input("an actuator file (.toml)")
 JSON = Output((".json",), is_kept=False)
 REPORT = Output((".html", ".htm"), is_kept=False)
 RRD = Output((".rrd",))
 SAVED_ACTUATOR = Output((".toml",))
-MEASUREMENT = Output(tuple(WRITTEN), has_side_file=True)
+MEASUREMENT = Output(has_side_file=True)
+
+
+def _is_pattern(text: str) -> bool:
+    from ema_model.recordings.recording_set import is_pattern
+
+    return is_pattern(text)
 
 
 _Declared = TypeVar("_Declared", Input, Output)
@@ -104,6 +115,8 @@ def check_files(parser: argparse.ArgumentParser, arguments: argparse.Namespace) 
 
     To be asked before any work.  Where the outputs go, what killed processes left of theirs is removed.
     """
+    from ema_model.files.whole_file import remove_abandoned
+
     inputs = [one for one in _named(Input, parser, arguments) if one.declared.is_file(str(one.path))]
     outputs = _named(Output, parser, arguments)
     for one in inputs:
@@ -133,6 +146,9 @@ def _named(
 
 def _files(text: str, declared: Input | Output) -> list[str]:
     if isinstance(declared, Input) and declared.several and declared.is_file(text):
+        import emaviz.formats  # noqa: F401  they join the family
+        from ema_model.recordings.recording_set import files_of
+
         return files_of(text, in_folders=declared.in_folders)
     return [text]
 
@@ -141,6 +157,8 @@ def _taken(one: _Named[_Declared]) -> list[tuple[Path, str]]:
     """Where no other output may go, and why: the file itself, and what would be read as its side file."""
     taken = [(one.path, f"is what {one.option} names" if one.option else "is a file to read")]
     if one.declared.has_side_file:
+        from ema_model.recordings.side_file.read import OF_A_FOLDER, side_path
+
         own = side_path(one.path)
         why = f"is the place of the side file of {shown(one.path.name, 100)}"
         taken += [(own, why), (own.with_name(OF_A_FOLDER), why)]

@@ -7,13 +7,11 @@ import math
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ema_model import faults
 from ema_model.actuator import Actuator, load_actuator
 from ema_model.commands import Command, Recorded, command
-from ema_model.effects import find
-from ema_model.effects.user.entries import kind_of, read_entries
 from ema_model.errors import InputError, quoted
 from ema_model.quantities.axes import Axes
 from ema_model.recordings import Measurement, read
@@ -30,9 +28,11 @@ from ema_model.recordings.recording_set import (
     runs_of,
 )
 from ema_model.simulation.load_profile import LoadProfile
-from ema_model.simulation.run import Run
 from emaviz.cli.options import COMMAND_OR_FILE
 from emaviz.cli.output import Progress
+
+if TYPE_CHECKING:
+    from ema_model.simulation.run import Run
 
 
 def read_set(
@@ -141,6 +141,11 @@ def faults_of(arguments: argparse.Namespace, known: Mapping[str, float] | None =
 
 def effects_of(arguments: argparse.Namespace, axes: Axes) -> dict[str, dict[str, float]]:
     """Effects from --effect NAME:param=value,…, or user_torque:expression=…,param=value,…; names are the axes'."""
+    if not arguments.effect:
+        return {}
+    from ema_model.effects import find  # the kernels take a while to import
+    from ema_model.effects.user.entries import kind_of, read_entries
+
     effects: dict[str, dict[str, float]] = {}
     for text in arguments.effect:
         name, _, rest = text.partition(":")
@@ -197,6 +202,8 @@ def weights_of(texts: list[str] | None) -> dict[str, float] | None:
 def run_of(arguments: argparse.Namespace, actuator: Actuator, sample_rate_Hz: float = 10_000.0) -> Run:
     """The run that the options ask for."""
     demand, length = _command(arguments, actuator)
+    from ema_model.simulation.run import Run  # takes a second: a wrong command is refused before
+
     duration = arguments.duration if arguments.duration is not None else length
     load = LoadProfile(arguments.load_shape, arguments.load_time, arguments.load_frequency)
     return Run(demand, duration, sample_rate_Hz, arguments.load_torque, load)

@@ -15,6 +15,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 EXIT_CODE = 130  # as shells have it: 128 + SIGINT
+_END = b"\0"  # no signal's number
 _GRACE_S = 1.5  # to close recordings and remove drafts
 _ANSWER_S = 60.0  # the same where a part of the answer is to be made and written, on a busy machine
 
@@ -73,12 +74,16 @@ def until_interrupted(run: Callable[[], int]) -> int:
 
     signal.signal(signal.SIGINT, interrupted)
     code = EXIT_CODE
+    watch = _Watch()
     try:
-        _start_watch()
+        watch.start()
         code = run()
     except BaseException:
         if not _state.came:
             raise
+    finally:
+        if not _state.came:
+            watch.end()
     if _state.came:
         # The interpreter's own way to end waits for threads, and takes the ground from those that compile.
         atexit._run_exitfuncs()
@@ -93,26 +98,46 @@ def _silent(*_: object) -> None:
     """In the place of the hooks that print tracebacks."""
 
 
-def _start_watch() -> None:
-    receiving, sending = os.pipe()
-    if sys.platform != "win32":
-        os.set_blocking(sending, False)  # a pipe that is full must not hold up the system's handler
-    # That handler writes there at once, even while the main thread is in native code.
-    signal.set_wakeup_fd(sending, warn_on_full_buffer=False)
-    threading.Thread(target=_watch, args=(receiving,), name="interrupts", daemon=True).start()
+class _Watch:
+    """The thread that ends the process where an interrupt does not."""
 
+    def __init__(self) -> None:
+        self._receiving, self._sending = os.pipe()
+        self._thread = threading.Thread(target=self._run, name="interrupts", daemon=True)
 
-def _watch(receiving: int) -> None:
-    _wait(receiving)
-    if _state.has_answer and sys.stderr.isatty():
-        print("\r\x1b[Kwriting what was found so far; Ctrl-C ends it at once", file=sys.stderr, flush=True)
-    late = threading.Timer(_ANSWER_S if _state.has_answer else _GRACE_S, os._exit, (EXIT_CODE,))
-    late.daemon = True
-    late.start()
-    _wait(receiving)
-    os._exit(EXIT_CODE)
+    def start(self) -> None:
+        """Begins to watch."""
+        if sys.platform != "win32":
+            os.set_blocking(self._sending, False)  # a pipe that is full must not hold up the system's handler
+        # That handler writes there at once, even while the main thread is in native code.
+        signal.set_wakeup_fd(self._sending, warn_on_full_buffer=False)
+        self._thread.start()
 
+    def end(self) -> None:
+        """Ends the thread: one that Python still finds when it ends is torn away, which can abort the process.
 
-def _wait(receiving: int) -> None:
-    while signal.SIGINT not in os.read(receiving, 1):
-        pass
+        An interrupt from here on ends the process as the system does.
+        """
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+        signal.set_wakeup_fd(-1)
+        if self._thread.ident is not None:
+            os.write(self._sending, _END)
+            self._thread.join()
+
+    def _run(self) -> None:
+        if not self._interrupted():
+            return
+        if _state.has_answer and sys.stderr.isatty():
+            print("\r\x1b[Kwriting what was found so far; Ctrl-C ends it at once", file=sys.stderr, flush=True)
+        late = threading.Timer(_ANSWER_S if _state.has_answer else _GRACE_S, os._exit, (EXIT_CODE,))
+        late.daemon = True
+        late.start()
+        if self._interrupted():
+            os._exit(EXIT_CODE)
+
+    def _interrupted(self) -> bool:
+        """Waits for an interrupt; False at the end."""
+        while (seen := os.read(self._receiving, 1)) != _END:
+            if signal.SIGINT in seen:
+                return True
+        return False

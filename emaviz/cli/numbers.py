@@ -33,6 +33,7 @@ class Number:
 
 
 FINITE = Number()
+SAMPLE_RATE = Number(1e-3, 1e9)  # Hz
 SEED = Number(0, 2**63 - 1, whole=True)
 
 

@@ -1,21 +1,51 @@
-"""Options that several commands share; what they give is read by `given`."""
+"""Options that several commands share; what they give is read by `given`.
+
+Names of commands, effects and the like are read from the sources that state them: the parser must answer at once, and
+to import what computes takes a second.
+"""
 
 from __future__ import annotations
 
 import argparse
+import re
+from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
-from ema_model.commands import COMMANDS
-from ema_model.errors import quoted
-from ema_model.recordings.formats.text_layout import known_encoding
-from ema_model.simulation.load_profile import SHAPES, LoadProfile
+from ema_model.errors import did_you_mean, quoted
+from ema_model.members import stated, stated_in
 from emaviz.cli import files
 from emaviz.cli.numbers import FINITE, SEED, whole
 
-COMMAND_OR_FILE = files.Input(
+
+@cache
+def command_names() -> tuple[str, ...]:
+    """As `ema_model.commands.COMMANDS` has them, in its order."""
+    names, places = stated("ema_model.commands", "name"), stated("ema_model.commands", "place")
+    del names["recorded"]  # which is made from a file
+    return tuple(names[file] for file in sorted(names, key=lambda file: (places.get(file, _LAST), names[file])))
+
+
+@dataclass(frozen=True)
+class _CommandOrFile(files.Input):
+    """The type of an option that takes a command's name, or a recording's file."""
+
+    def __call__(self, text: str) -> str:
+        if not self.is_file(text) and text not in (names := command_names()):
+            raise argparse.ArgumentTypeError(
+                f"no command {quoted(text)!r}; commands are {', '.join(names)}, or a recording's file"
+                f"{did_you_mean(text, names)}"
+            )
+        return text
+
+
+_LAST = 9  # the place of a command that states none
+_LOAD = "ema_model.simulation.load_profile"
+
+COMMAND_OR_FILE = _CommandOrFile(
     "the file of a measurement",
     has_side_file=True,
-    is_file=lambda name: name not in COMMANDS and bool(Path(name).suffix),
+    is_file=lambda name: bool(Path(name).suffix) and name not in command_names(),
 )
 
 
@@ -49,6 +79,22 @@ def add_fit(parser: argparse.ArgumentParser, what: str) -> None:
     add_report(parser)
     add_json(parser)
     files.add_force(parser)
+
+
+def add_units(parser: argparse.ArgumentParser) -> None:
+    """--by and --unit; `by_unit` takes what they give."""
+    parser.add_argument(
+        "--by",
+        metavar="unit|COLUMN",
+        help="take units beside each other: a unit is a folder of recordings, or a number in a column of that name",
+    )
+    parser.add_argument(
+        "--unit",
+        action="append",
+        default=[],
+        metavar="NAME=GLOB",
+        help="the recordings of one unit, by their names or paths: left='*left*'; repeat for each unit",
+    )
 
 
 def add_actuator(parser: argparse.ArgumentParser) -> None:
@@ -87,6 +133,8 @@ def add_mapping(parser: argparse.ArgumentParser) -> None:
 
 
 def _encoding(text: str) -> str:
+    from ema_model.recordings.formats.text_layout import known_encoding  # the readers take a while to import
+
     try:
         return known_encoding(text)
     except ValueError:
@@ -99,9 +147,28 @@ def add_effects(parser: argparse.ArgumentParser) -> None:
         "--effect",
         action="append",
         default=[],
+        type=_with_effect,
         metavar="NAME:param=value,…",
         help="a physical effect, or your own torque 'user_torque:expression=c*omega,c=-1e-4'; repeat for more",
     )
+
+
+def _with_effect(text: str) -> str:
+    effect_name(text.partition(":")[0])
+    return text
+
+
+def effect_name(text: str) -> str:
+    """The type of an argument that names an effect: of the library, or of the user's own kinds."""
+    kinds = stated_in("ema_model.effects.user.entries", "TITLES")
+    known = [*stated("ema_model.effects", "EFFECT"), *kinds]
+    # A model may hold an effect several times: cogging_torque_2.
+    if not (
+        text in known or re.sub(r"_\d+$", "", text) in known or text.startswith(tuple(f"{kind}_" for kind in kinds))
+    ):
+        like = did_you_mean(text, known) or "; `emaviz effects` lists them"
+        raise argparse.ArgumentTypeError(f"no effect {quoted(text)!r}{like}")
+    return text
 
 
 def add_seed(parser: argparse.ArgumentParser) -> None:
@@ -128,12 +195,13 @@ def add_record(parser: argparse.ArgumentParser, what: str) -> None:
 
 def add_run(parser: argparse.ArgumentParser) -> None:
     """What is asked of the actuator: --command, --set, --duration, --load-torque, sensors' accuracy"""
+    shapes, time_s, frequency_Hz = (stated_in(_LOAD, fact) for fact in ("SHAPES", "time_s", "frequency_Hz"))
     parser.add_argument(
         "--command",
         type=COMMAND_OR_FILE,
         default="chirp",
         metavar="NAME|FILE",
-        help=f"{', '.join(COMMANDS)}, or a recording's command",
+        help=f"{', '.join(command_names())}, or a recording's command",
     )
     parser.add_argument(
         "--set",
@@ -147,12 +215,12 @@ def add_run(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--load-torque", type=FINITE, default=0.0, metavar="N_m", help="on the user shaft, against positive motion"
     )
-    parser.add_argument("--load-shape", choices=SHAPES, default="constant", help="of the load torque over time")
+    parser.add_argument("--load-shape", choices=shapes, default="constant", help="of the load torque over time")
     parser.add_argument(
-        "--load-time", type=FINITE, default=LoadProfile.time_s, metavar="s", help="of its step, or of its chirp's rise"
+        "--load-time", type=FINITE, default=time_s, metavar="s", help="of its step, or of its chirp's rise"
     )
     parser.add_argument(
-        "--load-frequency", type=FINITE, default=LoadProfile.frequency_Hz, metavar="Hz", help="of its sine, or chirp"
+        "--load-frequency", type=FINITE, default=frequency_Hz, metavar="Hz", help="of its sine, or chirp"
     )
     parser.add_argument("--noise-current", type=FINITE, default=0.0, metavar="A", help="rms noise of the sensors")
     parser.add_argument(

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 import json
+import logging
+import re
 import sys
 import threading
 import time
@@ -12,7 +14,6 @@ from contextlib import suppress
 from datetime import timedelta
 from typing import Any
 
-import numba
 import numpy as np
 
 from ema_model.errors import InputError
@@ -21,6 +22,8 @@ from emaviz import __version__
 from emaviz.text.time_left import time_left
 
 _LINE_EVERY_S = 10.0  # of a log
+
+_LOG = logging.getLogger("emaviz")
 
 
 def write_json(arguments: Any, result: dict[str, Any]) -> None:
@@ -31,6 +34,8 @@ def write_json(arguments: Any, result: dict[str, Any]) -> None:
     path = arguments.json
     if path is None:
         return
+    import numba  # takes a third of a second
+
     document = {
         "schema": 1,
         "versions": {"emaviz": __version__, "numpy": np.__version__, "numba": numba.__version__},
@@ -58,6 +63,15 @@ def say_not_written(arguments: Any, *options: str) -> None:
         print(f"{', '.join(given)}: not written, since the answer is not whole")
 
 
+def be_verbose() -> logging.Logger:
+    """What says on stderr what is done, a line each with the time of day."""
+    handler = logging.StreamHandler()
+    handler.setFormatter(logging.Formatter("%(asctime)s %(message)s", "%H:%M:%S"))
+    _LOG.handlers = [handler]
+    _LOG.setLevel(logging.INFO)
+    return _LOG
+
+
 class Progress:
     """Says on stderr how far a long command is, unless it has --quiet.
 
@@ -75,17 +89,21 @@ class Progress:
         self._over = threading.Event()  # for the thread that writes while nothing new is said
         self._writer: threading.Thread | None = None
         self._writing = threading.Lock()
+        self._what = ""  # of the verbose log
 
     def show(self, text: str, share: float | None = None) -> None:
         """Replaces the line, ten times a second at most; share: of the whole work that is done, 0 … 1, if known."""
         if self._quiet:
             return
         self._said = text, share
+        now = self._clock()
+        if _LOG.isEnabledFor(logging.INFO):
+            self._log_each(text, now)
+            return
         if not sys.stderr.isatty():
             self.log()
             self._keep_logging()
             return
-        now = self._clock()
         if now - self._started < 1.0 or now - self._shown < 0.1:
             return
         self._shown, self._drawn = now, True
@@ -101,6 +119,13 @@ class Progress:
             (text, share), elapsed_s = self._said, now - self._started
             left = "" if share is None else time_left(elapsed_s, share)
             print(f"[{timedelta(seconds=int(elapsed_s))}] {text}{left and f', {left}'}", file=sys.stderr, flush=True)
+
+    def _log_each(self, text: str, now: float) -> None:
+        """Each thing that begins, and how far it is once a second."""
+        what = re.sub(r"[-+.\d]+", "", text)
+        if what != self._what or now - self._shown >= 1.0:
+            self._what, self._shown = what, now
+            _LOG.info("%s", text)
 
     def done(self) -> None:
         """Takes the line away; nothing more is said until the next `show`."""

@@ -1,25 +1,58 @@
-"""The command line's parser, of what each verb's file states: its `HELP`, its `PLACE` in the list, and its options."""
+"""The command line's parser, of what each verb's file states: its `HELP`, its `PLACE` in the list, and its options.
+
+Nothing that computes is imported for it: the help, the completion and a refusal come at once.
+"""
 
 from __future__ import annotations
 
 import argparse
 import importlib
-from collections.abc import Iterable
+import sys
+from collections.abc import Iterable, Sequence
 from functools import partial
 from types import ModuleType
 from typing import Any, NoReturn
 
 import emaviz
-from ema_model.errors import InputError
+from ema_model.errors import InputError, did_you_mean, quoted
 from emaviz.cli import COMMANDS
 from emaviz.cli.files import check_files
 
 
 class Parser(argparse.ArgumentParser):
-    """Argparse that tells a mistake in one line."""
+    """Argparse that tells a mistake in one line, which points to what is like it and to the help of the verb."""
 
     def error(self, message: str) -> NoReturn:
         raise InputError(f"{message} (see {self.prog} --help)")
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        if action.choices is not None and value not in action.choices:
+            names = [str(one) for one in action.choices]
+            like = did_you_mean(value, names)
+            problem = f"{quoted(value)!r} is none of {', '.join(names)}{like}"
+            raise argparse.ArgumentError(action, problem)
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> tuple[Any, list[str]]:
+        """Refuses what is not known here, where the options are, and not in the parser of the whole program."""
+        given = sys.argv[1:] if args is None else list(args)
+        if self._subparsers is None:
+            self._refuse_unknown(given)
+        parsed, rest = super().parse_known_args(given, namespace)
+        if rest:
+            self.error(f"unexpected {' '.join(map(quoted, rest))}")
+        return parsed, rest
+
+    def _refuse_unknown(self, given: Sequence[str]) -> None:
+        """Before anything else: a mistyped option is not a missing one."""
+        for text in given[: given.index("--")] if "--" in given else given:
+            name = text.partition("=")[0]
+            if name.startswith("--") and " " not in name and not any(o.startswith(name) for o in self.option_names):
+                self.error(f"no option {quoted(name)}{did_you_mean(name, self.option_names)}")
+
+    @property
+    def option_names(self) -> list[str]:
+        """The long ones, in order."""
+        return [name for name in self._option_string_actions if name.startswith("--")]
 
 
 class _Version(argparse.Action):
@@ -31,25 +64,49 @@ class _Version(argparse.Action):
 
 
 def parser_of(wanted: str) -> Parser:
-    """The parser with the wanted command alone, or with all of them; `run` of what it parses runs the command."""
+    """The parser with the wanted command alone; of another word, with the list of all commands without their options.
+
+    `run` of what it parses runs the command.
+    """
+    known = wanted in COMMANDS
+    return _parser((wanted,) if known else COMMANDS, with_options=known)
+
+
+def whole_parser() -> Parser:
+    """The parser with all commands and all their options."""
+    return _parser(COMMANDS, with_options=True)
+
+
+def _parser(verbs: Iterable[str], *, with_options: bool) -> Parser:
     parser = Parser(prog="emaviz", description="Break, watch and identify the model of an electromechanical actuator.")
     parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
+    _add_verbose(parser)
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    add_verbs(commands, "emaviz.cli.verbs", COMMANDS if wanted not in COMMANDS else (wanted,), "run")
+    add_verbs(commands, "emaviz.cli.verbs", verbs, "run", with_options=with_options)
     return parser
 
 
-def add_verbs(to: Any, package: str, verbs: Iterable[str], run: str) -> None:
+def add_verbs(to: Any, package: str, verbs: Iterable[str], run: str, *, with_options: bool = True) -> None:
     """Parsers of the verbs of a package, in their order; what is to be run is the `run` of what they parse."""
     modules = {name: importlib.import_module(f"{package}.{name}") for name in verbs}
     for name, verb in sorted(modules.items(), key=lambda one: one[1].PLACE):
         sub = to.add_parser(name, help=verb.HELP, description=verb.HELP)
-        verb.add_arguments(sub)
-        # Without a default: one of `emaviz actuator` would undo what its own verb was given.
-        sub.add_argument(
-            "-q", "--quiet", action="store_true", default=argparse.SUPPRESS, help="say nothing of how far it is"
-        )
+        if with_options:
+            verb.add_arguments(sub)
+            _add_verbose(sub)
+            sub.add_argument(
+                "-q", "--quiet", action="store_true", default=argparse.SUPPRESS, help="say nothing of how far it is"
+            )
         sub.set_defaults(**{run: partial(_run, verb, sub)})
+
+
+def _add_verbose(to: argparse.ArgumentParser) -> None:
+    to.add_argument(
+        *("-v", "--verbose"),
+        action="store_true",
+        default=argparse.SUPPRESS,  # given before the command, it holds as well
+        help="say on stderr what is done, and when; of an internal failure, where",
+    )
 
 
 def _run(verb: ModuleType, parser: argparse.ArgumentParser, arguments: argparse.Namespace) -> int:

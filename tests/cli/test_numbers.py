@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 from options_of import needed, options_with_values
 
+from ema_model.simulation import plant, run
 from emaviz.cli import main
 from emaviz.cli.numbers import Number
-from emaviz.cli.verbs import identify, simulate
 
 NUMBERS = [one for one in options_with_values() if isinstance(one[2].type, Number)]
 HOSTILE = ("nan", "inf", "-inf", "9" * 5000, "-" + "9" * 5000, "", "many", "1e999")
@@ -42,7 +42,7 @@ def _nothing_is_simulated(tmp_path, monkeypatch):
     def simulated(*_, **__):
         raise AssertionError("this was simulated")
 
-    for module, name in ((simulate, "simulate_reference"), (simulate, "simulate_monitor"), (identify, "simulated")):
+    for module, name in ((run, "simulate_reference"), (run, "simulate_monitor"), (plant, "simulated")):
         monkeypatch.setattr(module, name, simulated)
 
 

@@ -130,7 +130,7 @@ def test_a_quiet_campaign_says_nothing_and_another_says_how_far_it_is(tmp_path, 
             )
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("emaviz.cli.verbs.campaign.run_plan", run_plan)
+    monkeypatch.setattr("ema_model.campaign.run_plan", run_plan)
     monkeypatch.setattr(output.Progress.__init__, "__defaults__", (clock,))
     line = ["campaign", "robust_quick", "--out", str(tmp_path / "out")]
     assert main(line) == 130

@@ -1,7 +1,7 @@
 """A user's effect as the entries of a table: of an actuator file, or of a command line's `--effect`.
 
     [effects.user_torque]                     [effects.torque_curve]
-    expression = "c*omega + A*sin(7*theta)"   variable = "theta"    # or omega, q, user, load
+    expression = "c*omega + A*sin(7*theta)"   variable = "theta"    # or omega, user, q, load, t
     c = -1e-4                                 modulator = "1"       # or sign_speed, current
     A = { value = 0.02, sigma = 0.005 }       low = 0.0
                                               high = 6.283185307179586
@@ -17,21 +17,22 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from ema_model.effects.user.curve import torque_curve
-from ema_model.effects.user.expression import parse
+from ema_model.effects.user.curve import OF_VARIABLE, torque_curve
+from ema_model.effects.user.expression import VARIABLES, parse
 from ema_model.effects.user.torque import RANGE, user_torque
 from ema_model.effects.user.user_effect import UserEffect
 from ema_model.errors import InputError, quoted
 from ema_model.quantities.numbers import as_number
 
+_OF = ", ".join(f"{name} ({meaning})" for name, meaning in VARIABLES.items())
 # The keys of each kind, with what they mean.
 KEYS = {
     "user_torque": {
-        "expression": 'a torque at the motor, N·m, of theta, omega, q, user, load: "c*omega + A*sin(7*theta)"',
+        "expression": f'a torque at the motor, N·m, of {_OF}: "c*omega + A*sin(7*theta)"',
         "PARAMETER": "a value for each other name in the expression; in its table, low and high bound it",
     },
     "torque_curve": {
-        "variable": "theta, omega, q, user or load: what the torque depends on",
+        "variable": f"one of {', '.join(OF_VARIABLE.values())}: what the torque depends on",
         "modulator": "1, sign_speed or current: what the curve is multiplied by; 1 without it",
         "low": "where the first knot stands, in the variable's unit",
         "high": "where the last one stands; over a whole turn of theta, where the first comes again",

@@ -7,15 +7,18 @@ import re
 import sys
 from contextlib import suppress
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from ema_model.campaign import Status, Store, duration, estimate_s, load_plan, plan_path, run_plan, scheduler
-from ema_model.campaign.plan import Plan
 from ema_model.errors import InputError
 from ema_model.files.refusal import shown
-from emaviz.cli import files, options, output
+from emaviz.cli import files, options
 from emaviz.cli.interrupt import PartialAnswer
 from emaviz.cli.numbers import whole
-from emaviz.text.campaign import interrupted, progress_table, report_text
+
+if TYPE_CHECKING:
+    from ema_model.campaign import Status, Store
+    from ema_model.campaign.plan import Plan
+    from emaviz.cli import output
 
 HELP = "compute the many tasks of a plan, in processes or on a Dask cluster; status and report of one"
 PLACE = 11
@@ -40,7 +43,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", nargs="?", type=files.Folder(), metavar="DIR", help="of status and report")
     parser.add_argument("--out", dest="out", type=files.Folder(), metavar="DIR", help="where the rows are kept")
     parser.add_argument(
-        "--scheduler", type=_address, metavar="tcp://HOST:PORT", help="of Dask; without it, processes here"
+        "--scheduler",
+        type=_address,
+        metavar="tcp://HOST:PORT",
+        help="of Dask; without it, processes here. Whoever answers there is trusted: what it sends by pickle is run",
     )
     parser.add_argument("--workers", type=whole(1, 10_000), metavar="N", help="processes here; all cores without it")
     parser.add_argument("--dry-run", action="store_true", help="say what would be computed, and how long it takes")
@@ -59,11 +65,17 @@ def run(arguments: argparse.Namespace) -> int:
         return _report(arguments)
     if arguments.scheduler and arguments.workers:
         raise InputError("--workers is of processes here; a cluster has the workers that were begun for it")
+    from ema_model.campaign import load_plan, plan_path
+
     plan = load_plan(plan_path(arguments.plan))
     return _dry_run(plan, arguments) if arguments.dry_run else _run(plan, arguments)
 
 
 def _run(plan: Plan, arguments: argparse.Namespace) -> int:
+    from ema_model.campaign import Store, run_plan, scheduler
+    from emaviz.cli import output
+    from emaviz.text.campaign import interrupted
+
     progress = output.Progress(arguments)
     progress.show("beginning")
     try:
@@ -109,6 +121,9 @@ def _ended(status: Status, folder: str) -> str:
 
 def _dry_run(plan: Plan, arguments: argparse.Namespace) -> int:
     """What there is to do, by the seconds that such tasks took where some are there, else by rough ones."""
+    from ema_model.campaign import Store, duration, estimate_s, scheduler
+    from emaviz.cli import output
+
     try:
         store = Store(arguments.out)
     except InputError:  # nothing there yet
@@ -131,6 +146,10 @@ def _dry_run(plan: Plan, arguments: argparse.Namespace) -> int:
 
 
 def _status(arguments: argparse.Namespace) -> int:
+    from ema_model.campaign import Store
+    from emaviz.cli import output
+    from emaviz.text.campaign import progress_table
+
     store = Store(arguments.folder)
     print(progress_table(store))
     output.write_json(arguments, _numbers(store))
@@ -138,7 +157,10 @@ def _status(arguments: argparse.Namespace) -> int:
 
 
 def _report(arguments: argparse.Namespace) -> int:
+    from ema_model.campaign import Store
+    from emaviz.cli import output
     from emaviz.report.campaign import write_campaign_report  # plotly takes a second to import
+    from emaviz.text.campaign import report_text
 
     store = Store(arguments.folder)
     print(report_text(store))

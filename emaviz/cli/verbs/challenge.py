@@ -5,13 +5,14 @@ from __future__ import annotations
 import argparse
 import shutil
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from ema_model.challenges import Challenge
-from ema_model.challenges.challenge import EFFECTS, challenges, folder
-from ema_model.errors import InputError, quoted
+from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.files.refusal import shown
-from ema_model.practice import made
-from emaviz.cli import files, output
+from emaviz.cli import files
+
+if TYPE_CHECKING:
+    from ema_model.challenges import Challenge
 
 HELP = "list challenges to practise on, take one's recordings, open its seal"
 PLACE = 8
@@ -26,6 +27,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Lists, writes or reveals."""
+    from ema_model.challenges.challenge import challenges
+
     known = {one.name: one for one in challenges(kind=None)}
     if arguments.name is None:
         if arguments.out or arguments.reveal:
@@ -34,7 +37,8 @@ def run(arguments: argparse.Namespace) -> int:
             print(f"{one.name:20} {'●' * one.grade:5}  {one.title}")
         return 0
     if arguments.name not in known:
-        raise InputError(f"no challenge {quoted(arguments.name)}; there are {', '.join(known)}")
+        like = did_you_mean(arguments.name, known)
+        raise InputError(f"no challenge {quoted(arguments.name)}; there are {', '.join(known)}{like}")
     one = known[arguments.name]
     if arguments.out:
         _write(one, Path(arguments.out), arguments)
@@ -46,6 +50,10 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _write(one: Challenge, where: Path, arguments: argparse.Namespace) -> None:
+    from ema_model.challenges.challenge import EFFECTS
+    from ema_model.practice import made
+    from emaviz.cli import output
+
     if one.kind == EFFECTS:
         command = _copy(one, where)
     else:
@@ -73,7 +81,11 @@ def _copy(one: Challenge, where: Path) -> str:
 
 
 def _answer(one: Challenge) -> list[str]:
+    from ema_model.challenges.challenge import EFFECTS, folder
+
     if one.kind != EFFECTS:
+        from ema_model.practice import made
+
         return list(made.reveal(one).lines)
     from ema_model.challenges.truth import read_truth
 

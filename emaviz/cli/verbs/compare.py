@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import argparse
+from typing import TYPE_CHECKING
 
-from ema_model.actuator import save_actuator
-from ema_model.comparison import Comparison, as_dict, compare
 from ema_model.errors import InputError
-from emaviz.cli import by_unit, files, given, options, output
+from emaviz.cli import files, options
+
+if TYPE_CHECKING:
+    from ema_model.comparison import Comparison
+    from emaviz.cli import output
 
 HELP = "show where the model fails beside recordings"
 PLACE = 4
@@ -16,7 +19,7 @@ PLACE = 4
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of INTERFACES, with the signals to fit."""
     files.add_recordings(parser, "compared", declared=files.UNITS)
-    by_unit.add_units(parser)
+    options.add_units(parser)
     options.add_fit(parser, "the comparison")
     parser.add_argument(
         "--calibrate", action=argparse.BooleanOptionalAction, default=True, help="fit the actuator within tolerances"
@@ -39,28 +42,38 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Reads, compares, writes and prints."""
-    actuator = given.actuator_of(arguments)
     if arguments.save_actuator and not arguments.calibrate:
         raise InputError("--save-actuator writes what the calibration found; leave --no-calibrate out")
-    if by_unit.is_asked(arguments):
+    from emaviz.cli import given, output
+
+    actuator = given.actuator_of(arguments)
+    if arguments.by or arguments.unit:
+        from emaviz.cli import by_unit
+
         return by_unit.run(arguments, actuator)
+    k, weights = given.faults_of(arguments, actuator.faults), given.weights_of(arguments.signals)
+    effects = given.effects_of(arguments, actuator.axes)
     progress = output.Progress(arguments)
     try:
         measurements, held = given.read_set(arguments, actuator, progress)
+        from ema_model.comparison import as_dict, compare  # takes a second: recordings are refused before
+
         result = compare(
             measurements,
             actuator,
-            k=given.faults_of(arguments, actuator.faults),
-            effects=given.effects_of(arguments, actuator.axes),
+            k=k,
+            effects=effects,
             calibrate=arguments.calibrate,
             free=arguments.free,
-            signals=given.weights_of(arguments.signals),
+            signals=weights,
             holdout=held,
             on_progress=progress.show,
         )
     finally:
         progress.done()
     if result.calibration is not None and arguments.save_actuator:
+        from ema_model.actuator import save_actuator
+
         save_actuator(result.calibration.actuator, arguments.save_actuator)
     output.write_json(arguments, as_dict(result))
     print(result, flush=True)
@@ -84,6 +97,7 @@ def _write(result: Comparison, arguments: argparse.Namespace, progress: output.P
 
 
 def _record(result: Comparison, arguments: argparse.Namespace) -> None:
+    from emaviz.cli import output
     from emaviz.recording import RecordingError
     from emaviz.recording.comparison import write_comparison
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import argparse
+from typing import TYPE_CHECKING
 
-from ema_model.actuator import save_actuator
-from ema_model.comparison.summary import plain
-from ema_model.discovery import Discovery, as_dict, discover, verified
-from ema_model.discovery.words import verification
-from emaviz.cli import by_unit, files, given, options, output
+from emaviz.cli import files, options
 from emaviz.cli.interrupt import EXIT_CODE, PartialAnswer
 from emaviz.cli.numbers import whole
+
+if TYPE_CHECKING:
+    from ema_model.discovery import Discovery
 
 HELP = "find the physical effects that the model lacks, and add them"
 PLACE = 5
@@ -20,7 +20,7 @@ _CURRENT_ONLY = ("current_A",)
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of INTERFACES."""
     files.add_recordings(parser, "fitted", declared=files.UNITS)
-    by_unit.add_units(parser)
+    options.add_units(parser)
     options.add_fit(parser, "the discovery")
     parser.add_argument("--signals", choices=("current", "all"), default="all", help="what is fitted")
     parser.add_argument("--max-effects", type=whole(0, 100), default=3, metavar="N", help="at most so many are added")
@@ -30,13 +30,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Reads, discovers, writes and prints; once interrupted, what was found so far."""
+    from emaviz.cli import given, output
+
     actuator = given.actuator_of(arguments)
     signals = _CURRENT_ONLY if arguments.signals == "current" else None
-    if by_unit.is_asked(arguments):
+    if arguments.by or arguments.unit:
+        from emaviz.cli import by_unit
+
         return by_unit.run_discovery(arguments, actuator, signals)
     progress = output.Progress(arguments)
     try:
         fitted, held = given.read_set(arguments, actuator, progress)
+        # These take a second: recordings are refused before.
+        from ema_model.actuator import save_actuator
+        from ema_model.comparison.summary import plain
+        from ema_model.discovery import as_dict, discover, verified
+        from ema_model.discovery.words import verification
+
         with PartialAnswer() as answer:
             found = discover(
                 fitted,
@@ -71,6 +81,8 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _write(found: Discovery, arguments: argparse.Namespace) -> None:
     """The recording and the report, last: if one fails, the answer is there."""
+    from emaviz.cli import output
+
     if arguments.record:
         from emaviz.recording.discovery.write import write_discovery  # rerun takes a second to import
 

@@ -5,16 +5,14 @@ from __future__ import annotations
 import argparse
 import textwrap
 from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from ema_model.effects import CATALOGUE, Effect, Parameter, find
-from ema_model.effects.effect import FAMILIES
-from ema_model.effects.user.entries import KEYS, TITLES
 from ema_model.quantities.axes import Axes
-from ema_model.quantities.variables import VARIABLES
 from emaviz.cli import files
-from emaviz.cli.options import add_json
-from emaviz.cli.output import write_json
+from emaviz.cli.options import add_json, effect_name
+
+if TYPE_CHECKING:
+    from ema_model.effects import Effect, Parameter
 
 HELP = "list the physical effects that can be added to the models, or explain one"
 PLACE = 8
@@ -22,7 +20,7 @@ PLACE = 8
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """NAME, --html and --json."""
-    parser.add_argument("name", nargs="?", metavar="NAME", help="one effect; all without it")
+    parser.add_argument("name", nargs="?", type=effect_name, metavar="NAME", help="one effect; all without it")
     parser.add_argument(
         "--html", type=files.Folder(), metavar="DIR", help="write the library as pages, with typeset equations"
     )
@@ -31,6 +29,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Prints the list or the explanation, or writes the pages."""
+    from ema_model.effects import CATALOGUE, find
+    from ema_model.effects.user.entries import KEYS, TITLES
+    from emaviz.cli.output import write_json
+
     if arguments.name in KEYS:
         print(explain_users(arguments.name))
         write_json(arguments, {"effects": [_users_facts(arguments.name)]})
@@ -55,17 +57,24 @@ def run(arguments: argparse.Namespace) -> int:
 
 def explain_users(name: str) -> str:
     """What an effect of the user's own is made of, for a terminal."""
+    from ema_model.effects.user.entries import KEYS, TITLES
+
     width = max(map(len, KEYS[name]))
     entries = [f"  {key:{width}}  {meaning}" for key, meaning in KEYS[name].items()]
     return "\n".join([TITLES[name], "", f"The table [effects.{name}] of an actuator file", *entries])
 
 
 def _users_facts(name: str) -> dict[str, Any]:
+    from ema_model.effects.user.entries import KEYS, TITLES
+
     return {"name": name, "title": TITLES[name], "keys": KEYS[name]}
 
 
 def explain(effect: Effect) -> str:
     """Everything about an effect, for a terminal."""
+    from ema_model.effects.effect import FAMILIES
+    from ema_model.quantities.variables import VARIABLES
+
     lines = [effect.title, f"  {effect.equation}", "", textwrap.fill(effect.explanation, 92), "", "Parameters"]
     width = max(len(p.name) for p in effect.parameters)
     lines += [

@@ -3,32 +3,23 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
+import math
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from ema_model.actuator import Actuator, save_actuator
-from ema_model.actuator.naming import on_axes
-from ema_model.actuator.readings import readings, sentences
-from ema_model.discovery.model_fit import with_effect
 from ema_model.errors import InputError
-from ema_model.identification.objective import Objective
-from ema_model.identification.run import (
-    ALGORITHMS,
-    ROBUST,
-    SEARCH_SHARE,
-    Identification,
-    Progress,
-    algorithm_title,
-    identify,
-)
-from ema_model.quantities.numbers import amount
-from ema_model.recordings import Measurement
-from ema_model.simulation.plant import FITNESSES, simulated
-from ema_model.simulation.sensors import Sensors
-from emaviz.cli import files, given, options, output
+from ema_model.members import stated, stated_in
+from emaviz.cli import files, options
 from emaviz.cli.interrupt import PartialAnswer
 from emaviz.cli.numbers import whole
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from ema_model.actuator import Actuator
+    from ema_model.identification.objective import Objective
+    from ema_model.identification.run import Identification, Progress
+    from ema_model.recordings import Measurement
+    from emaviz.cli import output
 
 HELP = "find the faults k1 … k8 of recordings, or of a simulated actuator"
 PLACE = 3
@@ -36,16 +27,19 @@ PLACE = 3
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of INTERFACES, and those of the run that is simulated when no file is given."""
+    robust = stated_in("ema_model.identification.run", "ROBUST")
+    algorithms = (robust, *stated("ema_model.identification.optimisers", "name").values())
+    fitnesses = stated_in("ema_model.simulation.plant", "FITNESSES")
     files.add_recordings(parser, "fitted", nargs="*")
     parser.add_argument(
-        "--algorithm", choices=tuple(ALGORITHMS), default=ROBUST, help="robust, or one of the thesis's as published"
+        "--algorithm", choices=algorithms, default=robust, help="robust, or one of the thesis's as published"
     )
     parser.add_argument(
         "--polish", action="store_true", help="let a least-squares fit follow ssa, hba or do (robust always has it)"
     )
     parser.add_argument("--population", type=whole(2, 100_000), default=50, metavar="N")
     parser.add_argument("--iterations", type=whole(1, 1_000_000), default=150, metavar="N")
-    parser.add_argument("--fitness", choices=FITNESSES, default="filtered", help="0.5 ms means, or every sample")
+    parser.add_argument("--fitness", choices=fitnesses, default="filtered", help="0.5 ms means, or every sample")
     parser.add_argument("--circuit", choices=("reduced", "thesis"), default="reduced", help="of the monitor model")
     options.add_fit(parser, "the identification")
     options.add_faults(parser)
@@ -55,9 +49,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Fits, prints and records; once interrupted, the best so far."""
+    from emaviz.cli import given, output
+
     actuator = given.actuator_of(arguments)
-    for name, settings in given.effects_of(arguments, actuator.axes).items():
-        actuator = with_effect(actuator, name, settings)
+    if effects := given.effects_of(arguments, actuator.axes):
+        from ema_model.discovery.model_fit import with_effect
+
+        for name, settings in effects.items():
+            actuator = with_effect(actuator, name, settings)
     truth = given.faults_of(arguments) if arguments.fault or not arguments.files else None
     progress = output.Progress(arguments)
     try:
@@ -65,12 +64,19 @@ def run(arguments: argparse.Namespace) -> int:
     finally:
         progress.done()
 
+    # These take a second: recordings are refused before.
+    from ema_model.actuator import save_actuator
+    from ema_model.identification.objective import Objective
+    from ema_model.identification.run import SEARCH_SHARE, identify
+    from ema_model.quantities.numbers import amount
+
     def fitness(of: list[Measurement]) -> Objective:
         return Objective(of, actuator, circuit=arguments.circuit, fitness=arguments.fitness)
 
     objective, held = fitness(measurements), fitness(unseen) if unseen else None
     recorder = _Recorder(arguments, measurements, objective, truth) if arguments.record else None
-    partial, history = PartialAnswer(), list[Progress]()
+    partial = PartialAnswer()
+    history: list[Progress] = []
 
     def on_iteration(at: Progress) -> None:
         history.append(at)
@@ -130,6 +136,9 @@ def run(arguments: argparse.Namespace) -> int:
 
 def result(answer: Identification, actuator: Actuator, holdout_rmse: float | None = None) -> dict[str, Any]:
     """The JSON form of an answer (INTERFACES)."""
+    from ema_model.actuator.naming import on_axes
+    from ema_model.actuator.readings import readings
+
     sure = answer.uncertainty
     document = {
         "k": answer.k,
@@ -160,6 +169,12 @@ def result(answer: Identification, actuator: Actuator, holdout_rmse: float | Non
 
 def _say_so_far(history: list[Progress], actuator: Actuator, arguments: argparse.Namespace) -> None:
     """Writes and prints the best of a search that was interrupted, and how it came there."""
+    from ema_model.actuator.readings import readings, sentences
+    from ema_model.faults import NAMES
+    from ema_model.identification.run import algorithm_title
+    from ema_model.quantities.numbers import amount
+    from emaviz.cli import output
+
     last = history[-1]
     document = {
         "interrupted": True,
@@ -177,7 +192,7 @@ def _say_so_far(history: list[Progress], actuator: Actuator, arguments: argparse
     output.write_json(arguments, document)
     where = f"at iteration {last.iteration} of {last.iterations} of {algorithm_title(last.algorithm)}"
     print(f"Interrupted {where}: the best k so far, which no fit has refined, without intervals.")
-    for name, value, phrase in zip(faults.NAMES, last.k, sentences(last.k, actuator)):
+    for name, value, phrase in zip(NAMES, last.k, sentences(last.k, actuator)):
         print(f"  {name}  {value:.4f}  {phrase}")
     print(f"rmse {amount(last.rmse, 'A')}, {last.evaluations} simulations in {last.elapsed_s:.1f} s")
     output.say_not_written(arguments, "report", "save_actuator")
@@ -187,10 +202,15 @@ def _recordings(
     arguments: argparse.Namespace, actuator: Actuator, truth: np.ndarray | None, progress: output.Progress
 ) -> tuple[list[Measurement], list[Measurement]]:
     """Those to fit, and those held out."""
+    from emaviz.cli import given
+
     fitted, held = given.read_set(arguments, actuator, progress)
     if fitted:
         return fitted, held
     assert truth is not None
+    from ema_model.simulation.plant import simulated
+    from ema_model.simulation.sensors import Sensors
+
     sensors = Sensors(arguments.noise_current, arguments.encoder_bits)
     try:
         clean = simulated(given.run_of(arguments, actuator), actuator, truth, arguments.fitness)
@@ -200,7 +220,7 @@ def _recordings(
 
 
 def _finite(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
+    return float(value) if math.isfinite(value) else None
 
 
 class _Recorder:
@@ -213,6 +233,7 @@ class _Recorder:
         objective: Objective,
         truth: np.ndarray | None,
     ) -> None:
+        from emaviz.cli import output
         from emaviz.recording import RecordingError
         from emaviz.recording.story import IdentificationStory
 

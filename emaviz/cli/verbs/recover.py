@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from ema_model.errors import InputError
-from emaviz.cli import files, options, output
+from emaviz.cli import files, options
 
 HELP = "make a whole recording of one that was cut off (FILE.part)"
 PLACE = 10
@@ -22,6 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Recovers it; the part goes once its recording was read."""
+    from emaviz.cli import output
     from emaviz.recording import RecordingError
     from emaviz.recording.recover import recover_part
 

@@ -6,17 +6,10 @@ import argparse
 from contextlib import suppress
 from pathlib import Path
 
-from ema_model.actuator import load_actuator
-from ema_model.campaign import Store, load_plan, run_plan, scheduler
-from ema_model.campaign.plan import plan_path
-from ema_model.campaign.thesis import Evaluation
-from ema_model.campaign.thesis.responses import drawn
 from ema_model.errors import InputError
-from emaviz.cli import files, options, output
+from emaviz.cli import files, options
 from emaviz.cli.interrupt import PartialAnswer
 from emaviz.cli.numbers import whole
-from emaviz.text.campaign import interrupted
-from emaviz.text.reproduce import aligned, answer, short_table
 
 HELP = "compute the thesis's evaluation anew, and set its numbers beside ours"
 PLACE = 12
@@ -38,6 +31,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Computes what the folder lacks, writes both files, prints the short table."""
+    from ema_model.actuator import load_actuator
+    from ema_model.campaign import Store, load_plan, run_plan, scheduler
+    from ema_model.campaign.plan import plan_path
+    from ema_model.campaign.thesis import Evaluation
+    from ema_model.campaign.thesis.responses import drawn
+    from emaviz.cli import output
+    from emaviz.text.campaign import interrupted
+    from emaviz.text.reproduce import aligned, answer, short_table
+
     plan = load_plan(plan_path(arguments.plan or ("thesis_quick" if arguments.quick else "thesis")))
     if "identify" not in {task.kind for task in plan.tasks}:
         raise InputError(f"{arguments.plan}: identifies nothing, so that nothing stands beside the thesis")

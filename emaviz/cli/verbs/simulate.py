@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from ema_model.actuator import Actuator
-from ema_model.actuator.readings import readings
 from ema_model.errors import InputError
-from ema_model.models.open_loop import simulate_open_loop
-from ema_model.recordings import Measurement, write_measurement
-from ema_model.simulation.run import simulate_monitor, simulate_reference
-from ema_model.simulation.sensors import Sensors
-from emaviz.cli import files, given, options, output
+from emaviz.cli import files, options
 from emaviz.cli.numbers import FINITE
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from ema_model.actuator import Actuator
+    from ema_model.recordings import Measurement
 
 HELP = "simulate one run of the reference or the monitor model and write it as a recording"
 PLACE = 2
@@ -47,6 +46,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Simulates, records with the sensors' accuracy, writes."""
+    import numpy as np
+
+    from ema_model.actuator.readings import readings
+    from ema_model.recordings import write_measurement
+    from ema_model.simulation.sensors import Sensors
+    from emaviz.cli import given, output
+
     actuator = given.actuator_of(arguments)
     k, effects = given.faults_of(arguments, actuator.faults), given.effects_of(arguments, actuator.axes)
     sensors = Sensors(arguments.noise_current, arguments.encoder_bits)
@@ -76,9 +82,15 @@ def run(arguments: argparse.Namespace) -> int:
 def _simulated(
     arguments: argparse.Namespace, actuator: Actuator, k: np.ndarray, effects: dict[str, dict[str, float]]
 ) -> Measurement:
+    from emaviz.cli import given
+
     if arguments.input:
+        from ema_model.models.open_loop import simulate_open_loop
+
         return simulate_open_loop(given.input_of(arguments, actuator), actuator, k, effects)
     asked = given.run_of(arguments, actuator, arguments.sample_rate)
+    from ema_model.simulation.run import simulate_monitor, simulate_reference
+
     if arguments.model == "rm":
         return simulate_reference(asked, actuator, k, effects)
     return simulate_monitor(asked, actuator, k, effects, arguments.circuit)

@@ -7,19 +7,16 @@ import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from ema_model.actuator import Actuator
 from ema_model.errors import InputError, quoted
-from ema_model.files.arriving import LOOK_S, Watched
-from ema_model.recordings.recording_set import recordings_in
-from ema_model.tracking.criteria import LEAST_FLIGHTS
-from ema_model.tracking.flight import Flight
-from ema_model.tracking.identify import identify_all
-from ema_model.tracking.order import check_enough, check_order, flights_in, in_order
-from ema_model.tracking.summary import as_dict
-from ema_model.tracking.track import check_thresholds, track
-from emaviz.cli import files, given, options, output
+from emaviz.cli import files, options
 from emaviz.cli.interrupt import PartialAnswer
+
+if TYPE_CHECKING:
+    from ema_model.actuator import Actuator
+    from ema_model.tracking.flight import Flight
+    from emaviz.cli import output
 
 HELP = "follow k over the flights of one unit: what drifts, and what life remains"
 PLACE = 6
@@ -59,6 +56,8 @@ def run(arguments: argparse.Namespace) -> int:
 
     Once interrupted, what the flights so far say.
     """
+    from emaviz.cli import given, output
+
     thresholds = _thresholds(arguments.threshold)
     actuator = given.actuator_of(arguments)
     progress = output.Progress(arguments)
@@ -74,6 +73,8 @@ def run(arguments: argparse.Namespace) -> int:
                         flights.append(flight)
                         answer.grows()
             except KeyboardInterrupt:
+                from ema_model.tracking.criteria import LEAST_FLIGHTS
+
                 progress.done()
                 print(f"Interrupted: {len(flights)} of {len(paths)} flights are identified.", flush=True)
                 if sum(not one.excluded for one in flights) >= LEAST_FLIGHTS:
@@ -91,6 +92,9 @@ def run(arguments: argparse.Namespace) -> int:
 def _identified(
     paths: Sequence[Path], arguments: argparse.Namespace, actuator: Actuator, progress: output.Progress
 ) -> Iterator[Flight]:
+    from ema_model.tracking.identify import identify_all
+    from emaviz.cli import given
+
     return identify_all(
         paths,
         lambda path: given.read_one(str(path), arguments, actuator, progress),
@@ -110,6 +114,10 @@ def _tell(
     of: int | None = None,
 ) -> None:
     """Writes and prints what flights say; of: as many as there would have been without an interrupt."""
+    from ema_model.tracking.summary import as_dict
+    from ema_model.tracking.track import track
+    from emaviz.cli import output
+
     result = track(flights, thresholds, arguments.seed)
     progress.done()
     cut_off = {} if of is None else {"interrupted": True, "flights_identified": len(flights), "flights_named": of}
@@ -129,6 +137,13 @@ def _watch(
     arguments: argparse.Namespace, actuator: Actuator, thresholds: Mapping[str, float], progress: output.Progress
 ) -> None:
     """Until it is interrupted; a file that cannot be used is told once and left out, and may be replaced."""
+    from ema_model.files.arriving import LOOK_S, Watched
+    from ema_model.recordings.recording_set import recordings_in
+    from ema_model.tracking.criteria import LEAST_FLIGHTS
+    from ema_model.tracking.order import check_order, in_order
+
+    from emaviz.cli import given
+
     folder = Path(arguments.files[0])
     if len(arguments.files) > 1 or not folder.is_dir():
         raise InputError(f"--watch: {quoted(arguments.files[0])}: name one folder, in which flights arrive")
@@ -154,6 +169,11 @@ def _watch(
 
 
 def _thresholds(texts: list[str]) -> dict[str, float]:
+    if not texts:
+        return {}
+    from ema_model.tracking.track import check_thresholds
+    from emaviz.cli import given
+
     found: dict[str, float] = {}
     for text in texts:
         name, value = given.pair(text, "--threshold")
@@ -169,6 +189,8 @@ def _paths(names: list[str]) -> list[Path]:
     folders = [path for path in named if path.is_dir()]
     if folders and len(named) > 1:
         raise InputError(f"{quoted(folders[0])}: is a folder; name one folder alone, or files")
+    from ema_model.tracking.order import check_enough, check_order, flights_in
+
     paths = flights_in(folders[0]) if folders else named
     check_order(paths)
     check_enough(paths, names[0])

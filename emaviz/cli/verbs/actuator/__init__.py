@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import argparse
 
-from ema_model.members import members
+from ema_model.members import stated
 from emaviz.cli.parser import add_verbs
 
 HELP = "describe an actuator in a file, check one, or read what every key of it means"
@@ -17,7 +17,7 @@ PLACE = 7
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The verbs with their own options."""
     verbs = parser.add_subparsers(title="what to do", metavar="new|check|keys", dest="verb", required=True)
-    add_verbs(verbs, __name__, members(__name__, "HELP"), "run_verb")
+    add_verbs(verbs, __name__, stated(__name__, "HELP"), "run_verb")
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 import argparse
+from typing import TYPE_CHECKING
 
-from ema_model.actuator import Actuator, load_actuator
-from ema_model.actuator.layout import WITHOUT_DRIVE
-from ema_model.actuator.naming import on_axes
-from ema_model.actuator.plausible import implausible, missing
-from ema_model.actuator.steps import usual_filter
-from ema_model.comparison import compare
-from ema_model.estimation.identifiable import told
-from ema_model.quantities.titles import in_sentence
-from ema_model.recordings import read
 from ema_model.text import Document, Lines
-from emaviz.cli import files, options, output
+from emaviz.cli import files, options
+
+if TYPE_CHECKING:
+    from ema_model.actuator import Actuator
 
 HELP = "say what an actuator file lacks, what is hard to believe, and what a recording cannot tell of it"
 PLACE = 2
@@ -30,6 +25,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Loads, checks, and calibrates where there is a recording."""
+    from ema_model.actuator import load_actuator
+    from ema_model.actuator.plausible import implausible, missing
+    from emaviz.cli import output
+
     actuator = load_actuator(arguments.file)
     found = {"missing": list(missing(actuator)), "implausible": list(implausible(actuator)), "unidentifiable": []}
     if arguments.recording:
@@ -42,9 +41,16 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _beside(actuator: Actuator, arguments: argparse.Namespace) -> dict[str, list[str]]:
     """What the recording and a calibration by it say."""
+    from ema_model.actuator.naming import on_axes
+    from ema_model.actuator.steps import usual_filter
+    from ema_model.recordings import read
+    from emaviz.cli import output
+
     progress = output.Progress(arguments)
     try:
         recording = read(arguments.recording, actuator, arguments.mapping)
+        from ema_model.comparison import compare  # takes a second: recordings are refused before
+
         result = compare([recording], actuator, on_progress=progress.show)
     finally:
         progress.done()
@@ -68,6 +74,8 @@ def _beside(actuator: Actuator, arguments: argparse.Namespace) -> dict[str, list
         one = calibration.parameters[path]
         shown = on_axes(path, actuator.axes).path
         strange.append(f"{shown} ends at the edge of its tolerance, at {one.value:g} {one.unit}".rstrip())
+    from ema_model.estimation.identifiable import told
+
     for one in told(calibration):
         shown = on_axes(one.name, actuator.axes).path
         if one.is_unseen:
@@ -83,6 +91,10 @@ def _left(share: float) -> str:
 
 
 def _document(actuator: Actuator, found: dict[str, list[str]], arguments: argparse.Namespace) -> Document:
+    from ema_model.actuator.layout import WITHOUT_DRIVE
+    from ema_model.actuator.naming import on_axes
+    from ema_model.quantities.titles import in_sentence
+
     free = [path for path, tolerance in actuator.tolerances.items() if tolerance.free]
     count = sum(map(len, found.values()))
     state = "nothing to complain of" if not count else f"{count} thing{'s' if count > 1 else ''} to look at"

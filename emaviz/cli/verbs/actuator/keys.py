@@ -5,8 +5,7 @@ from __future__ import annotations
 import argparse
 from dataclasses import asdict
 
-from ema_model.actuator.reference import markdown, parameter_rows
-from emaviz.cli import options, output
+from emaviz.cli import options
 
 HELP = "print the reference of every key of an actuator file, as Markdown"
 PLACE = 3
@@ -19,6 +18,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Prints it."""
+    from ema_model.actuator.reference import markdown, parameter_rows
+    from emaviz.cli import output
+
     print(markdown())
     rows = [asdict(row) for row in parameter_rows()]
     output.write_json(arguments, {"parameters": rows})

@@ -8,16 +8,11 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from ema_model.actuator import save_actuator
-from ema_model.actuator.describe import DRIVES, described, entry_of, gear_of, number_of
-from ema_model.actuator.keys import KINDS
-from ema_model.actuator.plausible import implausible, missing
-from ema_model.effects.user.entries import kind_of
 from ema_model.errors import InputError, quoted
+from ema_model.members import stated_in
 from ema_model.quantities.axes import KINDS as AXES
-from emaviz.cli import files, given, options, output
-from emaviz.cli.numbers import FINITE
-from emaviz.cli.verbs.actuator.questions import SAMPLE_RATE, ask
+from emaviz.cli import files, options
+from emaviz.cli.numbers import FINITE, SAMPLE_RATE
 
 HELP = "write an actuator file with comments, from options or from answers on the terminal"
 PLACE = 1
@@ -27,6 +22,7 @@ _TEXTS = ("expression", "variable", "modulator")  # of a user's effect
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The kinds, the values that are known, effects, and how recordings are read."""
+    kinds = stated_in("ema_model.actuator.keys", "KINDS")
     parser.add_argument("file", type=files.SAVED_ACTUATOR, metavar="FILE.toml", help="the file to write")
     parser.add_argument("--name", help="what the actuator is called; without it, the file's name")
     parser.add_argument("--description", default="", help="a sentence about it")
@@ -34,9 +30,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--user", choices=AXES, help="whether what it moves turns or slides; rotary without it")
     parser.add_argument("--gear", metavar="RATIO", help="user's motion per motor's: 0.002, 1/500 or 500:1")
     parser.add_argument("--lead-mm", type=FINITE, metavar="mm", help="of a screw, per turn of the motor")
-    parser.add_argument("--controller", choices=tuple(KINDS["controller"]), help="unknown: inverse dynamics")
+    parser.add_argument("--controller", choices=tuple(kinds["controller"]), help="unknown: inverse dynamics")
     parser.add_argument(
-        "--drive", choices=(*KINDS["inverter"], "unknown"), help="what the controller's output acts through"
+        "--drive", choices=(*kinds["inverter"], "unknown"), help="what the controller's output acts through"
     )
     parser.add_argument(
         "--set",
@@ -67,6 +63,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Asks for what no option says where a terminal is there, guesses the rest, and writes the file."""
+    from ema_model.actuator import save_actuator
+    from ema_model.actuator.describe import described
+    from ema_model.actuator.plausible import implausible, missing
+    from emaviz.cli import output
+    from emaviz.cli.verbs.actuator.questions import ask
+
     document = _document(arguments)
     if arguments.controller is None and sys.stdin.isatty():
         ask(document, arguments)
@@ -86,6 +88,9 @@ def _kinds(arguments: argparse.Namespace) -> tuple[str, str, list[str]]:
 
     What is not known of a loop is left to inverse dynamics.
     """
+    from ema_model.actuator.describe import DRIVES
+    from ema_model.actuator.keys import KINDS
+
     controller, drive = arguments.controller, arguments.drive
     if controller is None:
         raise InputError(f"{_HERE}: say --controller {', '.join(KINDS['controller'])}; unknown is always an answer")
@@ -137,6 +142,8 @@ def _put(document: dict[str, Any], section: str, name: str, entry: Any, where: s
 
 
 def _setting(section: str, text: str, where: str) -> Any:
+    from ema_model.actuator.describe import entry_of, number_of
+
     known = {"true": True, "false": False}
     if section == "model" and text in known:
         return known[text]
@@ -148,11 +155,17 @@ def _gear(arguments: argparse.Namespace) -> dict[str, Any] | None:
         if arguments.gear is not None:
             raise InputError("--gear and --lead-mm say the same; give one of them")
         return {"value": 1e-3 * arguments.lead_mm / math.tau}
+    from ema_model.actuator.describe import gear_of
+
     return None if arguments.gear is None else gear_of(arguments.gear, "--gear")
 
 
 def _effect(text: str) -> tuple[str, dict[str, Any]]:
     """The table of --effect NAME:param=value±tolerance,…"""
+    from ema_model.actuator.describe import entry_of, number_of
+    from ema_model.effects.user.entries import kind_of
+    from emaviz.cli import given
+
     name, _, rest = text.partition(":")
     table: dict[str, Any] = {}
     for part in given.split_at_commas(rest):
@@ -172,6 +185,9 @@ def _effect(text: str) -> tuple[str, dict[str, Any]]:
 
 
 def _rule(text: str) -> dict[str, Any]:
+    from ema_model.actuator.describe import number_of
+    from emaviz.cli import given
+
     pattern, separator, rest = text.partition(":")
     if not separator or not rest:
         raise InputError(f"--where {quoted(text)}: write it as PATTERN:section.name=value,… or PATTERN:map")

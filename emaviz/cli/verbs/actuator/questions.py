@@ -11,9 +11,8 @@ from ema_model.actuator.naming import on_axes
 from ema_model.actuator.parameters import facts_of
 from ema_model.errors import InputError
 from ema_model.quantities.axes import KINDS as AXES
-from emaviz.cli.numbers import Number
+from emaviz.cli.numbers import SAMPLE_RATE
 
-SAMPLE_RATE = Number(1e-3, 1e9)  # Hz
 _GEAR = "transmission.gear_ratio"
 
 

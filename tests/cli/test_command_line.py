@@ -207,7 +207,7 @@ def test_the_names_that_options_list_are_the_models():
 
 SUGGESTED = {
     "comapre x.csv": "comapre: neither a command nor a file; did you mean 'compare'? (see emaviz --help)",
-    "recognise": "recognise: neither a command nor a file (see emaviz --help)",
+    "fly": "fly: neither a command nor a file (see emaviz --help)",
     "actuator nwe": "'nwe' is none of new, check, keys; did you mean 'new'? (see emaviz actuator --help)",
     "compare x.csv --holdaut y": "no option --holdaut; did you mean '--holdout'? (see emaviz compare --help)",
     "simulate --ouut=x.csv": "no option --ouut; did you mean '--out'? (see emaviz simulate --help)",

@@ -19,7 +19,6 @@ from ema_model.campaign.execute import execute
 from ema_model.campaign.version import version
 from ema_model.errors import InputError
 from emaviz.cli import main
-from emaviz.cli.verbs import campaign
 
 
 class Here:
@@ -190,7 +189,7 @@ class Losing(Here):
 
 
 def test_workers_that_are_gone_are_told_once(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(campaign, "scheduler", lambda address, workers: Losing())
+    monkeypatch.setattr("ema_model.campaign.scheduler", lambda address, workers: Losing())
     plan = cheap(tmp_path, 2)
     arguments = ["campaign", plan, "--out", tmp_path / "o", "--scheduler", "tcp://127.0.0.1:1", "--quiet"]
     assert main([str(one) for one in arguments]) == 0

@@ -19,7 +19,6 @@ from ema_model.commands import command
 from ema_model.faults import NAMES, error_percent
 from ema_model.simulation.run import Run
 from emaviz.cli import main
-from emaviz.cli.verbs import reproduce
 from emaviz.recording import reproduce as recording
 from emaviz.recording.read import read
 from emaviz.report.reproduce import SECTIONS, severities
@@ -61,7 +60,7 @@ def made(plan, tmp_path_factory):
     """The folder, and what was printed; computed here, with short responses."""
     folder = tmp_path_factory.mktemp("made") / "out"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(reproduce, "scheduler", lambda address, workers: Here())
+        patch.setattr("ema_model.campaign.scheduler", lambda address, workers: Here())
         for name, settings in (("chirp", {}), ("step", {"time_s": 0.002})):
             patch.setitem(responses.RUNS, name, Run(command(name, settings), 0.01))
         arguments = ["reproduce", "--plan", str(plan), "--out", str(folder), "--json", str(folder.parent / "r.json")]

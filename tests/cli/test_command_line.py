@@ -3,15 +3,24 @@
 from __future__ import annotations
 
 import json
+import os
+import re
 import socket
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
+from options_of import command_parser, every_command
 
+from ema_model.commands import COMMANDS as MODEL_COMMANDS
+from ema_model.effects import CATALOGUE
+from ema_model.effects.user.entries import KINDS
+from ema_model.identification.run import ALGORITHMS
 from ema_model.recordings.file import read_measurement
-from emaviz.cli import main
+from ema_model.simulation.plant import FITNESSES
+from emaviz.cli import main, options
 
 
 @pytest.fixture(scope="module")
@@ -140,3 +149,168 @@ def test_the_model_core_imports_no_screen():
     code = "import sys, ema_model.identification.run; print(sorted({'viser', 'rerun', 'emaviz'} & set(sys.modules)))"
     shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert shown.stdout.strip() == "[]"
+
+
+# Commands one after another in one process: after each, its exit code and which of these modules are there by then.
+RUNS_ALL = """
+import contextlib, io, json, sys
+from emaviz.cli import main
+
+for line in json.load(sys.stdin):
+    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+        try:
+            code = main(line.split())
+        except SystemExit as ended:
+            code = ended.code
+    heavy = ("numpy", "numba", "scipy", "msgspec", "pyarrow", "plotly", "rerun", "viser")
+    print(json.dumps([line, code, [name for name in heavy if name in sys.modules]]))
+"""
+AT_ONCE = {
+    0: ["--version", "--help", *(f"{one} --help" for one in every_command()), "completion bash"],
+    2: [
+        *("comapre x.csv", "compare x.csv --fruit 1", "compare", "identify --algorithm magic", "identify --seed=-1"),
+        *("simulate --command chrip --out x.csv", "simulate --effect coging_torque --out x.csv", "simulate --colour 1"),
+        *("effects coging_torque", "campaign thesis", "campaign thesis --out x --scheduler here", "actuator nwe"),
+    ],
+}
+WITHOUT_KERNELS = [
+    *("compare missing.csv", "identify .", "compare bad.csv", "discover bad.csv --actuator bad.csv", "view bad.csv"),
+    *("simulate --out missing/x.csv", "identify --fault k9=0.1", "simulate --set amplitude=1 --out x.csv"),
+]
+
+
+def runs(lines, folder):
+    (folder / "bad.csv").write_text("a,b\n1,2\n")
+    command, given = [sys.executable, "-c", RUNS_ALL], json.dumps(lines)
+    done = subprocess.run(command, input=given, cwd=folder, capture_output=True, text=True, check=True)
+    return [tuple(json.loads(line)) for line in done.stdout.splitlines()]
+
+
+def test_help_completion_and_refused_arguments_import_nothing_that_computes(tmp_path):
+    expected = [(line, code, []) for code, lines in AT_ONCE.items() for line in lines]
+    assert runs([line for line, _, _ in expected], tmp_path) == expected
+
+
+def test_a_refused_file_needs_no_kernels(tmp_path):
+    for line, code, modules in runs(WITHOUT_KERNELS, tmp_path):
+        assert code == 2 and not {"numba", "scipy", "plotly", "rerun", "viser"} & set(modules), (line, code, modules)
+
+
+def test_the_names_that_options_list_are_the_models():
+    assert options.command_names() == tuple(MODEL_COMMANDS)
+    for name in (*CATALOGUE, *KINDS, "cogging_torque_2", "user_torque_own"):
+        assert options.effect_name(name) == name
+    identify = command_parser("identify")
+    choices = {action.dest: tuple(action.choices) for action in identify._actions if action.choices}
+    assert choices["algorithm"] == tuple(ALGORITHMS) and choices["fitness"] == FITNESSES
+
+
+SUGGESTED = {
+    "comapre x.csv": "comapre: neither a command nor a file; did you mean 'compare'? (see emaviz --help)",
+    "fly": "fly: neither a command nor a file (see emaviz --help)",
+    "actuator nwe": "'nwe' is none of new, check, keys; did you mean 'new'? (see emaviz actuator --help)",
+    "compare x.csv --holdaut y": "no option --holdaut; did you mean '--holdout'? (see emaviz compare --help)",
+    "simulate --ouut=x.csv": "no option --ouut; did you mean '--out'? (see emaviz simulate --help)",
+    "actuator check a.toml --jsn x": "no option --jsn; did you mean '--json'? (see emaviz actuator check --help)",
+    "identify --algorithm robost": "did you mean 'robust'? (see emaviz identify --help)",
+    "simulate --out x.csv --command chrip": "or a recording's file; did you mean 'chirp'? (see emaviz simulate --help)",
+    "simulate --out x.csv --effect coging_torque": "no effect 'coging_torque'; did you mean 'cogging_torque'?",
+    "simulate --out x.csv --effect cogging_torque:amplitud_Nm=1": "phase_rad; did you mean 'amplitude_Nm'?",
+    "simulate --out x.csv --set amplitude=1": "did you mean 'amplitude_rad'?",
+    "effects stribeck": "no effect 'stribeck'; did you mean 'stribeck_friction'?",
+    "compare RUN --signal curent_A": "did you mean 'current_A'?",
+    "compare RUN --free motor.inertia_kgm": "did you mean 'motor.inertia_kgm2'?",
+    "identify --fault k9=1": "no fault 'k9'; faults are k1 … k8",
+    "challenge frist": "no challenge frist; there are ",
+}
+
+
+@pytest.mark.parametrize("line", SUGGESTED)
+def test_a_mistyped_name_is_answered_by_the_one_like_it(line, recording, capsys):
+    assert main([str(recording) if text == "RUN" else text for text in line.split()]) == 2
+    said = capsys.readouterr().err
+    assert SUGGESTED[line] in said and said.count("\n") == 1, said
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+@pytest.mark.parametrize("line", ["--version", "compare --help", "effects", "challenge", "completion zsh"])
+def test_an_output_that_cannot_be_written_is_told(line):
+    for to, unbuffered in (("> /dev/full", ""), ("> /dev/full", "1"), (">&-", "")):
+        environment = {**os.environ, "PYTHONUNBUFFERED": unbuffered}
+        command = f"{sys.executable} -m emaviz {line} {to}"
+        done = subprocess.run(["sh", "-c", command], capture_output=True, text=True, env=environment)
+        told = "emaviz: the standard output cannot be written ("
+        assert done.returncode == 1 and done.stderr.startswith(told) and done.stderr.count("\n") == 1, done
+
+
+def test_closed_streams_do_not_become_files(tmp_path):
+    out = tmp_path / "a.json"
+    done = subprocess.run(["sh", "-c", f"{sys.executable} -m emaviz effects cogging_torque --json {out} <&- >&- 2>&-"])
+    assert done.returncode == 1 and json.loads(out.read_text())["effects"][0]["name"] == "cogging_torque"
+
+
+COMPLETED = {
+    "comp": ["compare", "completion"],
+    "compare --hol": ["--holdout"],
+    "actuator n": ["new"],
+    "actuator new --contr": ["--controller"],
+    "identify --algorithm ": list(ALGORITHMS),
+    "compare --no-c": ["--no-calibrate"],
+}
+
+
+def test_bash_completes_commands_options_and_choices(capsys):
+    assert main(["completion", "bash"]) == 0
+    script = capsys.readouterr().out
+    for line in COMPLETED:
+        words = ["emaviz", *line.split(" ")]
+        script += f"COMP_WORDS=({' '.join(map(repr, words))}); COMP_CWORD={len(words) - 1}; _emaviz\n"
+        script += 'echo "${COMPREPLY[@]}"\n'
+    done = subprocess.run(["bash", "-c", script], capture_output=True, text=True, check=True)
+    assert [line.split() for line in done.stdout.splitlines()] == list(COMPLETED.values())
+
+
+def test_each_shell_gets_every_command_and_option(capsys):
+    options_there = {name for sub in every_command() for name in re.findall(r"--[a-z-]+", _help(sub, capsys))}
+    for shell, dashes in (("zsh", "--"), ("fish", "-l ")):
+        assert main(["completion", shell]) == 0
+        script = capsys.readouterr().out
+        assert all(f"{dashes}{name[2:]}" in script for name in options_there)
+
+
+def _help(command, capsys):
+    with pytest.raises(SystemExit):
+        main([*command.split(), "--help"])
+    return capsys.readouterr().out.partition("options:")[2]
+
+
+def test_verbose_says_what_is_done_and_when(recording):
+    command = [sys.executable, "-m", "emaviz", "-v", "compare", str(recording), "--no-calibrate"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    lines = done.stderr.splitlines()
+    assert all(re.match(r"\d\d:\d\d:\d\d ", line) for line in lines), done.stderr
+    assert "emaviz -v compare" in lines[0] and "reading friction.csv" in done.stderr and "ended after" in lines[-1]
+
+
+BROKEN = """
+import sys
+from emaviz import cli
+from emaviz.cli.verbs import challenge
+
+def run(arguments):
+    raise RuntimeError("this is broken")
+
+challenge.run = run
+sys.argv = ["emaviz", "challenge", *sys.argv[1:]]
+sys.exit(cli.main())
+"""
+
+
+def test_a_failure_of_ours_is_a_line_and_with_verbose_a_traceback():
+    line, traceback = (
+        subprocess.run([sys.executable, "-c", BROKEN, *verbose], capture_output=True, text=True)
+        for verbose in ([], ["--verbose"])
+    )
+    assert line.returncode == traceback.returncode == 1
+    assert line.stderr == "emaviz: an internal failure, RuntimeError: this is broken; --verbose shows where\n"
+    assert "Traceback" in traceback.stderr and "in run" in traceback.stderr

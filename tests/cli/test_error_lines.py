@@ -15,7 +15,7 @@ from ema_model.challenges.sealed_file import sealed_challenge
 from ema_model.commands import command
 from ema_model.effects import find
 from ema_model.effects.user import user_torque
-from ema_model.errors import InputError, quoted
+from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.recordings import ColumnMapping, MappedColumn
 from ema_model.recordings.columns.mapping import parse_mapping
 from ema_model.recordings.file import read_measurement
@@ -59,6 +59,12 @@ def test_a_line_is_one_whatever_is_put_into_it():
     assert head.startswith("file.csv: ") and head.endswith("; do this")
     again = InputError(head)
     assert str(again) == head and str(InputError()) == ""
+
+
+def test_a_name_like_it_is_suggested(text):
+    assert did_you_mean("curent", ["speed", "current"]) == "; did you mean 'current'?"
+    assert did_you_mean("k9", ["current"]) == did_you_mean("k9", []) == ""
+    one_line(InputError(f"no column{did_you_mean(text, iter([text]))}"))
 
 
 def test_column_names_and_cells(tmp_path, text):

@@ -10,11 +10,11 @@ from support.foreign_files import FILES as WRITERS
 from support.mat_structs import write_dspace, write_simulink
 from support.servo_logs import SERVO_SIGNALS, duty_of, write_servo_log
 
+from ema_model import comparison
 from ema_model.actuator import load_actuator, shipped
 from ema_model.commands import command
 from ema_model.simulation.run import Run, simulate_reference
 from emaviz.cli import main
-from emaviz.cli.verbs import compare
 
 # Names and units as the maker's manual or a public log has them: signal → column, and SI of one of its units.
 ENGLISH = {
@@ -146,7 +146,7 @@ def test_opened_with_no_option(name, run, tmp_path, monkeypatch, capsys):
     def look(given, *_, **__):
         raise Seen(given)
 
-    monkeypatch.setattr(compare, "compare", look)
+    monkeypatch.setattr(comparison, "compare", look)
     with pytest.raises(Seen) as seen:
         main(["compare", str(path), "--actuator", str(tmp_path / "mine.toml")])
     (found,) = seen.value.args[0]

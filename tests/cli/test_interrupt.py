@@ -312,3 +312,18 @@ def test_a_caller_of_main_keeps_its_own_handling(tmp_path, monkeypatch):
     before = signal.getsignal(signal.SIGINT), threading.excepthook
     assert main(["effects", "--json", "a.json"]) == 0
     assert (signal.getsignal(signal.SIGINT), threading.excepthook) == before
+
+
+LEFT = """
+import sys, threading
+from emaviz.cli import main
+
+sys.argv = ["emaviz", "compare", "--fruit"]
+code = main()
+print(code, [thread.name for thread in threading.enumerate()])
+"""
+
+
+def test_no_thread_outlives_main(process_of):
+    out, _ = process_of("-c", LEFT).communicate(timeout=60)
+    assert out == "2 ['MainThread']\n"

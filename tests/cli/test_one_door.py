@@ -10,13 +10,15 @@ import numpy as np
 import pytest
 from support.on_page import wait_until
 
+from ema_model import comparison, discovery
 from ema_model.actuator import load_actuator, shipped
 from ema_model.commands import command
+from ema_model.identification import objective
 from ema_model.quantities.numbers import amount
 from ema_model.recordings import Measurement, read, write_measurement
+from ema_model.simulation import run as simulating
 from ema_model.simulation.run import Run, simulate_reference
 from emaviz.cli import main
-from emaviz.cli.verbs import compare, discover, identify, simulate
 from emaviz.session.compare.comparing import Comparing
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.discover.source import DiscoverySource
@@ -144,13 +146,13 @@ def test_the_same_comes_in_by_every_way(kind, way, rig, tmp_path, monkeypatch):
         function = "simulate_monitor" if kind == "linear" else "simulate_reference"
         model = ("--model", "mm" if kind == "linear" else "rm")
         run = on_command_line(
-            "simulate", simulate, function, monkeypatch, "--command", path, "--out", out, *asked, *model
+            "simulate", simulating, function, monkeypatch, "--command", path, "--out", out, *asked, *model
         )
         assert np.array_equal(run.command.command_rad, expected["command_rad"])
         assert np.array_equal(run.command.time_s, expected.time_s)
         return
     else:
-        module = {"compare": compare, "discover": discover, "identify": identify}[way]
+        module = {"compare": comparison, "discover": discovery, "identify": objective}[way]
         function = "Objective" if way == "identify" else way
         (found,) = on_command_line(way, module, function, monkeypatch, path, *asked)
     assert set(found.signals) == set(expected.signals)
@@ -170,11 +172,11 @@ def test_the_arrays_are_what_the_model_needs(rig, run):
 
 
 def test_a_line_says_what_was_assumed_and_canonical_names_are_silent(rig, tmp_path, monkeypatch, capsys):
-    on_command_line("identify", identify, "Objective", monkeypatch, rig / "german.csv")
+    on_command_line("identify", objective, "Objective", monkeypatch, rig / "german.csv")
     told = capsys.readouterr().err
     assert told.startswith("german.csv: time_s from Zeit [ms], command_rad from Sollwinkel [°], ")
     assert "motor_speed_rad_s from Motordrehzahl [1/min], current_A from iq [mA]\n" in told and told.count("\n") == 1
-    on_command_line("identify", identify, "Objective", monkeypatch, rig / "phases.csv")
+    on_command_line("identify", objective, "Objective", monkeypatch, rig / "phases.csv")
     assert capsys.readouterr().err == ""
 
 
@@ -205,7 +207,7 @@ def test_what_is_unsure_is_asked_for_with_an_option_to_copy(header, tmp_path, ca
     if "COLUMN" in options[0]:
         options = ["command_rad=flow[rad]"]
     given = [part for option in options for part in ("--map", option)]
-    (found,) = on_command_line("identify", identify, "Objective", monkeypatch, path, *given)
+    (found,) = on_command_line("identify", objective, "Objective", monkeypatch, path, *given)
     assert np.array_equal(found["time_s"], read(path, load_actuator(), options).time_s)
 
 
@@ -214,7 +216,7 @@ def test_what_is_not_needed_and_unsure_is_left_aside_and_said(tmp_path, capsys, 
     path = tmp_path / "log.csv"
     header = "time_s,command_rad,current_A,speed"
     np.savetxt(path, np.column_stack([1e-3 * count, count, -count, count]), delimiter=",", header=header, comments="")
-    (found,) = on_command_line("compare", compare, "compare", monkeypatch, path)
+    (found,) = on_command_line("compare", comparison, "compare", monkeypatch, path)
     assert set(found) == {"time_s", "command_rad", "current_A"}
     assert capsys.readouterr().err == "log.csv: left aside: speed (it has no unit)\n"
 
@@ -227,7 +229,7 @@ def test_a_side_file_is_not_guessed_over(tmp_path, capsys, monkeypatch):
     path.with_suffix(".toml").write_text(
         'schema = 1\n[mapping]\ntime_s = "t[s]"\ncommand_rad = "set[deg]"\ncurrent_A = "iq[A]"\n', encoding="utf-8"
     )
-    (found,) = on_command_line("compare", compare, "compare", monkeypatch, path)
+    (found,) = on_command_line("compare", comparison, "compare", monkeypatch, path)
     assert set(found) == {"time_s", "command_rad", "current_A"} and capsys.readouterr().err == ""
     assert {entry.signal for entry in found.reading.mapping.entries} == set(found)
 

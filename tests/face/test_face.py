@@ -38,6 +38,27 @@ def test_a_recording_is_a_file_or_a_measurement_one_or_several(recording, tmp_pa
         em.simulate(faults={"k9": 0.1})
 
 
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"sample_rate_Hz": "fast"},
+        {"duration_s": None},
+        {"load_torque_Nm": [1.0, 2.0]},
+        {"noise_A": "much"},
+        {"encoder_bits": "many"},
+        {"seed": "first"},
+        {"seed": 1.5},
+        {"faults": {"k1": "half"}},
+        {"settings": {"amplitude_rad": "large"}},
+        {"effects": {"cogging_torque": {"amplitude_Nm": "large"}}},
+    ],
+    ids=str,
+)
+def test_what_is_no_number_is_refused_in_one_line(given):
+    with pytest.raises(em.InputError, match=r"must be a (whole )?number"):
+        em.simulate(**{"duration_s": 0.01, **given})
+
+
 def test_units_are_compared_by_name():
     given = {name: em.simulate("chirp", duration_s=0.2, noise_A=0.3, seed=i) for i, name in enumerate("ab")}
     found = em.compare_units(given, free=["transmission.backlash_rad"])

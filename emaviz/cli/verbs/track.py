@@ -141,7 +141,6 @@ def _watch(
     from ema_model.recordings.recording_set import recordings_in
     from ema_model.tracking.criteria import LEAST_FLIGHTS
     from ema_model.tracking.order import check_order, in_order
-
     from emaviz.cli import given
 
     folder = Path(arguments.files[0])

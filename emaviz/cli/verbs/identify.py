@@ -65,7 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
     recorder = _Recorder(arguments, measurements, objective, truth) if arguments.record else None
 
     def on_iteration(at: Progress) -> None:
-        progress.show(f"{at.algorithm} {at.iteration}/{at.iterations}  rmse {at.rmse:.4f} A")
+        progress.show(f"{at.algorithm} {at.iteration}/{at.iterations}  uncorrected error {at.rmse:.4f} A")
         if recorder is not None:
             recorder.iteration(at)
 
@@ -99,7 +99,9 @@ def run(arguments: argparse.Namespace) -> int:
     if unseen and holdout_rmse is None:
         print("the model diverges on what was not fitted")
     elif holdout_rmse is not None:
-        print(f"rmse {amount(holdout_rmse, 'A')} on what was not fitted: {', '.join(one.name for one in unseen)}")
+        beside = f"{amount(answer.rmse, 'A')} on what was"
+        names = ", ".join(one.name for one in unseen)
+        print(f"uncorrected error {amount(holdout_rmse, 'A')} on what was not fitted, {beside}: {names}")
     if arguments.report:
         from emaviz.report import write_identification_report  # plotly takes a second to import
 
@@ -125,6 +127,7 @@ def result(answer: Identification, actuator: Actuator, holdout_rmse: float | Non
         "warnings": sure.warnings,
         "physical": readings(answer.k, actuator),
         "rmse": answer.rmse,
+        "corrected_rmse": _finite(answer.corrected_rmse),
         "evaluations": answer.evaluations,
         "elapsed_s": answer.elapsed_s,
         "compile_s": answer.compile_s,

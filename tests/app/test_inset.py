@@ -72,7 +72,8 @@ def test_results_have_the_width_beside_an_inset_that_grows_at_a_click(page):
 
 
 COVERED = """() => {
-  const root = [...document.querySelectorAll('.mantine-Notifications-root')].find(one => one.querySelector('.mantine-Notification-root'));
+  const roots = [...document.querySelectorAll('.mantine-Notifications-root')];
+  const root = roots.find(one => one.querySelector('.mantine-Notification-root'));
   const clip = root.getBoundingClientRect();
   const told = [...root.querySelectorAll('.mantine-Notification-root')].map(one => one.getBoundingClientRect());
   const at = (box) => document.elementFromPoint(box.x + box.width / 2, box.y + box.height / 2);

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
@@ -12,7 +13,7 @@ from ema_model.comparison.curves import quantile_knots
 from ema_model.comparison.explain import Explanation, used_blocks
 from ema_model.comparison.residuals import Residuals
 from ema_model.comparison.result import Region
-from ema_model.comparison.sentences import region_sentence
+from ema_model.comparison.sentences import range_text, region_sentence
 from ema_model.quantities.axes import Axes
 
 Array = NDArray[np.float64]
@@ -25,6 +26,7 @@ _LEAST_Z = 4.0  # of a region's mean over its error
 _SLOW = 0.08  # of the largest speed, below which a region is that of reversals
 _ALWAYS = ("load", "motor_speed", "user_position", "time")
 _ONE_WAY = 0.9
+_DIGITS = (3, 4, 5, 6)  # of the ends of a range, as many as tell it from another one
 
 
 def worst_moment(residuals: Residuals, region: Region) -> tuple[int, int]:
@@ -35,9 +37,17 @@ def worst_moment(residuals: Residuals, region: Region) -> tuple[int, int]:
 
 
 def worst_regions(
-    residuals: Residuals, signal: str, explanations: Sequence[Explanation], axes: Axes, count: int = 5
+    residuals: Residuals,
+    signal: str,
+    explanations: Sequence[Explanation],
+    axes: Axes,
+    recordings: Sequence[str] = (),
+    count: int = 5,
 ) -> list[Region]:
-    """Up to `count` regions, distinct from one another; those of the best explanation first."""
+    """Up to `count` regions, distinct from one another in place and in words; those of the best explanation first.
+
+    recordings: their names.
+    """
     used = used_blocks(residuals, signal)
     if used is None:
         return []
@@ -54,7 +64,27 @@ def worst_regions(
         for region in sorted(regions, key=lambda one: -abs(one.mean) * np.sqrt(np.count_nonzero(one.blocks))):
             if len(found) < count and not any(_alike(region, other) for other in found):
                 found.append(region)
-    return found
+    return _named_apart(found, residuals, signal, axes, recordings)
+
+
+def _named_apart(
+    regions: Sequence[Region], residuals: Residuals, signal: str, axes: Axes, recordings: Sequence[str]
+) -> list[Region]:
+    """Regions of one and the same sentence say their range and, where they lie in one of several, the recording."""
+    named = list(regions)
+    for digits in _DIGITS:
+        counts = Counter(region.sentence for region in named)
+        if len(counts) == len(named):
+            break
+        for i, region in enumerate(regions):
+            if counts[named[i].sentence] > 1:
+                details = range_text(region.variable, region.low, region.high, axes, digits)
+                inside = np.unique(residuals.recording[region.blocks])
+                if len(recordings) > 1 and len(inside) == 1:
+                    details += f", in {recordings[int(inside[0])] or f'recording {inside[0] + 1}'}"
+                place = region.variable, region.low, region.high, region.blocks
+                named[i] = _region(residuals, signal, *place, axes, details)
+    return named
 
 
 def _of_variable(
@@ -92,7 +122,7 @@ def _of_variable(
 
 
 def _region(
-    residuals: Residuals, signal: str, variable: str, low: float, high: float, mask: Mask, axes: Axes
+    residuals: Residuals, signal: str, variable: str, low: float, high: float, mask: Mask, axes: Axes, details: str = ""
 ) -> Region:
     error = residuals.values[signal][mask]
     rmse, mean = float(np.sqrt(np.mean(error**2))), float(np.mean(error))
@@ -124,6 +154,7 @@ def _region(
             axes=axes,
             duration_s=0.0 if time is None else float(np.nanmax(time)),
             slow=slow,
+            details=details,
         ),
         blocks=mask,
     )

@@ -61,15 +61,17 @@ def region_sentence(
     axes: Axes,
     duration_s: float,
     slow: bool,
+    details: str = "",
 ) -> str:
     """One line on a region: what the motor needs more or less there, or how far a position is off.
 
     mean: of measurement − model; direction: ±1 where all of the region moves one way, else 0; typical: the
-    variable's mean there; slow: the region is that of reversals.
+    variable's mean there; slow: the region is that of reversals; details: what else is said
+    of the place.
     """
-    where = _where(variable, low, high, typical, axes, duration_s, slow)
+    where = _where(variable, low, high, typical, axes, duration_s, slow) + (f" ({details})" if details else "")
     moving = ""
-    if direction and variable != "motor_speed":
+    if direction and (slow or variable != "motor_speed"):  # a speed has the direction in its sign
         moving = " when it moves forward" if direction > 0 else " when it moves back"
     told = of_residual(signal, axes, torque_constant)
     size = told.scaled(mean).text(abs(mean))
@@ -86,6 +88,14 @@ def region_sentence(
         side = ("behind" if behind else "ahead of") if direction else ("above" if mean > 0.0 else "below")
         return f"The {title} is {size} {side} the model {where}{moving}."
     return f"The {title} is {size} {'above' if mean > 0 else 'below'} the model {where}{moving}."
+
+
+def range_text(variable: str, low: float, high: float, axes: Axes, digits: int = 3) -> str:
+    """'from 250 to 350 rad/s'."""
+    told = of_variable(variable, axes)
+    told = told if is_turn(variable, axes) else told.scaled([low, high])
+    ends = [number(told.factor * end, digits) for end in (low, high)]
+    return f"from {ends[0]} to {ends[1]} {told.unit}".rstrip()
 
 
 def _where(variable: str, low: float, high: float, typical: float, axes: Axes, duration_s: float, slow: bool) -> str:

@@ -61,7 +61,7 @@ def judge(
     primary = next(name for name in ORDER_OF_PRIMARY if name in residuals.values)
     explained = explain(residuals, primary, actuator.axes)
     orders = residual_orders(residuals, primary)
-    regions = worst_regions(residuals, primary, explained, actuator.axes)
+    regions = worst_regions(residuals, primary, explained, actuator.axes, recordings)
     significant = [one for one in explained if one.significant]
     names = judged(residuals.values)
     error = over_floor(residuals, names)

@@ -22,7 +22,7 @@ from ema_model.side_by_side import windows
 Array = NDArray[np.float64]
 
 _EXACT = 1e-4  # of a tolerance, within which a parameter counts as its file's value
-_DIVERGED = 1e6  # floors, that a run which diverges counts as at most
+DIVERGED = 1e6  # floors, that a run which diverges counts as at most
 
 TOGETHER = 2 * LANES  # candidates: a block of lanes on each of two cores
 
@@ -164,9 +164,9 @@ class Problem:
                 part += added[name]
             part *= weight
             first += len(weight)
-        np.clip(found, -_DIVERGED, _DIVERGED, out=found)
+        np.clip(found, -DIVERGED, DIVERGED, out=found)
         if np.isnan(found).any():
-            found[np.isnan(found)] = _DIVERGED
+            found[np.isnan(found)] = DIVERGED
         return found
 
     def _places(self, window: int) -> dict[str, int]:

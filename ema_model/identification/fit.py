@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ema_model.estimation.descent import Descent
 from ema_model.estimation.floor import Floor, floor
-from ema_model.estimation.problem import Problem
+from ema_model.estimation.problem import DIVERGED, TOGETHER, Problem
 from ema_model.estimation.unknowns import K_SIGMA, Unknown, lags_of, loads_of, starts_of, unknowns_of
 from ema_model.faults import HEALTHY, NAMES
 from ema_model.identification.base_spreads import spreads_of
@@ -234,19 +234,38 @@ def _with_twins(
     return best, kept, evaluations
 
 
-def current_error(found: Fitted, k: ArrayLike | None = None) -> float:
-    """Rms of measured less model current with the model's own bias added, A: of the fit, or with faults k (8,).
+class CorrectedError:
+    """Rms of measured less model current with the model's own bias added, A: faults k (n, 8) → (n,).
 
-    What the rmse alone counts against an answer of the simplified model, this leaves out.
+    The bias, and all that moves beside k, are as one fit has them, so that any k may be compared by it; infinite where
+    the model diverges.  What the plain rmse counts against an answer of the simplified model, this leaves out.
     """
-    problem = found.problem
-    residual = found.residual if k is None else problem.residuals(problem.at(k)[None, :])[0]
-    parts = [
-        residual[rows] / problem.over_sigma(i, name, np.ones(rows.stop - rows.start))
-        for i, name, rows in problem.parts()
-        if name == CURRENT
-    ]
-    return float(np.sqrt(np.mean(np.concatenate(parts) ** 2))) if parts else float("nan")
+
+    def __init__(self, found: Fitted) -> None:
+        self._found = found
+        problem = found.problem
+        self._parts = [
+            (rows, problem.over_sigma(i, name, np.ones(rows.stop - rows.start)))
+            for i, name, rows in problem.parts()
+            if name == CURRENT
+        ]
+        self.least = float(self._of(found.residual[None, :])[0])  # at the fit itself
+
+    def __call__(self, k: ArrayLike) -> Array:
+        """k (n, 8) → (n,), A."""
+        problem = self._found.problem
+        k = np.atleast_2d(np.asarray(k, dtype=float))
+        x = np.tile(self._found.x, (len(k), 1))
+        x[:, :FAULTS] = problem.at(k)[:, :FAULTS]
+        few = [self._of(problem.residuals(x[first : first + TOGETHER])) for first in range(0, len(x), TOGETHER)]
+        return np.concatenate(few)
+
+    def _of(self, residuals: Array) -> Array:
+        """Of residuals (n, values + unknowns)."""
+        parts = [residuals[:, rows] for rows, _ in self._parts]
+        errors = np.concatenate([part / over for part, (_, over) in zip(parts, self._parts)], axis=1)
+        diverged = np.any([np.max(np.abs(part), axis=1) >= DIVERGED for part in parts], axis=0)
+        return np.where(diverged, np.inf, np.sqrt(np.mean(errors**2, axis=1)))
 
 
 def _better(problem: Problem, given: Setting, x: Array, other: Array, found: Sequence[Twins | None]) -> bool:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Mapping
+from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.errors import InputError
-from ema_model.identification.objective import Objective
 
 Array = NDArray[np.floating]
+Cost = Callable[[Array], Array]  # k (n, 8) → (n,), A: of an answer its corrected error
 
 POINTS = 41  # along each axis
 _ROWS = 2  # simulated at once: about two iterations of a usual search
@@ -31,7 +31,7 @@ class Landscape:
     through: Array  # (8,), what the others are held at
     across: Array  # (POINTS,), values of k x
     upwards: Array  # (POINTS,)
-    rmse_A: Array  # (upwards, across)
+    error_A: Array  # (upwards, across)
     rows: int  # done
 
     @property
@@ -44,19 +44,19 @@ class Landscape:
 class Way:
     """From where a search ended straight to the answer."""
 
-    rmse_A: float  # where it ended
+    error_A: float  # where it ended
     highest_A: float  # on the way
     answer_A: float  # at the answer
 
     @property
     def is_trap(self) -> bool:
         """A worse place, and a ridge before the answer."""
-        return self.is_worse and self.highest_A > _RISE * self.rmse_A
+        return self.is_worse and self.highest_A > _RISE * self.error_A
 
     @property
     def is_worse(self) -> bool:
         """Than the answer."""
-        return self.rmse_A > _WORSE * self.answer_A
+        return self.error_A > _WORSE * self.answer_A
 
 
 def extent(through: Array, k: int, interval90: Array | None = None, close: bool = False) -> tuple[float, float]:
@@ -70,7 +70,7 @@ def extent(through: Array, k: int, interval90: Array | None = None, close: bool 
 
 
 def slices(
-    objective: Objective,
+    cost: Cost,
     through: Array,
     x: int,
     y: int,
@@ -85,17 +85,17 @@ def slices(
     if x == y or not {x, y} <= set(range(8)):
         raise InputError("a landscape needs two different k; choose another for one axis")
     xs, ys = np.linspace(*across, points), np.linspace(*upwards, points)
-    rmse = np.full((points, points), np.nan)
+    error = np.full((points, points), np.nan)
     for first in range(0, points, _ROWS):
         some = ys[first : first + _ROWS]
         k = np.tile(np.asarray(through, dtype=float), (len(some) * points, 1))
         k[:, x], k[:, y] = np.tile(xs, len(some)), np.repeat(some, points)
-        found = objective(k).reshape(len(some), points)
-        rmse[first : first + len(some)] = np.where(np.isfinite(found), found, np.nan)
-        yield Landscape(x, y, np.array(through), xs, ys, rmse.copy(), first + len(some))
+        found = cost(k).reshape(len(some), points)
+        error[first : first + len(some)] = np.where(np.isfinite(found), found, np.nan)
+        yield Landscape(x, y, np.array(through), xs, ys, error.copy(), first + len(some))
 
 
-def ways(objective: Objective, ends: Mapping[str, Array], answer: Array) -> dict[str, Way]:
+def ways(cost: Cost, ends: Mapping[str, Array], answer: Array) -> dict[str, Way]:
     """The straight ways from the searches' ends (8,) to the answer (8,), by the searches' names; k7 is an angle."""
     share = np.linspace(0.0, 1.0, _WAY_POINTS)[:, None]
     found = {}
@@ -105,6 +105,6 @@ def ways(objective: Objective, ends: Mapping[str, Array], answer: Array) -> dict
         k = end + share * step
         k[:, 6] %= 1.0
         k[0], k[-1] = end, answer
-        rmse = objective(k)
-        found[name] = Way(float(rmse[0]), float(np.max(rmse)), float(rmse[-1]))
+        error = cost(k)
+        found[name] = Way(float(error[0]), float(np.max(error)), float(error[-1]))
     return found

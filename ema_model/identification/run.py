@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Any
@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from ema_model import faults
 from ema_model.actuator import Actuator
 from ema_model.errors import InputError, quoted
-from ema_model.identification.fit import FAULTS, LONGER_STEPS_S, Setting, current_error, refine, refine_best, setting
+from ema_model.identification.fit import FAULTS, LONGER_STEPS_S, CorrectedError, Setting, refine, refine_best, setting
 from ema_model.identification.objective import Objective
 from ema_model.identification.optimisers import OPTIMISERS, Optimiser, create
 from ema_model.identification.search import search
@@ -48,7 +48,7 @@ class Progress:
     algorithm: str
     iteration: int
     iterations: int
-    rmse: float  # A, of the best so far; `robust` ranks by the corrected error, so that this may rise
+    rmse: float  # A, of the best so far, uncorrected; `robust` ranks by all signals, so that this may rise
     k: Array  # (8,), of the best
     population: Array  # (n, 8)
     population_rmse: Array  # (n,), A
@@ -76,7 +76,9 @@ class Identification(InWords):
     polished: bool = False  # by a least-squares fit after the search
     searched_k: Array | None = None  # (8,), where the search alone ended
     parameters: dict[str, float] = field(default_factory=dict)  # of the actuator, where the fit moved them beside k
-    corrected_rmse: float = float("nan")  # A, with the model's own bias taken out
+    corrected_rmse: float = float("nan")  # A, of k: by `corrected_error`
+    corrected_history: Array = field(default_factory=lambda: np.zeros(0))  # (iterations + 1,), A, of k_history
+    corrected_error: CorrectedError | None = field(default=None, compare=False)
 
     @property
     def found_actuator(self) -> Actuator:
@@ -89,6 +91,25 @@ class Identification(InWords):
     def error_percent(self) -> float | None:
         """Err % (T 5.2, literal), where the truth is known."""
         return None if self.truth is None else faults.error_percent(self.k, self.truth)
+
+    def corrected_by(self, error: CorrectedError) -> Identification:
+        """The same answer with its corrected errors by that of another fit; simulates its history."""
+        every, places = np.unique(np.vstack([self.k_history, self.k]), axis=0, return_inverse=True)
+        *history, last = error(every)[places.ravel()]
+        return replace(self, corrected_rmse=float(last), corrected_history=np.array(history), corrected_error=error)
+
+
+def by_one_error(answers: Sequence[Identification]) -> list[Identification]:
+    """Answers to the same recordings, all corrected as the closest fit among them has it: so they can be compared.
+
+    A fit that an answer was taken from goes before one that only stands beside a search.
+    """
+    found = [(not one.polished, one.corrected_error.least, i) for i, one in enumerate(answers) if one.corrected_error]
+    if not found:
+        return list(answers)
+    error = answers[min(found)[2]].corrected_error
+    assert error is not None, "it was found among those that have one"
+    return [one.corrected_by(error) for one in answers]
 
 
 def steps(
@@ -155,7 +176,7 @@ def steps(
     k = found.k if polishes else last.k
     sure = uncertainty(found, k)
     after = time.perf_counter() - started - first_compile
-    return Identification(
+    answer = Identification(
         actuator=objective.actuator,
         algorithm=algorithm,
         seed=seed,
@@ -172,8 +193,8 @@ def steps(
         polished=polishes,
         searched_k=last.k,
         parameters=found.problem.parameters(found.x) if polishes else {},
-        corrected_rmse=current_error(found, None if polishes else k),
     )
+    return answer.corrected_by(CorrectedError(found))
 
 
 def _optimise(objective: Objective, optimiser: Optimiser) -> Generator[Progress, None, None]:

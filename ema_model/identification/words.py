@@ -15,6 +15,10 @@ from ema_model.quantities.titles import in_sentence
 from ema_model.simulation.words import run_in_words
 from ema_model.text import Document, Lines, Remark, Remarks, Table
 
+CORRECTED = (
+    "Corrected error: rms of measured less model current, with what the simplified model is known to lack added."
+)
+
 
 def verdict(answer: Identification) -> str:
     """The short one: healthy, which k are not, or that nothing can be told."""
@@ -82,24 +86,19 @@ def _health(answer: Identification) -> Remark:
 
 def facts(answer: Identification) -> list[str]:
     """What it came to and took: error, simulations, time."""
-    corrected = "" if np.isnan(answer.corrected_rmse) else f", {amount(answer.corrected_rmse, 'A')} corrected"
     return [
         *(["stopped"] if answer.stopped else []),
         *([] if answer.error_percent is None else [f"Err {answer.error_percent:.2f} %"]),
-        f"rmse {amount(answer.rmse, 'A')}{corrected}",
+        f"corrected error {amount(answer.corrected_rmse, 'A')}",
         f"{answer.evaluations} simulations in {answer.elapsed_s:.2f} s",
     ]
 
 
 def why_best(best: Identification, others: Sequence[Identification]) -> str:
     """Why one answer of several to the same recording is the one to believe."""
-    if best.polished and not all(answer.polished for answer in others):
-        why = "its answer was fitted with the model's own bias taken out; the others are where their searches ended"
-    elif best.polished:
-        why = "its fitted answer has the least rmse"
-    else:
-        why = "it has the least rmse"
-    return f"{why}. Corrected: the rmse with what the simplified model is known to lack added."
+    fitted = best.polished and not all(answer.polished for answer in others)
+    how = "; its answer was fitted, the others are where their searches ended" if fitted else ""
+    return f"it has the least corrected error{how}. {CORRECTED}"
 
 
 def _named(name: str) -> str:
@@ -111,20 +110,22 @@ def landscape_words(found: Landscape) -> str:
     stopped = "" if found.share == 1.0 else f"Stopped at {100.0 * found.share:.0f} %. "
     others = [i for i in range(len(faults.NAMES)) if i not in (found.x, found.y)]
     held = ", ".join(f"{faults.NAMES[i]} {found.through[i]:.3f}" for i in others)
-    known = found.rmse_A[np.isfinite(found.rmse_A)]
-    reach = f" From {amount(known.min(), 'A')} to {amount(known.max(), 'A')}." if len(known) else ""
+    known = found.error_A[np.isfinite(found.error_A)]
+    reach = f" Corrected error from {amount(known.min(), 'A')} to {amount(known.max(), 'A')}." if len(known) else ""
     return f"{stopped}Held: {held}.{reach}"
 
 
-def way_sentences(found: Mapping[str, Way]) -> Sequence[str]:
-    """What became of each search that is not the answer, in words."""
+def way_sentences(found: Mapping[str, Way], fitted: str = "") -> Sequence[str]:
+    """What became of each search, in words; fitted: the one from whose end a fit went on to the answer."""
     said = []
     for name, way in found.items():
         title = algorithm_title(name)
-        end, answer, highest = (amount(rmse, "A") for rmse in (way.rmse_A, way.answer_A, way.highest_A))
-        if way.is_trap:
+        end, answer, highest = (amount(error, "A") for error in (way.error_A, way.answer_A, way.highest_A))
+        if name == fitted:
+            said.append(f"{title} has the answer: a fit went on to it ({answer}) from where its search ended ({end}).")
+        elif way.is_trap:
             said.append(
-                f"{title} ended in a local minimum: its rmse is {end} there, and on the straight line to the answer "
+                f"{title} ended in a local minimum: its error is {end} there, and on the straight line to the answer "
                 f"({answer}) it rises to {highest} first."
             )
         elif way.is_worse:

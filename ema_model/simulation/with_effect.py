@@ -30,6 +30,8 @@ RUNS: dict[str, Run] = {
 }
 _SATURATED = "step"  # where the drive stands at its limits, so that a small effect shifts the whole transient
 _LEAST = 1e-3  # of a signal's range, rms
+_TURN = 2.0 * np.pi
+_PERIODS, _LONG_PERIODS = 3, 2  # that are shown; of a period as long as a turn
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +90,16 @@ _SIGNALS = {
 }
 
 
+def few_periods(settings: Mapping[str, float]) -> tuple[float, int]:
+    """The angle over which an effect with these settings repeats a few times, rad (m of a linear motor), and how often.
+
+    By its order or its period; what has neither repeats once a turn.
+    """
+    period = settings.get("period_rad", _TURN / settings.get("order", 1.0))
+    count = _PERIODS if period < 0.99 * _TURN else _LONG_PERIODS
+    return count * period, count
+
+
 class EffectRuns:
     """An actuator's effects in `RUNS`; the runs without them are simulated once."""
 
@@ -114,7 +126,8 @@ class EffectRuns:
     def clearest(self, effect: Effect) -> WithEffect | None:
         """An effect at its clear severity in the run that shows it most; None where the actuator stands none.
 
-        What follows a variable is looked for in the saturated run last; where none shows it, the largest trace counts.
+        What follows a variable is looked for in the saturated run last, and what repeats with the motor's angle in runs
+        that go through some periods; where none shows it, the largest trace counts.
         """
         found: list[WithEffect] = []
         for run in RUNS:
@@ -123,6 +136,8 @@ class EffectRuns:
 
         def rank(felt: WithEffect) -> tuple[bool, float, float]:
             fits = effect.against == "time" or felt.run != _SATURATED
+            if effect.against == "motor_angle":
+                fits &= float(np.ptp(felt.against("motor_angle"))) > few_periods(felt.settings)[0]
             return fits and felt.visibility > 0.0, felt.visibility, felt.trace
 
         return max(found, key=rank, default=None)

@@ -1,4 +1,7 @@
-"""The live chart of identifications: the best error of each iteration, all optimisers in one plot."""
+"""The live chart of identifications: the best error of each iteration, all optimisers in one plot.
+
+While they search it is the simplified model's own; once all have ended, what that model is known to lack is added.
+"""
 
 from __future__ import annotations
 
@@ -17,19 +20,19 @@ _LEAST_A = 1e-9  # a logarithmic axis has no zero
 
 
 class LiveConvergence:
-    """RMSE against iteration, logarithmic; an optimiser that has ended keeps its level."""
+    """Error against iteration, logarithmic; an optimiser that has ended keeps its level."""
 
     def __init__(self, gui: viser.GuiApi, height: int = 200) -> None:
-        axes: Any = ({**AXIS, "label": "Iteration", "size": 30}, {**AXIS, "label": "RMSE of the best [A]", "size": 56})
         self._algorithms: tuple[str, ...] = ()
         self._iterations = 150
+        self._corrected = False
         self._legend: Any = add_html(gui)
         self.handle: Any = gui.add_uplot(
             data=(np.array([0.0, 1.0]), np.array([1.0, 1.0])),
             series=({"label": "iteration"}, _UNSEEN),
             title="Convergence",
             scales=_scales(150),
-            axes=axes,
+            axes=_axes(False),
             legend={"show": False},
             padding=(PADDING[0], 14, *PADDING[2:]),  # half of the last number
             height=height,
@@ -46,12 +49,15 @@ class LiveConvergence:
             self._iterations = iterations
             self.handle.scales = _scales(iterations)
 
-    def show(self, rmse: Mapping[str, Sequence[float]]) -> None:
-        """Draws the errors so far, A, by algorithm; of one whose answer was fitted after the search, its last."""
-        if tuple(rmse) != self._algorithms:
+    def show(self, errors: Mapping[str, Sequence[float]], *, corrected: bool) -> None:
+        """Draws the errors so far, A, by algorithm, all corrected or none; the last of a fitted answer is its fit."""
+        if tuple(errors) != self._algorithms:
             return
-        count = max([2, *map(len, rmse.values())])
-        lines = [_to_length(values, count) for values in rmse.values()]
+        if corrected != self._corrected:
+            self._corrected = corrected
+            self.handle.axes = _axes(corrected)
+        count = max([2, *map(len, errors.values())])
+        lines = [_to_length(values, count) for values in errors.values()]
         self.handle.data = (np.arange(count, dtype=float), *lines)
 
 
@@ -69,12 +75,12 @@ def _told(algorithm: str) -> str:
     """In the legend: what rises has a reason."""
     if algorithm != ROBUST:
         return algorithm_title(algorithm)
-    return f"{algorithm_title(algorithm)}: ranks by the corrected error, so that this may rise; the last is its fit"
+    return f"{algorithm_title(algorithm)}: ranks by all signals, so that this may rise; the last is its fit"
 
 
-def _to_length(rmse: Sequence[float], count: int) -> np.ndarray:
+def _to_length(errors: Sequence[float], count: int) -> np.ndarray:
     """The last value goes on: it stays the best."""
-    values = np.asarray(rmse if len(rmse) else [1.0], dtype=float)
+    values = np.asarray(errors if len(errors) else [1.0], dtype=float)
     values = np.maximum(np.where(np.isfinite(values), values, 1e3), _LEAST_A)
     return np.concatenate([values, np.full(count - len(values), values[-1])])
 
@@ -84,6 +90,15 @@ def _line(algorithm: str) -> Any:
 
 
 _UNSEEN: Any = {**_line(""), "stroke": "#00000000"}  # before anything is searched
+
+
+def error_title(corrected: bool) -> str:
+    """Of an axis of errors, A."""
+    return f"{'Corrected' if corrected else 'Uncorrected'} error of the best [A]"
+
+
+def _axes(corrected: bool) -> Any:
+    return {**AXIS, "label": "Iteration", "size": 30}, {**AXIS, "label": error_title(corrected), "size": 56}
 
 
 def _scales(iterations: int) -> Any:

@@ -12,8 +12,8 @@ from ema_model.quantities.axes import ROTARY, Axes
 from ema_model.quantities.numbers import Quantity
 from ema_model.quantities.shown import of_residual
 from ema_model.quantities.titles import in_sentence
-from ema_model.quantities.variables import is_turn, of_variable
-from ema_model.simulation.with_effect import WithEffect
+from ema_model.quantities.variables import of_variable
+from ema_model.simulation.with_effect import WithEffect, few_periods
 from emaviz.colours import DIFFERENCE
 from emaviz.figures.decimate import envelope
 from emaviz.figures.lines import scattered
@@ -24,7 +24,8 @@ Array = NDArray[np.float64]
 
 SEVERITIES = (("low", "#ff9a9a"), ("medium", DIFFERENCE), ("high", "#991b1b"))  # shades of the residual's colour
 _SIGNAL = "current_A"
-_DOTS, _POINTS = 400, 600  # of a severity
+_DOTS, _PERIODIC_DOTS, _POINTS = 400, 900, 600  # of a severity
+_START = 0.1  # of a run, in which a loop that finds its way hides what is periodic
 _SHARE, _FEWEST = 0.005, 200  # of a change's power that may lie before or behind what is shown; samples
 # of a window: below the text and the sliders of most effects it is seen whole
 _FITS = "width:100%;max-height:clamp(180px,calc(100vh - 665px),330px)"
@@ -62,7 +63,17 @@ def _series(felt: Sequence[tuple[str, str, WithEffect]], axes: Axes, variable: s
     residual, axis = of_residual(_SIGNAL, axes), of_variable(variable, axes)
     title = f"{residual.title} {'over' if variable == 'time' else 'against'} {in_sentence(axis.title)}"
     strongest = felt[-1][2]
-    part = _where(strongest.change(_SIGNAL)[1])
+    change = strongest.change(_SIGNAL)[1]
+    span, dots, begin = 0.0, _DOTS, 0
+    if variable == "motor_angle":  # what follows it is periodic
+        span, periods = few_periods(strongest.settings)
+        dots = _PERIODIC_DOTS
+        begin = int(_START * len(change))
+        if float(np.ptp(strongest.against(variable)[begin:])) > span:
+            title += f", folded to {periods} periods"
+        else:
+            span = 0.0
+    part = _where(change, begin)
     lines = []
     for name, colour, one in reversed(felt):  # so that a strong one hides no slight one
         x, y = one.against(variable)[part], one.change(_SIGNAL)[1][part]
@@ -70,18 +81,18 @@ def _series(felt: Sequence[tuple[str, str, WithEffect]], axes: Axes, variable: s
             x, y = envelope(x, [y], _POINTS)
             lines.append(Series(name, colour, x, y))
         else:
-            x = np.mod(x, 2.0 * np.pi) if is_turn(variable, axes) else x
-            places = scattered(x, y, _DOTS)
+            x = np.mod(x, span) if span else x
+            places = scattered(x, y, dots)
             lines.append(Series(name, colour, x[places], y[places], joined=False))
     least = _FLAT * float(np.ptp(strongest.without[_SIGNAL]))
     return chart(title, axis, residual, lines, least, style)
 
 
-def _where(change: Array) -> slice:
-    """The samples about where nearly all of a change lies; all of them where there is none."""
-    power = np.cumsum(change**2)
+def _where(change: Array, begin: int) -> slice:
+    """The samples from `begin` on about where nearly all of a change lies; all of these where there is none."""
+    power = np.cumsum(np.where(np.arange(len(change)) < begin, 0.0, change) ** 2)
     if power[-1] == 0.0:
-        return slice(None)
+        return slice(begin, None)
     first, last = np.searchsorted(power, [_SHARE * power[-1], (1.0 - _SHARE) * power[-1]])
     around = max(last - first, _FEWEST) // 4
-    return slice(max(first - around, 0), last + around)
+    return slice(max(first - around, begin), last + around)

@@ -37,20 +37,21 @@ class Marks:
 def figure(landscape: Landscape, marks: Marks, *, dark: bool = False) -> go.Figure:
     """Dark: a low error.  Points off the slice are drawn where their two k are."""
     x, y = landscape.x, landscape.y
-    height = np.log10(np.maximum(landscape.rmse_A, _LEAST_A))
+    height = np.log10(np.maximum(landscape.error_A, _LEAST_A))
     drawn = theme.new("Cost around the answer", axis_title(x), axis_title(y), dark=dark)
-    known = landscape.rmse_A[np.isfinite(landscape.rmse_A)]
+    known = landscape.error_A[np.isfinite(landscape.error_A)]
     ticks = round_values(float(known.min()), float(known.max())) if len(known) else []
     drawn.add_trace(
         go.Contour(
             x=landscape.across, y=landscape.upwards, z=height, connectgaps=False, ncontours=18,
             colorscale="Viridis", contours={"coloring": "heatmap"},
             line={"width": 0.5, "color": "rgba(255,255,255,.55)"},
-            colorbar={"title": {"text": "rmse [A]", "side": "right"}, "thickness": 10, "len": 0.95, "outlinewidth": 0,
-                      "tickvals": [float(np.log10(max(tick, _LEAST_A))) for tick in ticks],
+            colorbar={"title": {"text": "corrected error [A]", "side": "right"}, "thickness": 10, "len": 0.95,
+                      "outlinewidth": 0, "tickvals": [float(np.log10(max(tick, _LEAST_A))) for tick in ticks],
                       "ticktext": [f"{tick:.3g}" for tick in ticks]},
-            customdata=landscape.rmse_A, showlegend=False, name="",
-            hovertemplate=f"{FAULTS[x].name} %{{x:.3f}}, {FAULTS[y].name} %{{y:.3f}}: rmse %{{customdata:.4g}} A",
+            customdata=landscape.error_A, showlegend=False, name="",
+            hovertemplate=f"{FAULTS[x].name} %{{x:.3f}}, {FAULTS[y].name} %{{y:.3f}}: "
+                          "corrected error %{customdata:.4g} A",
         )
     )  # fmt: skip
     if marks.interval90 is not None:

@@ -15,7 +15,8 @@ from ema_model.discovery.steps.snapshot import Look
 from ema_model.quantities.numbers import Quantity
 from ema_model.quantities.shown import of_residual
 from ema_model.quantities.titles import in_sentence
-from ema_model.quantities.variables import is_turn, of_variable
+from ema_model.quantities.variables import of_variable
+from ema_model.simulation.with_effect import few_periods
 from emaviz.figures import theme
 from emaviz.figures.binned import Binned, binned, edges_for
 
@@ -24,6 +25,7 @@ Array = NDArray[np.float64]
 SIGNATURE = theme.MODEL
 _VARIABLES = ("motor_angle", "motor_speed", "user_position", "current", "load", "acceleration")
 _TURN = 2.0 * np.pi
+_MOST_IN_A_TURN = 8.0  # periods that are told from one another where a turn is drawn whole
 _SHOWN = 400  # blocks over time
 _CLEAR = 0.25  # of the signature's square that a variable must tell, else it is drawn over time
 
@@ -36,7 +38,7 @@ def figure(look: Look, one: Candidate, *, dark: bool = False) -> go.Figure:
     if change is None or not np.any(change):
         return theme.missing(title, "these recordings do not show it", dark=dark)
     residuals = look.residuals
-    variable = variable_of(residuals, change)
+    variable = variable_of(residuals, change, _span(one))
     if variable == "time":
         return _over_time(look, one, title, signal, change, dark)
     x = _values(residuals, variable, one)
@@ -85,15 +87,15 @@ def _over_time(look: Look, one: Candidate, title: str, signal: str, change: Arra
     return chart
 
 
-def variable_of(residuals: Residuals, change: Array) -> str:
-    """The variable that an effect's change follows best; time where it follows none."""
+def variable_of(residuals: Residuals, change: Array, span: float = _TURN) -> str:
+    """The variable that an effect's change follows best, the motor's angle over a span; time where it follows none."""
     best, told = "time", _CLEAR
     power = float(np.sum(change**2))
     for variable in _VARIABLES:
         x = residuals.variables.get(variable)
         if x is None or np.isfinite(x).sum() < 100 or np.ptp(x[np.isfinite(x)]) == 0.0:
             continue
-        x = np.mod(x, _TURN) if variable == "motor_angle" else x
+        x = np.mod(x, span) * (_TURN / span) if variable == "motor_angle" else x
         known = np.isfinite(x)
         edges = edges_for(variable, x)
         place = np.clip(np.searchsorted(edges, x[known], side="right") - 1, 0, len(edges) - 2)
@@ -110,26 +112,29 @@ def _values(residuals: Residuals, variable: str, one: Candidate) -> Array:
     if variable == "time":
         return residuals.variables.get("time", residuals.time_s)
     x = residuals.variables[variable]
-    return np.mod(x, _period(one)) if variable == "motor_angle" else x
+    return np.mod(x, _span(one)) if variable == "motor_angle" else x
 
 
-def _period(one: Candidate) -> float:
-    """A quarter of a turn or less where a turn has too many periods to be seen."""
+def _span(one: Candidate) -> float:
+    """Of the motor's angle: a whole turn of few periods, else a few periods."""
     order = one.settings.get("order", 1.0)
-    return _TURN if order <= 8.0 else _TURN * np.ceil(order / 6.0) ** -1 if order % np.ceil(order / 6.0) == 0 else _TURN
+    whole = "period_rad" not in one.settings and 2.0 <= order <= _MOST_IN_A_TURN
+    return _TURN if whole else few_periods(one.settings)[0]
 
 
 def _edges(variable: str, x: Array, one: Candidate) -> Array:
     if variable == "motor_angle":
-        order = one.settings.get("order", 1.0) * _period(one) / _TURN
-        return np.linspace(0.0, _period(one), int(np.clip(14 * order, 36, 240)) + 1)
+        span, count = few_periods(one.settings)
+        periods = count * _span(one) / span
+        return np.linspace(0.0, _span(one), int(np.clip(14 * periods, 36, 240)) + 1)
     return edges_for(variable, x)
 
 
 def _axis(look: Look, variable: str, one: Candidate) -> Quantity:
     axis = of_variable(variable, look.found.actuator.axes)
-    parts = round(_TURN / _period(one)) if is_turn(variable, look.found.actuator.axes) else 1
-    return axis if parts == 1 else replace(axis, title=f"{axis.title}, folded {parts} times")
+    if variable != "motor_angle" or _span(one) == _TURN:
+        return axis
+    return replace(axis, title=f"{axis.title}, folded to {few_periods(one.settings)[1]} periods")
 
 
 def _shown(look: Look, signal: str, *lines: Binned) -> Quantity:

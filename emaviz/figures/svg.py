@@ -18,6 +18,7 @@ _WIDTH, _HEIGHT = 460, 270
 _LEFT, _RIGHT, _TOP, _BOTTOM = 58, 14, 26, 40
 _AIR = 0.05  # of the range, above and below what is drawn
 _TICKS = 6
+_TURN_STEPS = (1.0, 2.0, 5.0, 10.0, 15.0, 30.0, 60.0, 90.0, 180.0, 360.0, 3600.0, 36000.0)  # degrees
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +69,7 @@ class _Axis:
     high: float
     start: float
     end: float
-    is_turn: bool = False  # in degrees, once round at most
+    is_turn: bool = False  # in degrees
 
     def at(self, value: Array) -> Array:
         return self.start + (self.end - self.start) * (value - self.low) / ((self.high - self.low) or 1.0)
@@ -76,7 +77,7 @@ class _Axis:
     @property
     def ticks(self) -> list[float]:
         """Round numbers; parts of a turn where these are degrees."""
-        return round_numbers(self.low, self.high, _TICKS, (30.0, 60.0, 90.0) if self.is_turn else ())
+        return round_numbers(self.low, self.high, _TICKS, _TURN_STEPS if self.is_turn else ())
 
 
 def _grid(x: _Axis, y: _Axis) -> str:

@@ -14,8 +14,8 @@ from ema_model.text import COLOURS
 from emaviz.colours import RUNS
 from emaviz.figures.lines import line
 from emaviz.figures.theme import DARK, LIGHT, plain
-from emaviz.recording.entry import Entry, setting
-from emaviz.recording.read import IdentificationTrace, Recording
+from emaviz.recording.entry import Entry, error_key, setting
+from emaviz.recording.read import Recording
 from emaviz.text.html import Html, html, joined
 
 FIRST, SECOND = RUNS
@@ -33,9 +33,11 @@ def signals(*recordings: Recording) -> list[str]:
 
 
 def figure(first: Recording, second: Recording, signal: str, *, dark: bool = False) -> go.Figure:
-    """Rows: the signal as recorded (thin) and fitted (bold), the residual, the best rmse of each iteration."""
+    """Rows: the signal as recorded (thin) and fitted (bold), the residual, the best error of each iteration."""
     drawn = make_subplots(rows=3, cols=1, vertical_spacing=0.1, row_heights=[0.4, 0.28, 0.32])
     theme = DARK if dark else LIGHT
+    traces = [trace for one in (first, second) for trace in one.identification.values()]
+    corrected = all(trace.corrected is not None for trace in traces)  # an older file has none
     for recording, colour, name in ((first, FIRST, "A"), (second, SECOND, "B")):
         for group, width, dash, said in (
             ("reference", 1.2, "dot", "recorded"),
@@ -50,11 +52,15 @@ def figure(first: Recording, second: Recording, signal: str, *, dark: bool = Fal
             _add(drawn, 2, residual.time_s, residual.values, f"{name} residual", colour, "solid", 1.2, listed=False)
         for place, (algorithm, trace) in enumerate(recording.identification.items()):
             said = plain(f"{name} {algorithm_title(algorithm)}")
-            _add_search(drawn, trace, said, colour, _DASHES[place % len(_DASHES)])
+            index, errors = trace.iteration, trace.rmse
+            if corrected and trace.corrected is not None:
+                index, errors = np.arange(len(trace.corrected)), trace.corrected
+            _add_search(drawn, index, errors, said, colour, _DASHES[place % len(_DASHES)])
     title, unit = SIGNALS[signal].title, SIGNALS[signal].unit or "-"
     drawn.update_yaxes(title_text=f"{title}<br>[{unit}]", row=1, col=1)
     drawn.update_yaxes(title_text=f"Residual<br>[{unit}]", row=2, col=1)
-    drawn.update_yaxes(title_text="RMSE of the best<br>[A]", type="log", row=3, col=1, **_LOG)
+    which = "Corrected" if corrected else "Uncorrected"
+    drawn.update_yaxes(title_text=f"{which}<br>error [A]", type="log", row=3, col=1, **_LOG)
     drawn.update_xaxes(title_text="Time [s]", matches="x", row=2, col=1)
     drawn.update_xaxes(title_text="Iteration", row=3, col=1)
     drawn.update_layout(
@@ -77,9 +83,10 @@ def table(first: Entry, second: Entry) -> Html:
         rows.append(_row("settings", "the same", "the same"))
     answers = (first.answer, second.answer)
     rows.append(_row("best algorithm", *(algorithm_title(one.best or "–") for one in (first, second))))
+    error = error_key(*answers)
     for title, key, form in (
         ("Err [%]", "error_percent", ".2f"),
-        ("rmse [A]", "rmse_A", ".4f"),
+        (f"{'uncorrected' if error == 'rmse_A' else 'corrected'} error [A]", error, ".4f"),
         ("time [s]", "elapsed_s", ".2f"),
         ("simulations", "evaluations", "d"),
     ):
@@ -112,11 +119,13 @@ def _add(
     )
 
 
-def _add_search(drawn: go.Figure, trace: IdentificationTrace, name: str, colour: str, dash: str) -> None:
-    known: NDArray[np.bool_] = np.isfinite(trace.rmse) & (trace.rmse > 0.0)
-    x = trace.iteration[known].astype(float)
+def _add_search(
+    drawn: go.Figure, index: NDArray[np.int64], errors: NDArray[np.float64], name: str, colour: str, dash: str
+) -> None:
+    known: NDArray[np.bool_] = np.isfinite(errors) & (errors > 0.0)
+    x = index[known].astype(float)
     drawn.add_trace(
-        go.Scatter(x=x, y=trace.rmse[known], name=name, mode="lines", line={"color": colour, "dash": dash}),
+        go.Scatter(x=x, y=errors[known], name=name, mode="lines", line={"color": colour, "dash": dash}),
         row=3,
         col=1,
     )

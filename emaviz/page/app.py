@@ -82,7 +82,7 @@ class App:
         self._docked = Docked(self.server)
         first = compare.WORKSPACE if given else explore.WORKSPACE
         self.workspaces = Workspaces(self.server, self.screen, self._docked, first.name)
-        self.page = Page(self.server, self.session, self.screen, self.workspaces)
+        self.page = Page(self.server, self.session, self.screen, self.workspaces, folder)
         self.comparing = Comparing(self.session, data)
         self.session.open_file = self.comparing.measurement
         self.discovering = Discovering(self.session, self.comparing)

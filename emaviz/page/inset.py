@@ -17,6 +17,7 @@ PLOTS_EARLY = Html('<div class="emaviz-early"></div>')
 ROOM = Html('<div class="emaviz-room"></div>')  # stands in a folder that only a large window has room for
 _ROOM_PX = 1700, 940  # of such a window, width and height
 _LEAST_WIDTH_PX = 900  # of a window
+_STRIP_PX = 76  # of the playback below
 _CLICK_PX = 4  # a pointer that moves further turns the actuator
 
 _SCRIPT = """
@@ -35,6 +36,12 @@ _SCRIPT = """
     body.classList.toggle('emaviz-inset', inset);
     body.classList.toggle('emaviz-low-inset', inset && low);
     button.style.display = can ? 'block' : 'none';
+    if (at) {  // what is told stands on the picture, beside the button
+      const box = at.getBoundingClientRect(), above = inset ? 6 : 52;
+      const note = { left: box.left + 6, top: box.top + above, width: Math.min(box.width - (inset ? 50 : 12), 440),
+                     height: (inset ? box.height : Math.min(box.height, innerHeight - STRIP)) - above - 6 };
+      for (const [side, px] of Object.entries(note)) root.style.setProperty(`--emaviz-note-${side}`, `${px}px`);
+    }
     if (!can) return;
     const box = at.getBoundingClientRect();
     button.style.left = `${box.right - 34}px`;
@@ -70,7 +77,9 @@ _SCRIPT = """
 
 def script() -> str:
     """To run in every page: `window.emavizInset.enter(inset, lower)` lays it out for a workspace."""
-    return _SCRIPT.replace("LEAST", str(_LEAST_WIDTH_PX)).replace("CLICK", str(_CLICK_PX))
+    return (
+        _SCRIPT.replace("LEAST", str(_LEAST_WIDTH_PX)).replace("CLICK", str(_CLICK_PX)).replace("STRIP", str(_STRIP_PX))
+    )
 
 
 def style() -> Html:
@@ -90,9 +99,10 @@ def style() -> Html:
         f"{right}{{width:calc(100% - var(--emaviz-left))!important}}"
         f"{right} > div:not([data-dock-region-handle]):not([data-dock-region-resize]) > div{{width:100%!important}}"
         f"{right} [data-dock-region-resize]{{display:none!important}}"
-        # what is told, where it covers no result
-        f"{inset} .mantine-Notifications-root{{left:10px!important}}"
-        f"{inset} .mantine-Notifications-root[data-position^=top]{{top:auto!important;bottom:80px!important}}"
+        # what is told, where it covers no control and no result
+        ".mantine-Notifications-root{left:var(--emaviz-note-left,10px)!important;right:auto!important;"
+        "top:var(--emaviz-note-top,80px)!important;bottom:auto!important;width:var(--emaviz-note-width,300px)!important;"
+        "max-height:var(--emaviz-note-height,50vh);overflow-y:auto}"
         ".emaviz-grow{position:fixed;z-index:7;width:26px;height:26px;padding:0;border-radius:4px;cursor:pointer;"
         "font-size:15px;line-height:24px;border:1px solid rgba(134,142,150,.55);"
         "background:var(--mantine-color-body);color:var(--mantine-color-text)}"

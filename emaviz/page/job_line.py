@@ -40,7 +40,7 @@ class JobLine:
 
     def say(self, text: str) -> None:
         """On the screen's thread."""
-        self._text.content = boxed(text if isinstance(text, Html) else begun(text)) if text else ""
+        self._text.content = boxed(text if isinstance(text, Html) else begun(self._page.local(text))) if text else ""
 
     def _waits(self, text: str) -> None:
         """For its turn, and can be stopped before that has come; or, with no text, does not wait any more."""

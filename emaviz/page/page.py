@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import viser
@@ -14,7 +15,7 @@ from emaviz.server.beside import say_beside
 from emaviz.server.viser_private import Inside, id_of
 from emaviz.session.session import Session
 from emaviz.session.worker import Worker
-from emaviz.text.sentence import begun
+from emaviz.text.sentence import begun, within
 
 
 @dataclass(frozen=True)
@@ -25,12 +26,17 @@ class Page:
     session: Session
     screen: Worker  # draws, at a pace that browsers can follow
     workspaces: Workspaces  # which windows are where
+    folder: Path | None = None  # of the data, whose files messages name without it
     _refused: set[str] = field(default_factory=set)  # controls beside which something is said
 
     def notify(self, title: str, text: str, colour: Any = "red") -> None:
         """A message in every open browser."""
         for client in self.server.get_clients().values():
-            client.add_notification(title, begun(text), auto_close_seconds=8.0, color=colour)
+            client.add_notification(title, begun(self.local(text)), auto_close_seconds=8.0, color=colour)
+
+    def local(self, text: str) -> str:
+        """A message that names files relative to the data folder, not by where the server has it."""
+        return text if self.folder is None else within(text, self.folder)
 
     def checked(self, change: Callable[[], Any], control: Any = None) -> bool:
         """Applies a change of settings; a bad value becomes a message and leaves the old one.
@@ -61,7 +67,7 @@ class Page:
         """Stands below a control until it is used again; no text takes it away."""
         if text or id_of(control) in self._refused:
             (self._refused.add if text else self._refused.discard)(id_of(control))
-            say_beside(Inside(self.server), control, text)
+            say_beside(Inside(self.server), control, self.local(text))
 
     def begins(self, begin: Callable[[], bool], button: Any = None) -> bool:
         """Begins a long run, or says why not, below the button that asks for it.

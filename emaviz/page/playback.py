@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from typing import Annotated, Any
 
@@ -37,6 +38,8 @@ class Looks(msgspec.Struct, frozen=True):
 class PlaybackStrip:
     """One strip for all workspaces: it shows the clock of the one that was used last.
 
+    A window at another one has an actuator of its own, and is the one that was used last once it uses the strip.
+
     theme(dark) sets the page's, of which `themed` tells.  moves: called with the reel's name, the moment and from–to, s
     of the recording's own time, on the screen's thread.
     """
@@ -44,6 +47,8 @@ class PlaybackStrip:
     def __init__(self, page: Page, scene: ActuatorScene, actuator: Actuator, theme: Callable[[bool], None]) -> None:
         self._page, self._scene, self._theme = page, scene, theme
         self._span_s = (0.0, 0.5)
+        self._placed: set[int] = set()  # windows with an actuator of their own
+        self._placing = threading.Lock()
         self.themed: Signal[[bool]] = Signal()
         self.moves: Signal[[str, float, tuple[float, float]]] = Signal()
         self.playback = Playback(scene, actuator, self._moved)
@@ -67,13 +72,14 @@ class PlaybackStrip:
             self._caption = add_html(gui)
             page.workspaces.connect()
         self._panel.float(x=0, y=-1, width=480)
-        self._play.on_click(lambda _: self.play(not self.playback.playing))
+        self._play.on_click(self._pressed)
         self._speed.on_update(lambda _: self._set_speed())
-        self._moment.on_update(lambda event: event.client and self._scrub())
+        self._moment.on_update(lambda event: event.client and self._scrub(event.client))
         self._opacity.on_update(lambda _: self._scene.set_opacity(min(max(float(self._opacity.value), 0.0), 1.0)))
         self._labels.on_update(lambda _: self._scene.show_labels(bool(self._labels.value)))
         self._dark.on_update(lambda _: self._set_dark())
         page.workspaces.entered.connect(self._enter)
+        page.server.on_client_disconnect(lambda client: self._forget(client.client_id))
 
         @self._picture.on_click
         def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
@@ -91,6 +97,17 @@ class PlaybackStrip:
         self.playback.play(playing)
         self._show_playing()
 
+    def _pressed(self, event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
+        wanted = not self.playback.playing  # as the button says
+        self._use(event.client)
+        self.play(wanted)
+
+    def _use(self, client: viser.ClientHandle | None) -> None:
+        """A window uses the strip, which then shows the clock of its workspace."""
+        at = self._page.workspaces.places().get(client.client_id) if client is not None else None
+        if at is not None and at != self.playback.on:
+            self._enter(at)
+
     def step(self, steps: int) -> None:
         """Rests so many hundredths of the run later."""
         self.play(False)
@@ -105,9 +122,27 @@ class PlaybackStrip:
 
     def _enter(self, workspace: str) -> None:
         self.playback.enter(workspace)
+        self._place_windows()
         with self._page.server.atomic():
             self._show_playing()
             self.say()
+
+    def _place_windows(self) -> None:
+        """A window that is at another workspace than the one used last has its own actuator, from then on."""
+        places, clients = self._page.workspaces.places(), self._page.server.get_clients()
+        if self.playback.on not in places.values():
+            return  # the window has gone on, which will be told
+        with self._placing:
+            for window, on in places.items():
+                if (on != self.playback.on or window in self._placed) and window in clients:
+                    self._placed.add(window)
+                    self.playback.show_in(window, self._scene.own(clients[window]), on)
+
+    def _forget(self, window: int) -> None:
+        with self._placing:
+            self._placed.discard(window)
+            self.playback.forget(window)
+            self._scene.forget(window)
 
     def put(self, shown: Motion | None, on: str, time_s: float | None = None) -> None:
         """Puts a run on a workspace's reel, or takes it off; time_s: where it is to rest, in its own time."""
@@ -145,21 +180,26 @@ class PlaybackStrip:
         if self._caption.content != line:
             self._caption.content = line
 
-    def _moved(self, time_s: float, duration_s: float) -> None:
-        """The scene shows another moment; called on the playback's thread."""
-        on, shown = self.playback.on, self.playback.motion
+    def _moved(self, on: str, time_s: float, duration_s: float) -> None:
+        """A scene shows another moment; called on the playback's thread."""
+        shown = self.playback.motion if on == self.playback.on else self.playback.reels[on].motion
         start = shown.start_s if shown is not None else 0.0
-        self._page.screen.post("play-head", lambda: self._draw(on, start + time_s, (start, start + duration_s)))
+        span_s = start, start + duration_s
+        self._page.screen.post(f"play-head {on}", lambda: self._draw(on, start + time_s, span_s))
 
     def _draw(self, on: str, time_s: float, span_s: tuple[float, float]) -> None:
         with self._page.server.atomic():
+            if on != self.playback.on:  # of another window, whose clock the strip does not show
+                self.moves(on, time_s, span_s)
+                return
             if span_s != self._span_s:
                 self._span_s = span_s
                 self._moment.min, self._moment.max = (round(edge, 4) for edge in span_s)
             self._moment.value = round(time_s, 4)
             self.moves(on, time_s, span_s)
 
-    def _scrub(self) -> None:
+    def _scrub(self, client: viser.ClientHandle) -> None:
+        self._use(client)
         self.play(False)
         self.playback.seek(float(self._moment.value) - self._span_s[0])
 

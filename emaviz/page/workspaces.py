@@ -1,8 +1,7 @@
 """The workspaces: a window's tab, its panel on the right, its address and the actuator's run change together.
 
 Each window has its own: the server is told which tab is in front there, and how large the window is, by buttons that
-nobody sees, and shows that window alone the panel that belongs to it.  The 3D scene is the server's, so the actuator
-plays for the window that was used last.
+nobody sees, and shows that window alone the panel that belongs to it.
 """
 
 from __future__ import annotations
@@ -56,6 +55,7 @@ _SCRIPT = """
     if (now.name === told) return;
     told = now.name;
     window.emavizInset?.enter(now.inset, now.lower);
+    document.title = `${now.title} – emaviz`;
     const address = new URL(location.href);
     address.searchParams.set('view', told);
     history.replaceState(history.state, '', address);
@@ -164,6 +164,11 @@ class Workspaces:
             there = [client for client, at in self._at.items() if at == name]
         for client in there:
             self._inside.run(f"window.emavizViews?.front({json.dumps(before)}, {json.dumps(after)})", client)
+
+    def places(self) -> dict[int, str]:
+        """The workspace's name by window."""
+        with self._changing:
+            return dict(self._at)
 
     def anyone(self, name: str) -> bool:
         """Whether a window shows this workspace."""

@@ -22,6 +22,7 @@ _TYPES = {
 _ADDRESS = re.compile(r"Hosting a web-viewer at (http://127\.0\.0\.1:\d+)")
 # Links to its makers' fonts: refused as a style sheet, which is an error in the console, but not as a connection.
 _ABROAD = re.compile(rb"\s*<link\b[^>]*https?://[^>]*>")
+_TITLE = re.compile(rb"<title>[^<]*</title>")
 _TIMEOUT_S = 20.0
 
 
@@ -87,4 +88,9 @@ def _copy(address: str):
     for name, kind in _TYPES.items():
         with opener.open(f"{address}/{name}", timeout=_TIMEOUT_S) as answer:
             body = answer.read()
-            yield name, kind, _ABROAD.sub(b"", body) if name == "index.html" else body
+            yield name, kind, _page(body) if name == "index.html" else body
+
+
+def _page(body: bytes) -> bytes:
+    """The viewer's page without its makers' fonts, under the app's name."""
+    return _TITLE.sub(b"<title>Recording \xe2\x80\x93 emaviz</title>", _ABROAD.sub(b"", body), count=1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 import rerun as rr
@@ -130,9 +130,7 @@ def _dashboard(contents: Contents) -> rrb.Container:
         )
         for signal in contents.charts
     ]
-    errors = [f"{algorithm_path(name)}/log10_rmse" for name in names]
-    title = "Convergence: log10 of the RMSE of the best [A]"
-    convergence = plot(title, errors, legend=len(names) > 1, linked=False, falls=True)
+    convergence = _convergence(names, legend=len(names) > 1, falls=True)
     kinds = ["best", "interval"]
     kinds += ["truth"] if contents.truth else []
     kinds += ["population"] if len(names) == 1 else []  # of several it would hide all else
@@ -250,9 +248,7 @@ def _identification_tab(name: str, algorithm: Algorithm) -> rrb.Container:
     left: list[rrb.Container | rrb.View] = []
     right: list[rrb.Container | rrb.View] = []
     if algorithm.iterations:
-        left.append(
-            plot("Convergence: log10 of the RMSE of the best [A]", [f"{root}/log10_rmse"], legend=False, linked=False)
-        )
+        left.append(_convergence([name]))
         right.append(rrb.Grid(*(_k_view(root, k) for k in K_NAMES), grid_columns=2))
     if algorithm.result:
         left.append(rrb.TextDocumentView(origin=f"{root}/result", name="Result"))
@@ -260,6 +256,14 @@ def _identification_tab(name: str, algorithm: Algorithm) -> rrb.Container:
     title = f"Identification {name} (below, choose the timeline: iteration)"
     shares = [2, 3] if right else None
     return rrb.Horizontal(rrb.Vertical(*left), *right, column_shares=shares, name=title)
+
+
+def _convergence(names: Iterable[str], *, legend: bool = False, falls: bool = False) -> rrb.TimeSeriesView:
+    """The best error of each iteration; the corrected one takes the other's place once it is there."""
+    kinds = ("log10_rmse", "log10_corrected_error")
+    paths = [f"{algorithm_path(name)}/{kind}" for name in names for kind in kinds]
+    title = "Convergence: log10 of the error of the best [A], corrected once all have ended"
+    return plot(title, paths, legend=legend, linked=False, falls=falls)
 
 
 def _k_view(root: str, k: str) -> rrb.TimeSeriesView:

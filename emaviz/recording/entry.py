@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
 from typing import Any
@@ -27,8 +28,22 @@ class Entry:
 
     @property
     def answer(self) -> dict[str, Any] | None:
-        """The best answer: k, rmse_A, error_percent, evaluations, elapsed_s, healthy, alarms, stopped."""
+        """The best answer: k, rmse_A, corrected_rmse_A (not in older files), error_percent, evaluations, elapsed_s,
+        healthy, alarms, stopped.
+        """
         return self.found.get(self.best or "")
+
+
+def error_key(*answers: Mapping[str, Any] | None) -> str:
+    """Of the error by which answers are compared: the corrected one where all of them have it."""
+    have = all(answer.get("corrected_rmse_A") is not None for answer in answers if answer)
+    return "corrected_rmse_A" if have else "rmse_A"
+
+
+def error_said(answer: Mapping[str, Any], *others: Mapping[str, Any]) -> str:
+    """An answer's error, by the key that it shares with others."""
+    key = error_key(answer, *others)
+    return f"{'corrected' if key == 'corrected_rmse_A' else 'uncorrected'} error {amount(answer[key], 'A')}"
 
 
 def setting(name: str, value: Any) -> tuple[str, str]:

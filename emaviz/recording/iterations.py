@@ -64,9 +64,7 @@ class IterationBuffer:
         index, rmse, best = self._index, np.array(self._rmse), np.array(self._best)
         time = _time(index)
         yield f"{self._path}/rmse", time, rr.Scalars.columns(scalars=rmse)
-        # The plots have no logarithmic axis.
-        positive = np.where(np.isfinite(rmse) & (rmse > 0.0), rmse, np.nan)
-        yield f"{self._path}/log10_rmse", time, rr.Scalars.columns(scalars=np.log10(positive))
+        yield f"{self._path}/log10_rmse", time, rr.Scalars.columns(scalars=log10(rmse))
         for j, k in enumerate(K_NAMES):
             yield f"{self._path}/best/{k}", time, rr.Scalars.columns(scalars=best[:, j])
             if truth is not None:
@@ -77,6 +75,11 @@ class IterationBuffer:
                 yield f"{self._path}/population/{k}", *_ragged(rows)
         if self._population_rmse:
             yield f"{self._path}/population/rmse", *_ragged(self._population_rmse)
+
+
+def log10(errors: Array) -> Array:
+    """For plots, which have no logarithmic axis; NaN where there is none."""
+    return np.log10(np.where(np.isfinite(errors) & (errors > 0.0), errors, np.nan))
 
 
 def _time(index: list[int]) -> list[rr.TimeColumn]:

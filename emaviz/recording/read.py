@@ -37,12 +37,13 @@ class IdentificationTrace:
     """The iterations of one algorithm, in order."""
 
     iteration: NDArray[np.int64]  # (n,)
-    rmse: Array  # (n,), A
+    rmse: Array  # (n,), A, uncorrected
     best: Array  # (n, 8)
     population: Array | None  # (m, N, 8) on the m iterations that have one; NaN where it was smaller than N
     population_rmse: Array | None  # (m, N), A
     monitor: dict[int, Series]  # current, A, of the best individual by iteration
     result: str | None  # Markdown
+    corrected: Array | None = None  # (m,), A, of the same iterations; of a search that has ended
 
 
 @dataclass
@@ -210,6 +211,7 @@ class _Chunks:
         best = [self.rows(f"{root}/best/{k}")[1] for k in K_NAMES]
         population = [self.rows(f"{root}/population/{k}")[1] for k in K_NAMES]
         population_rmse = self.rows(f"{root}/population/rmse")[1]
+        corrected = self.rows(f"{root}/corrected_error")[1]
         prefix = f"{root}/monitor/iteration_"
         monitor = {int(p.removeprefix(prefix).split("/")[0]): p for p in self.paths if p.startswith(prefix)}
         # A file cut short can end between the entities of one chunk: keep what all of them have.
@@ -222,6 +224,7 @@ class _Chunks:
             population_rmse=population_rmse if len(population_rmse) else None,
             monitor={index: self.series(p) for index, p in sorted(monitor.items())},
             result=self.text(f"{root}/result"),
+            corrected=corrected.reshape(-1) if len(corrected) else None,
         )
 
 

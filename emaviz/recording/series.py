@@ -37,7 +37,10 @@ def iteration_style(path: str) -> Style:
     if kind == "truth":
         return line(f"true {name} [-]", style.TRUTH_COLOUR, 2.0)
     # Series of one name share an entry of the legend; the logarithm's plot says in its title what they are.
-    return line(title if kind == "log10_rmse" else f"{title}, RMSE of the best [A]", colour, 2.0)
+    which = "corrected" if kind == "corrected_error" else "uncorrected"
+    if kind == "log10_rmse":
+        title = f"{title}, uncorrected"
+    return line(title if kind.startswith("log10") else f"{title}, {which} error of the best [A]", colour, 2.0)
 
 
 def line(name: str, colour: Colour, width: float) -> Style:

@@ -123,6 +123,8 @@ class IdentificationStory:
                     self._writer.fit_iteration(answer.algorithm, last, self._named(name), model.time_s, model[name])
                 self._writer.iteration(answer.algorithm, last, answer.rmse, answer.k)
                 self._writer.interval(answer.algorithm, last, answer.uncertainty.interval90)
+            if len(answer.corrected_history):
+                self._writer.corrected(answer.algorithm, [*answer.corrected_history, answer.corrected_rmse])
             self._writer.result(_result(answer, self._objective), answer.algorithm)
         found = {answer.algorithm: _facts(answer) for answer in (best, *others)}
         self._writer.properties({"settings": self._configuration, "found": found, "best": best.algorithm})
@@ -186,7 +188,7 @@ def _result(answer: Identification, objective: Objective) -> dict[str, Any]:
     }
     result |= {
         "verdict": verdict(answer),
-        "rmse": amount(answer.rmse, "A"),
+        "corrected error": amount(answer.corrected_rmse, "A"),
         "evaluations": answer.evaluations,
         "time": f"{answer.elapsed_s:.2f} s" + (" (stopped)" if answer.stopped else ""),
         "seed": answer.seed,
@@ -203,6 +205,7 @@ def _facts(answer: Identification) -> dict[str, Any]:
         "k": answer.k,
         "k_interval90": sure.interval90,
         "rmse_A": answer.rmse,
+        "corrected_rmse_A": answer.corrected_rmse,
         "error_percent": answer.error_percent,
         "evaluations": answer.evaluations,
         "elapsed_s": answer.elapsed_s,

@@ -19,7 +19,7 @@ from emaviz.recording import dashboard, series, style
 from emaviz.recording.blueprint import Algorithm, Contents, build, send
 from emaviz.recording.dashboard import Chart
 from emaviz.recording.file import RrdFile
-from emaviz.recording.iterations import IterationBuffer
+from emaviz.recording.iterations import IterationBuffer, log10
 from emaviz.recording.markdown import table
 from emaviz.recording.paths import MIN_FREE_BYTES
 
@@ -145,6 +145,19 @@ class RecordingWriter:
             if self._flusher is None:
                 self._flusher = threading.Thread(target=self._flush_regularly, name="recording-flush", daemon=True)
                 self._flusher.start()
+
+    def corrected(self, algorithm: str, errors_A: ArrayLike) -> None:
+        """The corrected error of the best after each iteration (n,), from 0 on, once it is known.
+
+        In the plot it takes the place of the uncorrected one, which a static value hides there.
+        """
+        errors = np.asarray(errors_A, dtype=float)
+        time = [rr.TimeColumn(style.ITERATION, sequence=np.arange(len(errors)))]
+        root = style.algorithm_path(algorithm)
+        with self._file.lock:
+            self._file.do(lambda stream: stream.log(f"{root}/log10_rmse", rr.Scalars([]), static=True))
+            for kind, values in (("corrected_error", errors), ("log10_corrected_error", log10(errors))):
+                self._send(f"{root}/{kind}", series.iteration_style(f"{root}/{kind}"), time, values)
 
     def monitor_iteration(self, algorithm: str, index: int, time_s: ArrayLike, current_A: ArrayLike) -> None:
         """The best individual's current (n,) at time_s (n,) on this iteration."""

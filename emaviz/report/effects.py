@@ -58,7 +58,7 @@ def _page(title: str, body: str) -> str:
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
         "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'\">"
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<title>{escape(title)}</title><style>{_STYLE}</style></head>\n"
+        f"<title>{escape(title)} – emaviz</title><style>{_STYLE}</style></head>\n"
         f"<body>{back}<h1>{escape(title)}</h1>\n{body}\n</body></html>\n"
     )
 

@@ -37,7 +37,7 @@ def page(title: str, lead: str, sections: Sequence[Section[Subject]], subject: S
         f'<meta http-equiv="Content-Security-Policy" content="{_policy(plotly, script)}">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         '<meta name="color-scheme" content="light dark">\n'
-        f"<title>{escape(title)}</title>\n<style>{style}</style>\n</head>\n<body>\n<main>\n"
+        f"<title>{escape(title)} – emaviz</title>\n<style>{style}</style>\n</head>\n<body>\n<main>\n"
         f'<header><h1>{escape(title)}</h1><p class="lead">{escape(lead)}</p></header>\n'
         f"<nav>{contents}</nav>\n{parts}\n"
         f"<footer>Written by emaviz {escape(__version__)}, {escape(now)}.</footer>\n</main>\n"

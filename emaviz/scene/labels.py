@@ -1,6 +1,6 @@
 """Names and callouts in the picture, laid out so that none covers another where the camera stands at first.
 
-They hang in the scene, which all windows share: they are laid out for the picture that was framed last.
+They hang in a scene, which windows may share: they are laid out for the picture that was framed last.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ from ema_model.actuator import Actuator
 from ema_model.faults import physical
 from ema_model.quantities.sides import USER
 from ema_model.recordings import Measurement
-from emaviz.scene.actuator import ActuatorScene
+from emaviz.scene.actuator import Machine
 from emaviz.scene.callouts import Callout, callouts
 from emaviz.scene.drive_box import said
 from emaviz.scene.drivetrain import ARM
@@ -76,12 +76,12 @@ class Motion:
         """Length of the run."""
         return float(self.time_s[-1])
 
-    def damage(self, scene: ActuatorScene) -> None:
+    def damage(self, scene: Machine) -> None:
         """Shows what its faults change for good."""
         scene.damage(self.turns, self.eccentricity, self.phase_rad, self.room)
         scene.tell(self.callouts, self.drive_says, self.load_says)
 
-    def pose(self, scene: ActuatorScene, time_s: float) -> None:
+    def pose(self, scene: Machine, time_s: float) -> None:
         """Shows a moment, s from the run's start."""
         at = min(int(np.searchsorted(self.time_s, time_s)), len(self.time_s) - 1)
         scene.pose(

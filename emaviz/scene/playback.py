@@ -1,4 +1,7 @@
-"""Plays runs on the 3D actuator, slower than life, over and over: a reel for each workspace, each with its clock."""
+"""Plays runs on the 3D actuator, slower than life, over and over: a reel for each workspace, each with its clock.
+
+Windows share one scene, which plays for the one that was used last; a window at another workspace has its own.
+"""
 
 from __future__ import annotations
 
@@ -6,14 +9,14 @@ import contextlib
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import takewhile
 
 import numpy as np
 
 from ema_model.actuator import Actuator
-from emaviz.scene.actuator import ActuatorScene
+from emaviz.scene.actuator import ActuatorScene, Machine
 from emaviz.scene.motion import Motion, motion
 from emaviz.session.session import Simulation
 
@@ -43,14 +46,30 @@ class Reel:
     playing: bool = True
 
 
-class Playback:
-    """A thread that poses the scene: a second on the screen is `speed` seconds of the run.
+@dataclass(eq=False)
+class Stage:
+    """A scene, the reel that it shows, and whose faults it has."""
 
-    moved(time_s, duration_s) is called on that thread, a few times a second, and after `seek`; times from the run's
-    start.
+    scene: Machine
+    on: str
+    damaged: Motion | None = None
+
+    def show(self, shown: Motion, time_s: float) -> None:
+        """A moment of a run."""
+        if shown is not self.damaged:
+            self.damaged = shown
+            shown.damage(self.scene)
+        shown.pose(self.scene, time_s)
+
+
+class Playback:
+    """A thread that poses the scenes: a second on the screen is `speed` seconds of the run.
+
+    moved(on, time_s, duration_s) is called on that thread with the name of each reel that is shown, a few times a
+    second, and after `seek`; times from the run's start.
     """
 
-    def __init__(self, scene: ActuatorScene, actuator: Actuator, moved: Callable[[float, float], None]) -> None:
+    def __init__(self, scene: ActuatorScene, actuator: Actuator, moved: Callable[[str, float, float], None]) -> None:
         self.scene, self._actuator, self._moved = scene, actuator, moved
         self.speed = 0.1
         self.reels: dict[str, Reel] = {FIRST: Reel()}
@@ -58,7 +77,8 @@ class Playback:
         self.on = FIRST  # the name of the reel that is played
         self._whole: Motion | None = None  # Explore's run on a healthy actuator, where there is nothing else to play
         self._stale = False  # what the scene shows is not the run at the clock
-        self._damaged: Motion | None = None  # whose faults the scene shows
+        self._shared = Stage(scene, FIRST)
+        self._own: dict[int, Stage] = {}  # by window
         self._came_s: deque[float] = deque([-1e9] * 6, maxlen=6)  # when the last runs came
         self._posing = threading.Lock()
         self._wake = threading.Event()
@@ -74,14 +94,33 @@ class Playback:
     @property
     def motion(self) -> Motion | None:
         """The run that is shown."""
-        return self._reel.motion or (self.reels[FIRST].motion if self.on in _OF_SLIDERS else self._whole)
+        return self._motion_on(self.on)
+
+    def _motion_on(self, on: str) -> Motion | None:
+        """A reel's own run, or what is shown where it has none."""
+        own = self.reels[on].motion
+        return own or (self.reels[FIRST].motion if on in _OF_SLIDERS else self._whole)
 
     def enter(self, on: str) -> None:
         """Goes on with another reel, from where its clock stood."""
         with self._posing:
             self._reel, self.on = self.reels.setdefault(on, Reel(playing=False)), on
+            self._shared.on = on
             self._stale = True
         self._wake.set()
+
+    def show_in(self, window: int, scene: Machine, on: str) -> None:
+        """A window's own scene shows a reel from now on."""
+        with self._posing:
+            self.reels.setdefault(on, Reel(playing=False))
+            self._own.setdefault(window, Stage(scene, on)).on = on
+            self._stale = True
+        self._wake.set()
+
+    def forget(self, window: int) -> None:
+        """A window is closed."""
+        with self._posing:
+            self._own.pop(window, None)
 
     def show(self, simulation: Simulation) -> None:
         """Puts Explore's run on its reel, which keeps its moment."""
@@ -94,7 +133,7 @@ class Playback:
             reel.motion = shown
             if on == FIRST:
                 self._whole = None if shown is None else shown.without_faults()
-            if reel is self._reel or self._reel.motion is None:
+            if reel is self._reel or self._reel.motion is None or any(one.on == on for one in self._own.values()):
                 self._stale = True
                 self._came_s.append(time.monotonic())
         self._wake.set()
@@ -139,26 +178,35 @@ class Playback:
             now = posed = time.monotonic()
             passed, last = now - last, now
             with self._posing:
-                shown, reel = self.motion, self._reel
-                if shown is not None:
-                    if reel.playing:
-                        reel.clock_s += passed * self.speed
-                    if reel.clock_s > shown.duration_s:
-                        reel.clock_s = reel.clock_s % shown.duration_s if reel.playing else shown.duration_s
-                    moves = reel.playing or self._stale
-                    if moves:
-                        self._show_damage(shown)
-                        shown.pose(self.scene, reel.clock_s)
-                else:
-                    moves = False
+                stages = [self._shared, *self._own.values()]
+                moved = self._move(stages, passed)
                 stale, self._stale = self._stale, False
-            if shown is not None and moves and (stale or now - told >= 1.0 / _TOLD_PER_S):
+            if moved and (stale or now - told >= 1.0 / _TOLD_PER_S):
                 told = now
-                self._moved(reel.clock_s, shown.duration_s)
-            if not (self.playing or self._stale):
+                for on, shown in moved.items():
+                    self._moved(on, self.reels[on].clock_s, shown.duration_s)
+            if not (any(self.reels[one.on].playing for one in stages) or self._stale):
                 self._wake.wait()
                 last = time.monotonic()
             self._wake.clear()
+
+    def _move(self, stages: Sequence[Stage], passed_s: float) -> dict[str, Motion]:
+        """Each reel that is shown goes on once, and its stages with it; those that have moved."""
+        moved: dict[str, Motion] = {}
+        for on in dict.fromkeys(stage.on for stage in stages):
+            shown, reel = self._motion_on(on), self.reels[on]
+            if shown is None:
+                continue
+            if reel.playing:
+                reel.clock_s += passed_s * self.speed
+            if reel.clock_s > shown.duration_s:
+                reel.clock_s = reel.clock_s % shown.duration_s if reel.playing else shown.duration_s
+            if reel.playing or self._stale:
+                moved[on] = shown
+        for stage in stages:
+            if stage.on in moved:
+                stage.show(moved[stage.on], self.reels[stage.on].clock_s)
+        return moved
 
     @property
     def _pace(self) -> float:
@@ -175,8 +223,3 @@ class Playback:
             return _POSES_WHILE_BEHIND_PER_S
         in_time = np.median(gaps) <= _IN_TIME_S  # of this change alone: a quick one before says nothing of it
         return _POSES_WHILE_CHANGING_PER_S if in_time else _POSES_WHILE_BEHIND_PER_S
-
-    def _show_damage(self, shown: Motion) -> None:
-        if shown is not self._damaged:
-            self._damaged = shown
-            shown.damage(self.scene)

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import asyncio
 import concurrent.futures
+import functools
+import gzip
 import http
 import inspect
 import socket
@@ -133,6 +135,7 @@ def _guard(
         if inspect.isawaitable(response):
             response = await response
         if response is not None:
+            _name(response)
             shown = viewer() if door.asked_here(request.headers) else None
             protect(response.headers, door.asked(request.headers) or "", shown)
             if door.token and door.brings_token(request.path):
@@ -140,6 +143,23 @@ def _guard(
         return response
 
     return process_request
+
+
+def _name(response: Response) -> None:
+    """Gives viser's page the app's name, before its script has a more exact one."""
+    if not response.headers.get("Content-Type", "").startswith("text/html"):
+        return
+    response.body = _named(response.body, response.headers.get("Content-Encoding") == "gzip")
+    if "Content-Length" in response.headers:
+        del response.headers["Content-Length"]
+        response.headers["Content-Length"] = str(len(response.body))
+
+
+@functools.lru_cache(maxsize=4)
+def _named(body: bytes, zipped: bool) -> bytes:
+    plain = gzip.decompress(body) if zipped else body
+    named = plain.replace(b"<title>Viser</title>", b"<title>emaviz</title>", 1)
+    return gzip.compress(named, compresslevel=1, mtime=0) if zipped else named
 
 
 def _page(body: bytes | None) -> Response:

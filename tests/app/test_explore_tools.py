@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from support.on_page import choose, field, wait_until
 from ema_model.actuator import load_actuator
 from ema_model.faults import vector
 from ema_model.simulation.run import simulate_monitor
+from emaviz.page.explore.tab import ExploreTab
 from emaviz.page.picture import png
 from emaviz.session.fan import SEVERITIES, fan_of
 from emaviz.session.settings import Settings
@@ -67,6 +69,25 @@ def page(shared_page, app):
     yield shared_page
     app.session.settings.restore(Settings().saved())
     app.screen.post("as new", app.shared.tabs[next(iter(app.shared.tabs))].show_settings)
+
+
+@pytest.mark.browser
+def test_a_model_that_plays_the_plant_says_that_it_moves_the_sliders_and_undo_brings_them_back(page, app):
+    session, panel = app.session, app.tab(ExploreTab).panel
+    field(page, "k1 friction × 1.00").fill("0.3")
+    wait_until(lambda: session.settings.k[0] == 0.3)
+    improved = replace(session.actuator, faults={"k2": 0.5})
+    app.screen.post("lead", lambda: panel.take_plant("improved model", improved))
+    page.get_by_text("The sliders of Explore have moved").wait_for(timeout=10_000)
+    wait_until(lambda: session.plant == "improved model" and session.settings.k[1] == 0.5)
+    assert session.settings.k[0] == 0.0
+    page.get_by_role("button", name="Undo", exact=True).click()
+    wait_until(lambda: session.plant != "improved model" and session.settings.k[0] == 0.3)
+    assert session.settings.k[1] == 0.0
+    app.screen.post("suggested", lambda: panel.take(command="sine"))
+    wait_until(lambda: session.settings.command == "sine")
+    page.get_by_role("button", name="Undo", exact=True).click()
+    wait_until(lambda: session.settings.command != "sine")
 
 
 @pytest.mark.browser

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import urllib.request
+
 import pytest
 from support.on_page import wait_until
 
@@ -67,6 +69,57 @@ def test_results_have_the_width_beside_an_inset_that_grows_at_a_click(page):
     left, top, right, bottom = box(page, PICTURE)
     page.mouse.click(0.5 * (left + right), top + 40.0)  # what is told covers its lower part
     wait_until(lambda: box(page, PICTURE)[3] - box(page, PICTURE)[1] > 700.0, 10.0)
+
+
+COVERED = """() => {
+  const roots = [...document.querySelectorAll('.mantine-Notifications-root')];
+  const root = roots.find(one => one.querySelector('.mantine-Notification-root'));
+  const clip = root.getBoundingClientRect();
+  const told = [...root.querySelectorAll('.mantine-Notification-root')].map(one => one.getBoundingClientRect());
+  const at = (box) => document.elementFromPoint(box.x + box.width / 2, box.y + box.height / 2);
+  const controls = [...document.querySelectorAll('button, input, [role=tab], [role=slider]')]
+    .filter(one => !root.contains(one)).map(one => [one, one.getBoundingClientRect()]);
+  root.style.display = 'none';
+  const seen = controls.filter(([one, box]) => box.width && one.contains(at(box)));  // the others are scrolled away
+  root.style.display = '';
+  const over = (a, b) => a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
+  const covered = seen.filter(([_, box]) => over(box, clip) && told.some(note => over(box, note))).map(([one]) => one);
+  return { notes: told.length, covered: covered.map(one => one.textContent || one.title || one.type) };
+}"""
+
+
+@pytest.mark.parametrize("size", [(1400, 900), (1100, 700)])
+def test_what_is_told_covers_no_control(page, app, size):
+    page.set_viewport_size({"width": size[0], "height": size[1]})
+    for name in ("Explore", "Compare", "Discover"):
+        go(page, name)
+        for i in range(4):
+            app.page.notify(f"Message {i}", "A long line that says what went wrong, where it was and what to do. " * 2)
+        page.get_by_text("Message 3").wait_for()
+        page.wait_for_timeout(400)  # until they have come to rest
+        found = page.evaluate(COVERED)
+        assert found["notes"] >= 4 and not found["covered"], (name, found)
+        page.evaluate("document.querySelectorAll('.mantine-Notification-closeButton').forEach(one => one.click())")
+        page.locator(".mantine-Notification-root").first.wait_for(state="detached")
+
+
+def test_a_message_names_a_file_of_the_data_folder_without_the_folder(page, app):
+    folder = app.page.folder.resolve()
+    app.page.notify("It cannot be read", f"{folder}/rig/a.csv: is empty; {folder} has {folder}-b/x.csv")
+    told = page.get_by_text("It cannot be read").locator("xpath=ancestor::*[contains(@class,'Notification-root')]")
+    text = told.inner_text()
+    assert "rig/a.csv: is empty; the data folder has" in text and f"{folder}/" not in text
+    assert f"{folder}-b/x.csv" in text, "another folder's name is not cut"
+    told.locator("button").click()
+
+
+def test_the_title_names_the_app_and_the_tab(page, app):
+    with urllib.request.urlopen(app.address) as answer:
+        assert b"<title>emaviz</title>" in answer.read()
+    go(page, "Compare")
+    wait_until(lambda: page.title() == "Compare – emaviz", 10.0)
+    go(page, "Explore")
+    wait_until(lambda: page.title() == "Explore – emaviz", 10.0)
 
 
 def test_explore_keeps_the_actuator_in_the_middle(page):

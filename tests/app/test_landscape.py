@@ -36,13 +36,13 @@ def test_a_slice_is_the_cost_over_two_k_and_grows_to_the_whole():
     through = vector({"k1": 0.9, "k3": 0.2, "k6": 0.1})
     parts = whole(through, 0, 5, points=9)
     assert [part.rows for part in parts] == sorted({part.rows for part in parts}) and parts[-1].share == 1.0
-    assert np.all(np.isnan(parts[0].rmse_A[parts[0].rows :])) and np.all(np.isfinite(parts[-1].rmse_A))
+    assert np.all(np.isnan(parts[0].error_A[parts[0].rows :])) and np.all(np.isfinite(parts[-1].error_A))
     last = parts[-1]
     for row, column in ((0, 0), (3, 7), (8, 8)):
         k = through.copy()
         k[0], k[5] = last.across[column], last.upwards[row]
-        assert last.rmse_A[row, column] == pytest.approx(bowl(k)[0])
-    row, column = np.unravel_index(np.argmin(last.rmse_A), last.rmse_A.shape)
+        assert last.error_A[row, column] == pytest.approx(bowl(k)[0])
+    row, column = np.unravel_index(np.argmin(last.error_A), last.error_A.shape)
     assert abs(last.across[column] - 0.3) <= 0.0625 and abs(last.upwards[row] - 0.4) <= 0.0625
 
 
@@ -51,7 +51,7 @@ def test_a_model_that_diverges_is_a_gap():
         return np.where(k[:, 0] > 0.5, np.inf, 1.0)
 
     last = list(slices(diverging, HEALTHY, 0, 1, points=5))[-1]
-    assert np.isnan(last.rmse_A[:, 3:]).all() and np.isfinite(last.rmse_A[:, :3]).all()
+    assert np.isnan(last.error_A[:, 3:]).all() and np.isfinite(last.error_A[:, :3]).all()
 
 
 @pytest.mark.parametrize("pair", [(1, 1), (0, 8), (-1, 2)])
@@ -77,6 +77,7 @@ def test_a_trap_has_a_ridge_before_the_answer():
     assert found["ssa"].is_trap and not found["do"].is_trap and found["do"].is_worse and not found["hba"].is_worse
     first, second, third = way_sentences(found)
     assert "local minimum" in first and "had not converged" in second and "ended at the answer" in third
+    assert "has the answer: a fit went on" in way_sentences(found, "do")[1], "its own fit has led there"
 
 
 def test_a_way_goes_the_short_way_round_the_angle():
@@ -97,11 +98,13 @@ def test_the_map_has_units_marks_and_a_box():
     interval = np.stack([TRUTH - 0.05, TRUTH + 0.05], axis=1)
     drawn = figures.figure(found, figures.Marks(TRUTH, interval, TRUTH, {"do": HEALTHY}))
     assert "k1" in drawn.layout.xaxis.title.text and "[–]" in drawn.layout.yaxis.title.text
-    assert drawn.data[0].colorbar.title.text == "rmse [A]"
+    assert drawn.data[0].colorbar.title.text == "corrected error [A]"
     assert [trace.name for trace in drawn.data[1:]] == ["Dandelion ended", "truth", "answer, 90 %"]
     (box,) = drawn.layout.shapes
     assert (box.x0, box.x1, box.y0, box.y1) == pytest.approx((0.25, 0.35, 0.35, 0.45))
-    assert landscape_words(found).startswith("Held: k2 0.000, k3 0.000, k4 0.000, k5 0.000, k7 0.500, k8 0.500. From ")
+    assert landscape_words(found).startswith(
+        "Held: k2 0.000, k3 0.000, k4 0.000, k5 0.000, k7 0.500, k8 0.500. Corrected error from "
+    )
     half = whole(TRUTH, 0, 5, points=9)[1]
     assert landscape_words(half).startswith("Stopped at 44 %. Held: k2")
     empty = Landscape(0, 5, TRUTH, np.linspace(0, 1, 3), np.linspace(0, 1, 3), np.full((3, 3), np.nan), 0)

@@ -142,7 +142,8 @@ def test_two_recordings_share_their_axes(recorded, races):
     drawn = {trace.name: trace for trace in figure.data}
     assert {"A fitted", "B fitted", "A recorded", "B recorded", "A residual", "B residual"} <= set(drawn)
     assert {"A Dandelion", "A Honey Badger", "B Dandelion"} <= set(drawn)
-    assert np.allclose(drawn["B Dandelion"].y, second.identification["do"].rmse)
+    assert np.allclose(drawn["B Dandelion"].y, second.identification["do"].corrected)
+    assert figure.layout.yaxis3.title.text == "Corrected<br>error [A]"
     assert drawn["A fitted"].yaxis == drawn["B fitted"].yaxis
     text = two_recordings.table(*(recorded.entry(name) for name in names))
     assert "0.2 0 0" in text and "0.6 0 0" in text and "population" not in text, "only what differs"

@@ -280,7 +280,7 @@ def resting_for(growing, seconds):
 def test_playback_plays_pauses_and_seeks(actuator):
     run, k = run_of(actuator, k6=0.4)
     scene, told = Recorder(), []
-    playback = Playback(scene, actuator, lambda time_s, duration_s: told.append((time_s, duration_s)))
+    playback = Playback(scene, actuator, lambda on, time_s, duration_s: told.append((time_s, duration_s)))
     try:
         began = time.monotonic()
         playback.show(Simulation(run, run, k, 0.0))

@@ -118,6 +118,32 @@ def test_another_window_keeps_its_own_workspace_and_a_reload_its_place(tab, app,
     wait_until(lambda: not app.workspaces.anyone("library"), 20.0)
 
 
+def test_the_actuator_of_a_window_has_no_faults_of_another_one(tab, app, browser):
+    go(tab, "Discover")
+    wait_until(lambda: app.playback.on == "discover", 10.0)
+    app.session.settings.set_fault(1, 0.7)
+    app.session.refresh()
+    other = browser.new_page(viewport={"width": 1400, "height": 900})
+    other.goto(f"{app.address}/?view=explore")
+    other.get_by_role("tab", name="Signals", exact=True).wait_for(timeout=60_000)
+    try:
+        wait_until(lambda: app.playback.on == "explore" and app.scene._own, 30.0)
+        here = next(window for window, name in app.workspaces.places().items() if name == "discover")
+        wait_until(lambda: app.scene._faults == {"k2"}, 20.0)
+        assert not app.scene._own[here]._faults, "it is Explore's plant that has them"
+        tab.get_by_role("button", name="Play", exact=True).click()
+        wait_until(lambda: app.playback.on == "discover" and app.playback.playing, 10.0)
+        wait_until(lambda: not app.scene._faults, 10.0)
+        there = next(window for window, name in app.workspaces.places().items() if name == "explore")
+        wait_until(lambda: app.scene._own[there]._faults == {"k2"}, 10.0)
+    finally:
+        app.strip.play(False)
+        other.close()
+        app.session.settings.set_fault(1, 0.0)
+        app.session.refresh()
+    wait_until(lambda: there not in app.scene._own, 20.0)
+
+
 def test_compare_leads_on_to_identify_and_discover(tab, app, compared):
     go(tab, "Compare")
     strip = tab.get_by_role("button", name="Reset view").bounding_box()["y"]

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import json
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from support.hidden_effects import ACTUATOR, SINE, plant, recorded
 
 from ema_model.actuator import load_actuator
-from ema_model.comparison import as_dict, compare
+from ema_model.comparison import as_dict, compare, regions
+from ema_model.comparison.regions import worst_regions
+from ema_model.comparison.residuals import Residuals
 from ema_model.errors import InputError
 from ema_model.recordings import SIGNALS, Measurement
 
@@ -105,6 +108,39 @@ def test_regions_lie_where_their_sentences_say(cogged):
         assert region.rmse == pytest.approx(np.sqrt(np.mean(error**2)))
         assert region.mean == pytest.approx(np.mean(error))
         assert region.sentence.endswith("than the model.")
+
+
+def regions_of(time_s, speed, error_A, *told):
+    """The worst regions of a residual current at a motor's speed, told by variables times modulators."""
+    noise = 1e-3 * np.random.default_rng(0).standard_normal(len(speed))
+    sigma, alike = {"current_A": np.full(len(speed), 1e-3)}, np.zeros(len(speed), dtype=int)
+    known = {"motor_speed": speed, "time": time_s}
+    values, nothing = {"current_A": error_A + noise}, np.zeros(len(speed), dtype=bool)
+    rest = (alike, alike, nothing, time_s[1] - time_s[0], 0.075)
+    residuals = Residuals(time_s, values, sigma, sigma, sigma, known, *rest)
+    explained = [SimpleNamespace(variable=one, modulator=by, significant=True) for one, by in told]
+    return [one.sentence for one in worst_regions(residuals, "current_A", explained, ACTUATOR.axes)]
+
+
+def test_friction_at_reversals_says_which_way_it_moves():
+    time = np.arange(0.0, 4.0, 1e-3)
+    speed = 300.0 * np.sin(np.pi * time)
+    found = regions_of(time, speed, 0.2 * np.sign(speed) * (np.abs(speed) < 15.0), ("motor_speed", "sign_speed"))
+    slow = [one for one in found if "at reversals" in one]
+    assert len(slow) == 2 and len(set(slow)) == 2, slow
+    assert any("moves forward" in one for one in slow) and any("moves back" in one for one in slow)
+
+
+def test_regions_that_would_read_alike_say_their_range(monkeypatch):
+    def same(*_, details="", **more):
+        return f"The motor needs more torque somewhere{f' ({details})' if details else ''} than the model."
+
+    monkeypatch.setattr(regions, "region_sentence", same)
+    time = 10_000.0 + np.arange(0.0, 4.0, 1e-3)
+    speed = 300.0 * np.sin(np.pi * time)
+    found = regions_of(time, speed, 0.2 * np.sign(speed) * (np.abs(speed) < 15.0), ("motor_speed", "sign_speed"))
+    assert len(found) > 2 and len(set(found)) == len(found), found
+    assert all(" rad/s) than" in one or " s) than" in one for one in found)
 
 
 def test_json_is_whole_and_plain(cogged):

@@ -14,8 +14,8 @@ from ema_model.effects import CATALOGUE
 from ema_model.effects.user.entries import KEYS
 from ema_model.quantities.variables import variable_title
 from ema_model.simulation.run import simulate_monitor
-from ema_model.simulation.with_effect import RUNS, EffectRuns, WithEffect
-from emaviz.figures.effect_residual import SEVERITIES, pictures
+from ema_model.simulation.with_effect import RUNS, EffectRuns, WithEffect, few_periods
+from emaviz.figures.effect_residual import SEVERITIES, picture, pictures
 from emaviz.report.effects import write_effects_reference
 
 ACTUATOR = load_actuator()
@@ -140,3 +140,21 @@ def test_the_ink_follows_light_and_dark(pages, browser):
     assert page.evaluate(ink) == "rgb(255, 255, 255)"
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth + 1")
     page.context.close()
+
+
+@pytest.mark.parametrize("name", [name for name, one in CATALOGUE.items() if one.against == "motor_angle"])
+def test_a_periodic_effect_is_drawn_over_a_few_periods(runs, name):
+    effect = CATALOGUE[name]
+    clear = runs.clearest(effect)
+    (chart,) = charts(picture(effect, clear, ACTUATOR.axes))
+    count = few_periods(clear.settings)[1]
+    assert count >= 2 and f"folded to {count} periods" in chart.get("aria-label")
+    drawn = max((path.get("d") for path in chart.iter() if path.tag.endswith("path")), key=len)
+    dots = np.array(re.findall(r"M([-\d.]+) ([-\d.]+)h0", drawn), dtype=float)
+    per_period = 12
+    edges = np.linspace(58.0, 446.0, count * per_period + 1)  # the chart's left and right
+    place = np.clip(np.digitize(dots[:, 0], edges) - 1, 0, count * per_period - 1)
+    upper = np.array([-np.min(dots[place == one, 1]) for one in range(count * per_period)])
+    waves = upper.reshape(count, per_period)
+    assert np.ptp(waves.mean(axis=0)) > 0.2 * np.ptp(dots[:, 1]), "one sees it rise and fall"
+    assert all(np.corrcoef(waves[0], wave)[0, 1] > 0.8 for wave in waves[1:]), "and do so again"

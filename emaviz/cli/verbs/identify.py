@@ -82,7 +82,7 @@ def run(arguments: argparse.Namespace) -> int:
         history.append(at)
         partial.grows()
         share = SEARCH_SHARE * at.iteration / max(at.iterations, 1)
-        progress.show(f"{at.algorithm} {at.iteration}/{at.iterations}  rmse {at.rmse:.4f} A", share)
+        progress.show(f"{at.algorithm} {at.iteration}/{at.iterations}  uncorrected error {at.rmse:.4f} A", share)
         if recorder is not None:
             recorder.iteration(at)
 
@@ -121,7 +121,9 @@ def run(arguments: argparse.Namespace) -> int:
     if unseen and holdout_rmse is None:
         print("the model diverges on what was not fitted")
     elif holdout_rmse is not None:
-        print(f"rmse {amount(holdout_rmse, 'A')} on what was not fitted: {', '.join(one.name for one in unseen)}")
+        beside = f"{amount(answer.rmse, 'A')} on what was"
+        names = ", ".join(one.name for one in unseen)
+        print(f"uncorrected error {amount(holdout_rmse, 'A')} on what was not fitted, {beside}: {names}")
     if recorder is not None:
         recorder.finish(answer)
     if arguments.report:
@@ -152,6 +154,7 @@ def result(answer: Identification, actuator: Actuator, holdout_rmse: float | Non
         "warnings": sure.warnings,
         "physical": readings(answer.k, actuator),
         "rmse": answer.rmse,
+        "corrected_rmse": _finite(answer.corrected_rmse),
         "evaluations": answer.evaluations,
         "elapsed_s": answer.elapsed_s,
         "compile_s": answer.compile_s,
@@ -194,7 +197,7 @@ def _say_so_far(history: list[Progress], actuator: Actuator, arguments: argparse
     print(f"Interrupted {where}: the best k so far, which no fit has refined, without intervals.")
     for name, value, phrase in zip(NAMES, last.k, sentences(last.k, actuator)):
         print(f"  {name}  {value:.4f}  {phrase}")
-    print(f"rmse {amount(last.rmse, 'A')}, {last.evaluations} simulations in {last.elapsed_s:.1f} s")
+    print(f"uncorrected error {amount(last.rmse, 'A')}, {last.evaluations} simulations in {last.elapsed_s:.1f} s")
     output.say_not_written(arguments, "report", "save_actuator")
 
 

@@ -33,7 +33,9 @@ class DiscoverTab(Tab):
                 shared.discovering,
                 shared.strip,
                 lambda: DiscoveryKeep(self.page, shared.discovering, shared.viewer),
-                lambda: leads(self.page, shared.discovering),
+                lambda: leads(
+                    self.page, shared.discovering, lambda *model: shared.tab(ExploreTab).panel.take_plant(*model)
+                ),
                 self._load_experiment,
             )
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import viser
 
+from ema_model.actuator import Actuator
 from ema_model.actuator.readings import sentences
 from ema_model.commands import COMMANDS
 from ema_model.faults import FAULTS, HEALTHY
@@ -37,7 +38,8 @@ class ExplorePanel:
     def __init__(self, page: Page, fan: Callable[[int], None]) -> None:
         """fan(fault): shows five severities of it."""
         self._page = page
-        self._undo = Undo(page.session.settings)
+        session = page.session
+        self._undo = Undo(session.settings, lambda: session.plant, session.choose_plant)
         self._touched = 0  # the fault that was moved last
         self._reads: list[tuple[Any, Callable[[], Any]]] = []  # controls, and what the session holds for them
         gui = page.server.gui
@@ -105,8 +107,24 @@ class ExplorePanel:
 
     def _take_plant(self) -> None:
         session = self._page.session
-        if not self._page.checked(lambda: session.choose_plant(self._own.value), self._own):
+        if not self._page.checked(lambda: self._change_plant(lambda: session.choose_plant(self._own.value)), self._own):
             self._own.value = session.plant
+
+    def take_plant(self, name: str, actuator: Actuator) -> None:
+        """An improved model plays the plant, on the screen's thread; InputError where Explore cannot simulate it."""
+        self._change_plant(lambda: self._page.session.take_plant(name, actuator))
+
+    def _change_plant(self, change: Callable[[], None]) -> None:
+        """With what it does to the sliders said, and a step back."""
+        settings = self._page.session.settings
+        before = settings.k.copy()
+        self._keep(None)
+        change()
+        if not np.array_equal(before, settings.k):
+            text = (
+                "They are now the faults that this model has; Undo brings back the model and the sliders from before."
+            )
+            self._page.notify("The sliders of Explore have moved", text, "yellow")
 
     def _plant_taken(self) -> None:
         session = self._page.session
@@ -173,6 +191,7 @@ class ExplorePanel:
                 tried.set(name, value)
         for name, value in (settings or {}).items():
             tried.set_command_setting(tried.command, name, value)
+        self._keep(None)
         self._page.session.settings.restore(tried.saved())
         self.show_settings()
 

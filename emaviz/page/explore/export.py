@@ -101,7 +101,7 @@ class ExportControls:
             for time_s in np.linspace(0.0, motion.duration_s, _FRAMES, endpoint=False):
                 motion.pose(self._playback.scene, float(time_s))
                 serializer.insert_sleep(_FRAME_S)
-            page = serializer.as_html()
+            page = serializer.as_html().replace("<title>Viser</title>", "<title>Actuator – emaviz</title>", 1)
         client.send_file_download("emaviz-actuator.html", page.encode(), save_immediately=True)
         path = self._folder.fresh(self._folder.scenes, "actuator", ".html")
         try:

@@ -177,7 +177,7 @@ class IdentifyPanel:
                 at = "done"
             elif track.fitting is not None:
                 at = f"searched; {track.fitting[0]}"
-            lines.append(_line(html("{} · {} · rmse {:.4f} A", named(name), at, track.rmse[-1])))
+            lines.append(_line(html("{} · {} · uncorrected error {:.4f} A", named(name), at, track.rmse[-1])))
         if race.growing is not None and race is not self._race:
             self._link.content = recording_link(self._viewer, race.growing, "Watch it live ↗")
             self._watch.visible = self._viewer is not None

@@ -11,7 +11,7 @@ import viser
 from ema_model.faults import FAULTS
 from ema_model.identification.landscape import POINTS, Landscape, Way
 from ema_model.identification.run import algorithm_title
-from ema_model.identification.words import way_sentences
+from ema_model.identification.words import CORRECTED, way_sentences
 from emaviz.figures import landscape as drawn
 from emaviz.page.identify.swarm import telling
 from emaviz.page.inset import COLUMNS, NEXT_COLUMN
@@ -131,7 +131,9 @@ class LandscapeView:
 
     def _say_ways(self, race: Race, found: Mapping[str, Way]) -> None:
         if race is self._race:
-            self._words.content = joined(note(line) for line in way_sentences(found))
+            best = race.best
+            fitted = best.algorithm if best is not None and best.answer is not None and best.answer.polished else ""
+            self._words.content = joined(note(line) for line in (*way_sentences(found, fitted), CORRECTED))
 
     def _busy(self, busy: bool) -> None:
         self._draw.visible = not busy

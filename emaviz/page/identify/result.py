@@ -138,6 +138,7 @@ class IdentifyResult:
                         one.elapsed_s,
                         performance.get(one.algorithm),
                         one.stopped,
+                        one.corrected_rmse,
                     )
                     for one in race.answers
                 ),
@@ -175,7 +176,8 @@ class IdentifyResult:
         with self._page.server.atomic():
             self._show_search()
             self._convergence.begin(tuple(race.tracks), longest)
-            self._convergence.show({name: track.errors for name, track in race.tracks.items()})
+            errors = {name: race.errors_of(track) for name, track in race.tracks.items()}
+            self._convergence.show(errors, corrected=race.error is not None)
             self._swarm.show(race, begun)
 
     def _draw_answer(self) -> None:

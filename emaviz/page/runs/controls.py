@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from datetime import datetime
 from typing import Any
 
@@ -16,7 +16,7 @@ from emaviz.page.identify.controls import recording_link
 from emaviz.page.page import Page
 from emaviz.page.runs import WORKSPACE
 from emaviz.page.runs.result import RunsResult
-from emaviz.recording.entry import Entry, setting
+from emaviz.recording.entry import Entry, error_said, setting
 from emaviz.recording.viewer import ViewerHost
 from emaviz.session.archive import Recorded
 from emaviz.session.worker import Worker
@@ -208,7 +208,7 @@ def _card(entry: Entry) -> Html:
         html(
             "<div>{} {}{}</div>",
             named(name),
-            _result(answer),
+            _result(answer, entry.found.values()),
             " ★" if name == entry.best and len(entry.found) > 1 else "",
         )
         for name, answer in entry.found.items()
@@ -231,12 +231,12 @@ def _size(entry: Entry) -> str:
     return f"{entry.at:%Y-%m-%d %H:%M:%S} · {entry.size_bytes / 1e6:.1f} MB"
 
 
-def _result(answer: dict[str, Any]) -> str:
+def _result(answer: dict[str, Any], all_answers: Iterable[dict[str, Any]]) -> str:
     error = "" if answer.get("error_percent") is None else f"Err {answer['error_percent']:.2f} % · "
     alarms = ", ".join(answer.get("alarms", ())) or "no single k stands out"
     verdict = "healthy" if answer.get("healthy") else f"not healthy: {alarms}"
     stopped = " · stopped" if answer.get("stopped") else ""
-    return f"{error}rmse {answer['rmse_A']:.4f} A · {answer['elapsed_s']:.1f} s · {verdict}{stopped}"
+    return f"{error}{error_said(answer, *all_answers)} · {answer['elapsed_s']:.1f} s · {verdict}{stopped}"
 
 
 def _listed(entries: list[Entry]) -> Html:
@@ -245,7 +245,7 @@ def _listed(entries: list[Entry]) -> Html:
     rows = []
     for entry in entries:
         answer = entry.answer
-        facts = [] if not answer else [f"rmse {answer['rmse_A']:.3f} A"]
+        facts = [] if not answer else [error_said(answer, *entry.found.values())]
         if answer and answer.get("error_percent") is not None:
             facts.append(f"Err {answer['error_percent']:.2f} %")
         says = " · ".join(filter(None, (entry.kind, entry.says, *facts)))

@@ -6,7 +6,7 @@ import plotly.graph_objects as go
 
 from ema_model.identification.run import algorithm_title
 from emaviz.figures import theme
-from emaviz.figures.convergence import colour
+from emaviz.figures.convergence import colour, error_title
 from emaviz.report.identification.subject import Identified
 from emaviz.report.markup import paragraph
 from emaviz.report.section import Figures, Section
@@ -22,9 +22,9 @@ class Convergence(Section[Identified]):
     def body(self, subject: Identified, figures: Figures) -> str:
         """Always there."""
         answer = subject.answer
-        chart = theme.new("Best error of each iteration", "Iteration", "RMSE [A]")
+        chart = theme.new("Best error of each iteration", "Iteration", error_title(True))
         drawn = {"color": colour(answer.algorithm), "width": 2}
-        chart.add_trace(go.Scatter(y=answer.rmse_history, mode="lines", line=drawn, showlegend=False))
+        chart.add_trace(go.Scatter(y=answer.corrected_history, mode="lines", line=drawn, showlegend=False))
         chart.update_yaxes(type="log")
         ended = ", stopped by the user" if answer.stopped else ", then a least-squares fit" if answer.polished else ""
         told = f"{algorithm_title(answer.algorithm)}{ended}: {answer.evaluations} simulations"

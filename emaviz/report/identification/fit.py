@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ema_model.identification.words import CORRECTED
 from ema_model.quantities.numbers import amount
 from emaviz.figures import identified_fit
 from emaviz.report.identification.subject import Identified
@@ -19,8 +20,14 @@ class Fit(Section[Identified]):
     def body(self, subject: Identified, figures: Figures) -> str:
         """Always there."""
         held = subject.holdout_rmse
+        answer = subject.answer
         beside = "" if held is None else f"; {amount(held, 'A')} on the recordings that were not fitted"
-        parts = [paragraph(f"The current is off by {amount(subject.answer.rmse, 'A')} (rms){beside}.")]
+        parts = [
+            paragraph(
+                f"Corrected error {amount(answer.corrected_rmse, 'A')}; as it is drawn here, uncorrected, "
+                f"{amount(answer.rmse, 'A')}{beside}. {CORRECTED}"
+            )
+        ]
         for chart in identified_fit.figures(subject.objective, subject.answer.k):
             parts.append(figures.place(chart, 320))
         return "".join(parts)

@@ -35,8 +35,8 @@ class Landscapes:
         if x == y:
             raise InputError("a landscape needs two different k; choose another for one axis")
         best = race.best
-        assert best is not None and best.k is not None, "the race is over"
-        answer = best.k
+        assert best is not None and best.k is not None and race.error is not None, "the race is over"
+        answer, error = best.k, race.error
         interval = best.answer.uncertainty.interval90 if best.answer is not None else None
         across, upwards = (extent(through, k, interval, close) for k in (x, y))
         found: Landscape | None = None
@@ -45,8 +45,8 @@ class Landscapes:
             nonlocal found
             asked("from where the searches ended to the answer")
             if race not in self._ways:
-                self._ways = {race: ways(race.objective, ends(race), answer)}
-            for found in slices(race.objective, through, x, y, across, upwards):
+                self._ways = {race: ways(error, ends(race), answer)}
+            for found in slices(error, through, x, y, across, upwards):
                 self.grown(race, found)
                 asked.say(f"{found.rows} of {len(found.upwards)} rows", found.share)
                 if asked.stopping:

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.faults import performance_coefficient
+from ema_model.identification.fit import CorrectedError
 from ema_model.identification.objective import Objective
-from ema_model.identification.run import SEARCH_SHARE, Identification, Progress, steps
+from ema_model.identification.run import SEARCH_SHARE, Identification, Progress, by_one_error, steps
 from ema_model.quantities.numbers import amount
 from ema_model.recordings import Measurement
 from ema_model.simulation import plant
@@ -45,7 +46,7 @@ class Track:
 
     algorithm: str
     iterations: int
-    rmse: list[float] = field(default_factory=list)  # A, of the best after each iteration; see `Progress`
+    rmse: list[float] = field(default_factory=list)  # A, uncorrected, of the best after each iteration
     last: Progress | None = None
     frames: list[Frame] = field(default_factory=list)  # every `stride` iterations
     stride: int = 1
@@ -63,10 +64,12 @@ class Track:
         return SEARCH_SHARE * len(self.rmse) / (self.iterations + 1.0)
 
     @property
-    def errors(self) -> list[float]:
-        """A, of the best after each iteration, and of the answer where a fit went on from there."""
+    def corrected(self) -> list[float]:
+        """A, of the best after each iteration, and of the answer where a fit went on from there; once it is there."""
         answer = self.answer
-        return [*self.rmse, answer.rmse] if answer is not None and answer.polished else list(self.rmse)
+        if answer is None:
+            return []
+        return [*map(float, answer.corrected_history), *([answer.corrected_rmse] if answer.polished else [])]
 
     @property
     def k(self) -> Array | None:
@@ -86,11 +89,6 @@ class Track:
                 self.frames.append(Frame(at.iteration, at.population.astype(np.float32), at.k, at.rmse))
 
 
-def _rank(track: Track) -> tuple[bool, float]:
-    answer = track.answer
-    return (True, track.rmse[-1]) if answer is None else (not answer.polished, answer.rmse)
-
-
 @dataclass(eq=False)
 class Race:
     """What is identified, by whom, and how far they are."""
@@ -105,6 +103,7 @@ class Race:
     known: bool = False  # the actuator's own parameters are exact, as in a simulation of the same file
     growing: Path | None = None  # of the recording, while it is written
     path: Path | None = None  # and once it is whole
+    error: CorrectedError | None = None  # by which all answers are compared, once all are there
 
     @property
     def source(self) -> str:
@@ -121,7 +120,8 @@ class Race:
         """What goes on."""
         going = [track for track in self.tracks.values() if track.answer is None]
         if len(self.tracks) == 1 and going and going[0].fitting is None and going[0].rmse:
-            return f"iteration {len(going[0].rmse) - 1} of {going[0].iterations}, rmse {amount(going[0].rmse[-1], 'A')}"
+            at = f"iteration {len(going[0].rmse) - 1} of {going[0].iterations}"
+            return f"{at}, uncorrected error {amount(going[0].rmse[-1], 'A')}"
         fitting = next((track.fitting[0] for track in going if track.fitting is not None), "fitting the answer")
         return "searching" if any(track.fitting is None for track in going) else fitting
 
@@ -137,9 +137,13 @@ class Race:
 
     @property
     def best(self) -> Track | None:
-        """The one to believe: an answer that a fit has freed of the monitor's own error, else the least rmse."""
+        """The one to believe, of the least error that is shown: corrected once all are there, uncorrected before."""
         begun = [track for track in self.tracks.values() if track.rmse]
-        return min(begun, key=_rank, default=None)
+        return min(begun, key=lambda track: self.errors_of(track)[-1], default=None)
+
+    def errors_of(self, track: Track) -> list[float]:
+        """A, as they are shown: corrected by one fit for all once all are there, uncorrected of the search before."""
+        return list(track.rmse) if self.error is None else track.corrected
 
     def performance(self) -> dict[str, float]:
         """Performance coefficient, % (T 5.4), by algorithm; empty unless several have ended and the truth is known."""
@@ -247,3 +251,8 @@ def run(race: Race, asked: Run, tell: Callable[[Progress | None], object]) -> St
                 tell(at)
             yield
         begun = True
+    compared = by_one_error(race.answers)
+    for track, answer in zip((track for track in race.tracks.values() if track.answer is not None), compared):
+        track.answer = answer
+    race.error = compared[0].corrected_error
+    tell(None)

@@ -6,7 +6,6 @@ import argparse
 import sys
 import threading
 import time
-import traceback
 import webbrowser
 from collections.abc import Sequence
 from pathlib import Path
@@ -38,7 +37,7 @@ from emaviz.session.compare.comparing import Comparing
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.discover.discovering import Discovering
 from emaviz.session.session import Session
-from emaviz.session.worker import Worker
+from emaviz.session.worker import Worker, report
 
 _FASTEST_REDRAW_S = 0.04
 _SLOW_REDRAW_S = 0.3  # of what nobody watches while dragging
@@ -186,7 +185,7 @@ class App:
             client.add_notification("The Rerun viewer cannot be shown", f"{_NOT_FROM_ELSEWHERE}.", color="yellow")
 
     def _on_screen_error(self, error: BaseException) -> None:
-        traceback.print_exception(error)
+        report(error, self.page.notify, "It cannot be done")
 
 
 def serve(arguments: argparse.Namespace) -> int:

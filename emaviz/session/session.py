@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 import threading
 import time
-import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -26,7 +25,7 @@ from emaviz.session.fan import Fan, fan_of
 from emaviz.session.identify.identifying import Identifying
 from emaviz.session.settings import Settings
 from emaviz.session.signal import Signal
-from emaviz.session.worker import Worker
+from emaviz.session.worker import Worker, report
 
 OWN_PLANT = "the actuator's file"
 
@@ -191,11 +190,7 @@ class Session:
             self.refresh()
 
     def _on_error(self, error: BaseException) -> None:
-        if isinstance(error, InputError):
-            self.events.told("The run has failed", str(error))
-            return
-        traceback.print_exception(error)
-        self.events.told("Something failed; the app goes on", f"{type(error).__name__}: {quoted(error)}")
+        report(error, self.events.told, "The run has failed")
 
 
 def _no_files(name: str) -> Measurement:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import traceback
 from collections.abc import Callable
 
-from ema_model.errors import InputError, quoted
+from ema_model.errors import InputError
 from emaviz.session.compare.events import LAY_OUT, MAP, OPEN, SAVE
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.signal import Signal
-from emaviz.session.worker import Worker
+from emaviz.session.worker import Worker, report
 
 _CANNOT = {
     OPEN: "The file cannot be read",
@@ -44,8 +43,7 @@ class FileJobs:
 
     def on_error(self, error: BaseException) -> None:
         """Of a thread that goes on."""
-        traceback.print_exception(error)
-        self._told("Something failed; the app goes on", f"{type(error).__name__}: {quoted(error)}")
+        report(error, self._told, _CANNOT[SAVE])
 
     def _try(self, what: str, job: Callable[[], object]) -> None:
         try:

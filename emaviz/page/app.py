@@ -23,6 +23,7 @@ from emaviz.page.keys import add_keys
 from emaviz.page.members import tabs
 from emaviz.page.page import Page
 from emaviz.page.playback import PlaybackStrip
+from emaviz.page.standing import Standings
 from emaviz.page.tab import AnyTab, Shared
 from emaviz.page.viewer_links import follow_theme
 from emaviz.page.workspaces import Workspaces
@@ -82,8 +83,9 @@ class App:
         first = compare.WORKSPACE if given else explore.WORKSPACE
         self.workspaces = Workspaces(self.server, self.screen, self._docked, first.name)
         self.page = Page(self.server, self.session, self.screen, self.workspaces)
+        self.standings = Standings(self.screen, self.workspaces)
         self.comparing = Comparing(self.session, data)
-        self.session.open_file = self.comparing.measurement
+        self.session.open_file, self.session.version_of = self.comparing.measurement, self.comparing.version
         self.discovering = Discovering(self.session, self.comparing)
         self.campaigns = Campaigns(self.session, data, campaigns)
         self._build()
@@ -123,6 +125,7 @@ class App:
             Uploads(self.server, self.comparing.folder, lambda path: self.shared.take(path), self._refused),
             self._slow_screen,
             self._files,
+            self.standings,
         )
         for kind, panel in zip(kinds, panels):
             self.shared.tabs[kind] = kind(self.shared, panel)
@@ -154,6 +157,7 @@ class App:
     def close(self) -> None:
         """Ends everything that was started."""
         self.playback.close()
+        self.standings.close()
         for one in self.shared.tabs.values():
             one.close()
         self.discovering.close()

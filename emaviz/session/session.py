@@ -22,7 +22,8 @@ from ema_model.recordings import Measurement
 from ema_model.simulation import plant
 from ema_model.simulation.run import simulate_monitor
 from emaviz.session.fan import Fan, fan_of
-from emaviz.session.identify.identifying import Identifying
+from emaviz.session.identify.identifying import Identifying, inputs_of
+from emaviz.session.inputs import Inputs
 from emaviz.session.settings import Settings
 from emaviz.session.signal import Signal
 from emaviz.session.worker import Worker, report
@@ -68,7 +69,8 @@ class Session:
         self.ready = threading.Event()
         self.open_file: Callable[[str], Measurement] = _no_files  # by the name of a file in the data folder
         self.worker = Worker("emaviz-compute", self._on_error)
-        self.identifying = Identifying(self.worker, actuator, folder, self.events.told)
+        self.version_of: Callable[[str], str] = lambda _: ""  # of such a file
+        self.identifying = Identifying(self.worker, actuator, folder, self.events.told, self.inputs)
         self.identifying.identified.connect(lambda _: self._show_identified())
 
     def start(self) -> None:
@@ -184,6 +186,10 @@ class Session:
         """Begins an identification as the settings say; False while another long run goes on."""
         known = self.plant == OWN_PLANT
         return self.identifying.begin(self.settings, self.plants[self.plant], self.open_file, known)
+
+    def inputs(self) -> Inputs:
+        """What an identification would take now."""
+        return inputs_of(self.settings, self.plant, lambda name: self.version_of(name))
 
     def _show_identified(self) -> None:
         if self.settings.monitor == "identified":

@@ -21,8 +21,8 @@ _CANNOT = {
 class FileJobs:
     """One after another; what is wrong is told where it was asked for, and to all."""
 
-    def __init__(self, folder: DataFolder, failed: Signal[[str, str]], told: Signal[[str, str]]) -> None:
-        """failed(what, why): "" once it is done; told(title, line): to all."""
+    def __init__(self, folder: DataFolder, failed: Signal[[str, str, str]], told: Signal[[str, str]]) -> None:
+        """failed(what, name, why): "" once it is done; told(title, line): to all."""
         self._folder, self._failed, self._told = folder, failed, told
         self._worker = Worker("emaviz-files", self.on_error)
 
@@ -35,7 +35,7 @@ class FileJobs:
 
         def done() -> None:
             try:
-                self._try(what, job)
+                self._try(what, name, job)
             finally:
                 ended()
 
@@ -45,12 +45,12 @@ class FileJobs:
         """Of a thread that goes on."""
         report(error, self._told, _CANNOT[SAVE])
 
-    def _try(self, what: str, job: Callable[[], object]) -> None:
+    def _try(self, what: str, name: str, job: Callable[[], object]) -> None:
         try:
             job()
         except InputError as error:
             line = str(error).replace(f"{self._folder.folder}/", "")  # the page knows its files by their names there
-            self._failed(what, line)
+            self._failed(what, name, line)
             self._told(_CANNOT[what], line)
             return
-        self._failed(what, "")
+        self._failed(what, name, "")

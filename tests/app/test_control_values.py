@@ -195,6 +195,14 @@ def test_a_control_in_a_hidden_folder_refuses(server, controls, raw):
     wait_until(lambda: clicked and box.value, 10.0)
     assert len(clicked) == 1
     outer.remove()
+    panel = gui.add_panel()  # which each window shows or hides for itself
+    panel.visible = False
+    with panel.add_tab("tab"):
+        button = gui.add_button("in a panel")
+    button.on_click(lambda _: clicked.append(2))
+    raw.update(uuid(button), True)
+    wait_until(lambda: len(clicked) == 2, 10.0)
+    panel.remove()
 
 
 @pytest.mark.parametrize("prop", ["update_cb", "props", "removed", "uuid", "sync_cb", "is_button", "", 3])

@@ -6,7 +6,6 @@ import argparse
 import sys
 import threading
 import time
-import traceback
 import webbrowser
 from collections.abc import Sequence
 from pathlib import Path
@@ -24,6 +23,7 @@ from emaviz.page.keys import add_keys
 from emaviz.page.members import tabs
 from emaviz.page.page import Page
 from emaviz.page.playback import PlaybackStrip
+from emaviz.page.standing import Standings
 from emaviz.page.tab import AnyTab, Shared
 from emaviz.page.viewer_links import follow_theme
 from emaviz.page.workspaces import Workspaces
@@ -38,7 +38,7 @@ from emaviz.session.compare.comparing import Comparing
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.discover.discovering import Discovering
 from emaviz.session.session import Session
-from emaviz.session.worker import Worker
+from emaviz.session.worker import Worker, report
 
 _FASTEST_REDRAW_S = 0.04
 _SLOW_REDRAW_S = 0.3  # of what nobody watches while dragging
@@ -82,9 +82,10 @@ class App:
         self._docked = Docked(self.server)
         first = compare.WORKSPACE if given else explore.WORKSPACE
         self.workspaces = Workspaces(self.server, self.screen, self._docked, first.name)
-        self.page = Page(self.server, self.session, self.screen, self.workspaces, folder)
+        self.page = Page(self.server, self.session, self.screen, self.workspaces, data.folder)
+        self.standings = Standings(self.screen, self.workspaces)
         self.comparing = Comparing(self.session, data)
-        self.session.open_file = self.comparing.measurement
+        self.session.open_file, self.session.version_of = self.comparing.measurement, self.comparing.version
         self.discovering = Discovering(self.session, self.comparing)
         self.campaigns = Campaigns(self.session, data, campaigns)
         self._build()
@@ -124,6 +125,7 @@ class App:
             Uploads(self.server, self.comparing.folder, lambda path: self.shared.take(path), self._refused),
             self._slow_screen,
             self._files,
+            self.standings,
         )
         for kind, panel in zip(kinds, panels):
             self.shared.tabs[kind] = kind(self.shared, panel)
@@ -155,6 +157,7 @@ class App:
     def close(self) -> None:
         """Ends everything that was started."""
         self.playback.close()
+        self.standings.close()
         for one in self.shared.tabs.values():
             one.close()
         self.discovering.close()
@@ -186,7 +189,7 @@ class App:
             client.add_notification("The Rerun viewer cannot be shown", f"{_NOT_FROM_ELSEWHERE}.", color="yellow")
 
     def _on_screen_error(self, error: BaseException) -> None:
-        traceback.print_exception(error)
+        report(error, self.page.notify, "It cannot be done")
 
 
 def serve(arguments: argparse.Namespace) -> int:

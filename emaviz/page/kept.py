@@ -14,6 +14,7 @@ from emaviz.page.page import Page
 from emaviz.page.style import IN_ROW
 from emaviz.recording.viewer import ViewerHost
 from emaviz.session.data_folder import DataFolder
+from emaviz.session.inputs import Provenance
 from emaviz.session.signal import Signal
 from emaviz.text.html import add_html, html
 
@@ -50,9 +51,14 @@ class KeepButtons:
         viewer: ViewerHost | None,
         kept: Signal[[Path]],
         save: Callable[[str, Any], object],
+        provenance: Provenance,
         *buttons: Keeps,
     ) -> None:
-        """what: is kept, a word that no other tab has; save(suffix, button): asks for the file; kept: it is written."""
+        """what: is kept, a word that no other tab has; save(suffix, button): asks for the file; kept: it is written.
+
+        provenance: of the result, which is written as it was computed.
+        """
+        self._provenance = provenance
         self._folder, self._viewer, self._save = folder, viewer, save
         self._asked: viser.ClientHandle | None = None  # who is sent the file
         gui = page.server.gui
@@ -69,7 +75,7 @@ class KeepButtons:
 
     def name(self, path: Path, text: str = "") -> None:
         """Where a file is kept, and what is to be said of it."""
-        name = ", ".join(filter(None, (self._folder.name_of(path), text)))
+        name = ", ".join(filter(None, (self._folder.name_of(path), self._provenance.note(), text)))
         self._links.content = html(
             '<div style="padding:2px 10px;font-size:13px">Also kept in the data folder: {}</div>', name
         )

@@ -12,12 +12,14 @@ import viser
 
 from emaviz.page.page import Page
 from emaviz.page.playback import PlaybackStrip
+from emaviz.page.standing import Standing, Standings
 from emaviz.page.workspaces import Workspace
 from emaviz.recording.viewer import ViewerHost
 from emaviz.server.uploads import Uploads
 from emaviz.session.campaigns import Campaigns
 from emaviz.session.compare.comparing import Comparing
 from emaviz.session.discover.discovering import Discovering
+from emaviz.session.inputs import Provenance, results_part
 from emaviz.session.saved import Part
 from emaviz.session.worker import Worker
 
@@ -37,6 +39,7 @@ class Shared:
     uploads: Uploads
     slow_screen: Worker  # draws what nobody watches while dragging
     files: Worker  # reads and packs files
+    standings: Standings  # of the tabs' results
     tabs: dict[type[Tab], Tab] = field(default_factory=dict)
 
     def tab(self, kind: type[AnyTab]) -> AnyTab:
@@ -76,6 +79,7 @@ class Shared:
         parts = {"settings": Part(settings.saved, restore)}
         for tab in self.tabs.values():
             parts |= tab.kept()
+        parts["results"] = results_part(self.standings.provenances)
         return parts | {"look": Part(self.strip.saved, lambda saved, _: self.strip.restore(saved))}
 
 
@@ -87,6 +91,10 @@ class Tab(ABC):
     def __init__(self, shared: Shared, right: viser.PanelHandle) -> None:
         """Builds the result in the panel on the right."""
         self.shared, self.page, self.right = shared, shared.page, right
+
+    def standing(self, provenance: Provenance, *, saved: bool = True) -> Standing:
+        """Of a result of this tab; saved: a session's file says that it was there."""
+        return self.shared.standings.add(provenance, self.workspace.title, self.workspace.name, saved=saved)
 
     @abstractmethod
     def build(self) -> None:

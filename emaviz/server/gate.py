@@ -66,10 +66,10 @@ class Gate:
             case messages.GuiUpdateMessage():
                 return self._may_change(client, message)
             case messages.GuiButtonHoldMessage(uuid=uuid):
-                return _usable(self._inside.control(client, uuid))
+                return self._inside.lets_at(self._inside.control(client, uuid))
             case messages.FileTransferStartUpload(source_component_uuid=uuid):
                 control = self._inside.control(client, uuid)
-                return isinstance(control, viser.GuiUploadButtonHandle) and _usable(control)
+                return isinstance(control, viser.GuiUploadButtonHandle) and self._inside.lets_at(control)
             case messages.GuiFormSubmitMessage(uuid=uuid) | messages.GuiFormDirtyMessage(uuid=uuid):
                 return self._inside.has_form(client, uuid)
         return not isinstance(message, _OF_NODES) or self._inside.has_node(client, message.name)
@@ -80,7 +80,7 @@ class Gate:
             return False
         if (waiting := self._waiting.pop(message.uuid, None)) is not None:
             waiting.cancel()
-        if not _usable(control):
+        if not self._inside.lets_at(control):
             self._inside.send_value(client, control)
             return False
         try:
@@ -117,8 +117,3 @@ class Gate:
         for waiting in self._waiting.values():
             waiting.cancel()
         self._waiting.clear()
-
-
-def _usable(control: Any) -> bool:
-    """Whether a page lets its user at this control."""
-    return control is not None and control.visible and not getattr(control, "disabled", False)

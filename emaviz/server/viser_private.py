@@ -62,6 +62,22 @@ class Inside:
         found = (gui._gui_input_handle_from_uuid.get(uuid) for gui in self._guis(client))
         return next((one for one in found if one is not None and not one._impl.removed), None)
 
+    def lets_at(self, control: Any) -> bool:
+        """Whether a page lets its user at this control: it can be used, and all that it stands in is shown."""
+        if control is None or getattr(control, "disabled", False):
+            return False
+        gui, inside = control._impl.gui_api, control
+        while inside is not None and not isinstance(inside, viser.PanelHandle):  # as each window shows it
+            if not getattr(inside, "visible", True):
+                return False
+            if isinstance(inside, viser.GuiTabHandle):
+                inside = inside._parent
+            elif (state := getattr(inside, "_impl", None)) is None:  # the page itself, or a window on it
+                return True
+            else:
+                inside = gui._container_handle_from_uuid.get(getattr(state, "parent_container_id", ""))
+        return True
+
     def has_form(self, client: int | None, uuid: str) -> bool:
         """Whether this page shows such a form."""
         found = (gui._container_handle_from_uuid.get(uuid) for gui in self._guis(client))

@@ -21,6 +21,7 @@ from ema_model.identification.objective import Objective
 from ema_model.identification.run import Progress, identify
 from ema_model.recordings import Measurement
 from emaviz.session.data_folder import DataFolder
+from emaviz.session.inputs import Inputs, digest, version_of
 from emaviz.session.job import Job, Tell
 from emaviz.session.session import Session
 from emaviz.session.signal import Signal
@@ -49,6 +50,12 @@ class Campaigns:
         if name not in folders:
             raise InputError(f"{shown(name)}: no such campaign; read the folder again")
         return Store(folders[name])
+
+    def inputs(self, name: str) -> Inputs:
+        """What a campaign's tables are made from now."""
+        folder = self._folders().get(name)
+        rows = "" if folder is None else " ".join(sorted(version_of(one) for one in folder.rglob("*.parquet")))
+        return Inputs(name, name, options={"the set of its rows": digest(rows)})
 
     def open_row(self, campaign: str, row_name: str) -> bool:
         """Computes a row's task again and writes its recording; False while another long run goes on."""

@@ -53,6 +53,11 @@ def checked(kind: type[msgspec.Struct], name: str, value: Any, axes: Axes = ROTA
     return read
 
 
+def title(kind: type[msgspec.Struct], name: str) -> str:
+    """What a setting is called in a sentence."""
+    return str(_types(kind)[name].__metadata__[0].title)
+
+
 def limits(kind: type[msgspec.Struct], name: str) -> dict[str, Any]:
     """From and to, as a control's `min` and `max`."""
     about: msgspec.Meta = _types(kind)[name].__metadata__[0]

@@ -126,9 +126,15 @@ class Job:
         self.ended: Signal[[str]] = Signal()  # what came of it
         self._worker, self._on_stop, self._on_divergence = worker, on_stop, on_divergence
         self._run: Run | None = None
+        self._awaited = ""  # title of the run that waits
         self._pace = Pace()
         self._over = threading.Event()  # set: whoever waits to begin shall not any more
         self._over.set()
+
+    @property
+    def title(self) -> str:
+        """Of the run that goes on, or waits for its turn; "" for none."""
+        return self._run.title if self.running and self._run is not None else self._awaited if self.waiting else ""
 
     @property
     def paused(self) -> bool:
@@ -165,6 +171,7 @@ class Job:
         that whatever a person asks for meanwhile goes first.
         """
         self._over.set()
+        self._awaited = title
         self._over = over = threading.Event()
 
         def wait() -> None:

@@ -20,6 +20,7 @@ from ema_model.recordings.health.card import Health, health_of
 from ema_model.recordings.read import how_to_read, recorded
 from ema_model.recordings.side_file.read import SideFile, find_side_file
 from emaviz.session.data_folder import DataFolder
+from emaviz.session.inputs import digest, version_of
 
 Array = NDArray[np.float64]
 
@@ -38,6 +39,11 @@ class Opened:
     measurement: Measurement | None = None  # as the chosen actuator's model needs it
     health: Health | None = None
     problem: str = ""  # why there are no columns
+    version: str = ""  # of the file, when it was read
+
+    def version_on(self, disk: str) -> str:
+        """What was read, and how, if the file is of that version."""
+        return f"{disk or self.version} {digest((self.mapping, self.hints))}"
 
 
 def all_measured(opened: Iterable[Opened]) -> list[Measurement]:
@@ -76,7 +82,7 @@ def read_opened(name: str, path: Path, actuator: Actuator, side: SideFile) -> Op
 
     InputError for what is no table; but of a text there are the first lines, for somebody to find the table by.
     """
-    hints = hints_of(str(path), side)
+    hints, version = hints_of(str(path), side), version_of(path)
     try:
         head = read_head(path, max_bytes=PAGE_BYTES, hints=hints)
     except InputError:  # which reading the columns tells, where it is what was said
@@ -87,9 +93,9 @@ def read_opened(name: str, path: Path, actuator: Actuator, side: SideFile) -> Op
         if head is None:
             raise
         problem = str(error).removeprefix(f"{shown(path, 300)}: ")
-        return Opened(name, path, {}, ColumnMapping(), head, hints, problem=problem)
+        return Opened(name, path, {}, ColumnMapping(), head, hints, problem=problem, version=version)
     reading = how_to_read(path, actuator, side=side, columns=columns)
-    table = Opened(name, path, columns, reading.proposed(columns), head, hints)
+    table = Opened(name, path, columns, reading.proposed(columns), head, hints, version=version)
     return table if reading.is_guess else measured(table, actuator, side)
 
 
@@ -100,6 +106,9 @@ def guesses(opened: Opened, actuator: Actuator) -> bool:
 
 def measured(opened: Opened, actuator: Actuator, side: SideFile | None = None) -> Opened:
     """The same with what was measured and its health; `side` is the recording's side file, where it has one."""
+    version = version_of(opened.path)
     found = recorded(opened.path, actuator, side=side or SideFile(), max_bytes=PAGE_BYTES)
     measurement = prepared(found, actuator)
-    return replace(opened, recorded=found, measurement=measurement, health=health_of(measurement, actuator))
+    return replace(
+        opened, recorded=found, measurement=measurement, health=health_of(measurement, actuator), version=version
+    )

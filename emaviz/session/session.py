@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 import threading
 import time
-import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -23,10 +22,11 @@ from ema_model.recordings import Measurement
 from ema_model.simulation import plant
 from ema_model.simulation.run import simulate_monitor
 from emaviz.session.fan import Fan, fan_of
-from emaviz.session.identify.identifying import Identifying
+from emaviz.session.identify.identifying import Identifying, inputs_of
+from emaviz.session.inputs import Inputs
 from emaviz.session.settings import Settings
 from emaviz.session.signal import Signal
-from emaviz.session.worker import Worker
+from emaviz.session.worker import Worker, report
 
 OWN_PLANT = "the actuator's file"
 
@@ -69,7 +69,8 @@ class Session:
         self.ready = threading.Event()
         self.open_file: Callable[[str], Measurement] = _no_files  # by the name of a file in the data folder
         self.worker = Worker("emaviz-compute", self._on_error)
-        self.identifying = Identifying(self.worker, actuator, folder, self.events.told)
+        self.version_of: Callable[[str], str] = lambda _: ""  # of such a file
+        self.identifying = Identifying(self.worker, actuator, folder, self.events.told, self.inputs)
         self.identifying.identified.connect(lambda _: self._show_identified())
 
     def start(self) -> None:
@@ -186,16 +187,16 @@ class Session:
         known = self.plant == OWN_PLANT
         return self.identifying.begin(self.settings, self.plants[self.plant], self.open_file, known)
 
+    def inputs(self) -> Inputs:
+        """What an identification would take now."""
+        return inputs_of(self.settings, self.plant, lambda name: self.version_of(name))
+
     def _show_identified(self) -> None:
         if self.settings.monitor == "identified":
             self.refresh()
 
     def _on_error(self, error: BaseException) -> None:
-        if isinstance(error, InputError):
-            self.events.told("The run has failed", str(error))
-            return
-        traceback.print_exception(error)
-        self.events.told("Something failed; the app goes on", f"{type(error).__name__}: {quoted(error)}")
+        report(error, self.events.told, "The run has failed")
 
 
 def _no_files(name: str) -> Measurement:

@@ -13,12 +13,26 @@ import time
 import traceback
 from collections.abc import Callable, Generator
 
+from ema_model.errors import InputError, quoted
+
 Job = Callable[[], None]
 Steps = Generator[None, None, None]
 
 _ATTENDED_S = 0.3  # after a quick job, in which another one is likely: somebody drags a slider
 _STEP_TO_REST = 2.0  # meanwhile, the rest after a long job's step over the time that the step took
 _LONGEST_REST_S = 0.05
+
+
+def report(error: BaseException, told: Callable[[str, str], object], title: str) -> None:
+    """What a thread could not do, as its `on_error`: a line where input was refused, else a traceback on the log too.
+
+    told(title, line): to the user; title: of what was refused.
+    """
+    if isinstance(error, InputError):
+        told(title, str(error))
+        return
+    traceback.print_exception(error)
+    told("Something failed; the app goes on", f"{type(error).__name__}: {quoted(error)}")
 
 
 class Worker:

@@ -176,6 +176,35 @@ def test_a_disabled_or_hidden_control_refuses(controls, raw):
     wait_until(lambda: clicked, 10.0)
 
 
+def test_a_control_in_a_hidden_folder_refuses(server, controls, raw):
+    gui, clicked = server.gui, []
+    with gui.add_folder("outer") as outer:
+        tabs = gui.add_tab_group()
+        with tabs.add_tab("tab"), gui.add_folder("inner") as inner:
+            button, box = gui.add_button("deep"), gui.add_checkbox("deep box", False)
+    button.on_click(lambda _: clicked.append(1))
+    for hidden in (outer, tabs, inner):
+        hidden.visible = False
+        raw.update(uuid(button), True)
+        raw.update(uuid(box), True)
+        heard(raw, controls)
+        hidden.visible = True
+        assert not box.value
+    raw.update(uuid(box), True)
+    raw.update(uuid(button), True)
+    wait_until(lambda: clicked and box.value, 10.0)
+    assert len(clicked) == 1
+    outer.remove()
+    panel = gui.add_panel()  # which each window shows or hides for itself
+    panel.visible = False
+    with panel.add_tab("tab"):
+        button = gui.add_button("in a panel")
+    button.on_click(lambda _: clicked.append(2))
+    raw.update(uuid(button), True)
+    wait_until(lambda: len(clicked) == 2, 10.0)
+    panel.remove()
+
+
 @pytest.mark.parametrize("prop", ["update_cb", "props", "removed", "uuid", "sync_cb", "is_button", "", 3])
 def test_no_other_property_can_be_set(controls, raw, prop):
     control = controls["slider"]

@@ -17,6 +17,7 @@ from emaviz.server import gate
 from emaviz.server.gate import TYPING_S
 from emaviz.server.messages import MOST_INT
 from emaviz.server.values import checked
+from emaviz.server.viser_private import Inside
 
 NUMBERS = (viser.GuiNumberHandle, viser.GuiSliderHandle)
 PUSHED = (viser.GuiButtonHandle, viser.GuiButtonGroupHandle, viser.GuiUploadButtonHandle)
@@ -126,6 +127,62 @@ def test_every_refused_number_is_sent_back(controls, raw):
     wait_until(lambda: set(numbers) <= {one.get("uuid") for one in raw.said}, 30.0 + TYPING_S)
     assert all(raw.values[uuid] == one.value for uuid, one in numbers.items())
     assert any(one.startswith("Seed: 1e+20 is above 9007199254740991") for one in raw.told())
+
+
+# --- presses ----------------------------------------------------------------------------------------------------------
+
+
+def press_every_button(app, raw, marker):
+    """Each once, of every tab; what they ask of the app's threads is done when this returns."""
+    buttons = [uuid for uuid, one in app.server.gui._gui_input_handle_from_uuid.items() if one._impl.is_button]
+    for uuid in buttons:
+        raw.update(uuid, True)
+    heard(raw, marker)
+    time.sleep(0.5)  # viser's own threads call the handlers
+    for _ in range(3):  # what a thread does may ask another
+        for thread in (app.screen, app._slow_screen, app._files, app.comparing._files._worker, app.discovering._files):
+            done = threading.Event()
+            thread.post("pressed", done.set)
+            assert done.wait(60.0)
+    return len(buttons)
+
+
+@pytest.fixture
+def no_long_runs(app, monkeypatch):
+    """As while another long run goes on."""
+    monkeypatch.setattr(app.session.worker, "start", lambda *_: False)
+    yield
+    for job in (app.comparing.job, app.discovering.job):
+        job.stop()
+
+
+@pytest.fixture
+def no_gate(monkeypatch):
+    """As for a press that was on its way when its control was hidden or disabled."""
+    monkeypatch.setattr(Inside, "lets_at", lambda _, control: control is not None)
+
+
+def test_no_press_of_any_button_before_a_result_costs_a_traceback(
+    app, controls, raw, marker, no_long_runs, no_gate, capfd
+):
+    assert app.discovering.look is None and app.comparing.comparison is None
+    kept = {file for file in app.comparing.folder.recordings.iterdir()}
+    assert press_every_button(app, raw, marker) > 200
+    assert "Traceback" not in capfd.readouterr().err
+    assert {file for file in app.comparing.folder.recordings.iterdir()} == kept, "there was nothing to keep"
+
+
+def test_a_picture_that_a_page_does_not_draw_is_no_traceback(app, raw, capfd, monkeypatch):
+    monkeypatch.setattr("emaviz.page.picture._LONGEST_S", 0.3)
+    for answer in (b"no picture", None):
+        raw.update(app.strip._picture._impl.uuid, True)
+        wait_until(lambda: raw.asked_for_a_picture, 20.0)
+        asked = raw.asked_for_a_picture.pop()
+        if answer is not None:
+            raw.send({"type": "GetRenderResponseMessage", "payload": answer, "render_uuid": asked})
+        wait_until(lambda: any("picture" in one for one in raw.told()), 20.0)
+        raw.said.clear()
+    assert "Traceback" not in capfd.readouterr().err
 
 
 # --- at random --------------------------------------------------------------------------------------------------------

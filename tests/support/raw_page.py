@@ -35,6 +35,7 @@ class RawPage:
         """host: the name in its address bar; camera: whether it counts as a page, as a browser's does at once."""
         self.values: dict[str, Any] = {}
         self.said: list[dict[str, Any]] = []  # other messages of the server that tests look at
+        self.asked_for_a_picture: list[str] = []  # ids of the requests
         self.drawn, self.closed = threading.Event(), threading.Event()
         self._plug = connect(
             f"ws://{host}:{port}/?token={token}",
@@ -92,5 +93,7 @@ class RawPage:
             self.said.append(message)
         elif kind.startswith("Gui") and "value" in message:
             self.values[message["uuid"]] = message["value"]
+        elif kind == "GetRenderRequestMessage":
+            self.asked_for_a_picture.append(message["render_uuid"])
         elif kind == "NotificationShowMessage":
             self.said.append(message)

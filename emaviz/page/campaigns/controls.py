@@ -14,7 +14,9 @@ from ema_model.errors import InputError
 from ema_model.recordings import Measurement
 from emaviz.page.job_line import JobLine
 from emaviz.page.page import Page
+from emaviz.page.standing import Standing
 from emaviz.session.campaigns import Campaigns
+from emaviz.session.inputs import Provenance
 from emaviz.session.worker import Worker
 from emaviz.text.html import Html, add_html, html, joined, said
 
@@ -33,8 +35,9 @@ class CampaignControls:
         files: Worker,
         panel: viser.PanelHandle,
         opened: Callable[[Path, Measurement], None],
+        standings: Callable[[Provenance], Standing],
     ) -> None:
-        """opened(path, run): a row was simulated again, and is recorded there."""
+        """opened(path, run): a row was simulated again, and is recorded there; standings: says how the tables stand."""
         self._page, self._campaigns, self._files = page, campaigns, files
         self._rows: dict[str, str] = {}  # names of the rows, by what the list says of them
         gui = page.server.gui
@@ -46,7 +49,11 @@ class CampaignControls:
             self._status = add_html(gui, _box("None below the data folder; emaviz gui --campaign DIR opens one."))
             JobLine(page, campaigns.job)
             again = gui.add_button("Look for campaigns again", icon=viser.Icon.REFRESH, color="gray")
+        self._provenance = Provenance("the table", again.label, lambda: campaigns.inputs(str(self._choice.value)))
+        standing = standings(self._provenance)
+        standing.connect(again)
         with panel.add_tab("Campaign", viser.Icon.TABLE):
+            standing.add(gui)
             self._tables = add_html(gui, _box("Choose a campaign on the left."))
         self._choice.on_update(lambda event: event.client and self._post(self._show))
         self._group.on_update(lambda event: event.client and self._post(self._show_rows))
@@ -71,6 +78,7 @@ class CampaignControls:
             return
         store = self._campaigns.store(name)
         self._group.options = list(store.header.kinds) or [NONE]
+        self._provenance.take()
         self._tables.content = tables(store)
         self._say(_progress(store))
         self._show_rows()

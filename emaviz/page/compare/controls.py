@@ -14,6 +14,7 @@ from emaviz.page.compare.options import AskedControls
 from emaviz.page.compare.result import ResultPanel
 from emaviz.page.job_line import JobLine
 from emaviz.page.page import Page
+from emaviz.page.standing import Standing
 from emaviz.server.uploads import Uploads
 from emaviz.session.actuators import UPLOADED
 from emaviz.session.compare.comparing import Comparing
@@ -28,10 +29,13 @@ _NONE = "–"
 class ComparePanel:
     """The tab's controls.  `result` is the panel on the right, which shows previews and the comparison."""
 
-    def __init__(self, page: Page, comparing: Comparing, result: ResultPanel, uploads: Uploads) -> None:
+    def __init__(
+        self, page: Page, comparing: Comparing, result: ResultPanel, uploads: Uploads, standing: Standing
+    ) -> None:
         self._page, self._comparing, self._result = page, comparing, result
         self._shown: str | None = None
         self._asked_at: Any = None  # by which control the last file was asked for
+        self._complains: dict[str, str] = {}  # of which file something is said, by what was done with it
         gui = page.server.gui
         gui.add_markdown("Upload a measurement of a test bench, or **drop it anywhere** on the page.")
         self._upload = uploads.add_button("Upload a measurement", ",".join(FORMATS), icon=viser.Icon.UPLOAD)
@@ -53,11 +57,14 @@ class ComparePanel:
         self._which.on_update(lambda event: event.client and self._post_show(str(self._which.value)))
         self._columns.on_click(lambda _: page.screen.post("columns", self._open_columns))
         self._remove.on_click(lambda _: self._remove_shown())
-        self._start.on_click(lambda _: comparing.asking.ask(by_hand=True))
+        self._start.on_click(lambda _: comparing.ask())
+        standing.connect(self._start, self._forget_errors)
         events = comparing.events
         events.opened.connect(lambda opened: page.screen.post(f"opened {opened.name}", lambda: self._opened(opened)))
         events.refused.connect(lambda: page.screen.post("columns", self._open_columns))
-        events.failed.connect(lambda what, why: page.screen.post(f"failed to {what}", lambda: self._failed(what, why)))
+        events.failed.connect(
+            lambda what, name, why: page.screen.post(f"failed to {what}", lambda: self._failed(what, name, why))
+        )
         events.removed.connect(lambda: page.screen.post("removed", self._removed))
         events.compared.connect(lambda found: page.screen.post("compared", lambda: result.show(found)))
         events.missing.connect(lambda why, by_hand: page.screen.post("missing", lambda: self._missing(why, by_hand)))
@@ -107,8 +114,9 @@ class ComparePanel:
             self._result.preview(opened)
         self._comparing.asking.ask(by_hand=False)
 
-    def _failed(self, what: str, why: str) -> None:
+    def _failed(self, what: str, name: str, why: str) -> None:
         """Beside what was asked for; no reason takes it away."""
+        self._complains[what] = name if why else ""
         if what == OPEN and why and not self._comparing.running:
             self._line.say("")
         if what == OPEN:  # beside the control that was used last, and no longer beside the other
@@ -120,6 +128,10 @@ class ComparePanel:
             self._page.say_beside(control, why)
 
     def _removed(self) -> None:
+        """What was said of a file goes with it."""
+        for what, name in self._complains.items():
+            if name and name not in self._comparing.opened and what != OPEN:
+                self._failed(what, "", "")
         self._show(next(reversed(self._comparing.opened), None))
 
     def _post_show(self, name: str) -> None:
@@ -157,8 +169,16 @@ class ComparePanel:
     def _missing(self, why: str, by_hand: bool) -> None:
         """What a comparison lacks: beside the button, or, where nobody pressed it, in the line below."""
         self._page.say_beside(self._start, why if by_hand else "")
+        if why:
+            self._comparing.provenance.refused()
         if why and not by_hand:
             self._line.say(why)
+
+    def _forget_errors(self) -> None:
+        """What was said of a comparison that nobody asks for any more."""
+        self._page.say_beside(self._start, "")
+        if not self._comparing.running:
+            self._line.say("")
 
     def _show_running(self) -> None:
         """While one runs it is asked for already; else a press is carried out, or says what is missing."""

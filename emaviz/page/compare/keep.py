@@ -19,6 +19,7 @@ class KeepControls(KeepButtons):
             viewer,
             comparing.events.kept,
             lambda suffix, _: comparing.save(suffix),
+            comparing.provenance,
             REPORT,
             RECORD,
         )

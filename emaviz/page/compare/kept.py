@@ -51,6 +51,8 @@ def kept(comparing: Comparing, shown: Callable[[], None]) -> Part:
         if asked.window_s is not None:
             comparing.set_window(*asked.window_s)
         files = [names.get(name, name) for name in asked.files]
+        comparing.comparison = None  # of what was there before
+        comparing.provenance.clear()
         shown()
         for name in [name for name in comparing.opened if name not in files]:
             comparing.remove(name)

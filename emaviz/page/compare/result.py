@@ -130,6 +130,14 @@ class ResultPanel:
             self._numbers.content = numbers(self._comparison)
             self._show_answer(True)
 
+    def clear(self) -> None:
+        """Nothing is compared any more."""
+        self._comparison = self._region = None
+        self._place.visible = False
+        self._headline.content = begin("Nothing is compared yet", _STEPS)
+        self._show_answer(False)
+        self._strip.put(None, WORKSPACE.name)
+
     def _show_answer(self, visible: bool) -> None:
         for folder in (
             self._numbers,

@@ -27,7 +27,9 @@ class CompareTab(Tab):
 
     def __init__(self, shared: Shared, right: viser.PanelHandle) -> None:
         super().__init__(shared, right)
+        self._standing = self.standing(shared.comparing.provenance)
         with right.add_tab("Comparison", viser.Icon.ARROWS_DIFF):
+            self._standing.add(self.page.server.gui)
             self.result = ResultPanel(
                 self.page,
                 shared.strip,
@@ -38,7 +40,7 @@ class CompareTab(Tab):
 
     def build(self) -> None:
         """Recordings in, what is compared, and the run."""
-        self.panel = ComparePanel(self.page, self.shared.comparing, self.result, self.shared.uploads)
+        self.panel = ComparePanel(self.page, self.shared.comparing, self.result, self.shared.uploads, self._standing)
 
     def refresh_files(self) -> None:
         """What may be added."""
@@ -46,7 +48,12 @@ class CompareTab(Tab):
 
     def kept(self) -> dict[str, Part]:
         """What is opened and asked."""
-        return {"compare": kept(self.shared.comparing, self.panel.asked.show_settings)}
+
+        def shown() -> None:
+            self.result.clear()
+            self.panel.asked.show_settings()
+
+        return {"compare": kept(self.shared.comparing, shown)}
 
     def takes(self) -> dict[str, Callable[[Path], None]]:
         """Measurements and actuator files."""

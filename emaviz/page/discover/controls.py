@@ -21,6 +21,7 @@ from emaviz.page.discover.result import DiscoveryPanel
 from emaviz.page.discover.source import SourceControls
 from emaviz.page.job_line import JobLine
 from emaviz.page.page import Page
+from emaviz.page.standing import Standing
 from emaviz.server.uploads import Uploads
 from emaviz.server.viser_private import id_of
 from emaviz.session.discover.discovering import Discovering
@@ -33,7 +34,9 @@ _MOST_ADDED = 6 + len(CAUSES)
 class DiscoverPanel:
     """The tab's controls.  `result` is the panel on the right."""
 
-    def __init__(self, page: Page, discovering: Discovering, result: DiscoveryPanel, uploads: Uploads) -> None:
+    def __init__(
+        self, page: Page, discovering: Discovering, result: DiscoveryPanel, uploads: Uploads, standing: Standing
+    ) -> None:
         self._page, self._discovering, self._result = page, discovering, result
         self._look: Look | None = None
         self._opened: str | None = None
@@ -68,6 +71,7 @@ class DiscoverPanel:
         with self._never_folder:
             self._never = [self._slot() for _ in (*CATALOGUE, *CAUSES)]
         self._own = OwnEffect(page, discovering)
+        standing.connect(self._start, self._forget_errors)
         self._listen()
         self.source.show(None)
 
@@ -93,7 +97,7 @@ class DiscoverPanel:
         self._line.say("")
 
     def _source_shown(self) -> None:
-        self._start.disabled = self._discovering.running or not self._discovering.source.ready
+        self._show_start()
         self._guide.show(self._look, self._opened)
 
     def ask(self, begin: Callable[[], bool], button: Any) -> None:
@@ -101,7 +105,14 @@ class DiscoverPanel:
         self._page.begins(begin, button)
 
     def _begin(self) -> None:
-        self._page.begins(self._discovering.start, self._start)
+        if not self._page.begins(self._discovering.start, self._start):
+            self._discovering.provenance.refused()
+
+    def _forget_errors(self) -> None:
+        """What was said of measurements that are not chosen any more."""
+        self._page.say_beside(self._start, "")
+        if not self._discovering.running:
+            self._line.say("")
 
     def _step_back(self) -> None:
         self._page.checked(self._discovering.undo, self._undo)
@@ -111,11 +122,17 @@ class DiscoverPanel:
         if look is not None and index < len(look.removable):
             self.ask(lambda: self._discovering.remove(look.removable[index]), self._removes[index])
 
+    def _show_start(self, busy: bool = False) -> None:
+        """To be pressed where there is something to begin with, or to take again."""
+        discovering = self._discovering
+        unready = not discovering.source.ready and discovering.provenance.missing is None
+        self._start.disabled = busy or discovering.running or unready
+
     # --- the run ----------------------------------------------------------------------------------------------------
 
     def _busy(self, busy: bool) -> None:
         with self._page.server.atomic():
-            self._start.disabled = busy or not self._discovering.source.ready
+            self._show_start(busy)
             self._start.visible = not busy
             for control in (self._undo, self._all, *self._removes):
                 control.disabled = busy

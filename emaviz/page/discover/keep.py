@@ -31,6 +31,7 @@ class DiscoveryKeep(KeepButtons):
             viewer,
             events.kept,
             lambda suffix, _: discovering.keep(suffix),
+            discovering.provenance,
             *_BUTTONS,
         )
         events.verified.connect(lambda path, text: page.screen.post("verified", lambda: self.name(path, text)))

@@ -27,7 +27,9 @@ class DiscoverTab(Tab):
 
     def __init__(self, shared: Shared, right: viser.PanelHandle) -> None:
         super().__init__(shared, right)
+        self._standing = self.standing(shared.discovering.provenance)
         with right.add_tab("Discovery", viser.Icon.BULB):
+            self._standing.add(self.page.server.gui)
             self.result = DiscoveryPanel(
                 self.page,
                 shared.discovering,
@@ -41,7 +43,8 @@ class DiscoverTab(Tab):
 
     def build(self) -> None:
         """Which recordings, the run, and the steps."""
-        self.panel = DiscoverPanel(self.page, self.shared.discovering, self.result, self.shared.uploads)
+        shared = self.shared
+        self.panel = DiscoverPanel(self.page, shared.discovering, self.result, shared.uploads, self._standing)
 
     def kept(self) -> dict[str, Part]:
         """Every discovery, with the files that they need."""

@@ -16,6 +16,7 @@ from emaviz.figures.convergence import named
 from emaviz.page.identify.result import IdentifyResult
 from emaviz.page.job_line import JobLine
 from emaviz.page.page import Page
+from emaviz.page.standing import Standing
 from emaviz.page.style import IN_PAIRS
 from emaviz.page.viewer_links import LINK
 from emaviz.recording.viewer import ViewerHost
@@ -38,6 +39,7 @@ class IdentifyPanel:
         comparing: Comparing,
         viewer: ViewerHost | None,
         result: IdentifyResult,
+        standing: Standing,
         *,
         open_viewer: Callable[[str, str], None],
         to_discover: Callable[[Race], None],
@@ -89,6 +91,7 @@ class IdentifyPanel:
         for tick in self._ticks.values():
             tick.on_update(lambda event: event.client and page.screen.post("algorithms", self._take_algorithms))
         self._start.on_click(lambda _: self._begin())
+        standing.connect(self._start, self._forget_errors)
         self._watch.on_click(lambda event: page.screen.post("watch", lambda: self._watch_growing(event.client)))
         self._missing.on_click(
             lambda event: page.screen.post("to discover", lambda: self._look_for_missing(event.client))
@@ -142,7 +145,14 @@ class IdentifyPanel:
     # --- the race ---------------------------------------------------------------------------------------------------
 
     def _begin(self) -> None:
-        self._page.begins(self._page.session.identify, self._start)
+        if not self._page.begins(self._page.session.identify, self._start):
+            self._page.session.identifying.provenance.refused()
+
+    def _forget_errors(self) -> None:
+        """What was said of what is not identified any more."""
+        self._page.say_beside(self._start, "")
+        if not self._page.session.identifying.job.running:
+            self._line.say("")
 
     def _began(self) -> None:
         self._start.disabled = True

@@ -22,6 +22,7 @@ from emaviz.page.identify.swarm import SwarmView
 from emaviz.page.inset import COLUMNS
 from emaviz.page.page import Page
 from emaviz.page.playback import PlaybackStrip
+from emaviz.page.standing import Standing
 from emaviz.scene.motion import PLAYED, motion
 from emaviz.session.identify.race import Race, Track
 from emaviz.session.worker import Worker
@@ -49,6 +50,7 @@ class IdentifyResult:
         slow: Worker,
         panel: viser.PanelHandle,
         strip: PlaybackStrip,
+        standing: Standing,
         to_explore: Callable[[Suggestion], None],
     ) -> None:
         """to_explore(run): sets a run there."""
@@ -60,6 +62,7 @@ class IdentifyResult:
         self.rows: list[Row] = []
         gui = page.server.gui
         with panel.add_tab(_SEARCH, viser.Icon.CHART_DOTS):
+            standing.add(gui)
             add_html(gui, COLUMNS)
             self._empty: Any = add_html(gui, begin("Nothing is identified yet", _STEPS))
             self._convergence = LiveConvergence(gui)
@@ -67,6 +70,7 @@ class IdentifyResult:
             page.workspaces.heights.add([self._convergence.handle], spare_px=160, beside_px=332)
             self._swarm = SwarmView(page)
         with panel.add_tab(_ANSWER, viser.Icon.TARGET_ARROW):
+            standing.add(gui)
             self._whose = gui.add_dropdown("Algorithm shown", (_BEST, *ALGORITHMS.values()))
             self._bars = add_html(gui, fault_bars(HEALTHY, page.session.actuator))
             self._sure = add_html(gui)
@@ -80,6 +84,7 @@ class IdentifyResult:
             self._fit = LiveFit(gui)
             page.workspaces.heights.add(self._fit.handles, spare_px=30)
         with panel.add_tab("Landscape", viser.Icon.MAP_2):
+            standing.add(gui)
             self._landscape = LandscapeView(page, slow)
         with panel.add_tab("History", viser.Icon.TABLE):
             self._table = add_html(gui, table([]))

@@ -29,11 +29,13 @@ class IdentifyTab(Tab):
 
     def __init__(self, shared: Shared, right: viser.PanelHandle) -> None:
         super().__init__(shared, right)
+        self._standing = self.standing(self.page.session.identifying.provenance)
         self.result = IdentifyResult(
             self.page,
             shared.slow_screen,
             right,
             shared.strip,
+            self._standing,
             lambda run: take_separating(shared.tab(ExploreTab).panel, run),
         )
 
@@ -45,6 +47,7 @@ class IdentifyTab(Tab):
             shared.comparing,
             shared.viewer,
             self.result,
+            self._standing,
             open_viewer=lambda url, name: shared.tab(RunsTab).result.open(url, name),
             to_discover=partial(take_to_discover, self.page, shared.discovering),
         )

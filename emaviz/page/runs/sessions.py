@@ -16,7 +16,8 @@ from emaviz.session.compare.comparing import Comparing
 from emaviz.session.data_folder import SESSION_SUFFIX
 from emaviz.session.saved import Part
 from emaviz.session.worker import Worker
-from emaviz.text.html import add_html, html
+from emaviz.text.html import add_html, html, joined
+from emaviz.text.notes import boxed
 
 _NONE = "–"
 
@@ -24,9 +25,17 @@ _NONE = "–"
 class SessionControls:
     """Save, and load; files are packed on the worker `files`, controls are set on the screen's thread."""
 
-    def __init__(self, page: Page, comparing: Comparing, files: Worker, kept: Callable[[], Mapping[str, Part]]) -> None:
-        """kept(): the parts of the page."""
+    def __init__(
+        self,
+        page: Page,
+        comparing: Comparing,
+        files: Worker,
+        kept: Callable[[], Mapping[str, Part]],
+        lacking: Callable[[], Mapping[str, str]],
+    ) -> None:
+        """kept(): the parts of the page; lacking(): what each tab has to compute again, by its title."""
         self._page, self._comparing, self._files, self._kept = page, comparing, files, kept
+        self._lacking = lacking
         gui = page.server.gui
         with gui.add_folder("Session: everything on the page"):
             self._name = gui.add_text("Session name", f"session-{datetime.now():%Y%m%d}")
@@ -35,6 +44,7 @@ class SessionControls:
             )
             self._choice: Any = gui.add_dropdown("Saved", (_NONE,))
             self._load = gui.add_button("Load session", icon=viser.Icon.FOLDER_OPEN, color="gray", disabled=True)
+            self._loaded = add_html(gui)
             add_html(
                 gui,
                 html(
@@ -83,7 +93,12 @@ class SessionControls:
             session_file.read(path, self._kept(), self._comparing.folder)
         finally:
             self.refresh()
-        self._page.notify("Session loaded", path.name, "green")
+        lines = self._lacking()
+        told = [html("<div><b>{}.</b> {}</div>", title, line) for title, line in lines.items()]
+        begun = html("<div>{} is loaded{}</div>", path.name, ":" if told else ", with all its results.")
+        self._loaded.content = boxed(joined([begun, *told]))
+        said = "; ".join(f"{title}: {line[:1].lower()}{line[1:].rstrip('.')}" for title, line in lines.items())
+        self._page.notify("Session loaded", f"{path.name}. {said}" if said else path.name, "green")
 
     def _post(self, kind: str, job: Callable[[], None]) -> None:
         def checked() -> None:

@@ -35,8 +35,15 @@ class RunsTab(Tab):
         shared, page = self.shared, self.page
         recorded = Recorded(shared.comparing.folder.recordings)
         self.panel = RunsPanel(page, shared.viewer, recorded, shared.files, self.result)
-        self.sessions = SessionControls(page, shared.comparing, shared.files, shared.kept)
-        CampaignControls(page, shared.campaigns, shared.files, self.right, self._show)
+        self.sessions = SessionControls(page, shared.comparing, shared.files, shared.kept, shared.standings.lines)
+        CampaignControls(
+            page,
+            shared.campaigns,
+            shared.files,
+            self.right,
+            self._show,
+            lambda provenance: self.standing(provenance, saved=False),
+        )
         for events in (shared.comparing.events, shared.discovering.events):
             events.kept.connect(lambda _: self.panel.refresh_soon())
 

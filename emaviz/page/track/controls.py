@@ -13,6 +13,7 @@ from emaviz.page.folder_choice import FolderChoice
 from emaviz.page.job_line import JobLine
 from emaviz.page.page import Page
 from emaviz.page.practice import PracticeButtons
+from emaviz.page.standing import Standing
 from emaviz.page.style import LONG_LABELS
 from emaviz.page.track.result import TrackResult
 from emaviz.session.track.following import Following
@@ -30,7 +31,7 @@ _ABOUT = (
 class TrackPanel:
     """The tab's controls.  `result` is the panel on the right."""
 
-    def __init__(self, page: Page, following: Following, result: TrackResult) -> None:
+    def __init__(self, page: Page, following: Following, result: TrackResult, standing: Standing) -> None:
         self._page, self._following, self._result = page, following, result
         gui, post = page.server.gui, page.screen.post
         add_html(gui, note(_ABOUT))
@@ -56,7 +57,8 @@ class TrackPanel:
         for control in (self._ends, self._threshold):
             control.on_update(lambda event: event.client and self._ask_threshold())
         self._watch.on_update(lambda event: event.client and self._take_watch())
-        self._start.on_click(lambda _: page.ask("track", lambda: page.begins(following.begin, self._start)))
+        self._start.on_click(lambda _: post("track", self._begin))
+        standing.connect(self._start, self._forget_errors)
         following.job.began.connect(lambda _: post("track began", lambda: self._busy(True)))
         following.job.ended.connect(lambda _: post("track ended", lambda: self._busy(False)))
         following.events.followed.connect(lambda history: post("followed", lambda: result.show(history)))
@@ -122,7 +124,7 @@ class TrackPanel:
             return
         self._tell_thresholds()
         if following.history is not None and not following.job.running:
-            self._page.begins(following.begin, self._start)  # what is identified stays, so that this takes a moment
+            self._begin()  # what is identified stays, so that this takes a moment
 
     def _show_thresholds(self) -> None:
         """Of the chosen flights, which a challenge may bring."""
@@ -144,6 +146,17 @@ class TrackPanel:
 
     # --- the run ----------------------------------------------------------------------------------------------------
 
+    def _begin(self) -> None:
+        if not self._page.begins(self._following.begin, self._start):
+            self._following.provenance.refused()
+
+    def _forget_errors(self) -> None:
+        """What was said of flights that are not there any more."""
+        self._page.say_beside(self._start, "")
+        self._show_left_out()
+        if not self._following.job.running:
+            self._line.say("")
+
     def _busy(self, busy: bool) -> None:
         if busy:
             self._practice.fold()
@@ -156,5 +169,7 @@ class TrackPanel:
         self.refresh()
 
     def _show_left_out(self) -> None:
-        lines = self._following.left_out.values()
+        lines = self._following.complaints
+        if lines:
+            self._following.provenance.refused()
         self._left_out.content = boxed(warned(lines)) if lines else ""

@@ -17,4 +17,6 @@ class TrackKeep(KeepButtons):
         def save(suffix: str, button: Any) -> None:
             page.ask(f"track {suffix}", lambda: following.save(suffix), button)
 
-        super().__init__(page, "track", following.folder, viewer, following.events.kept, save, REPORT, RECORD)
+        super().__init__(
+            page, "track", following.folder, viewer, following.events.kept, save, following.provenance, REPORT, RECORD
+        )

@@ -26,7 +26,9 @@ class TrackTab(Tab):
     def __init__(self, shared: Shared, right: viser.PanelHandle) -> None:
         super().__init__(shared, right)
         following = self.following = Following(self.page.session, shared.comparing.folder, shared.files)
+        self._standing = self.standing(self.following.provenance)
         with right.add_tab("Flights", viser.Icon.TIMELINE):
+            self._standing.add(self.page.server.gui)
             self.result = TrackResult(
                 self.page,
                 shared.slow_screen,
@@ -37,7 +39,7 @@ class TrackTab(Tab):
 
     def build(self) -> None:
         """Which flights, and where the life ends."""
-        self.panel = TrackPanel(self.page, self.following, self.result)
+        self.panel = TrackPanel(self.page, self.following, self.result, self._standing)
 
     def refresh_files(self) -> None:
         """What may be followed."""

@@ -8,6 +8,7 @@ from emaviz.page.folder_choice import FolderChoice
 from emaviz.page.job_line import JobLine
 from emaviz.page.page import Page
 from emaviz.page.practice import PracticeButtons
+from emaviz.page.standing import Standing
 from emaviz.page.units import WORKSPACE
 from emaviz.page.units.result import UnitsResult
 from emaviz.session.units.comparing_units import ComparingUnits
@@ -23,7 +24,7 @@ _ABOUT = (
 class UnitsPanel:
     """The tab's controls.  `result` is the panel on the right."""
 
-    def __init__(self, page: Page, comparing: ComparingUnits, result: UnitsResult) -> None:
+    def __init__(self, page: Page, comparing: ComparingUnits, result: UnitsResult, standing: Standing) -> None:
         self._page, self._comparing, self._result = page, comparing, result
         gui, post = page.server.gui, page.screen.post
         add_html(gui, note(_ABOUT))
@@ -40,7 +41,8 @@ class UnitsPanel:
         self._line = JobLine(page, comparing.job, pauses="it")
         self._rule.on_update(lambda event: event.client and post("units rule", self._take_rule))
         self._actuator.on_update(lambda event: event.client and post("units actuator", self._take_actuator))
-        self._start.on_click(lambda _: page.ask("compare units", lambda: page.begins(comparing.begin, self._start)))
+        self._start.on_click(lambda _: post("compare units", self._begin))
+        standing.connect(self._start, self._forget_errors)
         comparing.job.began.connect(lambda _: post("units began", lambda: self._busy(True)))
         comparing.job.ended.connect(lambda _: post("units ended", lambda: self._busy(False)))
         comparing.events.compared.connect(lambda found: post("units compared", lambda: result.show(found)))
@@ -94,6 +96,16 @@ class UnitsPanel:
         comparing = self._comparing
         if not self._page.checked(lambda: comparing.choose_actuator(str(self._actuator.value)), self._actuator):
             self._actuator.value = comparing.actuator_name
+
+    def _begin(self) -> None:
+        if not self._page.begins(self._comparing.begin, self._start):
+            self._comparing.provenance.refused()
+
+    def _forget_errors(self) -> None:
+        """What was said of units that are not chosen any more."""
+        self._page.say_beside(self._start, "")
+        if not self._comparing.job.running:
+            self._line.say("")
 
     def _busy(self, busy: bool) -> None:
         if busy:

@@ -25,4 +25,6 @@ class UnitsKeep(KeepButtons):
         def save(suffix: str, button: Any) -> None:
             page.ask(f"units {suffix}", lambda: comparing.save(suffix), button)
 
-        super().__init__(page, "units", comparing.folder, None, comparing.events.kept, save, REPORT, _TYPE)
+        super().__init__(
+            page, "units", comparing.folder, None, comparing.events.kept, save, comparing.provenance, REPORT, _TYPE
+        )

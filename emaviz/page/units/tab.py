@@ -23,12 +23,14 @@ class UnitsTab(Tab):
     def __init__(self, shared: Shared, right: viser.PanelHandle) -> None:
         super().__init__(shared, right)
         self.comparing = ComparingUnits(self.page.session, shared.comparing.folder, shared.files)
+        self._standing = self.standing(self.comparing.provenance)
         with right.add_tab("Units", WORKSPACE.icon):
+            self._standing.add(self.page.server.gui)
             self.result = UnitsResult(self.page, self.comparing)
 
     def build(self) -> None:
         """Which units, what is held out, and the run."""
-        self.panel = UnitsPanel(self.page, self.comparing, self.result)
+        self.panel = UnitsPanel(self.page, self.comparing, self.result, self._standing)
 
     def refresh_files(self) -> None:
         """What may be compared."""

@@ -23,6 +23,7 @@ from emaviz.session.compare.file_jobs import FileJobs
 from emaviz.session.compare.keep import keep
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.described import number
+from emaviz.session.inputs import Inputs, Provenance, digest, listed, version_of, version_with_side
 from emaviz.session.job import Job, Tell
 from emaviz.session.opened import Opened, all_measured, guesses, measured, read_opened, side_file_of, side_with
 from emaviz.session.session import Session
@@ -55,6 +56,7 @@ class Comparing:
         self.on_error = self._files.on_error
         self.asking = Asking(self.job, lambda: self._title, self.compare, self._chosen, self.events.missing)
         self._use(session.actuator)
+        self.provenance = Provenance("the comparison", "Compare", self.inputs, self.job)
 
     def close(self) -> None:
         """Ends the threads."""
@@ -94,6 +96,17 @@ class Comparing:
         """Takes a recording off the list; its file stays."""
         self.opened.pop(name, None)
         self.events.removed()
+
+    def version(self, name: str) -> str:
+        """By which a measurement of the data folder is known again, as it would be read now; '' where it is gone."""
+        opened = self.opened.get(name)
+        if opened is not None:
+            return opened.version_on(version_of(opened.path))
+        try:
+            path = self.folder.measurement(name)
+        except InputError:
+            return ""
+        return version_with_side(path)
 
     def use_mapping(self, name: str, mapping: ColumnMapping) -> None:
         """Reads the file with this mapping soon, and remembers it in the side file."""
@@ -220,6 +233,31 @@ class Comparing:
 
     # --- comparison -------------------------------------------------------------------------------------------------
 
+    def inputs(self, as_read: bool = False) -> Inputs:
+        """What a comparison takes; as_read: of the files as they were read, else as they are on the disk."""
+        opened = list(self.opened.values())
+        names = [one.name.rpartition("/")[2] for one in opened]
+        return Inputs(
+            listed(names),
+            files={one.name: one.version_on("" if as_read else version_of(one.path)) for one in opened},
+            options={
+                "the actuator": f"{self.actuator_name} {digest(self.actuator)}",
+                "the calibration": listed(sorted(self.free)) if self.calibrate else "off",
+                "the window of time": str(self.window_s or ""),
+                **{
+                    f"the weight of the {in_sentence(SIGNALS[name].title)}": str(weight)
+                    for name, weight in self.weights.items()
+                },
+            },
+        )
+
+    def ask(self) -> None:
+        """Compares what is chosen, as a person asks; a file that has changed on the disk is read again before."""
+        for one in list(self.opened.values()):
+            if version_of(one.path) not in ("", one.version):
+                self.add(one.name)
+        self.asking.ask(by_hand=True)
+
     def compare(self) -> bool:
         """Begins a comparison of what is chosen; False while another long run goes on.
 
@@ -233,7 +271,7 @@ class Comparing:
             raise InputError("calibration is on, but no parameter may move; free one, or turn it off")
         if self.window_s is not None:
             measurements = [m.selected(self.window_s) for m in measurements]
-        asked, elapsed_s = self._asked(), 0.0
+        asked, of, elapsed_s = self._asked(), self.inputs(as_read=True), 0.0
 
         def work(tell: Tell) -> None:
             from ema_model.comparison import compare  # here, since it brings all of scipy's optimisers
@@ -241,6 +279,7 @@ class Comparing:
             nonlocal elapsed_s
             began = time.perf_counter()
             self.comparison = compare(measurements, **asked, on_progress=tell)
+            self.provenance.take(of)
             elapsed_s = time.perf_counter() - began
 
         def done() -> str:
@@ -250,7 +289,7 @@ class Comparing:
             fitted = "" if found.calibration is None else f", calibrated in {found.calibration.evaluations} steps"
             return f"Compared in {elapsed_s:.1f} s{fitted}."
 
-        return self.job.begin(self._title, work, done)
+        return self.provenance.begin(lambda: self.job.begin(self._title, work, done), of)
 
     @property
     def _title(self) -> str:

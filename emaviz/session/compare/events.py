@@ -18,7 +18,7 @@ class CompareEvents:
 
     opened: Signal[[Opened]] = field(default_factory=Signal)  # also when mapped or laid out anew
     refused: Signal[[]] = field(default_factory=Signal)  # a layout that does not fit: all is as it was
-    failed: Signal[[str, str]] = field(default_factory=Signal)  # which of those above, and why; "": it is done
+    failed: Signal[[str, str, str]] = field(default_factory=Signal)  # which of those above, name, why; "": done
     removed: Signal[[]] = field(default_factory=Signal)
     missing: Signal[[str, bool]] = field(default_factory=Signal)  # for a comparison, "": it began; asked for by hand
     compared: Signal[[Comparison]] = field(default_factory=Signal)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import traceback
 from collections.abc import Callable
 
-from ema_model.errors import InputError, quoted
+from ema_model.errors import InputError
 from emaviz.session.compare.events import LAY_OUT, MAP, OPEN, SAVE
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.signal import Signal
-from emaviz.session.worker import Worker
+from emaviz.session.worker import Worker, report
 
 _CANNOT = {
     OPEN: "The file cannot be read",
@@ -22,8 +21,8 @@ _CANNOT = {
 class FileJobs:
     """One after another; what is wrong is told where it was asked for, and to all."""
 
-    def __init__(self, folder: DataFolder, failed: Signal[[str, str]], told: Signal[[str, str]]) -> None:
-        """failed(what, why): "" once it is done; told(title, line): to all."""
+    def __init__(self, folder: DataFolder, failed: Signal[[str, str, str]], told: Signal[[str, str]]) -> None:
+        """failed(what, name, why): "" once it is done; told(title, line): to all."""
         self._folder, self._failed, self._told = folder, failed, told
         self._worker = Worker("emaviz-files", self.on_error)
 
@@ -36,7 +35,7 @@ class FileJobs:
 
         def done() -> None:
             try:
-                self._try(what, job)
+                self._try(what, name, job)
             finally:
                 ended()
 
@@ -44,15 +43,14 @@ class FileJobs:
 
     def on_error(self, error: BaseException) -> None:
         """Of a thread that goes on."""
-        traceback.print_exception(error)
-        self._told("Something failed; the app goes on", f"{type(error).__name__}: {quoted(error)}")
+        report(error, self._told, _CANNOT[SAVE])
 
-    def _try(self, what: str, job: Callable[[], object]) -> None:
+    def _try(self, what: str, name: str, job: Callable[[], object]) -> None:
         try:
             job()
         except InputError as error:
             line = str(error).replace(f"{self._folder.folder}/", "")  # the page knows its files by their names there
-            self._failed(what, line)
+            self._failed(what, name, line)
             self._told(_CANNOT[what], line)
             return
-        self._failed(what, "")
+        self._failed(what, name, "")

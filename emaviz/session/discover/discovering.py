@@ -29,6 +29,7 @@ from emaviz.session.discover.saved_stories import SavedStories
 from emaviz.session.discover.sealing import Sealing
 from emaviz.session.discover.shown import Shown
 from emaviz.session.discover.source import NOTHING, DiscoverySource
+from emaviz.session.inputs import Provenance
 from emaviz.session.job import Job, Tell
 from emaviz.session.session import Session
 from emaviz.session.worker import Worker
@@ -44,9 +45,12 @@ class Discovering:
         self.source = DiscoverySource(comparing)
         self.sealing = Sealing(session, comparing.folder)
         self.job = Job(session.worker, on_stop=self._stopped, on_divergence="the model stays as it was")
+        self.provenance = Provenance("the discovery", "Start", self.source.inputs, self.job)
         self.entries = Entries(self.source)
         self._shown = Shown(self.source, self.entries, self.events.looked)
-        self._stories = SavedStories(self.job, self.source, self.entries, self._shown, lambda: comparing.opened)
+        self._stories = SavedStories(
+            self.job, self.source, self.entries, self._shown, lambda: comparing.opened, self.provenance
+        )
         self._own = OwnPreview()
         self._files = Worker("emaviz-discovery-files", comparing.on_error)
 
@@ -82,6 +86,7 @@ class Discovering:
             self._take_again(entry)
             return
         self.source.recall(entry.recipe, entry.challenge, entry.revealed)
+        self.provenance.take(entry.inputs)
         self._shown.recall(entry)
 
     def _leave(self) -> None:
@@ -90,20 +95,34 @@ class Discovering:
         self.job.stop()  # one that waits to begin
         self._shown.leave()
         self._stories.forget()
+        self.provenance.clear()
 
     # --- steps ------------------------------------------------------------------------------------------------------
 
     def start(self) -> bool:
-        """Calibrates the model, and looks for what may be missing; False while another long run goes on."""
+        """Calibrates the model, and looks for what may be missing; False while another long run goes on.
+
+        Of a discovery of a session's file whose steps were not all taken again, they are.
+        """
+        if (unfinished := self._stories.unfinished) is not None:
+            if not self.job.waiting:
+                if self.session.worker.busy:
+                    return False
+                self._take_again(unfinished)
+            return True
         if not self.source.ready:
             raise InputError(NOTHING)
+        inputs = self.source.inputs()
 
         def job(tell: Tell) -> None:
             told = self._shown.begin(self.source.recipe(), tell)
             self._stories.forget()
+            if self.entries.current is not None:
+                self.entries.current.inputs = inputs
+            self.provenance.take(inputs)
             self._shown.assess(told, tell)
 
-        return self.job.begin("Calibrating the model", job)
+        return self.provenance.begin(lambda: self.job.begin("Calibrating the model", job), inputs)
 
     def add(self, name: str) -> bool:
         """The best of that effect, or that fault, into the model, refitted; then looks again."""
@@ -240,6 +259,9 @@ class Discovering:
             raise InputError("a step is running; wait for it, or stop it")
         if self.look is None or self._shown.told is None:
             raise InputError("there is no calibrated model yet; press Start")
+        if self._stories.unfinished is not None:  # one goes on from the steps that were taken
+            self._stories.forget()
+            self.provenance.take(self.source.inputs())
         return self._shown.told, self.look
 
     # --- a session --------------------------------------------------------------------------------------------------

@@ -13,6 +13,7 @@ from ema_model.quantities.numbers import number
 from emaviz.session.discover.progress import Telling
 from emaviz.session.discover.saved_story import Recipe, SavedStory
 from emaviz.session.discover.source import DiscoverySource
+from emaviz.session.inputs import Inputs
 
 _MOST_NAMES = 2  # of recordings, in an entry's words
 
@@ -29,6 +30,7 @@ class Entry:
     revealed: bool = False
     at: datetime = field(default_factory=datetime.now)
     brought: SavedStory | None = None  # what the file says, while there is no story
+    inputs: Inputs | None = None  # of the story
 
     def saved(self) -> SavedStory:
         """As a session's file has it."""

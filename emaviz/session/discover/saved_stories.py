@@ -13,7 +13,8 @@ from emaviz.session.discover.record import take_again
 from emaviz.session.discover.saved_story import SavedStory, story_of
 from emaviz.session.discover.shown import Shown
 from emaviz.session.discover.source import DiscoverySource
-from emaviz.session.job import RESTED, Job, Tell
+from emaviz.session.inputs import Provenance
+from emaviz.session.job import RESTED, Job, Stopped, Tell
 
 _MOST_BROUGHT = 50  # discoveries beside the shown one
 _MOST_WAIT_S = 20.0  # for measurements that may never be there
@@ -24,15 +25,27 @@ class SavedStories:
     """Saves all entries; takes those of a file."""
 
     def __init__(
-        self, job: Job, source: DiscoverySource, entries: Entries, shown: Shown, opened: Callable[[], Collection[str]]
+        self,
+        job: Job,
+        source: DiscoverySource,
+        entries: Entries,
+        shown: Shown,
+        opened: Callable[[], Collection[str]],
+        provenance: Provenance,
     ) -> None:
         """opened(): names of the recordings that are open on Compare."""
         self._job, self._source, self._entries, self._shown, self._opened = job, source, entries, shown, opened
-        self._again: SavedStory | None = None  # what is being taken again
+        self._provenance = provenance
+        self._again: SavedStory | None = None  # what is being taken again, or was when it was stopped
 
     def forget(self) -> None:
         """What was being taken again is put away."""
         self._again = None
+
+    @property
+    def unfinished(self) -> Entry | None:
+        """The discovery of a file whose steps are not all taken again."""
+        return self._entries.current if self._again is not None else None
 
     def saved(self) -> SavedStory | None:
         """Every discovery, the one that is shown (else the last) first and the rest as its others; None without one."""
@@ -66,20 +79,27 @@ class SavedStories:
 
     def take_again(self, entry: Entry) -> None:
         """The steps of one that a file brought, once nothing else runs; its fits begin where they ended then."""
-        saved, shown = entry.brought, self._shown
+        saved, shown = entry.brought or self._again, self._shown
         assert saved is not None, "it has no story yet"
         self._source.take(saved.recipe)
         shown.leave()
+        entry.told, entry.look, entry.brought = None, None, saved
         self._entries.current, self._again = entry, saved
 
         def job(tell: Tell) -> None:
+            inputs = self._source.inputs()
             try:
                 told = shown.begin(saved.recipe, tell)
                 shown.assess(told, tell)  # the first step's cards are what the report ranks
                 take_again(told.story, saved.steps, tell, lambda: shown.show(told))
-                told.experiment, self._source.revealed = saved.experiment, saved.revealed
-            finally:
+            except Stopped:
+                raise  # the rest can be taken later
+            except BaseException:
                 self._again = None
+                raise
+            told.experiment, self._source.revealed = saved.experiment, saved.revealed
+            self._again, entry.inputs = None, inputs
+            self._provenance.take(inputs)
             shown.assess(told, tell)
 
         wanted, until = {*saved.recipe.fitted, *saved.recipe.held}, time.perf_counter() + _MOST_WAIT_S
@@ -88,4 +108,7 @@ class SavedStories:
             open_or_late = wanted <= {*self._opened()} or time.perf_counter() > until
             return "" if open_or_late else "its measurements, which are being read"
 
-        self._job.begin_in_turn(_TITLE, lambda: self._job.begin(_TITLE, job), waits_for, RESTED)
+        def begin() -> bool:
+            return self._provenance.begin(lambda: self._job.begin(_TITLE, job))
+
+        self._job.begin_in_turn(_TITLE, begin, waits_for, RESTED)

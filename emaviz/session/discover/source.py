@@ -17,6 +17,7 @@ from ema_model.files.limits import CHALLENGE_RECORDING_BYTES
 from ema_model.recordings import Measurement, read
 from emaviz.session.compare.comparing import USUAL, Comparing
 from emaviz.session.discover.saved_story import Recipe
+from emaviz.session.inputs import Inputs, digest, listed, version_of
 
 COMPARED = "The measurements of Compare"
 NOTHING = "no measurement to fit is chosen; open one on Compare, or choose a challenge"
@@ -71,6 +72,25 @@ class DiscoverySource:
     def ready(self) -> bool:
         """Whether there is something to start with."""
         return self.challenge is not None or any(name not in self.held_out for name in self.compared)
+
+    def inputs(self) -> Inputs:
+        """What a discovery would take now."""
+        comparing = self._comparing
+        if self.challenge is not None:
+            sealed = self.challenge.sealed
+            version = "" if sealed is None else version_of(sealed)
+            return Inputs(self.challenge.title, self.chosen, {self.chosen: version or "shipped"})
+        known = list(self.compared)
+        fitted = [name for name in known if name not in self.held_out]
+        options = {
+            "the actuator": digest(comparing.actuator),
+            "the choice of what may move": listed(sorted(comparing.free)),
+            "the window of time": str(comparing.window_s or ""),
+            "the choice of signals": listed(list(comparing.weights)),
+            "what is held out": listed([name for name in known if name in self.held_out]),
+        }
+        subject = listed([name.rpartition("/")[2] for name in fitted])
+        return Inputs(subject, files={name: comparing.version(name) for name in known}, options=options)
 
     def recipe(self) -> Recipe:
         """What is chosen now; InputError where nothing is left to fit."""

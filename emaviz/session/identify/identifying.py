@@ -3,20 +3,30 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ema_model.actuator import Actuator
+from ema_model.faults import NAMES
 from ema_model.identification.objective import Objective
 from ema_model.identification.run import Identification, Progress
 from ema_model.identification.words import in_one_line
 from ema_model.recordings import Measurement
+from emaviz.session.described import title
 from emaviz.session.identify.race import OpenFile, Race, begin, run, target
+from emaviz.session.inputs import Inputs, Provenance
 from emaviz.session.job import Job, Run
-from emaviz.session.settings import Settings
+from emaviz.session.settings import SLIDERS, Settings
 from emaviz.session.signal import Signal
 from emaviz.session.worker import Steps, Worker
+
+_SEARCH = ("population", "iterations", "fitness", "seed")
+_PLANT = (  # settings of the sliders' plant beside its k and its command
+    *("duration_s", "load_torque_Nm", "load_shape", "load_time_s", "load_frequency_Hz", "current_noise_A"),
+    *("encoder_bits", "start_offset_rad", "start_speed_rad_s", "start_side", "effects"),
+)
 
 if TYPE_CHECKING:  # rerun may be missing or broken, and takes a second to import
     from emaviz.recording.story import IdentificationStory
@@ -25,11 +35,17 @@ if TYPE_CHECKING:  # rerun may be missing or broken, and takes a second to impor
 class Identifying:
     """Its job, and the last answer.  Signals are called on the compute thread, so listeners only hand over."""
 
-    def __init__(self, worker: Worker, monitor: Actuator, folder: Path, told: Signal[[str, str]]) -> None:
-        """monitor: whose k are looked for; folder: of recordings; told: a title and a line of what has failed."""
+    def __init__(
+        self, worker: Worker, monitor: Actuator, folder: Path, told: Signal[[str, str]], inputs: Callable[[], Inputs]
+    ) -> None:
+        """monitor: whose k are looked for; folder: of recordings; told: a title and a line of what has failed.
+
+        inputs(): what an identification would take now.
+        """
         self.job = Job(worker)
         self.progressed: Signal[[Race]] = Signal()
         self.identified: Signal[[Race]] = Signal()
+        self.provenance = Provenance("the answer", "Identify", inputs, self.job)
         self.answer: Identification | None = None
         self.answered_at: datetime | None = None
         self._monitor, self._folder, self._told = monitor, folder, told
@@ -56,7 +72,7 @@ class Identifying:
             said = in_one_line(race.best.answer)
             return said if race.ran_whole else f"Stopped; the best so far is kept. {said}"
 
-        return self.job.begin("Identifying", work, done)
+        return self.provenance.begin(lambda: self.job.begin("Identifying", work, done))
 
     def _race(self, race: Race, measurement: Measurement, asked: Run) -> Steps:
         story = self._story(race, measurement)
@@ -79,6 +95,7 @@ class Identifying:
         best = race.best
         assert best is not None and best.answer is not None, "the race is over"
         self.answer, self.answered_at = best.answer, datetime.now()
+        self.provenance.take()
         if story is not None:
             others = [answer for answer in race.answers if answer is not best.answer]
             story.finish(best.answer, *others)
@@ -102,6 +119,18 @@ class Identifying:
         except (OSError, ImportError) as error:  # a run without its recording is still a run
             self._told("The recording cannot be written", " ".join(str(error).split()))
             return None
+
+
+def inputs_of(settings: Settings, plant: str, version: Callable[[str], str]) -> Inputs:
+    """What an identification takes; plant: the name of the sliders' model; version(name): of a measurement."""
+    options = {title(Settings, name): str(getattr(settings, name)) for name in (*_SEARCH, "algorithms")}
+    if settings.source != SLIDERS:
+        subject = settings.source.rpartition("/")[2]
+        return Inputs(subject, settings.source, {settings.source: version(settings.source)}, options)
+    made = {title(Settings, name): str(getattr(settings, name)) for name in _PLANT}
+    made |= {name: str(value) for name, value in zip(NAMES, settings.k.tolist())}
+    made["the command"] = f"{settings.command} {settings.command_settings[settings.command]}"
+    return Inputs("the sliders' plant", SLIDERS, {}, {"the plant's model": plant, **made, **options})
 
 
 def readable(settings: Settings) -> dict[str, Any]:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Collection, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -23,6 +25,7 @@ from ema_model.tracking.result import Tracked
 from ema_model.tracking.track import check_thresholds
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.described import number
+from emaviz.session.inputs import Inputs, Provenance, version_with_side
 from emaviz.session.job import RESTED, Job, Run, Stopped
 from emaviz.session.opened import side_file_of
 from emaviz.session.practice import Practice
@@ -62,10 +65,13 @@ class Following:
         self._growing: History | None = None
         self._path: Path | None = folder.folder  # None: a session's, which is not there
         self._flights: dict[Path, Flight] = {}
+        self._versions: dict[Path, str] = {}  # of the recordings that were read
+        self._looks_on = False  # at what arrives, since flights of this folder were asked for
         self._brought_flights: list[Flight] = []  # by a session, until they are followed
         self._watched = Watched()
         self._closed = threading.Event()
         self._looks: threading.Thread | None = None
+        self.provenance = Provenance("the life", "Track", self.inputs, self.job)
 
     def close(self) -> None:
         """Ends the threads."""
@@ -82,10 +88,27 @@ class Following:
         if name != self.chosen or self._path != path:
             self.chosen, self.history, self._growing, self.left_out = str(name), None, None, {}
             self._path, self._flights, self._brought_flights, self._watched = path, {}, [], Watched()
+            self._versions, self._looks_on = {}, False
+            self.provenance.clear()
             challenge = self.practice.held(self.chosen)
             own = dict(self.thresholds.items() - self._brought.items())
             self._brought = {} if challenge is None else challenge.thresholds
             self.thresholds = own | self._brought
+
+    def inputs(self) -> Inputs:
+        """What would be followed now; of a folder that is watched, what arrives is taken up by itself."""
+        files, path = None, self._path
+        if path is not None:
+            with suppress(OSError):
+                files = {one: version_with_side(one) for one in recordings_in(path)}
+                if self.watching and self._looks_on:
+                    files = {one: self._versions[one] for one in files if one in self._versions}
+        return self._inputs(files)
+
+    def _inputs(self, files: Mapping[Path, str] | None) -> Inputs:
+        named = None if files is None else {f"{self.chosen}/{path.name}": version for path, version in files.items()}
+        options = {f"the threshold of {name}": str(at) for name, at in self.thresholds.items()}
+        return Inputs(self.chosen, self.chosen, named, options)
 
     def set_threshold(self, name: str, value: Any) -> None:
         """Where the life ends by a k; None for nowhere.  InputError for a value that is no threshold."""
@@ -125,8 +148,9 @@ class Following:
         self._path = self._path or self.folder.inner(self.chosen)  # it may have come since
         paths = self._paths(self._path)
         self.left_out = {}  # it may have been mended
+        self._forget_all_but([path for path in paths if self._versions.get(path) == version_with_side(path)])
         self._watched.arrived(paths)
-        started = self._start(paths, "Identifying flights")
+        started = self.provenance.begin(lambda: self._start(paths, "Identifying flights"))
         if started:
             self._watched.take(paths)
             self._watch()
@@ -173,6 +197,7 @@ class Following:
             run(text, (1.0 - _FOLLOWING) * done / count)
 
         run(text, (1.0 - _FOLLOWING) * place / count)
+        self._versions[path] = version_with_side(path)
         try:
             side = side_file_of(path, self.folder) or SideFile()
             recording = read(path, self.session.actuator, side=side)
@@ -189,16 +214,30 @@ class Following:
         """Looks after each flight, of all that are identified; share: of the bar."""
         self._grow([self._flights[path] for path in in_order(self._flights)], run, share)
 
+    def _forget_all_but(self, paths: Collection[Path]) -> None:
+        """Flights whose recordings were removed, or are others by now, are followed no more."""
+        self._flights = {path: flight for path, flight in self._flights.items() if path in paths}
+        self._versions = {path: version for path, version in self._versions.items() if path in paths}
+
+    @property
+    def complaints(self) -> list[str]:
+        """Why files are left out, of those that are still there."""
+        path, left_out = self._path, dict(self.left_out)
+        return [why for name, why in left_out.items() if path is None or (path / name).exists()]
+
     def _grow(self, flights: list[Flight], run: Run, share: float) -> None:
         if self._growing is None or self._growing.thresholds != self.thresholds:
             self._growing = History(self.thresholds)
         for done in self._growing.follow(flights):
             run.say(f"after flight {done}", 1.0 - share * (1.0 - done / len(flights)))
         self.history = self._growing.copy()
+        if self.last is not None:
+            self.provenance.take(self._inputs(None if self._path is None else dict(self._versions)))
 
     # --- what arrives -----------------------------------------------------------------------------------------------
 
     def _watch(self) -> None:
+        self._looks_on = True
         if self._looks is None:
             self._looks = threading.Thread(target=self._look_on, name="emaviz-flights", daemon=True)
             self._looks.start()
@@ -206,7 +245,7 @@ class Following:
     def _look_on(self) -> None:
         while not self._closed.wait(LOOK_S):
             path = self._path
-            if self.watching and self.chosen and path is not None and not self.session.worker.busy:
+            if self.watching and self._looks_on and self.chosen and path is not None and not self.session.worker.busy:
                 try:
                     self.take_up(self._watched.arrived(recordings_in(path)))
                 except (InputError, OSError) as error:
@@ -217,6 +256,7 @@ class Following:
         """Files that have arrived, or were replaced; each that cannot be put among the others is left out, and said."""
         if not new:
             return
+        self._forget_all_but([path for path in {**self._flights, **self._versions} if path.exists()])
         for path in new:
             self._flights.pop(path, None)
             self.left_out.pop(path.name, None)
@@ -235,8 +275,14 @@ class Following:
 
     def saved(self) -> dict[str, Any]:
         """The flights that are followed, as they were identified, and what is asked of them."""
-        flights = self._brought_flights if self.history is None else self.history.flights
+        flights = self._known()
         return kept.saved(self.chosen, self.thresholds, as_toml(self.session.actuator), flights, dict(self._flights))
+
+    def _known(self) -> list[Flight]:
+        """The flights that are identified, in order, also before there are enough of them to be followed."""
+        history = [] if self.history is None else self.history.flights
+        identified = [self._flights[path] for path in in_order(dict(self._flights))]
+        return max(self._brought_flights if self.history is None else [], history, identified, key=len)
 
     def restore(self, saved: Any) -> None:
         """Takes what `saved` gave: its flights are followed soon, and none is identified, whether it is there or not.
@@ -262,9 +308,12 @@ class Following:
         self._flights = {
             path: flight for path, one, flight in zip(files, told.flights, flights) if one.file and one.is_of(path)
         }
+        self._versions = {path: version_with_side(path) if path in self._flights else "" for path in files}
         self._watched.arrived(self._flights)
         self._watched.take(self._flights)
+        self._looks_on = False  # flights that came since are long work, which is asked for
         self._brought_flights = flights
+        self.provenance.clear()
         if not flights:
             return
 
@@ -275,7 +324,11 @@ class Following:
                 self.events.followed(self.history)
 
         title = "Following k"
-        self.job.begin_in_turn(title, lambda: self.job.begin(title, work), rests=RESTED)
+
+        def begin() -> bool:
+            return self.provenance.begin(lambda: self.job.begin(title, work))
+
+        self.job.begin_in_turn(title, begin, rests=RESTED)
 
     # --- what stays -------------------------------------------------------------------------------------------------
 

@@ -17,6 +17,7 @@ from ema_model.units.folders import check_same_type, units_in
 from ema_model.units.result import UnitsCompared
 from emaviz.session import actuators as actuator_files
 from emaviz.session.data_folder import DataFolder
+from emaviz.session.inputs import Inputs, Provenance, digest, version_with_side
 from emaviz.session.job import Job, Run
 from emaviz.session.opened import side_file_of
 from emaviz.session.practice import Practice
@@ -51,6 +52,33 @@ class ComparingUnits:
         self.actuator: Actuator = session.actuator
         self.actuator_name = session.actuator.name
         self.found: UnitsCompared | None = None
+        self.provenance = Provenance("the comparison", "Compare units", self.inputs, self.job)
+
+    def inputs(self) -> Inputs:
+        """What a comparison would take now."""
+        try:
+            folder = self.folder.inner(self.chosen)
+        except InputError:
+            files = None  # a session's, which is not there
+        else:
+            files = {
+                f"{self.chosen}/{file.relative_to(folder).as_posix()}": version_with_side(file)
+                for file in _recordings(self._units(folder))
+            }
+        options = {
+            "the rule to hold out": self.rule.strip(),
+            "the actuator": f"{self.actuator_name} {digest(self.actuator)}",
+        }
+        return Inputs(self.chosen, self.chosen, files, options)
+
+    def _units(self, folder: Path) -> dict[str, list[Path]]:
+        """The recordings of each; none where there is no unit."""
+        try:
+            units = units_in(folder)
+        except InputError:
+            return {}
+        own = {one.name for one in self.folder.own} if folder == self.folder.folder else set()
+        return {name: files for name, files in units.items() if name not in own}
 
     def fleets(self) -> dict[str, int]:
         """The folders of the data folder in which two folders or more hold recordings, and how many do."""
@@ -71,6 +99,7 @@ class ComparingUnits:
         """A folder by its name; InputError where there is none."""
         self.folder.inner(str(name))
         self.chosen, self.found = str(name), None
+        self.provenance.clear()
 
     def choose_actuator(self, name: Any) -> None:
         """One of `actuators`; InputError for another, or a file that is no actuator."""
@@ -85,12 +114,11 @@ class ComparingUnits:
         """
         if not self.chosen:
             raise InputError("no folder of units is chosen; put one into the data folder, a folder in it for each unit")
-        units = units_in(self.folder.inner(self.chosen))
-        own = {one.name for one in self.folder.own} if self.chosen == "." else set()
-        units = {name: files for name, files in units.items() if name not in own}
+        folder = self.folder.inner(self.chosen)
+        units = self._units(folder) or units_in(folder)  # which says why there is none
         if len(units) == 1:
             raise InputError(f"one unit only ({quoted(next(iter(units)), 60)}): two or more are needed to compare")
-        check_same_type([file for files in units.values() for file in files])
+        check_same_type(_recordings(units))
         fitted, held = _held_out(units, self.rule.strip())
         actuator = self.actuator
 
@@ -107,9 +135,10 @@ class ComparingUnits:
         def done() -> None:
             assert found is not None, "it came to its end"
             self.found = found
+            self.provenance.take()
             self.events.compared(found)
 
-        return self.job.begin("Comparing units", work, done)
+        return self.provenance.begin(lambda: self.job.begin("Comparing units", work, done))
 
     def _read_all(
         self, units: Mapping[str, Sequence[Path]], actuator: Actuator, run: Run, told: list[str]
@@ -160,6 +189,9 @@ class ComparingUnits:
         if actuator in self.actuators():
             self.choose_actuator(actuator)
         self.chosen, self.rule, self.found = told.folder, told.rule, found
+        self.provenance.clear()
+        if found is not None:
+            self.provenance.restored()
 
     def files(self) -> list[str]:
         """Names in the data folder of what a session needs for it."""
@@ -176,6 +208,10 @@ class ComparingUnits:
             path = self.folder.fresh(self.folder.actuators, "type", suffix)
             save_actuator(found.type_actuator, path)
         self.events.kept(path)
+
+
+def _recordings(units: Mapping[str, Sequence[Path]]) -> list[Path]:
+    return [file for files in units.values() for file in files]
 
 
 def _held_out(units: dict[str, list[Path]], rule: str) -> tuple[dict[str, list[Path]], dict[str, list[Path]]]:

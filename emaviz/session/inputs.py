@@ -1,0 +1,223 @@
+"""What a result was computed from, and whether that still is what is chosen: one rule for every tab."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from ema_model.recordings import side_path
+from emaviz.session.described import taken
+from emaviz.session.job import Job
+from emaviz.session.saved import Part
+
+_MOST_NAMES = 3
+
+
+class Inputs(msgspec.Struct, frozen=True):
+    """Of one result.
+
+    subject: what it is of, in words; source: which of several it is made from, as a folder's name, of which all else
+    depends; files: a version of each, by its name in the data folder, None where they cannot
+    be looked at; options: a value of each, by what it is called in a sentence.
+    """
+
+    subject: str = ""
+    source: str = ""
+    files: dict[str, str] | None = msgspec.field(default_factory=dict)
+    options: dict[str, str] = msgspec.field(default_factory=dict)
+
+    def changed(self, now: Inputs) -> str:
+        """What is different now: 'chirp.csv was removed and the window of time was changed'; '' for nothing."""
+        if self.source != now.source:
+            return "another source was chosen"
+        parts: list[str] = []
+        if self.files is not None and now.files is not None:
+            both = self.files.keys() & {name for name, version in now.files.items() if version}
+            for names, what in (
+                ([name for name in self.files if name not in both], "removed"),
+                ([name for name in now.files if name not in both], "added"),
+                ([name for name in self.files if name in both and self.files[name] != now.files[name]], "changed"),
+            ):
+                parts += _said([name.rpartition("/")[2] for name in names], what)
+        options = [name for name in {**self.options, **now.options} if self.options.get(name) != now.options.get(name)]
+        return listed(parts + _said(options, "changed"))
+
+    def renamed(self, names: Mapping[str, str]) -> Inputs:
+        """With the files' names of now, by those of then."""
+        files = self.files and {names.get(name, name): version for name, version in self.files.items()}
+        return msgspec.structs.replace(self, files=files)
+
+
+class SavedResult(msgspec.Struct, frozen=True):
+    """What a session's file says of a result; the result itself is kept by its tab, where it is."""
+
+    inputs: Inputs | None = None
+    running: str = ""  # what was being computed when it was saved
+
+
+class Provenance:
+    """Of the result that a tab shows.  Read and written on any thread."""
+
+    def __init__(self, what: str, start: str, now: Callable[[], Inputs], job: Job | None = None) -> None:
+        """what: the result, as 'the comparison'; start: the button that computes it; now(): what that would take."""
+        self.what, self.start, self.now = what, start, now
+        self.of: Inputs | None = None  # what is shown; None for nothing
+        self.missing: SavedResult | None = None  # a session had it, and it is to be computed again
+        self._job = job
+        self._restored = False  # a session brought the result itself
+        self._coming: Inputs | None = None  # of the run that goes on
+        self._error: Inputs | None = None  # of which something was refused, or has failed
+        if job is not None:
+            job.ended.connect(lambda _: self._ended(job))
+
+    # --- runs -------------------------------------------------------------------------------------------------------
+
+    def begin(self, begin: Callable[[], bool], of: Inputs | None = None) -> bool:
+        """Begins a run whose result takes the place of the shown one; of: its inputs, else what they are now."""
+        before, begun = self._coming, False
+        self._coming = self.now() if of is None else of
+        try:
+            begun = begin()
+        finally:
+            if not begun:
+                self._coming = before
+        return begun
+
+    def take(self, of: Inputs | None = None) -> None:
+        """A result is there; of: its inputs, else those of the run that goes on."""
+        self.of, self.missing, self._coming = of or self._coming or self.now(), None, None
+
+    def clear(self) -> None:
+        """Nothing is shown any more."""
+        self.of = self.missing = self._error = None
+
+    def _ended(self, job: Job) -> None:
+        if job.error:
+            self._error = self._coming or self.now()
+        self._coming = None
+
+    # --- errors -----------------------------------------------------------------------------------------------------
+
+    def refused(self) -> None:
+        """Something was said of what is chosen now."""
+        self._error = self.now()
+
+    def forget_error(self) -> bool:
+        """Whether what was refused, or has failed, is not what is chosen any more; true once."""
+        gone = self._error is not None and bool(self._error.changed(self.now()))
+        if gone:
+            self._error = None
+            if self._job is not None and not self._job.running:
+                self._job.error = ""
+        return gone
+
+    # --- in words ---------------------------------------------------------------------------------------------------
+
+    @property
+    def computing(self) -> bool:
+        """Whether the next result is on its way."""
+        return self._coming is not None or (self._job is not None and self._job.waiting)
+
+    def line(self, start: str = "") -> str:
+        """A sentence where what is shown is not what is chosen; '' where it is.  start: as the button is called now."""
+        press = f"press {start or self.start}"
+        if (missing := self.missing) is not None:
+            had = f"{self.what} of {missing.inputs.subject}" if missing.inputs is not None else ""
+            running = f"“{missing.running}” was running when this session was saved" if missing.running else ""
+            if self.computing:
+                had = f"this session's {had.removeprefix('the ')}" if had else "what was running in this session"
+                return f"Being computed again: {had}."
+            if not had:
+                return f"Not computed: {running}; {press}."
+            again = f"To be computed again: {had}, which this session was saved with; {press}."
+            return f"{again} {running}." if running else again
+        if self.of is None:
+            return ""
+        changed = self.of.changed(self.now())
+        if self.computing:
+            return f"Out of date: {f'{changed} since; ' if changed else ''}another one is being computed."
+        return f"Out of date: {changed} since; {press}." if changed else ""
+
+    def note(self) -> str:
+        """For what is written while it is out of date; '' otherwise."""
+        changed = "" if self.of is None else self.of.changed(self.now())
+        return f"as it was computed: {changed} since" if changed else ""
+
+    # --- a session --------------------------------------------------------------------------------------------------
+
+    def saved(self) -> SavedResult | None:
+        """For a session's file; None where nothing is shown, nor computed."""
+        job, missing = self._job, self.missing
+        running = "" if job is None or not (job.running or job.waiting) else job.title
+        if missing is not None:
+            return SavedResult(missing.inputs, running or missing.running)
+        return SavedResult(self.of, running) if self.of is not None or running else None
+
+    def restored(self) -> None:
+        """Its tab has the result itself from a session; `bring` says of what it is."""
+        self.take()
+        self._restored = True
+
+    def bring(self, saved: SavedResult | None, names: Mapping[str, str]) -> None:
+        """Once its tab has taken its part of a session; names: the files' names of now by those of then."""
+        restored, self._restored = self._restored, False
+        self.missing = self._error = None
+        if saved is None:
+            return
+        inputs = None if saved.inputs is None else saved.inputs.renamed(names)
+        if restored and inputs is not None:
+            self.of = inputs
+        is_here = inputs is not None and self.of is not None and not self.of.changed(inputs)
+        if saved.running or not is_here:
+            self.missing = SavedResult(inputs, saved.running)
+
+
+def results_part(members: Callable[[], Mapping[str, Provenance]]) -> Part:
+    """A session's part for the results of all tabs; to be restored after the tabs' own.  members(): by name."""
+
+    def save() -> dict[str, Any]:
+        saved = {name: one.saved() for name, one in members().items()}
+        return msgspec.to_builtins({name: one for name, one in saved.items() if one is not None})
+
+    def restore(given: Any, names: Mapping[str, str]) -> None:
+        saved: dict[str, SavedResult] = taken(dict[str, SavedResult], given, "list of results")
+        for name, one in members().items():
+            one.bring(saved.get(name), names)
+
+    return Part(save, restore)
+
+
+def version_of(path: Path, *said: object) -> str:
+    """By which a file is known again, with what was said of how to read it; '' where it is not there."""
+    try:
+        at = path.stat()
+    except OSError:
+        return ""
+    return " ".join((str(at.st_size), str(at.st_mtime_ns), *(digest(one) for one in said)))
+
+
+def version_with_side(path: Path) -> str:
+    """The same of a recording with its side file."""
+    return f"{version_of(path)} {version_of(side_path(path))}".strip()
+
+
+def digest(value: object) -> str:
+    """A short text that is another one for another value."""
+    return hashlib.sha256(repr(value).encode()).hexdigest()[:16]
+
+
+def listed(words: list[str]) -> str:
+    """'a, b and c'."""
+    return " and ".join(filter(None, (", ".join(words[:-1]), *words[-1:])))
+
+
+def _said(names: list[str], what: str) -> list[str]:
+    if not names:
+        return []
+    more = len(names) - _MOST_NAMES
+    shown = names if more <= 0 else [*names[:_MOST_NAMES], f"{more} more"]
+    return [f"{listed(shown)} {'was' if len(names) == 1 else 'were'} {what}"]

@@ -67,9 +67,7 @@ class Inside:
         if control is None or getattr(control, "disabled", False):
             return False
         gui, inside = control._impl.gui_api, control
-        while inside is not None and not isinstance(
-            inside, viser.PanelHandle
-        ):  # as each window shows it
+        while inside is not None and not isinstance(inside, viser.PanelHandle):  # as each window shows it
             if not getattr(inside, "visible", True):
                 return False
             if isinstance(inside, viser.GuiTabHandle):

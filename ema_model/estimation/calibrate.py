@@ -280,11 +280,18 @@ def calibrated(problem: Problem, x: Array, covariance: Array, most: float = 1.0)
     for i, u in enumerate(problem.unknowns):
         value = float(u.nominal + u.sigma * x[i])
         half = HALF_90 * u.sigma * min(most, float(np.sqrt(covariance[i, i])))
-        # What the file gives the value of its bound, as a delay of 0, was driven nowhere by standing there.
-        at_bound = bool((x[i] < u.low + 0.01 or x[i] > u.high - 0.01) and abs(x[i]) > _AS_IN_THE_FILE)
+        at_bound = driven_to_bound(u, float(x[i]))
         unit = on_axes(u.name, axes).unit
         found[u.name] = Calibrated(value, u.nominal, (value - half, value + half), unit, float(x[i]), at_bound)
     return {**found, **_eccentricity(problem, x, covariance)} if "k6" in found else found
+
+
+def driven_to_bound(unknown: Unknown, x: float) -> bool:
+    """Whether x, in σ, ended at a bound.
+
+    What the file gives the value of its bound, as a delay of 0, was driven nowhere by standing there.
+    """
+    return (x < unknown.low + 0.01 or x > unknown.high - 0.01) and abs(x) > _AS_IN_THE_FILE
 
 
 def _eccentricity(problem: Problem, x: Array, covariance: Array) -> dict[str, Calibrated]:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtri, stdtrit
 
 from ema_model import faults
+from ema_model.estimation.calibrate import driven_to_bound
 from ema_model.estimation.feldman_cousins import above_zero, length_of_vector
 from ema_model.estimation.unknowns import ECCENTRICITY, K_SIGMA, polar, to_vector
 from ema_model.identification.adequacy import Adequacy, adequacy
@@ -36,7 +37,6 @@ _INSEPARABLE = 0.9
 _WIDE = 0.03  # σ of a k below which it counts as known
 _ANY = 0.4  # width of an interval from which on a k is hardly known
 _LEAST_SPREAD = 0.02  # of a fit that left the base parameters where they were
-_AT_BOUND = 1e-6  # of x from its bound
 _SLIGHT = 2e-5  # least σ: as well as the models' steps in time let any k be told
 
 
@@ -142,10 +142,9 @@ def _sigmas(fits: Sequence[Fitted], basins: Sequence[_Basin]) -> dict[str, float
     A misfit widens it as it widens k.
     """
     problem, x = fits[0].problem, fits[0].x
-    inside = (x > problem.low + _AT_BOUND) & (x < problem.high - _AT_BOUND)
     sigmas = {}
     for i, one in enumerate(problem.unknowns):
-        if one.kind != "parameter" or not inside[i]:
+        if one.kind != "parameter" or driven_to_bound(one, float(x[i])):
             continue
         halves = []
         for fit, basin in zip(fits, basins):
@@ -225,7 +224,7 @@ def _unbounded(found: Fitted) -> Array:
     slopes, residual = found.slopes[rows][:, moves], found.residual[rows]
     hessian = slopes.T @ slopes + np.diag(prior[moves] ** 2)
     gradient = slopes.T @ residual + (prior**2 * x)[moves]
-    at_bound = (x <= problem.low + _AT_BOUND) | (x >= problem.high - _AT_BOUND)
+    at_bound = (x <= problem.low + 1e-6) | (x >= problem.high - 1e-6)
     step = np.zeros(problem.count)
     if (at_bound & moves)[:FAULTS].any():  # elsewhere the fit is there already
         step[moves] = -np.linalg.solve(hessian + 1e-9 * np.diag(np.diag(hessian)), gradient)

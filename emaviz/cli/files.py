@@ -10,6 +10,7 @@ import os
 import unicodedata
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from glob import has_magic
 from pathlib import Path
 from typing import Generic, NamedTuple, TypeVar
 
@@ -145,7 +146,8 @@ def _named(
 
 
 def _files(text: str, declared: Input | Output) -> list[str]:
-    if isinstance(declared, Input) and declared.several and declared.is_file(text):
+    stands_for_others = os.path.isdir(text) or has_magic(text)  # else there is no need to ask what reads recordings
+    if isinstance(declared, Input) and declared.several and stands_for_others and declared.is_file(text):
         import emaviz.formats  # noqa: F401  they join the family
         from ema_model.recordings.recording_set import files_of
 

@@ -62,12 +62,22 @@ class SavedResult(msgspec.Struct, frozen=True):
 class Provenance:
     """Of the result that a tab shows.  Read and written on any thread."""
 
-    def __init__(self, what: str, start: str, now: Callable[[], Inputs], job: Job | None = None) -> None:
-        """what: the result, as 'the comparison'; start: the button that computes it; now(): what that would take."""
+    def __init__(
+        self,
+        what: str,
+        start: str,
+        now: Callable[[], Inputs],
+        job: Job | None = None,
+        soon: Callable[[], object] = lambda: False,
+    ) -> None:
+        """what: the result, as 'the comparison'; start: the button that computes it; now(): what that would take.
+
+        soon(): whether a run is about to begin by itself.
+        """
         self.what, self.start, self.now = what, start, now
         self.of: Inputs | None = None  # what is shown; None for nothing
         self.missing: SavedResult | None = None  # a session had it, and it is to be computed again
-        self._job = job
+        self._job, self._soon = job, soon
         self._restored = False  # a session brought the result itself
         self._coming: Inputs | None = None  # of the run that goes on
         self._error: Inputs | None = None  # of which something was refused, or has failed
@@ -120,7 +130,7 @@ class Provenance:
     @property
     def computing(self) -> bool:
         """Whether the next result is on its way."""
-        return self._coming is not None or (self._job is not None and self._job.waiting)
+        return self._coming is not None or (self._job is not None and self._job.waiting) or bool(self._soon())
 
     def line(self, start: str = "") -> str:
         """A sentence where what is shown is not what is chosen; '' where it is.  start: as the button is called now."""

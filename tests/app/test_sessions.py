@@ -19,6 +19,7 @@ from ema_model.simulation.run import Run, simulate_reference
 from emaviz.figures.identified_table import Row
 from emaviz.page.compare.kept import Asked
 from emaviz.page.playback import Looks
+from emaviz.page.runs.tab import RunsTab
 from emaviz.session import saved as session_file
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.described import taken
@@ -243,6 +244,50 @@ def test_two_tabs_stay_in_step_and_a_reload_keeps_the_state(page, app, browser):
     wait_until(lambda: float(slider(page, "k1").input_value()) == 0.35)
     assert page.get_by_label("Load torque [N·m]", exact=True).input_value() == "7"
     assert app.session.settings.load_torque_Nm == 7.0
+
+
+@pytest.mark.browser
+def test_what_is_out_of_date_is_marked_and_what_a_session_lacks_is_named_in_its_place(page, app, monkeypatch):
+    comparing = app.comparing
+    run = simulate_reference(Run(command("chirp", {}), 0.02), load_actuator(), HEALTHY)
+    comparing.calibrate = False
+    for name in ("a", "b"):
+        write_measurement(run, comparing.folder.uploads / f"{name}.csv")
+        comparing.add(f"uploads/{name}.csv")
+    wait_until(lambda: len(comparing.opened) == 2)
+    wait_until(lambda: comparing.provenance.of is not None and not comparing.provenance.line())
+    page.get_by_role("tab", name="Compare", exact=True).click()
+    page.get_by_role("button", name="Remove", exact=True).click()
+    banner = page.get_by_role("status").filter(has_text="was removed since; press Compare.")
+    banner.wait_for()
+    assert "Out of date: b.csv" in banner.inner_text() or "Out of date: a.csv" in banner.inner_text()
+    grey = "one => getComputedStyle(one.closest('.emaviz-out-of-date').parentElement.nextElementSibling).opacity"
+    assert float(banner.evaluate(grey)) < 0.9, "the result is greyed"
+    banner.get_by_role("button", name="Compare").click()  # presses the tab's own
+    banner.wait_for(state="hidden")
+    wait_until(lambda: comparing.comparison is not None and len(comparing.comparison.recordings) == 1)
+    wait_until(lambda: not comparing.running)
+
+    identifying = app.session.identifying.provenance
+    identifying.take()
+    session_file.write(
+        comparing.folder.sessions / "lacking.emaviz", app.shared.kept(), comparing.folder, list(comparing.opened)
+    )
+    identifying.clear()
+    monkeypatch.setattr(app.session.worker, "start", lambda *_: False)  # what begins by itself has to wait
+    page.get_by_role("tab", name="Runs", exact=True).click()
+    app.shared.tab(RunsTab).sessions.uploaded(comparing.folder.sessions / "lacking.emaviz")
+    page.get_by_text("lacking.emaviz is loaded:").wait_for()
+    said = page.locator("div", has_text="lacking.emaviz is loaded:").last.locator("xpath=..").inner_text()
+    assert "Identify. To be computed again: the answer of the sliders' plant" in said and "press Identify." in said
+    assert "Compare. Being computed again: this session's comparison of " in said and "Discover" not in said
+    for tab, line in (("Identify", "press Identify."), ("Compare", "Being computed again")):
+        page.get_by_role("tab", name=tab, exact=True).click()
+        page.get_by_role("status").filter(has_text=line).first.wait_for()
+    comparing.job.stop()
+    page.get_by_role("status").filter(has_text="press Compare.").get_by_role("button", name="Compare").wait_for()
+    comparing.calibrate = True
+    identifying.clear()
 
 
 @pytest.mark.long

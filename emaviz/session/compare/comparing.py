@@ -56,7 +56,9 @@ class Comparing:
         self.on_error = self._files.on_error
         self.asking = Asking(self.job, lambda: self._title, self.compare, self._chosen, self.events.missing)
         self._use(session.actuator)
-        self.provenance = Provenance("the comparison", "Compare", self.inputs, self.job)
+        self.provenance = Provenance(
+            "the comparison", "Compare", self.inputs, self.job, soon=lambda: self.asking.reading
+        )
 
     def close(self) -> None:
         """Ends the threads."""

@@ -149,7 +149,7 @@ def _name(response: Response) -> None:
     """Gives viser's page the app's name, before its script has a more exact one."""
     if not response.headers.get("Content-Type", "").startswith("text/html"):
         return
-    response.body = _named(response.body, response.headers.get("Content-Encoding") == "gzip")
+    response.body = _named(bytes(response.body), response.headers.get("Content-Encoding") == "gzip")
     if "Content-Length" in response.headers:
         del response.headers["Content-Length"]
         response.headers["Content-Length"] = str(len(response.body))

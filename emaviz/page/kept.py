@@ -9,9 +9,9 @@ from typing import Any, Protocol
 
 import viser
 
-from emaviz.page.identify.controls import recording_link
 from emaviz.page.page import Page
 from emaviz.page.style import IN_ROW
+from emaviz.page.viewer_links import recording_link
 from emaviz.recording.viewer import ViewerHost
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.inputs import Provenance

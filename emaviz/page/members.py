@@ -1,4 +1,4 @@
-"""Finds the tabs: every folder here that states a `WORKSPACE`, and whose `tab.py` defines its tab."""
+"""Finds the tabs: every file here that states a `WORKSPACE` and defines its tab, or folder whose `tab.py` does."""
 
 from __future__ import annotations
 
@@ -10,7 +10,10 @@ from emaviz.page.tab import Tab
 
 def tabs() -> list[type[Tab]]:
     """In their order."""
-    folders = members("emaviz.page", "WORKSPACE", files=False, folders=True)
-    modules = [importlib.import_module(f"emaviz.page.{name}.tab") for name in folders]
-    found: list[type[Tab]] = [one for module in modules for one in classes_in(module, Tab)]
+    found: list[type[Tab]] = []
+    for name in members("emaviz.page", "WORKSPACE", files=True, folders=True):
+        module = importlib.import_module(f"emaviz.page.{name}")
+        if hasattr(module, "__path__"):
+            module = importlib.import_module(f"emaviz.page.{name}.tab")
+        found += classes_in(module, Tab)
     return sorted(found, key=lambda one: one.workspace.place)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import viser
@@ -18,7 +17,7 @@ from emaviz.page.job_line import JobLine
 from emaviz.page.page import Page
 from emaviz.page.standing import Standing
 from emaviz.page.style import IN_PAIRS
-from emaviz.page.viewer_links import LINK
+from emaviz.page.viewer_links import recording_link
 from emaviz.recording.viewer import ViewerHost
 from emaviz.session.compare.comparing import Comparing
 from emaviz.session.described import limits
@@ -210,19 +209,6 @@ class IdentifyPanel:
         self._result.finished(race)
         if race.path is not None:
             self._link.content = recording_link(self._viewer, race.path, "Open this run in Rerun ↗")
-
-
-def recording_link(viewer: ViewerHost | None, path: Path, text: str = "") -> Html:
-    """A link that opens a recording in the Rerun viewer, or its name where there is none."""
-    if viewer is None:
-        return html('<div style="padding:2px 10px;font-size:13px">{}</div>', path.name)
-    return html(
-        '<div style="padding:2px 10px;font-size:13px;overflow-wrap:anywhere"><a class="{}" href="{}" '
-        'target="_blank" rel="noopener">{}</a></div>',
-        LINK,
-        viewer.url_of(path.name),
-        text or f"Open {path.name} in Rerun ↗",
-    )
 
 
 def _line(inner: str) -> Html:

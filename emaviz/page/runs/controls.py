@@ -12,10 +12,10 @@ import viser
 
 from ema_model.errors import InputError
 from emaviz.figures.convergence import named
-from emaviz.page.identify.controls import recording_link
 from emaviz.page.page import Page
 from emaviz.page.runs import WORKSPACE
 from emaviz.page.runs.result import RunsResult
+from emaviz.page.viewer_links import recording_link
 from emaviz.recording.entry import Entry, error_said, setting
 from emaviz.recording.viewer import ViewerHost
 from emaviz.session.archive import Recorded

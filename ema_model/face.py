@@ -118,7 +118,7 @@ def _fits(value: object, kind: Any) -> bool:
     if kind in (float, int) and isinstance(value, bool | np.bool_):
         return False
     if kind is int:
-        return isinstance(value, int | np.integer) and value >= 0
+        return isinstance(value, int | np.integer) and bool(value >= 0)
     if kind is float:
         return isinstance(value, Real)
     return isinstance(value, (bool, np.bool_) if kind is bool else origin or kind)

@@ -1,7 +1,4 @@
-"""The command line: `verbs` has a file for each of its commands, beside it stands what they share.
-
-Exit codes: 0 done, 2 the input or the arguments are wrong (one line on stderr), 1 an internal failure.
-"""
+"""The command line: `verbs` has a file for each of its commands, beside it stands what they share."""
 
 from __future__ import annotations
 
@@ -11,7 +8,8 @@ from collections.abc import Sequence
 from ema_model.members import names
 
 # Whatever takes time is imported where an interrupt ends the program as it should.
-from emaviz.cli.interrupt import EXIT_CODE, until_interrupted
+from emaviz.cli.exit_code import ExitCode
+from emaviz.cli.interrupt import until_interrupted
 
 COMMANDS = tuple(names("emaviz.cli.verbs"))
 
@@ -32,14 +30,14 @@ def _run(given: list[str]) -> int:
             given.insert(0, "gui")
         try:
             parsed = parser_of(given[0]).parse_args(given)
-            return int(parsed.run(parsed) or 0)
+            return int(parsed.run(parsed) or ExitCode.DONE)
         except InputError as error:
             print(f"emaviz: {error}", file=sys.stderr)
-            return 2
+            return ExitCode.WRONG_INPUT
     except KeyboardInterrupt:
-        return EXIT_CODE
+        return ExitCode.INTERRUPTED
     except BrokenPipeError:  # the reader of our output went away, as `| head` does
         import os
 
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
+        return ExitCode.DONE

@@ -9,7 +9,8 @@ import sys
 import threading
 from collections.abc import Callable
 
-EXIT_CODE = 130  # as shells have it: 128 + SIGINT
+from emaviz.cli.exit_code import ExitCode
+
 _GRACE_S = 1.5  # to close recordings and remove drafts
 
 
@@ -32,7 +33,7 @@ def until_interrupted(run: Callable[[], int]) -> int:
             raise KeyboardInterrupt
 
     signal.signal(signal.SIGINT, interrupted)
-    code = EXIT_CODE
+    code = int(ExitCode.INTERRUPTED)
     try:
         _start_watch()
         code = run()
@@ -61,11 +62,11 @@ def _start_watch() -> None:
 
 def _watch(receiving: int) -> None:
     _wait(receiving)
-    late = threading.Timer(_GRACE_S, os._exit, (EXIT_CODE,))
+    late = threading.Timer(_GRACE_S, os._exit, (ExitCode.INTERRUPTED,))
     late.daemon = True
     late.start()
     _wait(receiving)
-    os._exit(EXIT_CODE)
+    os._exit(ExitCode.INTERRUPTED)
 
 
 def _wait(receiving: int) -> None:

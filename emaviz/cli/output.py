@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import sys
 import time
-from typing import Any
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 import numba
 import numpy as np
@@ -14,8 +15,11 @@ from ema_model.errors import InputError
 from ema_model.files.whole_file import whole_file
 from emaviz import __version__
 
+if TYPE_CHECKING:
+    from emaviz.cli.documents import HeadJson
 
-def write_json(arguments: Any, result: dict[str, Any]) -> None:
+
+def write_json(arguments: Any, result: Mapping[str, Any]) -> None:
     """Writes a result with its schema, versions, seed and options to --json, whole or not at all; nothing without it.
 
     InputError if it cannot be written.
@@ -23,16 +27,15 @@ def write_json(arguments: Any, result: dict[str, Any]) -> None:
     path = arguments.json
     if path is None:
         return
-    document = {
+    head: HeadJson = {
         "schema": 1,
         "versions": {"emaviz": __version__, "numpy": np.__version__, "numba": numba.__version__},
         "seed": getattr(arguments, "seed", 0),
         "configuration": configuration(arguments),
-        **result,
     }
     try:
         with whole_file(path) as draft, open(draft, "w", encoding="utf-8") as file:
-            json.dump(document, file, indent=1, default=_plain, ensure_ascii=False, allow_nan=False)
+            json.dump({**head, **result}, file, indent=1, default=_plain, ensure_ascii=False, allow_nan=False)
             file.write("\n")
     except OSError as error:
         raise InputError(f"--json {path}: cannot be written ({error.strerror}); check the disk") from None

@@ -12,6 +12,7 @@ from typing import Any, NoReturn
 import emaviz
 from ema_model.errors import InputError
 from emaviz.cli import COMMANDS
+from emaviz.cli.exit_code import EXIT_CODES
 from emaviz.cli.files import check_files
 
 
@@ -32,7 +33,8 @@ class _Version(argparse.Action):
 
 def parser_of(wanted: str) -> Parser:
     """The parser with the wanted command alone, or with all of them; `run` of what it parses runs the command."""
-    parser = Parser(prog="emaviz", description="Break, watch and identify the model of an electromechanical actuator.")
+    about = "Break, watch and identify the model of an electromechanical actuator."
+    parser = Parser(prog="emaviz", description=about, epilog=EXIT_CODES)
     parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     add_verbs(commands, "emaviz.cli.verbs", COMMANDS if wanted not in COMMANDS else (wanted,), "run")
@@ -44,8 +46,16 @@ def add_verbs(to: Any, package: str, verbs: Iterable[str], run: str) -> None:
     modules = {name: importlib.import_module(f"{package}.{name}") for name in verbs}
     for name, verb in sorted(modules.items(), key=lambda one: one[1].PLACE):
         sub = to.add_parser(name, help=verb.HELP, description=verb.HELP)
+        sub.epilog = _ending(verb, sub.prog)
         verb.add_arguments(sub)
         sub.set_defaults(**{run: partial(_run, verb, sub)})
+
+
+def _ending(verb: ModuleType, command: str) -> str:
+    """The last line of --help; command: "emaviz compare"."""
+    if not hasattr(verb, "documents"):
+        return EXIT_CODES
+    return f"{EXIT_CODES}.  Fields of --json: emaviz schema {command.removeprefix('emaviz ')}"
 
 
 def _run(verb: ModuleType, parser: argparse.ArgumentParser, arguments: argparse.Namespace) -> int:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import builtins
 import io
-import json
 import sys
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from support.documents import result_of
 from worked_actuators import BALL_SCREW, WORKED
 
 from ema_model.actuator import load_actuator, save_actuator
@@ -39,7 +39,7 @@ def check(path, *more, capsys) -> dict:
     out = Path(path).with_suffix(".json")
     assert main(["actuator", "check", str(path), *map(str, more), "--json", str(out)]) == 0
     capsys.readouterr()
-    return json.loads(out.read_text())
+    return result_of(out, "actuator check")
 
 
 @pytest.mark.parametrize("name", WORKED)

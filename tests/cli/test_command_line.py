@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import socket
 import subprocess
 import sys
 
 import numpy as np
 import pytest
+from support.documents import result_of
 
 from ema_model.recordings.file import read_measurement
 from emaviz.cli import main
@@ -57,7 +57,7 @@ def test_effects_act_in_both_models(tmp_path, model):
 def test_identify_finds_the_fault_of_a_file(recording, tmp_path, capsys):
     out = tmp_path / "result.json"
     assert main(["identify", str(recording), "--algorithm", "do", "--json", str(out), "--seed", "3"]) == 0
-    result = json.loads(out.read_text())
+    result = result_of(out, "identify")
     assert result["schema"] == 1 and result["seed"] == 3
     assert set(result["versions"]) == {"emaviz", "numpy", "numba"}
     assert abs(result["k"][0] - 0.25) < 0.02
@@ -71,7 +71,7 @@ def test_identify_with_faults_tells_the_error(tmp_path):
     out = tmp_path / "result.json"
     arguments = ["identify", "--fault", "k3=0.25", "--algorithm", "do", "--json", str(out)]
     assert main(arguments) == 0
-    assert json.loads(out.read_text())["error_percent"] < 0.6
+    assert result_of(out, "identify")["error_percent"] < 0.6
 
 
 def test_effects_lists_and_explains(capsys):

@@ -27,6 +27,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     options.add_seed(parser)
 
 
+def documents() -> tuple[type, ...]:
+    """What --json holds: of recordings, and of units beside each other."""
+    from ema_model.discovery.shown.summary import DiscoveryJson
+    from ema_model.units.discovery.summary import UnitsDiscoveredJson
+
+    return (DiscoveryJson, UnitsDiscoveredJson)
+
+
 def run(arguments: argparse.Namespace) -> int:
     """Reads, discovers, writes and prints."""
     actuator = given.actuator_of(arguments)

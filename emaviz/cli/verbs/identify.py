@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from ema_model import faults
 from ema_model.actuator import Actuator, save_actuator
-from ema_model.actuator.naming import on_axes
-from ema_model.actuator.readings import readings
 from ema_model.discovery.model_fit import with_effect
 from ema_model.errors import InputError
 from ema_model.identification.objective import Objective
-from ema_model.identification.run import ALGORITHMS, ROBUST, Identification, Progress, identify
+from ema_model.identification.run import ALGORITHMS, ROBUST, Progress, identify
+from ema_model.identification.summary import as_dict
 from ema_model.quantities.numbers import amount
 from ema_model.recordings import Measurement
 from ema_model.simulation.plant import FITNESSES, simulated
@@ -44,6 +42,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     options.add_faults(parser)
     options.add_effects(parser)
     options.add_run(parser)
+
+
+def documents() -> tuple[type, ...]:
+    """What --json holds."""
+    from ema_model.identification.summary import IdentificationJson
+
+    return (IdentificationJson,)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -93,8 +98,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.save_actuator:
         found = replace(actuator.with_values(answer.parameters), faults=faults.named(answer.k))
         save_actuator(found, arguments.save_actuator)
-    document = result(answer, actuator, holdout_rmse)
-    output.write_json(arguments, document)
+    output.write_json(arguments, as_dict(answer, actuator, holdout_rmse))
     print(answer)
     if unseen and holdout_rmse is None:
         print("the model diverges on what was not fitted")
@@ -108,36 +112,6 @@ def run(arguments: argparse.Namespace) -> int:
     if recorder is not None and recorder.failed:
         raise InputError(recorder.failed)
     return 0
-
-
-def result(answer: Identification, actuator: Actuator, holdout_rmse: float | None = None) -> dict[str, Any]:
-    """The JSON form of an answer (INTERFACES)."""
-    sure = answer.uncertainty
-    document = {
-        "k": answer.k,
-        "k_interval90": sure.interval90,
-        "healthy": bool(sure.healthy),
-        "alarms": sure.alarms,
-        "ambiguous": sure.ambiguous,
-        "hardly_known": sure.hardly_known,
-        "separated_by": sure.separated_by.options if sure.separated_by else "",
-        "adequate": bool(sure.adequate),
-        "warnings": sure.warnings,
-        "physical": readings(answer.k, actuator),
-        "rmse": answer.rmse,
-        "evaluations": answer.evaluations,
-        "elapsed_s": answer.elapsed_s,
-        "compile_s": answer.compile_s,
-        "algorithm": answer.algorithm,
-        "polished": answer.polished,
-        "searched_k": answer.searched_k,
-        "parameters": {on_axes(path, actuator.axes).path: value for path, value in answer.parameters.items()},
-        "holdout_rmse": holdout_rmse,
-        "history": {"rmse": answer.rmse_history, "k": answer.k_history},
-    }
-    if answer.truth is not None:
-        document |= {"truth": answer.truth, "error_percent": answer.error_percent}
-    return document
 
 
 def _recordings(

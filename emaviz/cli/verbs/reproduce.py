@@ -33,6 +33,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     options.add_json(parser)
 
 
+def documents() -> tuple[type, ...]:
+    """What --json holds."""
+    from ema_model.campaign.thesis.result import EvaluationJson
+
+    return (EvaluationJson,)
+
+
 def run(arguments: argparse.Namespace) -> int:
     """Computes what the folder lacks, writes both files, prints the short table."""
     plan = load_plan(plan_path(arguments.plan or ("thesis_quick" if arguments.quick else "thesis")))
@@ -55,7 +62,7 @@ def run(arguments: argparse.Namespace) -> int:
         write_reproduction(found, responses, folder / RECORDING)
     finally:
         progress.done()
-    output.write_json(arguments, dict(found.as_dict()))
+    output.write_json(arguments, found.as_dict())
     print(aligned(*short_table(found)))
     print("", *answer(found), sep="\n")
     if status.errors:

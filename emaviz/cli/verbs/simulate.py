@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,6 +17,9 @@ from ema_model.simulation.run import simulate_monitor, simulate_reference
 from ema_model.simulation.sensors import Sensors
 from emaviz.cli import files, given, options, output
 from emaviz.cli.numbers import FINITE
+
+if TYPE_CHECKING:
+    from emaviz.cli.documents import SimulatedJson
 
 HELP = "simulate one run of the reference or the monitor model and write it as a recording"
 PLACE = 2
@@ -45,6 +49,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     files.add_force(parser)
 
 
+def documents() -> tuple[type, ...]:
+    """What --json holds."""
+    from emaviz.cli.documents import SimulatedJson
+
+    return (SimulatedJson,)
+
+
 def run(arguments: argparse.Namespace) -> int:
     """Simulates, records with the sensors' accuracy, writes."""
     actuator = given.actuator_of(arguments)
@@ -59,10 +70,10 @@ def run(arguments: argparse.Namespace) -> int:
     write_measurement(signals, arguments.out)
     if arguments.record:
         _record(arguments, signals, k)
-    summary = {
+    summary: SimulatedJson = {
         "file": str(arguments.out),
         "samples": signals.samples,
-        "k": k,
+        "k": k.tolist(),
         "physical": readings(k, actuator),
         "effects": effects,
         "rms": {name: float(np.sqrt(np.mean(signals[name] ** 2))) for name in signals.signals if name != "time_s"},

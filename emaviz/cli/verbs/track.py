@@ -53,6 +53,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     options.add_seed(parser)
 
 
+def documents() -> tuple[type, ...]:
+    """What --json holds."""
+    from ema_model.tracking.summary import TrackedJson
+
+    return (TrackedJson,)
+
+
 def run(arguments: argparse.Namespace) -> int:
     """Identifies each flight, follows k, writes and prints; again for each that arrives, if it shall watch."""
     thresholds = _thresholds(arguments.threshold)

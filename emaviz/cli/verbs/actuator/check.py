@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from typing import TYPE_CHECKING
 
 from ema_model.actuator import Actuator, load_actuator
 from ema_model.actuator.layout import WITHOUT_DRIVE
@@ -14,6 +15,9 @@ from ema_model.quantities.titles import in_sentence
 from ema_model.recordings import read
 from ema_model.text import Document, Lines
 from emaviz.cli import files, options, output
+
+if TYPE_CHECKING:
+    from emaviz.cli.documents import CheckedActuatorJson
 
 HELP = "say what an actuator file lacks, what is hard to believe, and what a recording cannot tell of it"
 PLACE = 2
@@ -27,6 +31,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     options.add_json(parser)
 
 
+def documents() -> tuple[type, ...]:
+    """What --json holds."""
+    from emaviz.cli.documents import CheckedActuatorJson
+
+    return (CheckedActuatorJson,)
+
+
 def run(arguments: argparse.Namespace) -> int:
     """Loads, checks, and calibrates where there is a recording."""
     actuator = load_actuator(arguments.file)
@@ -35,7 +46,13 @@ def run(arguments: argparse.Namespace) -> int:
         for kind, lines in _beside(actuator, arguments).items():
             found[kind] += lines
     print(_document(actuator, found, arguments).text)
-    output.write_json(arguments, {"name": actuator.name, **found})
+    document: CheckedActuatorJson = {
+        "name": actuator.name,
+        "missing": found["missing"],
+        "implausible": found["implausible"],
+        "unidentifiable": found["unidentifiable"],
+    }
+    output.write_json(arguments, document)
     return 0
 
 

@@ -6,7 +6,7 @@ import argparse
 import math
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ema_model.actuator import save_actuator
 from ema_model.actuator.describe import described, entry_of, gear_of
@@ -18,6 +18,9 @@ from ema_model.quantities.axes import KINDS as AXES
 from emaviz.cli import files, given, options, output
 from emaviz.cli.numbers import FINITE
 from emaviz.cli.verbs.actuator.questions import ask
+
+if TYPE_CHECKING:
+    from emaviz.cli.documents import NewActuatorJson
 
 HELP = "write an actuator file with comments, from options or from answers on the terminal"
 PLACE = 1
@@ -59,6 +62,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     files.add_force(parser)
 
 
+def documents() -> tuple[type, ...]:
+    """What --json holds."""
+    from emaviz.cli.documents import NewActuatorJson
+
+    return (NewActuatorJson,)
+
+
 def run(arguments: argparse.Namespace) -> int:
     """Asks for what no option says where a terminal is there, guesses the rest, and writes the file."""
     document = _document(arguments)
@@ -67,11 +77,16 @@ def run(arguments: argparse.Namespace) -> int:
     controller, drive = _kinds(arguments)
     actuator = described(document, controller, drive, _HERE)
     save_actuator(actuator, arguments.file, with_comments=True)
-    found = {"missing": list(missing(actuator)), "implausible": list(implausible(actuator))}
+    found: NewActuatorJson = {
+        "file": arguments.file,
+        "name": actuator.name,
+        "missing": list(missing(actuator)),
+        "implausible": list(implausible(actuator)),
+    }
     print(f"{arguments.file}: {actuator.name}, controller {controller}, {len(actuator.tolerances)} parameters to fit")
     for line in (*found["missing"], *found["implausible"]):
         print(f"! {line}")
-    output.write_json(arguments, {"file": arguments.file, "name": actuator.name, **found})
+    output.write_json(arguments, found)
     return 0
 
 

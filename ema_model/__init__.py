@@ -23,6 +23,7 @@ if TYPE_CHECKING:
         read,
         save_actuator,
         simulate,
+        track,
     )
 
 __all__ = [
@@ -36,6 +37,7 @@ __all__ = [
     "read",
     "save_actuator",
     "simulate",
+    "track",
 ]
 
 

@@ -95,6 +95,17 @@ def vector(settings: dict[str, float]) -> NDArray[np.float64]:
     return k
 
 
+def checked(k: ArrayLike) -> NDArray[np.float64]:
+    """k (8,) as it is given; InputError for what is not 8 numbers, and outside [0, 1]."""
+    try:
+        found = np.asarray(k, dtype=float)
+    except (TypeError, ValueError):
+        found = np.empty(0)
+    if found.shape != HEALTHY.shape:
+        raise InputError(f"k must be 8 numbers, k1 … k8, not {quoted(repr(k), 60)}")
+    return vector(dict(zip(NAMES, found.tolist())))
+
+
 def named(k: ArrayLike) -> dict[str, float]:
     """The inverse of `vector`: the components of one k that are not healthy; k7, an angle, only beside a k6."""
     inside = zip(NAMES, np.clip(k, 0.0, 1.0))

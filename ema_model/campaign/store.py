@@ -15,11 +15,12 @@ import time
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, TypedDict
 
 import msgspec
 import pyarrow as pa
 import pyarrow.parquet as pq
+from msgspec import Meta
 
 from ema_model.campaign.kinds import COMMON, HOW, KINDS
 from ema_model.campaign.task import Task, from_json, text_hash
@@ -34,6 +35,15 @@ _MOST_PARTS = 200  # small ones of a kind, before they are joined
 _SMALL_BYTES = 2_000_000
 _TRIES = 20  # to read parts that are being joined
 _ENDING_S = 1.0  # in which a writer that was just killed may still be ending
+
+
+class GroupJson(TypedDict):
+    """How far one group of a plan is."""
+
+    kind: Annotated[str, Meta(description="of its tasks: identify, compare, discover, …")]
+    tasks: Annotated[int, Meta(description="how many there are")]
+    rows: Annotated[int, Meta(description="how many are computed")]
+    errors: Annotated[int, Meta(description="how many of those ended in an error")]
 
 
 @dataclass(frozen=True)
@@ -162,9 +172,9 @@ class Store:
                 self._write(written[-1], self.table(kind))
         return written
 
-    def progress(self) -> dict[str, dict[str, Any]]:
+    def progress(self) -> dict[str, GroupJson]:
         """By group: its kind, how many tasks it has, how many have a row, how many of those are errors."""
-        counts = {
+        counts: dict[str, GroupJson] = {
             group: {"kind": kind, "tasks": self.header.tasks[group], "rows": 0, "errors": 0}
             for group, kind in self.header.kinds.items()
         }

@@ -20,7 +20,7 @@ from ema_model.estimation import calibrate as fit
 from ema_model.estimation.floor import twin_error
 from ema_model.estimation.floor_band import band, least, spread
 from ema_model.estimation.problem import SIGNALS
-from ema_model.faults import named
+from ema_model.faults import checked, named
 from ema_model.models import Model, Window, model_for
 from ema_model.models.delay_of_drive import with_delay_of_drive
 from ema_model.models.stretches import evaluation_stretches, fit_stretches
@@ -51,15 +51,16 @@ def compare(
 ) -> Comparison:
     """The recordings of one actuator beside its model.
 
-    k: the actuator's faults, in place of its file's; effects: besides the actuator's own.
+    k: the actuator's faults (8,), in place of its file's; effects: besides the actuator's own.
     free: parameters to calibrate in place of those that the actuator's file leaves free; signals: to fit, in place of
     current and positions, with weights where it is a mapping (1 is what the signal's floor says).  holdout: recordings
     that are only held against the calibrated model, of which no more than their starts are fitted.
     on_progress is told what goes on, and may raise to stop.
-    Raises InputError for recordings that cannot be compared.
+    Raises InputError for recordings that cannot be compared, and for what is no k.
     """
     tell = on_progress or (lambda text: None)
     check_held_out(measurements, holdout)
+    k = None if k is None else checked(k)
     return _compare(measurements, actuator or load_actuator(), k, effects, calibrate, free, signals, holdout, tell)
 
 

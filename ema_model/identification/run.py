@@ -122,7 +122,7 @@ def steps(
     truth: ArrayLike | None = None,
     parameters_known: bool = False,
     polish: bool = False,
-    on_fit: Callable[[str, float], None] = lambda text, share: None,
+    on_fit: Callable[[str, float], None] | None = None,
     **settings: float,
 ) -> Generator[Progress, bool | None, Identification]:
     """Fits k1…k8 to the objective's recordings, an iteration (about 5 ms) at a time.
@@ -133,9 +133,12 @@ def steps(
     on_fit(text, share): what goes on after the last iteration, and how much of that is done, 0 … 1.
     parameters_known: the actuator's own parameters are exact, as in a simulation of the same file, so that
     they do not move and their tolerances do not widen the intervals.  settings: the algorithm's own.
-    Raises InputError for an unknown algorithm or impossible settings.
+    truth: k (8,), where it is known.
+    Raises InputError for an unknown algorithm, impossible settings, and a truth that is no k.
     """
     check_seed(seed)
+    known = None if truth is None else faults.checked(truth)
+    tell = on_fit or (lambda text, share: None)
     prepared = cache(lambda: setting(objective, parameters_known=parameters_known))
     if algorithm == ROBUST:
         if settings:
@@ -149,8 +152,8 @@ def steps(
                 algorithm, dimension=8, population=population, iterations=iterations, seed=seed, **settings
             )
         except (ValueError, TypeError) as error:
-            known = "" if algorithm in OPTIMISERS else f" and {ROBUST}"
-            raise InputError(f"{error}{known}") from None
+            others = "" if algorithm in OPTIMISERS else f" and {ROBUST}"
+            raise InputError(f"{error}{others}") from None
         running = _optimise(objective, optimiser)
     twins = _stack_of_twins(objective)
     compile_ahead(twins)
@@ -167,10 +170,10 @@ def steps(
     given = prepared()
     first_compile = _warm_up_fit(given) + _warm_up_twins(twins)
     if algorithm == ROBUST:
-        found = refine_best(given, last.population, seed, on_fit)
+        found = refine_best(given, last.population, seed, tell)
     else:
-        found = refine(given, last.k, seed, on_fit)
-    on_fit("intervals", 1.0)
+        found = refine(given, last.k, seed, tell)
+    tell("intervals", 1.0)
     polishes = (polish or algorithm == ROBUST) and not stopped
     looked = 0 if algorithm == ROBUST else given.rough.evaluations  # which the robust search has counted itself
     k = found.k if polishes else last.k
@@ -189,7 +192,7 @@ def steps(
         k_history=np.array([at.k for at in history]),
         stopped=stopped and last.iteration < last.iterations,
         uncertainty=sure,
-        truth=None if truth is None else np.asarray(truth, dtype=float),
+        truth=known,
         polished=polishes,
         searched_k=last.k,
         parameters=found.problem.parameters(found.x) if polishes else {},

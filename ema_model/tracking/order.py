@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Sequence, Sized
 from itertools import pairwise
 from pathlib import Path
 
@@ -49,11 +49,11 @@ def check_order(paths: Sequence[Path]) -> None:
     check_one_actuator(paths, "the flights are of one unit")
 
 
-def check_enough(paths: Sequence[Path], where: str) -> None:
+def check_enough(flights: Sized, where: str) -> None:
     """InputError for fewer flights than a trend needs; where: what was named."""
-    if len(paths) < LEAST_FLIGHTS:
-        flights = "1 flight tells" if len(paths) == 1 else f"{len(paths)} flights tell"
-        raise InputError(f"{quoted(where)}: {flights} no trend; give {LEAST_FLIGHTS} or more, or use `emaviz identify`")
+    if len(flights) < LEAST_FLIGHTS:
+        told = "1 flight tells" if len(flights) == 1 else f"{len(flights)} flights tell"
+        raise InputError(f"{quoted(where)}: {told} no trend; give {LEAST_FLIGHTS} or more, or use `emaviz identify`")
 
 
 def _when(path: Path) -> tuple[int, ...]:

@@ -1,8 +1,4 @@
-"""The command line: `verbs` has a file for each of its commands, beside it stands what they share.
-
-Exit codes: 0 done, 2 the input or the arguments are wrong (one line on stderr), 1 an internal failure, or a standard
-output that cannot be written.
-"""
+"""The command line: `verbs` has a file for each of its commands, beside it stands what they share."""
 
 from __future__ import annotations
 
@@ -16,7 +12,8 @@ from pathlib import Path
 from ema_model.members import names
 
 # Whatever takes time is imported where an interrupt ends the program as it should.
-from emaviz.cli.interrupt import EXIT_CODE, until_interrupted
+from emaviz.cli.exit_code import ExitCode
+from emaviz.cli.interrupt import until_interrupted
 
 COMMANDS = tuple(names("emaviz.cli.verbs"))
 _WITHOUT_COMMAND = ("-h", "--help", "--version")
@@ -43,7 +40,7 @@ def _program() -> int:
         from ema_model.errors import InputError  # a message on one line
 
         _say(str(InputError(f"an internal failure, {type(error).__name__}: {error}; --verbose shows where")))
-        return 1
+        return ExitCode.FAILED
 
 
 def _run(given: list[str]) -> int:
@@ -54,12 +51,12 @@ def _run(given: list[str]) -> int:
         try:
             parsed = parser_of(_command(given)).parse_args(given)
             verbose = vars(parsed).pop("verbose", False)  # not one of the options that results repeat
-            return _verbosely(parsed, given) if verbose else int(parsed.run(parsed) or 0)
+            return _verbosely(parsed, given) if verbose else int(parsed.run(parsed) or ExitCode.DONE)
         except InputError as error:
             _say(str(error))
-            return 2
+            return ExitCode.WRONG_INPUT
     except KeyboardInterrupt:
-        return EXIT_CODE
+        return ExitCode.INTERRUPTED
 
 
 def _verbosely(parsed: argparse.Namespace, given: list[str]) -> int:
@@ -68,7 +65,7 @@ def _verbosely(parsed: argparse.Namespace, given: list[str]) -> int:
     log, begun = be_verbose(), time.monotonic()
     log.info("emaviz %s", " ".join(given))
     try:
-        return int(parsed.run(parsed) or 0)
+        return int(parsed.run(parsed) or ExitCode.DONE)
     finally:
         log.info("ended after %.2f s", time.monotonic() - begun)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from copy import copy
 from dataclasses import replace
 from fnmatch import fnmatchcase
@@ -84,7 +84,7 @@ def _refuse(arguments: argparse.Namespace, options: Iterable[str]) -> None:
             raise InputError(f"{_WORD.get(name, f'--{name}')}: has no meaning where units are compared; leave it out")
 
 
-def _told(arguments: argparse.Namespace, result: object, document: dict[str, Any], of_type: Actuator) -> int:
+def _told(arguments: argparse.Namespace, result: object, document: Mapping[str, Any], of_type: Actuator) -> int:
     """Saves the type, writes and prints."""
     if arguments.save_actuator:
         save_actuator(of_type, arguments.save_actuator)

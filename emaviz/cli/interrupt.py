@@ -14,7 +14,8 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 
-EXIT_CODE = 130  # as shells have it: 128 + SIGINT
+from emaviz.cli.exit_code import ExitCode
+
 _END = b"\0"  # no signal's number
 _GRACE_S = 1.5  # to close recordings and remove drafts
 _ANSWER_S = 60.0  # the same where a part of the answer is to be made and written, on a busy machine
@@ -73,7 +74,7 @@ def until_interrupted(run: Callable[[], int]) -> int:
                 raise KeyboardInterrupt
 
     signal.signal(signal.SIGINT, interrupted)
-    code = EXIT_CODE
+    code = int(ExitCode.INTERRUPTED)
     watch = _Watch()
     try:
         watch.start()
@@ -129,11 +130,11 @@ class _Watch:
             return
         if _state.has_answer and sys.stderr.isatty():
             print("\r\x1b[Kwriting what was found so far; Ctrl-C ends it at once", file=sys.stderr, flush=True)
-        late = threading.Timer(_ANSWER_S if _state.has_answer else _GRACE_S, os._exit, (EXIT_CODE,))
+        late = threading.Timer(_ANSWER_S if _state.has_answer else _GRACE_S, os._exit, (ExitCode.INTERRUPTED,))
         late.daemon = True
         late.start()
         if self._interrupted():
-            os._exit(EXIT_CODE)
+            os._exit(ExitCode.INTERRUPTED)
 
     def _interrupted(self) -> bool:
         """Waits for an interrupt; False at the end."""

@@ -9,10 +9,10 @@ import re
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from datetime import timedelta
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,12 +21,15 @@ from ema_model.files.whole_file import whole_file
 from emaviz import __version__
 from emaviz.text.time_left import time_left
 
+if TYPE_CHECKING:
+    from emaviz.cli.documents import HeadJson
+
 _LINE_EVERY_S = 10.0  # of a log
 
 _LOG = logging.getLogger("emaviz")
 
 
-def write_json(arguments: Any, result: dict[str, Any]) -> None:
+def write_json(arguments: Any, result: Mapping[str, Any]) -> None:
     """Writes a result with its schema, versions, seed and options to --json, whole or not at all; nothing without it.
 
     InputError if it cannot be written.
@@ -36,16 +39,15 @@ def write_json(arguments: Any, result: dict[str, Any]) -> None:
         return
     import numba  # takes a third of a second
 
-    document = {
+    head: HeadJson = {
         "schema": 1,
         "versions": {"emaviz": __version__, "numpy": np.__version__, "numba": numba.__version__},
         "seed": getattr(arguments, "seed", 0),
         "configuration": configuration(arguments),
-        **result,
     }
     try:
         with whole_file(path) as draft, open(draft, "w", encoding="utf-8") as file:
-            json.dump(document, file, indent=1, default=_plain, ensure_ascii=False, allow_nan=False)
+            json.dump({**head, **result}, file, indent=1, default=_plain, ensure_ascii=False, allow_nan=False)
             file.write("\n")
     except OSError as error:
         raise InputError(f"--json {path}: cannot be written ({error.strerror}); check the disk") from None

@@ -16,6 +16,7 @@ from typing import Any, NoReturn
 import emaviz
 from ema_model.errors import InputError, did_you_mean, quoted
 from emaviz.cli import COMMANDS
+from emaviz.cli.exit_code import EXIT_CODES
 from emaviz.cli.files import check_files
 
 
@@ -78,7 +79,8 @@ def whole_parser() -> Parser:
 
 
 def _parser(verbs: Iterable[str], *, with_options: bool) -> Parser:
-    parser = Parser(prog="emaviz", description="Break, watch and identify the model of an electromechanical actuator.")
+    about = "Break, watch and identify the model of an electromechanical actuator."
+    parser = Parser(prog="emaviz", description=about, epilog=EXIT_CODES)
     parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
     _add_verbose(parser)
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
@@ -92,6 +94,7 @@ def add_verbs(to: Any, package: str, verbs: Iterable[str], run: str, *, with_opt
     for name, verb in sorted(modules.items(), key=lambda one: one[1].PLACE):
         sub = to.add_parser(name, help=verb.HELP, description=verb.HELP)
         if with_options:
+            sub.epilog = _ending(verb, sub.prog)
             verb.add_arguments(sub)
             _add_verbose(sub)
             sub.add_argument(
@@ -107,6 +110,13 @@ def _add_verbose(to: argparse.ArgumentParser) -> None:
         default=argparse.SUPPRESS,  # given before the command, it holds as well
         help="say on stderr what is done, and when; of an internal failure, where",
     )
+
+
+def _ending(verb: ModuleType, command: str) -> str:
+    """The last line of --help; command: "emaviz compare"."""
+    if not hasattr(verb, "documents"):
+        return EXIT_CODES
+    return f"{EXIT_CODES}.  Fields of --json: emaviz schema {command.removeprefix('emaviz ')}"
 
 
 def _run(verb: ModuleType, parser: argparse.ArgumentParser, arguments: argparse.Namespace) -> int:

@@ -7,6 +7,8 @@ import sys
 from collections.abc import Callable
 from typing import Any, TextIO
 
+from emaviz.cli.exit_code import ExitCode
+
 
 def open_closed() -> None:
     """Opens what the shell has closed (`>&-`), so that no file of ours takes its number; stdout still refuses text.
@@ -46,9 +48,9 @@ def until_unwritable(run: Callable[[], int], say: Callable[[str], None]) -> int:
             os.dup2(nowhere, out.fileno())
             os.close(nowhere)
     if isinstance(out.failure, BrokenPipeError):
-        return 0
+        return ExitCode.DONE
     say(f"the standard output cannot be written ({out.failure.strerror}); check where it goes")
-    return 1
+    return ExitCode.FAILED
 
 
 class _Out:

@@ -12,6 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 from processes import begun, ended, free_port, rows_of
 from support.cheap_plans import cheap, written
+from support.documents import result_of
 
 from ema_model.campaign import Store, load_plan, run_plan
 from ema_model.campaign import store as storing
@@ -75,13 +76,19 @@ def test_a_dry_run_computes_nothing(tmp_path, capsys):
     shown = capsys.readouterr().out
     assert "3 of 3" in shown and "2 workers: about" in shown and " h (" in shown and "rough" in shown
     assert not out.exists()
-    assert json.loads((tmp_path / "d.json").read_text())["tasks"] == 3
+    assert result_of(tmp_path / "d.json", "campaign")["tasks"] == 3
 
 
 @pytest.mark.long
 def test_a_dry_run_knows_what_is_there_and_how_long_it_took(made, folder, capsys):
     assert main(["campaign", str(made[0]), "--out", str(folder), "--dry-run"]) == 0
     assert "0 of 3" in (shown := capsys.readouterr().out) and "measured" in shown
+
+
+def test_the_status_is_told_in_numbers(folder, tmp_path):
+    assert main(["campaign", "status", str(folder), "--json", str(tmp_path / "s.json")]) == 0
+    told = result_of(tmp_path / "s.json", "campaign")
+    assert told["groups"] == {"cheap": {"kind": "identify", "tasks": 3, "rows": 3, "errors": 0}}
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ import shutil
 
 import numpy as np
 import pytest
+from support.documents import result_of
 from test_campaign_command import Here
 
 from ema_model.actuator import load_actuator
@@ -83,7 +84,7 @@ def figures_of(html):
 
 @pytest.mark.long
 def test_the_result_follows_from_the_rows(made):
-    told = json.loads((made.parent / "r.json").read_text())
+    told = result_of(made.parent / "r.json", "reproduce")
     rows = {(one["case"], one["algorithm"]): one for one in told["rows"]}
     kept = [row for row in Store(made).table("identify", how=True).to_pylist() if row["group"] == "thesis"]
     assert {row["algorithm"] for row in kept} == {"ssa", "hba", "do"}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 import signal
 import sys
@@ -11,6 +10,7 @@ import sys
 import pytest
 from processes import begun, children_of, cluster, ended, kill, rows_of, wait_for
 from support.cheap_plans import cheap, written
+from support.documents import result_of
 
 from ema_model.campaign import Store, load_plan
 
@@ -158,7 +158,7 @@ def test_what_fails_is_a_row_and_not_the_end(tmp_path):
     assert (out / "report.html").stat().st_size > 1e6
     told = ended(begun("status", out, "--json", tmp_path / "s.json"))
     assert "Plan" not in told and "plan: done" in told
-    assert json.loads((tmp_path / "s.json").read_text())["groups"]["broken"]["errors"] == 1
+    assert result_of(tmp_path / "s.json", "campaign")["groups"]["broken"]["errors"] == 1
 
 
 @pytest.mark.long

@@ -11,7 +11,7 @@ from emaviz.cli.parser import parser_of
 TEXT = {  # options that name no file and take no single number; each is refused or taken by what it is for
     "--fault", "--effect", "--map", "--free", "--signal", "--set", "--host", "--allow-host", "--data-dir", "name",
     "--scheduler", "--threshold", "--encoding", "--name", "--description", "--gear", "--where", "--runs",
-    "--by", "--unit",
+    "--by", "--unit", "verb",
 }  # fmt: skip
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import builtins
 import io
-import json
 import sys
 import tomllib
 from dataclasses import replace
@@ -12,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.documents import result_of
 from worked_actuators import BALL_SCREW, WORKED
 
 from ema_model.actuator import load_actuator, save_actuator
@@ -40,7 +40,7 @@ def check(path, *more, capsys) -> dict:
     out = Path(path).with_suffix(".json")
     assert main(["actuator", "check", str(path), *map(str, more), "--json", str(out)]) == 0
     capsys.readouterr()
-    return json.loads(out.read_text())
+    return result_of(out, "actuator check")
 
 
 @pytest.mark.parametrize("name", WORKED)
@@ -191,7 +191,7 @@ def test_nothing_that_is_given_is_left_out_silently(tmp_path, capsys):
     out = tmp_path / "new.json"
     assert new(path, "--force", "--controller=unknown", "--drive=voltage", "--json", str(out)) == 0
     line = "--drive voltage is left out: inverse dynamics has none"
-    assert f"! {line}" in capsys.readouterr().out and json.loads(out.read_text())["notes"] == [line]
+    assert f"! {line}" in capsys.readouterr().out and result_of(out, "actuator new")["notes"] == [line]
     assert new(path, "--force", "--controller=position") == 0
     assert "--drive is not given: voltage, " in capsys.readouterr().out
     assert load_actuator(path).inverter.kind == "voltage"

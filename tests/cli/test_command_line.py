@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from options_of import command_parser, every_command
+from support.documents import result_of
 
 from ema_model.commands import COMMANDS as MODEL_COMMANDS
 from ema_model.effects import CATALOGUE
@@ -66,7 +67,7 @@ def test_effects_act_in_both_models(tmp_path, model):
 def test_identify_finds_the_fault_of_a_file(recording, tmp_path, capsys):
     out = tmp_path / "result.json"
     assert main(["identify", str(recording), "--algorithm", "do", "--json", str(out), "--seed", "3"]) == 0
-    result = json.loads(out.read_text())
+    result = result_of(out, "identify")
     assert result["schema"] == 1 and result["seed"] == 3
     assert set(result["versions"]) == {"emaviz", "numpy", "numba"}
     assert abs(result["k"][0] - 0.25) < 0.02
@@ -80,7 +81,7 @@ def test_identify_with_faults_tells_the_error(tmp_path):
     out = tmp_path / "result.json"
     arguments = ["identify", "--fault", "k3=0.25", "--algorithm", "do", "--json", str(out)]
     assert main(arguments) == 0
-    assert json.loads(out.read_text())["error_percent"] < 0.6
+    assert result_of(out, "identify")["error_percent"] < 0.6
 
 
 def test_effects_lists_and_explains(capsys):
@@ -247,7 +248,7 @@ def test_an_output_that_cannot_be_written_is_told(line):
 def test_closed_streams_do_not_become_files(tmp_path):
     out = tmp_path / "a.json"
     done = subprocess.run(["sh", "-c", f"{sys.executable} -m emaviz effects cogging_torque --json {out} <&- >&- 2>&-"])
-    assert done.returncode == 1 and json.loads(out.read_text())["effects"][0]["name"] == "cogging_torque"
+    assert done.returncode == 1 and result_of(out, "effects")["effects"][0]["name"] == "cogging_torque"
 
 
 COMPLETED = {

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import json
-
 import numpy as np
 import pytest
+from support.documents import result_of
 from support.two_clocks import write_two_clocks
 
 from ema_model.actuator import load_actuator
@@ -51,7 +50,7 @@ def test_everything_is_written(rig, tmp_path, capsys):
     first = printed.splitlines()[0]
     assert "of the residual equivalent current variance is explained by motor angle (cross-validated)" in first
     assert "12 times a turn" in printed and "calibration converged" in printed
-    result = json.loads(out.read_text())
+    result = result_of(out, "compare")
     assert result["schema"] == 1 and result["seed"] == 7 and result["adequate"] is False
     assert result["explained_by"][0]["variable"] == "motor_angle" and result["orders"][0]["order"] == 12
     assert result["calibration"]["converged"] and result["worst_regions"][0]["sentence"]
@@ -64,7 +63,7 @@ def test_foreign_columns_are_mapped(rig, tmp_path):
     out = tmp_path / "r.json"
     mapping = [part for text in MAPPING for part in ("--map", text)]
     assert main(["compare", str(rig[1]), *mapping, "--json", str(out)]) == 0
-    result = json.loads(out.read_text())
+    result = result_of(out, "compare")
     assert set(result["signals"]) == {"current_A", "motor_position_rad"}
     assert result["explained_by"][0]["variable"] == "motor_angle"
 
@@ -76,7 +75,7 @@ def test_a_late_clock_is_told_and_taken_out(rig, tmp_path):
     found = []
     for more in ([], ["--map", "motor_speed_rad_s=motor_speed_rad_s[delay_s=0.005]"]):
         assert main(["compare", str(path), "--no-calibrate", "--to", "0.5", *more, "--json", str(out)]) == 0
-        findings = json.loads(out.read_text())["recordings"][0]["health"]["findings"]
+        findings = result_of(out, "compare")["recordings"][0]["health"]["findings"]
         found.append(next(one for one in findings if one["check"] == "speed_delay"))
     late, moved = found
     assert late["values"]["delay_low_s"] <= 0.005 <= late["values"]["delay_high_s"] and late["severity"] == "warning"
@@ -88,13 +87,13 @@ def test_options_reach_the_comparison(rig, tmp_path):
     out = tmp_path / "r.json"
     choice = ["--free", "motor.inertia_kgm2", "--signal", "current_A=2", "--from", "0.2", "--to", "0.7"]
     assert main(["compare", str(rig[0]), *choice, "--json", str(out)]) == 0
-    result = json.loads(out.read_text())
+    result = result_of(out, "compare")
     assert set(result["calibration"]["parameters"]) == {"motor.inertia_kgm2"}
     assert main(["compare", str(rig[0]), "--no-calibrate", "--json", str(out)]) == 0
-    assert json.loads(out.read_text())["calibration"] is None
+    assert result_of(out, "compare")["calibration"] is None
     added = ["--effect", "cogging_torque:amplitude_Nm=0.02,order=12"]
     assert main(["compare", str(rig[0]), *added, "--json", str(out)]) == 0
-    assert json.loads(out.read_text())["adequate"] is True
+    assert result_of(out, "compare")["adequate"] is True
 
 
 def test_held_out_recordings_judge_the_calibrated_model_which_is_saved(rig, tmp_path, capsys):
@@ -105,7 +104,7 @@ def test_held_out_recordings_judge_the_calibrated_model_which_is_saved(rig, tmp_
     np.savetxt(other, rows, delimiter=",", header=",".join(rows.dtype.names), comments="", fmt="%.10g")
     held = ["--holdout", str(other), "--free", "motor.inertia_kgm2"]
     assert main(["compare", str(rig[0]), *held, "--to", "0.5", *kept]) == 0
-    result = json.loads(out.read_text())
+    result = result_of(out, "compare")
     (one,) = result["holdout"]
     assert one["name"] == "own" and len(result["recordings"]) == 1
     fitted = result["signals"]["current_A"]

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 from support.bench_units import ACTUATOR, FRICTION, RUNS
+from support.documents import result_of
 
 from ema_model.actuator import load_actuator
 from ema_model.recordings import Measurement, write_measurement
@@ -43,7 +43,7 @@ def discovered(folder: Path, actuator: Path, *more: object) -> dict:
     out = folder / "result.json"
     given = ["--by", "unit", "--holdout", "*unseen*", "--actuator", actuator, "--json", out, *more]
     assert main(["discover", str(folder), *map(str, given)]) == 0
-    return json.loads(out.read_text())
+    return result_of(out, "discover")
 
 
 @pytest.mark.long

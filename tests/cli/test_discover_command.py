@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import json
-
 import pytest
+from support.documents import result_of
 
 from ema_model.actuator import load_actuator
 from emaviz.cli import main
@@ -29,7 +28,7 @@ def test_effect_is_found_and_the_model_saved(rig, tmp_path, capsys):
     assert main(["discover", str(rig / "sine.csv"), *arguments]) == 0
     printed = capsys.readouterr().out
     assert printed.startswith("effects found") and "error ladder" in printed and "+ Cogging torque" in printed
-    result = json.loads(out.read_text())
+    result = result_of(out, "discover")
     assert result["schema"] == 1 and result["verdict"] == "effects_found"
     assert [one["name"] for one in result["effects"]] == ["cogging_torque"]
     assert result["ladder"][-1]["holdout_rmse"] < result["ladder"][0]["holdout_rmse"]
@@ -43,7 +42,7 @@ def test_effect_is_found_and_the_model_saved(rig, tmp_path, capsys):
     assert saved["verified_holdout_rmse"] == pytest.approx(last["holdout_rmse"], rel=0.01)
     assert f"saved {better}, verified: " in printed and "worse" not in printed
     assert main(["compare", str(rig / "chirp.csv"), "--actuator", str(better), "--json", str(out)]) == 0
-    assert json.loads(out.read_text())["adequate"] is True
+    assert result_of(out, "compare")["adequate"] is True
 
 
 @pytest.mark.long
@@ -51,7 +50,7 @@ def test_recording_and_report_tell_the_same(rig, tmp_path):
     record, report, out = tmp_path / "d.rrd", tmp_path / "d.html", tmp_path / "d.json"
     arguments = ["--max-effects", "1", "--record", str(record), "--report", str(report), "--json", str(out)]
     assert main(["discover", str(rig / "sine.csv"), *arguments]) == 0
-    result, recording = json.loads(out.read_text()), read(record)
+    result, recording = result_of(out, "discover"), read(record)
     told = recording.properties["discovery"]
     assert told["ladder"] == result["ladder"] and told["effects"] == result["effects"]
     assert "sine.csv" in recording.config

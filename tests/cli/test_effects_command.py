@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import re
 from xml.etree import ElementTree
 
 import pytest
+from support.documents import result_of
 
 from ema_model.effects import CATALOGUE
 from ema_model.effects.user.entries import KEYS
@@ -19,7 +19,7 @@ def test_the_users_own_are_listed_and_explained(tmp_path, capsys):
     out = tmp_path / "e.json"
     assert main(["effects", "--json", str(out)]) == 0
     listed = capsys.readouterr().out
-    names = [one["name"] for one in json.loads(out.read_text())["effects"]]
+    names = [one["name"] for one in result_of(out, "effects")["effects"]]
     assert names == [*CATALOGUE, *KEYS] and all(name in listed for name in names)
     for name, keys in KEYS.items():
         assert main(["effects", name]) == 0

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import json
-
 import pytest
+from support.documents import result_of
 
 from emaviz.cli import main
 
@@ -22,7 +21,7 @@ def cogging(tmp_path_factory):
 def test_robust_is_the_default_and_says_how_sure_it_is(tmp_path, capsys):
     out = tmp_path / "result.json"
     assert main(["identify", "--fault", "k6=0.25", "--json", str(out)]) == 0
-    result = json.loads(out.read_text())
+    result = result_of(out, "identify")
     assert result["algorithm"] == "robust" and result["polished"] is True
     assert result["error_percent"] < 0.5 and result["adequate"] is True
     assert result["alarms"] == ["k6"] and result["healthy"] is False
@@ -36,7 +35,7 @@ def test_polish_is_told_beside_what_the_search_found(tmp_path):
     out = tmp_path / "result.json"
     arguments = ["identify", "--fault", "k1=0.25", "--algorithm", "ssa", "--population", "10", "--iterations", "8"]
     assert main([*arguments, "--polish", "--json", str(out)]) == 0
-    result = json.loads(out.read_text())
+    result = result_of(out, "identify")
     assert result["polished"] is True and result["error_percent"] < 0.5
     assert result["searched_k"] != result["k"]
 
@@ -45,12 +44,12 @@ def test_polish_is_told_beside_what_the_search_found(tmp_path):
 def test_missing_physics_blames_no_part_until_it_is_added(cogging, tmp_path, capsys):
     out = tmp_path / "result.json"
     assert main(["identify", str(cogging), "--json", str(out)]) == 0
-    result = json.loads(out.read_text())
+    result = result_of(out, "identify")
     assert result["adequate"] is False and result["alarms"] == [] and result["healthy"] is False
     assert "Discover, on the same recordings, looks for it" in result["warnings"][0]
     assert "the model does not fit" in capsys.readouterr().out
 
     assert main(["identify", str(cogging), "--effect", EFFECT, "--json", str(out)]) == 0
-    result = json.loads(out.read_text())
+    result = result_of(out, "identify")
     assert result["adequate"] is True and "k2" in result["alarms"]
     assert result["k"][1] == pytest.approx(0.2, abs=0.05)

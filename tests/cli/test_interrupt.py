@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 import signal
@@ -12,6 +11,7 @@ import threading
 import time
 
 import pytest
+from support.documents import result_of
 from support.representative import first_of
 
 from emaviz.cli import main
@@ -244,7 +244,7 @@ def cut_off(process_of, tmp_path):
         out, said = interrupted(process)
         assert said == ""
         written = tmp_path / "found.json"
-        return out, json.loads(written.read_text()) if written.exists() else None
+        return out, result_of(written, arguments[0]) if written.exists() else None
 
     return cut_off
 

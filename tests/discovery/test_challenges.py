@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import shutil
@@ -14,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from support.documents import result_of
 
 import ema_model
 from ema_model.actuator import load_actuator
@@ -174,7 +174,7 @@ def test_the_readme_shows_what_discovery_says(tmp_path):
     files = [*one.training, "--holdout", *one.holdout, "--json", out]
     same = os.environ | {"OPENBLAS_CORETYPE": "Haswell", "OPENBLAS_NUM_THREADS": "1"}
     subprocess.run([sys.executable, "-m", "emaviz", "discover", *map(str, files)], check=True, env=same)
-    found = json.loads(out.read_text(encoding="utf-8"))
+    found = result_of(out, "discover")
     readme = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
     [table] = re.findall(r"^error ladder.*\n((?:  .*\n)+)", readme, re.M)
     shown = [re.split(r"\s{2,}", line.strip(" +")) for line in table.splitlines()]

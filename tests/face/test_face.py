@@ -48,15 +48,28 @@ def test_a_recording_is_a_file_or_a_measurement_one_or_several(recording, tmp_pa
         {"encoder_bits": "many"},
         {"seed": "first"},
         {"seed": 1.5},
-        {"faults": {"k1": "half"}},
-        {"settings": {"amplitude_rad": "large"}},
-        {"effects": {"cogging_torque": {"amplitude_Nm": "large"}}},
     ],
     ids=str,
 )
 def test_what_is_no_number_is_refused_in_one_line(given):
     with pytest.raises(em.InputError, match=r"must be a (whole )?number"):
         em.simulate(**{"duration_s": 0.01, **given})
+
+
+@pytest.mark.parametrize(
+    ("given", "kind"),
+    [
+        ({"faults": {"k1": "half"}}, "numbers by name"),
+        ({"settings": {"amplitude_rad": "large"}}, "numbers by name"),
+        ({"effects": {"cogging_torque": {"amplitude_Nm": "large"}}}, "settings by the effect's name"),
+    ],
+    ids=str,
+)
+def test_names_with_what_is_no_number_are_refused_in_one_line(given, kind):
+    (option,) = given
+    with pytest.raises(em.InputError, match=rf"^em\.simulate: {option} must be {kind}.*'(half|large)'") as caught:
+        em.simulate(**{"duration_s": 0.01, **given})
+    assert "\n" not in str(caught.value)
 
 
 def test_units_are_compared_by_name():
@@ -71,8 +84,9 @@ def test_units_are_compared_by_name():
 def test_one_of_several_that_is_too_short_is_left_out(recording, tmp_path):
     short = tmp_path / "short.csv"
     write_measurement(recording.selected((0.0, 0.005)), short)
-    with pytest.warns(UserWarning, match=r"short\.csv: has 51 samples; .*; left out"):
+    with pytest.warns(UserWarning, match=r"short\.csv: has 51 samples; .*; left out") as warned:
         found = em.compare([recording, short], calibrate=False)
+    assert [one.filename for one in warned] == [__file__]
     assert [one.name for one in found.recordings] == ["chirp"]
     with pytest.raises(em.InputError, match=r"short\.csv: has 51 samples"):
         em.compare(short)

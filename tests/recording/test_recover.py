@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import http.client
-import json
 import os
 import re
 import subprocess
@@ -13,6 +12,7 @@ from urllib.parse import parse_qs, urlsplit
 import numpy as np
 import pytest
 from rerun.chunk import RrdReader
+from support.documents import result_of
 from support.on_page import wait_until
 
 from emaviz.cli import main
@@ -118,7 +118,7 @@ def test_the_command_recovers_a_part_and_overwrites_nothing(tmp_path, running, c
     assert main(["recover", str(part), "--force", "--json", str(tmp_path / "r.json")]) == 0
     assert f"{target}: recovered from a.rrd.part" in capsys.readouterr().out
     assert sorted(os.listdir(tmp_path)) == ["a.rrd", "r.json"]
-    assert json.loads((tmp_path / "r.json").read_text())["file"] == str(target)
+    assert result_of(tmp_path / "r.json", "recover")["file"] == str(target)
     recording = read(target)
     assert recording.complete and recording.config == "# run"
     assert len(recording.identification["hba"].iteration) == 40 and len(RrdReader(target).blueprints()) == 1

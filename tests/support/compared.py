@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from emaviz.cli import main
+from support.documents import result_of
 
 
 def one_file(path: Path, parts: list[dict[str, np.ndarray]]) -> None:
@@ -23,4 +23,4 @@ def compared(folder: Path, *arguments: object) -> dict[str, Any]:
     out = folder / "result.json"
     given = [str(one) for one in arguments]
     assert main(["compare", *given, "--actuator", str(folder / "mine.toml"), "--json", str(out)]) == 0
-    return json.loads(out.read_text())
+    return result_of(out, "compare")

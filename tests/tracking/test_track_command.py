@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from support.documents import result_of
 
 from ema_model.lives import drawn, worn_life
 from emaviz.cli import main
@@ -34,7 +35,7 @@ def test_all_outputs(folder, tmp_path, monkeypatch, capsys):
     written = [tmp_path / name for name in ("track.json", "track.html", "track.rrd")]
     options = [text for name, path in zip(("--json", "--report", "--record"), written) for text in (name, str(path))]
     assert main(["track", str(folder), "--threshold", f"{life.fault}={life.threshold}", *options]) == 0
-    found = json.loads(written[0].read_text())["faults"]
+    found = result_of(written[0], "track")["faults"]
     one = found[life.fault]
     assert set(found) == {"k1", "k2", "k3", "k4", "k5", "k6", "k8"} and one["trend"]
     left = one["remaining_flights"]

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import cached_property
-from typing import Any
+from typing import Annotated, Any, TypedDict
 
 import numpy as np
+from msgspec import Meta
 
 from ema_model.campaign.store import Store
 from ema_model.campaign.thesis.cases import ALGORITHMS
@@ -16,6 +16,41 @@ from ema_model.identification.run import ROBUST
 
 AS_THE_THESIS, FILTERED, TRADE_OFF = "thesis", "filtered", "trade_off"  # groups of the plan; robust has its own
 TARGET_PERCENT = 0.05  # mean Err of the robust identification over all eleven
+
+
+class ThesisRowJson(TypedDict):
+    """An algorithm on one faulty actuator: means and deviations over its runs; null where there is no run."""
+
+    case: Annotated[str, Meta(description="the actuator's name")]
+    algorithm: Annotated[str, Meta(description="ssa, hba, do or robust")]
+    runs: Annotated[int, Meta(description="how many")]
+    error_percent: Annotated[float | None, Meta(description="Err %, mean")]
+    error_deviation_percent: Annotated[float | None, Meta(description="Err %, standard deviation")]
+    error_wrapped_percent: Annotated[float | None, Meta(description="Err %, mean, with k7 as the angle that it is")]
+    time_s: Annotated[float | None, Meta(description="s of one run, mean")]
+    time_deviation_s: Annotated[float | None, Meta(description="s, standard deviation")]
+    thesis_error_percent: Annotated[float | None, Meta(description="Err % that the thesis prints; null: none")]
+    thesis_error_deviation_percent: Annotated[float | None, Meta(description="its standard deviation, as printed")]
+    thesis_time_s: Annotated[float | None, Meta(description="s that the thesis prints")]
+
+
+class CoefficientJson(TypedDict):
+    """The performance coefficient of an algorithm (T 5.4)."""
+
+    fault: Annotated[str, Meta(description="the kind of fault")]
+    algorithm: Annotated[str, Meta(description="ssa, hba or do")]
+    coefficient: Annotated[float, Meta(description="%, ours")]
+    thesis: Annotated[float | None, Meta(description="%, as the thesis prints it")]
+
+
+class EvaluationJson(TypedDict):
+    """The thesis's evaluation, computed anew, beside its printed numbers."""
+
+    mean_error_percent: Annotated[
+        dict[str, float | None], Meta(description="Err %, mean over the actuators, by algorithm")
+    ]
+    rows: Annotated[list[ThesisRowJson], Meta(description="of each actuator and algorithm")]
+    performance_coefficient_percent: Annotated[list[CoefficientJson], Meta(description="of each fault and algorithm")]
 
 
 class Evaluation:
@@ -91,7 +126,7 @@ class Evaluation:
     def _computed(self, algorithm: str) -> list[Score]:
         return [one for one in self.scores if one.algorithm == algorithm and one.error.count]
 
-    def as_dict(self) -> Mapping[str, Any]:
+    def as_dict(self) -> EvaluationJson:
         """For JSON; what there is no run of is null."""
         return {
             "mean_error_percent": {

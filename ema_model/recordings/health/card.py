@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field, replace
-from typing import Any
+from typing import Annotated, TypedDict
 
 import numpy as np
+from msgspec import Meta
 
 from ema_model.actuator import Actuator
 from ema_model.recordings.health import checks
@@ -16,6 +17,24 @@ from ema_model.recordings.measurement import Measurement
 from ema_model.text import InWords
 
 __all__ = ["Finding", "Health", "health", "health_of"]
+
+
+class FindingJson(TypedDict):
+    """What one check of a recording found."""
+
+    check: Annotated[str, Meta(description="which one: sampling, noise, delay, …")]
+    severity: Annotated[Severity, Meta(description="how much it matters")]
+    sentence: Annotated[str, Meta(description="the finding in words, with its number and unit")]
+    values: Annotated[dict[str, float | None], Meta(description="its numbers, units in the names; null: not known")]
+    signal: Annotated[str | None, Meta(description="of which signal; null: of the recording")]
+
+
+class HealthJson(TypedDict):
+    """The data health card of a recording."""
+
+    name: Annotated[str, Meta(description="the recording's")]
+    severity: Annotated[Severity, Meta(description="the worst of all findings")]
+    findings: Annotated[list[FindingJson], Meta(description="in the order of the checks")]
 
 
 @dataclass(frozen=True, repr=False)
@@ -42,11 +61,11 @@ class Health(InWords):
         fits = (f for f in self.findings if f.check == check and signal in (None, f.signal))
         return next(fits, None)
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> HealthJson:
         """For JSON: numbers that are not known are null."""
         findings = []
         for finding in self.findings:
-            entry = asdict(finding)
+            entry = FindingJson(**asdict(finding))
             entry["values"] = {k: v if np.isfinite(v) else None for k, v in finding.values.items()}
             findings.append(entry)
         return {"name": self.name, "severity": self.severity, "findings": findings}

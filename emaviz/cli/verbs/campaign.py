@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from ema_model.campaign import Status, Store
     from ema_model.campaign.plan import Plan
     from emaviz.cli import output
+    from emaviz.cli.documents import CampaignJson, PlannedJson
 
 HELP = "compute the many tasks of a plan, in processes or on a Dask cluster; status and report of one"
 PLACE = 11
@@ -52,6 +53,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--dry-run", action="store_true", help="say what would be computed, and how long it takes")
     parser.add_argument("--retry", action="store_true", help="compute again what ended in an error")
     options.add_json(parser)
+
+
+def documents() -> tuple[type, ...]:
+    """What --json holds: of a campaign, and of what one would compute."""
+    from emaviz.cli.documents import CampaignJson, PlannedJson
+
+    return (CampaignJson, PlannedJson)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -89,7 +97,9 @@ def _run(plan: Plan, arguments: argparse.Namespace) -> int:
         with suppress(InputError):  # there is no folder yet
             store = Store(arguments.out)
             print(interrupted(store), flush=True)
-            output.write_json(arguments, {"interrupted": True, **_numbers(store)})
+            so_far = _numbers(store)
+            so_far["interrupted"] = True
+            output.write_json(arguments, so_far)
         raise
     finally:
         progress.done()
@@ -140,7 +150,7 @@ def _dry_run(plan: Plan, arguments: argparse.Namespace) -> int:
         seconds = estimate_s(plan, there | {t.name for t in plan.tasks if t.group != group}, 1, known)
         print(f"{group:28}{kind:10}{left:8} of {len(tasks)}   {duration(seconds)} on one core ({how})")
     print(f"{workers} workers: about {total / 3600.0:.2g} h ({duration(total)})")
-    numbers = {"tasks": len(plan.tasks), "there": len(there), "workers": workers, "seconds": total}
+    numbers: PlannedJson = {"tasks": len(plan.tasks), "there": len(there), "workers": workers, "seconds": total}
     output.write_json(arguments, numbers)
     return 0
 
@@ -170,7 +180,10 @@ def _report(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _numbers(store: Store) -> dict:
-    return {"title": store.header.title, "version": store.header.version, "commit": store.header.commit} | {
-        "groups": store.progress()
+def _numbers(store: Store) -> CampaignJson:
+    return {
+        "title": store.header.title,
+        "version": store.header.version,
+        "commit": store.header.commit,
+        "groups": store.progress(),
     }

@@ -40,6 +40,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     options.add_seed(parser)
 
 
+def documents() -> tuple[type, ...]:
+    """What --json holds: of recordings, and of units beside each other."""
+    from ema_model.comparison.summary import ComparisonJson
+    from ema_model.units.summary import UnitsComparedJson
+
+    return (ComparisonJson, UnitsComparedJson)
+
+
 def run(arguments: argparse.Namespace) -> int:
     """Reads, compares, writes and prints."""
     if arguments.save_actuator and not arguments.calibrate:

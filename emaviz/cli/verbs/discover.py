@@ -6,7 +6,8 @@ import argparse
 from typing import TYPE_CHECKING
 
 from emaviz.cli import files, options
-from emaviz.cli.interrupt import EXIT_CODE, PartialAnswer
+from emaviz.cli.exit_code import ExitCode
+from emaviz.cli.interrupt import PartialAnswer
 from emaviz.cli.numbers import whole
 
 if TYPE_CHECKING:
@@ -26,6 +27,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--max-effects", type=whole(0, 100), default=3, metavar="N", help="at most so many are added")
     options.add_open_loop(parser)
     options.add_seed(parser)
+
+
+def documents() -> tuple[type, ...]:
+    """What --json holds: of recordings, and of units beside each other."""
+    from ema_model.discovery.shown.summary import DiscoveryJson
+    from ema_model.units.discovery.summary import UnitsDiscoveredJson
+
+    return (DiscoveryJson, UnitsDiscoveredJson)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -76,7 +85,7 @@ def run(arguments: argparse.Namespace) -> int:
     if not is_whole:
         output.say_not_written(arguments, "save_actuator")
     _write(found, arguments)
-    return 0 if is_whole else EXIT_CODE
+    return ExitCode.DONE if is_whole else ExitCode.INTERRUPTED
 
 
 def _write(found: Discovery, arguments: argparse.Namespace) -> None:

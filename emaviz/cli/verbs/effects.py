@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import textwrap
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, cast
 
 from ema_model.quantities.axes import Axes
 from emaviz.cli import files
@@ -13,6 +13,7 @@ from emaviz.cli.options import add_json, effect_name
 
 if TYPE_CHECKING:
     from ema_model.effects import Effect, Parameter
+    from emaviz.cli.documents import EffectJson, EffectParameterFactsJson
 
 HELP = "list the physical effects that can be added to the models, or explain one"
 PLACE = 8
@@ -25,6 +26,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--html", type=files.Folder(), metavar="DIR", help="write the library as pages, with typeset equations"
     )
     add_json(parser)
+
+
+def documents() -> tuple[type, ...]:
+    """What --json holds."""
+    from emaviz.cli.documents import EffectsJson
+
+    return (EffectsJson,)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -64,10 +72,10 @@ def explain_users(name: str) -> str:
     return "\n".join([TITLES[name], "", f"The table [effects.{name}] of an actuator file", *entries])
 
 
-def _users_facts(name: str) -> dict[str, Any]:
+def _users_facts(name: str) -> EffectJson:
     from ema_model.effects.user.entries import KEYS, TITLES
 
-    return {"name": name, "title": TITLES[name], "keys": KEYS[name]}
+    return {"name": name, "title": TITLES[name], "keys": dict(KEYS[name])}
 
 
 def explain(effect: Effect) -> str:
@@ -104,15 +112,15 @@ def _on_a_linear_axis(parameter: Parameter) -> str:
     return f" (where the {whose}'s axis is linear: {there.shown}, {there.low:g} … {there.high:g} {there.unit})"
 
 
-def _facts(effect: Effect) -> dict[str, Any]:
+def _facts(effect: Effect) -> EffectJson:
     return {
         "name": effect.name,
         "title": effect.title,
         "equation": effect.equation,
         "source": effect.source,
         "explanation": effect.explanation,
-        "parameters": [asdict(p) for p in effect.parameters],
-        "severities": effect.severities,
+        "parameters": [cast("EffectParameterFactsJson", asdict(p)) for p in effect.parameters],
+        "severities": list(effect.severities),
         "shows": effect.shows,
         "against": effect.against,
         "mistaken_for": effect.mistaken_for,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ema_model.errors import InputError
 from ema_model.members import stated, stated_in
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from ema_model.actuator import Actuator
     from ema_model.identification.objective import Objective
-    from ema_model.identification.run import Identification, Progress
+    from ema_model.identification.run import Progress
     from ema_model.recordings import Measurement
     from emaviz.cli import output
 
@@ -47,6 +47,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     options.add_run(parser)
 
 
+def documents() -> tuple[type, ...]:
+    """What --json holds: of a whole identification, and of one that was interrupted."""
+    from ema_model.identification.summary import IdentificationJson, IdentifiedSoFarJson
+
+    return (IdentificationJson, IdentifiedSoFarJson)
+
+
 def run(arguments: argparse.Namespace) -> int:
     """Fits, prints and records; once interrupted, the best so far."""
     from emaviz.cli import given, output
@@ -68,6 +75,7 @@ def run(arguments: argparse.Namespace) -> int:
     from ema_model.actuator import save_actuator
     from ema_model.identification.objective import Objective
     from ema_model.identification.run import SEARCH_SHARE, identify
+    from ema_model.identification.summary import as_dict
     from ema_model.quantities.numbers import amount
 
     def fitness(of: list[Measurement]) -> Objective:
@@ -115,8 +123,7 @@ def run(arguments: argparse.Namespace) -> int:
     holdout_rmse = None if held is None else _finite(held(answer.k)[0])
     if arguments.save_actuator:
         save_actuator(answer.found_actuator, arguments.save_actuator)
-    document = result(answer, actuator, holdout_rmse)
-    output.write_json(arguments, document)
+    output.write_json(arguments, as_dict(answer, actuator, holdout_rmse))
     print(answer)
     if unseen and holdout_rmse is None:
         print("the model diverges on what was not fitted")
@@ -136,63 +143,17 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def result(answer: Identification, actuator: Actuator, holdout_rmse: float | None = None) -> dict[str, Any]:
-    """The JSON form of an answer (INTERFACES)."""
-    from ema_model.actuator.naming import on_axes
-    from ema_model.actuator.readings import readings
-
-    sure = answer.uncertainty
-    document = {
-        "k": answer.k,
-        "k_interval90": sure.interval90,
-        "healthy": bool(sure.healthy),
-        "alarms": sure.alarms,
-        "ambiguous": sure.ambiguous,
-        "hardly_known": sure.hardly_known,
-        "separated_by": sure.separated_by.options if sure.separated_by else "",
-        "adequate": bool(sure.adequate),
-        "warnings": sure.warnings,
-        "physical": readings(answer.k, actuator),
-        "rmse": answer.rmse,
-        "corrected_rmse": _finite(answer.corrected_rmse),
-        "evaluations": answer.evaluations,
-        "elapsed_s": answer.elapsed_s,
-        "compile_s": answer.compile_s,
-        "algorithm": answer.algorithm,
-        "polished": answer.polished,
-        "searched_k": answer.searched_k,
-        "parameters": {on_axes(path, actuator.axes).path: value for path, value in answer.parameters.items()},
-        "holdout_rmse": holdout_rmse,
-        "history": {"rmse": answer.rmse_history, "k": answer.k_history},
-    }
-    if answer.truth is not None:
-        document |= {"truth": answer.truth, "error_percent": answer.error_percent}
-    return document
-
-
 def _say_so_far(history: list[Progress], actuator: Actuator, arguments: argparse.Namespace) -> None:
     """Writes and prints the best of a search that was interrupted, and how it came there."""
-    from ema_model.actuator.readings import readings, sentences
+    from ema_model.actuator.readings import sentences
     from ema_model.faults import NAMES
     from ema_model.identification.run import algorithm_title
+    from ema_model.identification.summary import so_far_as_dict
     from ema_model.quantities.numbers import amount
     from emaviz.cli import output
 
     last = history[-1]
-    document = {
-        "interrupted": True,
-        "iteration": last.iteration,
-        "iterations": last.iterations,
-        "k": last.k,
-        "k_interval90": None,
-        "physical": readings(last.k, actuator),
-        "rmse": last.rmse,
-        "evaluations": last.evaluations,
-        "elapsed_s": last.elapsed_s,
-        "algorithm": last.algorithm,
-        "history": {"rmse": [at.rmse for at in history], "k": [at.k for at in history]},
-    }
-    output.write_json(arguments, document)
+    output.write_json(arguments, so_far_as_dict(history, actuator))
     where = f"at iteration {last.iteration} of {last.iterations} of {algorithm_title(last.algorithm)}"
     print(f"Interrupted {where}: the best k so far, which no fit has refined, without intervals.")
     for name, value, phrase in zip(NAMES, last.k, sentences(last.k, actuator)):

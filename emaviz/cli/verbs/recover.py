@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ema_model.errors import InputError
 from emaviz.cli import files, options
+
+if TYPE_CHECKING:
+    from emaviz.cli.documents import RecoveredJson
 
 HELP = "make a whole recording of one that was cut off (FILE.part)"
 PLACE = 10
@@ -18,6 +22,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=files.RRD, metavar="FILE.rrd", help="its name; without it, FILE's without .part")
     options.add_json(parser)
     files.add_force(parser)
+
+
+def documents() -> tuple[type, ...]:
+    """What --json holds."""
+    from emaviz.cli.documents import RecoveredJson
+
+    return (RecoveredJson,)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -34,7 +45,7 @@ def run(arguments: argparse.Namespace) -> int:
         recover_part(part, target, replace=arguments.force)
     except RecordingError as error:
         raise InputError(str(error)) from None
-    result = {"file": str(target), "bytes": target.stat().st_size}
+    result: RecoveredJson = {"file": str(target), "bytes": target.stat().st_size}
     output.write_json(arguments, result)
     print(f"{target}: recovered from {part.name}, which is removed")
     return 0

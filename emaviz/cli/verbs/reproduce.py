@@ -29,6 +29,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     options.add_json(parser)
 
 
+def documents() -> tuple[type, ...]:
+    """What --json holds."""
+    from ema_model.campaign.thesis.result import EvaluationJson
+
+    return (EvaluationJson,)
+
+
 def run(arguments: argparse.Namespace) -> int:
     """Computes what the folder lacks, writes both files, prints the short table."""
     from ema_model.actuator import load_actuator
@@ -68,7 +75,7 @@ def run(arguments: argparse.Namespace) -> int:
         write_reproduction(found, responses, folder / RECORDING)
     finally:
         progress.done()
-    output.write_json(arguments, dict(found.as_dict()))
+    output.write_json(arguments, found.as_dict())
     print(aligned(*short_table(found)))
     print("", *answer(found), sep="\n")
     if status.errors:

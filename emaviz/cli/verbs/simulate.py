@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from ema_model.actuator import Actuator
     from ema_model.recordings import Measurement
+    from emaviz.cli.documents import SimulatedJson
 
 HELP = "simulate one run of the reference or the monitor model and write it as a recording"
 PLACE = 2
@@ -44,6 +45,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     files.add_force(parser)
 
 
+def documents() -> tuple[type, ...]:
+    """What --json holds."""
+    from emaviz.cli.documents import SimulatedJson
+
+    return (SimulatedJson,)
+
+
 def run(arguments: argparse.Namespace) -> int:
     """Simulates, records with the sensors' accuracy, writes."""
     import numpy as np
@@ -65,10 +73,10 @@ def run(arguments: argparse.Namespace) -> int:
     write_measurement(signals, arguments.out)
     if arguments.record:
         _record(arguments, signals, k)
-    summary = {
+    summary: SimulatedJson = {
         "file": str(arguments.out),
         "samples": signals.samples,
-        "k": k,
+        "k": k.tolist(),
         "physical": readings(k, actuator),
         "effects": effects,
         "rms": {name: float(np.sqrt(np.mean(signals[name] ** 2))) for name in signals.signals if name != "time_s"},

@@ -51,6 +51,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     options.add_seed(parser)
 
 
+def documents() -> tuple[type, ...]:
+    """What --json holds."""
+    from ema_model.tracking.summary import TrackedJson
+
+    return (TrackedJson,)
+
+
 def run(arguments: argparse.Namespace) -> int:
     """Identifies each flight, follows k, writes and prints; again for each that arrives, if it shall watch.
 
@@ -120,8 +127,10 @@ def _tell(
 
     result = track(flights, thresholds, arguments.seed)
     progress.done()
-    cut_off = {} if of is None else {"interrupted": True, "flights_identified": len(flights), "flights_named": of}
-    output.write_json(arguments, as_dict(result) | cut_off)
+    document = as_dict(result)
+    if of is not None:
+        document |= {"interrupted": True, "flights_identified": len(flights), "flights_named": of}
+    output.write_json(arguments, document)
     print(result, flush=True)
     if arguments.record:
         from emaviz.recording.tracking import write_tracking  # rerun takes a second to import

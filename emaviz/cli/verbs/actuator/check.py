@@ -11,6 +11,9 @@ from emaviz.cli import files, options
 if TYPE_CHECKING:
     from ema_model.actuator import Actuator
 
+if TYPE_CHECKING:
+    from emaviz.cli.documents import CheckedActuatorJson
+
 HELP = "say what an actuator file lacks, what is hard to believe, and what a recording cannot tell of it"
 PLACE = 2
 
@@ -21,6 +24,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("recording", nargs="?", type=files.RECORDING, metavar="RECORDING", help="of this actuator")
     options.add_mapping(parser)
     options.add_json(parser)
+
+
+def documents() -> tuple[type, ...]:
+    """What --json holds."""
+    from emaviz.cli.documents import CheckedActuatorJson
+
+    return (CheckedActuatorJson,)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -35,7 +45,13 @@ def run(arguments: argparse.Namespace) -> int:
         for kind, lines in _beside(actuator, arguments).items():
             found[kind] += lines
     print(_document(actuator, found, arguments).text)
-    output.write_json(arguments, {"name": actuator.name, **found})
+    document: CheckedActuatorJson = {
+        "name": actuator.name,
+        "missing": found["missing"],
+        "implausible": found["implausible"],
+        "unidentifiable": found["unidentifiable"],
+    }
+    output.write_json(arguments, document)
     return 0
 
 

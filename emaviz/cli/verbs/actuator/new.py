@@ -6,13 +6,16 @@ import argparse
 import math
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ema_model.errors import InputError, quoted
 from ema_model.members import stated_in
 from ema_model.quantities.axes import KINDS as AXES
 from emaviz.cli import files, options
 from emaviz.cli.numbers import FINITE, SAMPLE_RATE
+
+if TYPE_CHECKING:
+    from emaviz.cli.documents import NewActuatorJson
 
 HELP = "write an actuator file with comments, from options or from answers on the terminal"
 PLACE = 1
@@ -61,6 +64,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     files.add_force(parser)
 
 
+def documents() -> tuple[type, ...]:
+    """What --json holds."""
+    from emaviz.cli.documents import NewActuatorJson
+
+    return (NewActuatorJson,)
+
+
 def run(arguments: argparse.Namespace) -> int:
     """Asks for what no option says where a terminal is there, guesses the rest, and writes the file."""
     from ema_model.actuator import save_actuator
@@ -75,11 +85,17 @@ def run(arguments: argparse.Namespace) -> int:
     controller, drive, notes = _kinds(arguments)
     actuator = described(document, controller, drive, _HERE, arguments.sample_rate)
     save_actuator(actuator, arguments.file, with_comments=True)
-    found = {"notes": notes, "missing": list(missing(actuator)), "implausible": list(implausible(actuator))}
+    found: NewActuatorJson = {
+        "file": arguments.file,
+        "name": actuator.name,
+        "notes": notes,
+        "missing": list(missing(actuator)),
+        "implausible": list(implausible(actuator)),
+    }
     print(f"{arguments.file}: {actuator.name}, controller {controller}, {len(actuator.tolerances)} parameters to fit")
-    for line in (line for lines in found.values() for line in lines):
+    for line in (*found["notes"], *found["missing"], *found["implausible"]):
         print(f"! {line}")
-    output.write_json(arguments, {"file": arguments.file, "name": actuator.name, **found})
+    output.write_json(arguments, found)
     return 0
 
 

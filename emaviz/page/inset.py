@@ -103,6 +103,9 @@ def style() -> Html:
         ".mantine-Notifications-root{left:var(--emaviz-note-left,10px)!important;right:auto!important;"
         "top:var(--emaviz-note-top,80px)!important;bottom:auto!important;width:var(--emaviz-note-width,300px)!important;"
         "max-height:var(--emaviz-note-height,50vh);overflow-y:auto}"
+        # a control's hint stands beside the panel, on the control's height: it covers no other control
+        "body:has([data-dock-region=left]:hover) .mantine-Tooltip-tooltip[style*='15rem']"
+        "{left:calc(var(--emaviz-left,400px) + 8px)!important}"
         ".emaviz-grow{position:fixed;z-index:7;width:26px;height:26px;padding:0;border-radius:4px;cursor:pointer;"
         "font-size:15px;line-height:24px;border:1px solid rgba(134,142,150,.55);"
         "background:var(--mantine-color-body);color:var(--mantine-color-text)}"

@@ -103,6 +103,15 @@ def test_what_is_told_covers_no_control(page, app, size):
         page.locator(".mantine-Notification-root").first.wait_for(state="detached")
 
 
+def test_a_controls_hint_stands_beside_the_panel(page):
+    page.get_by_role("tab", name="Explore", exact=True).click()
+    page.get_by_label("Profile", exact=True).hover()
+    hint = page.get_by_text("How the load goes over time")
+    hint.wait_for()
+    panel = page.locator("[data-dock-region=left]").bounding_box()
+    assert hint.bounding_box()["x"] >= panel["x"] + panel["width"]
+
+
 def test_a_message_names_a_file_of_the_data_folder_without_the_folder(page, app):
     folder = app.page.folder.resolve()
     app.page.notify("It cannot be read", f"{folder}/rig/a.csv: is empty; {folder} has {folder}-b/x.csv")

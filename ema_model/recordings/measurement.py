@@ -178,8 +178,8 @@ class Measurement(InWords):
         if missing:
             where = shown(self.name, 100) or "the recording"
             needed = f"{where}: column {', '.join(map(self.shown, missing))} is needed"
-            for name in missing if self.axes is not None else ():
-                if wrong := self.axes.mismatch(name, self.of_other_axes):
+            for name in missing:
+                if self.axes is not None and (wrong := self.axes.mismatch(name, self.of_other_axes)):
                     raise InputError(f"{needed}; {wrong}")
             present = listed([self.shown(name) for name in self.signals])
             raise InputError(f"{needed}; add it (present: {present}){without and '; '}{without}")

@@ -34,6 +34,8 @@ def parameters_are_seen_whole(page, width, height):
 def test_units_are_compared(page, app):
     folder = app.comparing.folder
     write_units(folder.folder / "bench")
+    whole = folder.folder / "bench" / "left" / "left_slow.csv"
+    (whole.parent / "left_begun.csv").write_text("".join(whole.read_text().splitlines(keepends=True)[:51]))
     assert main(["actuator", "new", str(folder.actuators / "mine.toml"), *ACTUATOR]) == 0
     tab = app.tab(UnitsTab)
     page.get_by_role("tab", name="Units", exact=True).first.click()
@@ -45,6 +47,7 @@ def test_units_are_compared(page, app):
     page.get_by_text("no recording has such a name").wait_for()
     fill(page, "Hold out", "*unseen*")
     page.get_by_role("button", name="Compare units").click()
+    page.get_by_text("left_begun.csv: has 50 samples").first.wait_for()
     page.get_by_text("from the rest in motor dynamic friction").first.wait_for()
     page.get_by_text("3 units, 6 recordings fitted, 3 held out").first.wait_for()
     found = tab.comparing.found

@@ -145,8 +145,8 @@ def recordings(tmp_path):
     folder.mkdir()
     plan = written(tmp_path, "[groups.one]\nCHEAP\n")
     one = given(load_plan(plan).tasks[0]).fitted[0]
-    for name in ("a", "b", "c"):
-        rows = zip(*(one[column] for column in one.signals))
+    for number, name in enumerate(("a", "b", "c")):
+        rows = zip(*(one[column][number:] for column in one.signals))
         lines = [",".join(one.signals), *(",".join(f"{value:.9g}" for value in row) for row in rows)]
         (folder / f"{name}.csv").write_text("\n".join(lines) + "\n")
     return folder
@@ -161,6 +161,11 @@ def test_each_file_of_a_pattern_is_a_task(recordings):
     assert [task.case for task in plan.tasks] == ["a.csv", "b.csv", "c.csv", "a.csv + b.csv"]
     assert given(plan.tasks[0]).fitted[0].samples == 501
     assert len(given(plan.tasks[3]).held) == 1
+    whole = (recordings / "c.csv").read_bytes()
+    (recordings / "c.csv").write_bytes((recordings / "a.csv").read_bytes())
+    with pytest.raises(InputError, match=r"c: is both fitted and held out \(its content is that of a\)"):
+        given(load_plan(path).tasks[3])
+    (recordings / "c.csv").write_bytes(whole)
     copy = recordings.parent / "copy.toml"
     copy.write_text(plan.text)
     assert [task.recorded for task in load_plan(copy).tasks] == [task.recorded for task in plan.tasks]

@@ -17,7 +17,8 @@ from ema_model.simulation.one_stack import library_stack, own_stack, stack_at_ha
 from ema_model.simulation.run import Run, simulate_monitor, simulate_reference
 
 FITNESSES = ("filtered", "raw")
-_RATE_HZ = dict(zip(FITNESSES, (10_000.0, 100_000.0)))  # of what is identified, by the fitness that it is for
+# Of what is identified, by the fitness that it is for.
+_RATE_HZ: dict[str, float] = dict(zip(FITNESSES, (10_000.0, 100_000.0)))
 
 
 def can_be_explored(actuator: Actuator) -> bool:

@@ -49,7 +49,8 @@ def until_unwritable(run: Callable[[], int], say: Callable[[str], None]) -> int:
             os.close(nowhere)
     if isinstance(out.failure, BrokenPipeError):
         return ExitCode.DONE
-    say(f"the standard output cannot be written ({out.failure.strerror}); check where it goes")
+    why = out.failure.strerror if out.failure is not None else ""
+    say(f"the standard output cannot be written ({why}); check where it goes")
     return ExitCode.FAILED
 
 

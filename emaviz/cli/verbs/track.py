@@ -155,7 +155,8 @@ def _watch(
     folder = Path(arguments.files[0])
     if len(arguments.files) > 1 or not folder.is_dir():
         raise InputError(f"--watch: {quoted(arguments.files[0])}: name one folder, in which flights arrive")
-    watched, flights = Watched(), dict[Path, Flight]()
+    watched = Watched()
+    flights: dict[Path, Flight] = {}
     print(f"watching {folder}; Ctrl-C ends it", file=sys.stderr)
     try:
         while True:

@@ -288,6 +288,7 @@ def discover(
     candidates: Sequence[str] | None = None,
     most_effects: int = 3,
     on_progress: Callable[[str], None] | None = None,
+    stop: Callable[[], bool] | None = None,
 ) -> Discovery:
     """Which physical effects the model lacks, added to it one after another.
 
@@ -298,6 +299,7 @@ def discover(
     candidates: names of the effects to consider; all of `emaviz effects` without it.
     most_effects: how many are added at most.
     on_progress: takes a text that says what goes on; what it raises ends the discovery.
+    stop: is asked as often, once the model is calibrated; where it is true, what was added so far is the answer.
     """
     actuator = actuator or load_actuator()
     return discovery.discover(
@@ -308,6 +310,7 @@ def discover(
         candidates=candidates,
         most_effects=most_effects,
         on_progress=on_progress,
+        stop=stop,
     )
 
 

@@ -45,7 +45,7 @@ def discover(
     candidates: Sequence[str] | None = None,
     most_effects: int = 3,
     on_progress: Progress | None = None,
-    stop: Callable[[], bool] = lambda: False,
+    stop: Callable[[], bool] | None = None,
 ) -> Discovery:
     """The missing effects of recordings of one actuator, added to its model one after another.
 
@@ -59,7 +59,7 @@ def discover(
     progress = on_progress or (lambda text: None)
 
     def go_on() -> None:
-        if stop():
+        if stop is not None and stop():
             raise _Stopped
 
     def tell(text: str) -> None:

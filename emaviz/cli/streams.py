@@ -47,6 +47,7 @@ def until_unwritable(run: Callable[[], int], say: Callable[[str], None]) -> int:
             nowhere = os.open(os.devnull, os.O_WRONLY)
             os.dup2(nowhere, out.fileno())
             os.close(nowhere)
+    assert out.failure is not None, "else it has returned, or raised"
     if isinstance(out.failure, BrokenPipeError):
         return ExitCode.DONE
     why = out.failure.strerror if out.failure is not None else ""

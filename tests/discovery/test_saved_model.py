@@ -81,7 +81,7 @@ def test_the_saved_tolerances_are_what_was_found(saved):
     told = 0
     for path, one in again.tolerances.items():
         before = ACTUATOR.tolerances.get(path)
-        if path not in parameters or (before and parameters[path].sigma >= 0.9 * before.sigma):
+        if before and (path not in parameters or parameters[path].sigma >= 0.9 * before.sigma):
             assert one.sigma == pytest.approx(before.sigma)
         else:
             told += 1
@@ -94,9 +94,11 @@ def test_a_fit_with_the_saved_tolerances_counts_what_was_known(tmp_path):
     guessed = with_effect(replace(ACTUATOR, faults=FAULT), "cogging_torque", {"amplitude_Nm": 0.018, "order": 12.0})
     free = ["effects.cogging_torque.amplitude_Nm", "motor.inertia_kgm2", "transmission.backlash_rad"]
     first = compare(recordings()[:1], guessed, free=free).calibration
+    assert first is not None
     save_actuator(first.actuator, tmp_path / "first.toml")
     again = load_actuator(tmp_path / "first.toml")
     second = compare(recordings()[:1], again, free=free).calibration
+    assert second is not None
     for path in free:
         known, sigma = first.parameters[path], again.tolerances[path].sigma
         assert sigma == pytest.approx(known.sigma) and sigma < 0.5 * guessed.tolerances[path].sigma

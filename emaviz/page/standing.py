@@ -67,7 +67,7 @@ class Standing:
         press = Html()
         if self._start is not None and not self.provenance.computing:
             pressed = _PRESS.format(id_of(self._start))
-            press = html('<button style="{}" onclick="{}">{}</button>', _BUTTON, pressed, self._start.label)
+            press = html('<button style="{}" onclick="{}">{}</button>', _BUTTON, pressed, "Compute again")
         grey = _GREY if self.provenance.of is not None else ""
         return html(
             '<div class="emaviz-out-of-date emaviz-all-columns" role="status" style="{};color:{}"><div>▲ {}</div>{}{}'

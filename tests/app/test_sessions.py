@@ -263,7 +263,7 @@ def test_what_is_out_of_date_is_marked_and_what_a_session_lacks_is_named_in_its_
     assert "Out of date: b.csv" in banner.inner_text() or "Out of date: a.csv" in banner.inner_text()
     grey = "one => getComputedStyle(one.closest('.emaviz-out-of-date').parentElement.nextElementSibling).opacity"
     assert float(banner.evaluate(grey)) < 0.9, "the result is greyed"
-    banner.get_by_role("button", name="Compare").click()  # presses the tab's own
+    banner.get_by_role("button", name="Compute again").click()  # presses the tab's own
     banner.wait_for(state="hidden")
     wait_until(lambda: comparing.comparison is not None and len(comparing.comparison.recordings) == 1)
     wait_until(lambda: not comparing.running)
@@ -285,7 +285,7 @@ def test_what_is_out_of_date_is_marked_and_what_a_session_lacks_is_named_in_its_
         page.get_by_role("tab", name=tab, exact=True).click()
         page.get_by_role("status").filter(has_text=line).first.wait_for()
     comparing.job.stop()
-    page.get_by_role("status").filter(has_text="press Compare.").get_by_role("button", name="Compare").wait_for()
+    page.get_by_role("status").filter(has_text="press Compare.").get_by_role("button", name="Compute again").wait_for()
     comparing.calibrate = True
     identifying.clear()
 

@@ -13,6 +13,7 @@ import viser
 from support.on_page import field, wait_until
 from support.raw_page import CAMERA, RawPage
 
+from ema_model.recordings import write_measurement
 from emaviz.server import gate
 from emaviz.server.gate import TYPING_S
 from emaviz.server.messages import MOST_INT
@@ -170,6 +171,27 @@ def test_no_press_of_any_button_before_a_result_costs_a_traceback(
     assert press_every_button(app, raw, marker) > 200
     assert "Traceback" not in capfd.readouterr().err
     assert {file for file in app.comparing.folder.recordings.iterdir()} == kept, "there was nothing to keep"
+
+
+@pytest.mark.long
+def test_no_press_of_any_button_beside_results_costs_a_traceback(app, controls, raw, marker, capfd, request):
+    """As before, and with everything computed that the page can show of a challenge and of the sliders' plant."""
+    comparing, discovering, identifying = app.comparing, app.discovering, app.session.identifying
+    run = app.session.simulation.reference
+    write_measurement(run, comparing.folder.uploads / "run.csv")
+    comparing.add("uploads/run.csv")
+    wait_until(lambda: comparing.comparison is not None and not app.session.worker.busy)
+    app.session.settings.set("algorithms", ["do"])
+    app.session.settings.set("iterations", 5)
+    wait_until(app.session.identify)
+    wait_until(lambda: identifying.answer is not None and not app.session.worker.busy)
+    discovering.choose("first_bench_run")
+    wait_until(discovering.start)
+    wait_until(lambda: discovering.look is not None and discovering.look.assessment and not app.session.worker.busy)
+    for fixture in ("no_long_runs", "no_gate"):
+        request.getfixturevalue(fixture)
+    assert press_every_button(app, raw, marker) > 200
+    assert "Traceback" not in capfd.readouterr().err
 
 
 def test_a_picture_that_a_page_does_not_draw_is_no_traceback(app, raw, capfd, monkeypatch):

@@ -33,7 +33,9 @@ EXACT = 1e-6
 # Of what a fit ends at, which stops within a part of its own interval.
 FITTED = 2e-2
 
-NUMBER = re.compile(r"(?<![A-Za-z_])[+−-]?(?<![A-Za-z_])\d+(?:[.,]\d+)*(?:[eE][+−-]?\d+|·10[⁺⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?")
+NUMBER = re.compile(
+    r"\b(?=[0-9a-f]*\d)(?=\d*[a-f])[0-9a-f]{7,40}\b|(?<![A-Za-z_0-9])[+−-]?(?<![A-Za-z_])\d+(?:[.,]\d+)*(?:[eE][+−-]?\d+|·10[⁺⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?"
+)
 LONGEST_LIST = 8  # longer ones are told by their length and their mean
 
 

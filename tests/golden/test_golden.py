@@ -33,9 +33,11 @@ EXACT = 1e-6
 # Of what a fit ends at, which stops within a part of its own interval.
 FITTED = 2e-2
 
+HASH = r"\b(?=[0-9a-f]*\d)(?=\d*[a-f])[0-9a-f]{7,40}\b"
 NUMBER = re.compile(
-    r"\b(?=[0-9a-f]*\d)(?=\d*[a-f])[0-9a-f]{7,40}\b|(?<![A-Za-z_0-9])[+−-]?(?<![A-Za-z_])\d+(?:[.,]\d+)*(?:[eE][+−-]?\d+|·10[⁺⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?"
+    HASH + r"|(?<![A-Za-z_0-9])[+−-]?(?<![A-Za-z_])\d+(?:[.,]\d+)*(?:[eE][+−-]?\d+|·10[⁺⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?"
 )
+RANKED = re.compile(r"(?:^ ?[A-Z][A-Za-z -]+ #\n)+", re.MULTILINE)  # what is as good as nothing may change places
 LONGEST_LIST = 8  # longer ones are told by their length and their mean
 
 
@@ -171,10 +173,9 @@ def _hold(case: Case, kind: str, found: Any) -> None:
 
 def _masked(text: str, folder: Path) -> str:
     """Numbers as #, spaces between columns as one: their widths follow the numbers."""
-    text = text.replace(str(folder), "…")
-    return "".join(
-        f"{re.sub(r' +', ' ', line).rstrip()}\n" for line in NUMBER.sub("#", text).replace("#–", "–").split("\n")
-    ).rstrip("\n") + ("\n" if text.strip() else "")
+    text = NUMBER.sub("#", text.replace(str(folder), "…")).replace("#–", "–")
+    lines = "".join(f"{re.sub(r' +', ' ', line).rstrip()}\n" for line in text.split("\n")).rstrip("\n")
+    return RANKED.sub(lambda rows: "".join(sorted(rows[0].splitlines(True))), f"{lines}\n") if lines.strip() else ""
 
 
 def _json(path: Path, folder: Path) -> Any:

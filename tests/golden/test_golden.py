@@ -68,10 +68,20 @@ CASES = (
     Case("identify", "identify chirp.csv --algorithm do --population 4 --iterations 2 " + ALL.format("i")),
     Case("identify_robust", "identify chirp.csv " + ALL.format("r"), exact=False, long=True),
     Case("compare", "compare push.csv --actuator bench.toml " + ALL.format("c"), exact=False),
-    Case("compare_plain", "compare chirp.csv --no-calibrate " + ALL.format("p"), exact=False),
-    Case("compare_held_out", "compare left --holdout '*unseen*' --actuator bench.toml --json h.json", exact=False),
+    Case("compare_plain", "compare chirp.csv --no-calibrate " + ALL.format("p"), exact=False, long=True),
+    Case(
+        "compare_held_out",
+        "compare left --holdout '*unseen*' --actuator bench.toml --json h.json",
+        exact=False,
+        long=True,
+    ),
     Case("compare_closed", "compare chirp.csv --save-actuator found.toml " + ALL.format("o"), exact=False, long=True),
-    Case("compare_units", "compare bench --by unit --actuator bench.toml --json u.json --report u.html", exact=False),
+    Case(
+        "compare_units",
+        "compare bench --by unit --actuator bench.toml --json u.json --report u.html",
+        exact=False,
+        long=True,
+    ),
     Case("discover", "discover push.csv --actuator bench.toml --max-effects 1 " + ALL.format("d"), exact=False),
     Case("discover_closed", "discover chirp.csv --max-effects 1 " + ALL.format("e"), exact=False, long=True),
     Case(

@@ -26,7 +26,7 @@ import numba
 from ema_model.effects import find
 from ema_model.effects.effect import ADVANCE, PLACES, STAGES
 from ema_model.errors import InputError
-from ema_model.kernel_cache.folder import cache_folder
+from ema_model.kernel_cache import cache_folder
 from ema_model.physics.rows import LANES, PARAMETER_ROWS
 
 CIRCUITS = ("thesis", "reduced")  # the drives that stand for the hysteresis current loop

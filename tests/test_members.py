@@ -121,57 +121,17 @@ def run(arguments):
     print("HELLO" if arguments.loud else "hello")
     return 0
 ''',
-    "emaviz/figures/error_pie.py": '''
-"""A pie of the errors, which a section places."""
-
-from __future__ import annotations
-
-import plotly.graph_objects as go
-
-
-def figure(comparison):
-    names = [one.name for one in comparison.recordings]
-    return go.Figure(go.Pie(labels=names, values=[1.0] * len(names)))
-''',
-    "emaviz/report/comparison/pie.py": '''
-"""A section that shows the new figure, second in the report."""
-
-from __future__ import annotations
-
-from ema_model.comparison.result import Comparison
-from emaviz.figures import error_pie
-from emaviz.report.section import Figures, Section
-
-
-class Pie(Section[Comparison]):
-    """Placed behind the answer."""
-
-    title = "Shares of the error"
-    anchor = "pie"
-    place = 15
-
-    def body(self, subject: Comparison, figures: Figures) -> str:
-        """The figure alone."""
-        return figures.place(error_pie.figure(subject))
-''',
-    "emaviz/page/notes/__init__.py": '''
+    "emaviz/page/notes.py": '''
 """The Notes tab."""
+
+from __future__ import annotations
 
 import viser
 
+from emaviz.page.tab import Shared, Tab
 from emaviz.page.workspaces import Workspace
 
 WORKSPACE = Workspace("notes", "Notes", viser.Icon.NOTE, 99)
-''',
-    "emaviz/page/notes/tab.py": '''
-"""The Notes tab."""
-
-from __future__ import annotations
-
-import viser
-
-from emaviz.page.notes import WORKSPACE
-from emaviz.page.tab import Shared, Tab
 
 
 class NotesTab(Tab):
@@ -247,14 +207,13 @@ def test_an_effect_acts_on_both_kinds_of_axes(copied):
 
 
 @pytest.mark.long
-def test_a_command_a_format_and_a_section_with_its_figure(copied):
+def test_a_command_and_a_format(copied):
     copied("-m", "emaviz", "simulate", "--command", "square", "--duration", "0.2", "--model", "mm", "--out", "run.csv")
     header, *rows = (copied.folder / "run.csv").read_text().splitlines()
     lines = [json.dumps(header.split(",")), *(json.dumps([float(cell) for cell in row.split(",")]) for row in rows)]
     (copied.folder / "run.rows").write_text("\n".join(lines))
-    copied("-m", "emaviz", "compare", "run.rows", "--report", "report.html", "--no-calibrate")
-    report = (copied.folder / "report.html").read_text(encoding="utf-8")
-    assert report.index("The answer") < report.index("Shares of the error") < report.index("Data health")
+    copied("-m", "emaviz", "compare", "run.rows", "--no-calibrate", "--json", "found.json")
+    assert json.loads((copied.folder / "found.json").read_text())["signals"], "what was written so is read"
 
 
 def test_an_optimiser(copied):

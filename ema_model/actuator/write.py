@@ -15,12 +15,10 @@ from ema_model.actuator.actuator import Actuator
 from ema_model.actuator.layout import layout
 from ema_model.actuator.naming import on_axes
 from ema_model.actuator.parameters import SECTIONS, default_of, facts_of, numbers
-from ema_model.actuator.tables import as_spelt, tables_of
+from ema_model.actuator.reference import as_spelt, tables_of
 from ema_model.errors import InputError, quoted
-from ema_model.files.limits import TEXT_BYTES
-from ema_model.files.toml_text import toml_of
-from ema_model.files.toml_write import inline, toml_text
-from ema_model.files.whole_file import change_file
+from ema_model.files.sandbox import TEXT_BYTES
+from ema_model.files.written import change_file, inline, toml_of, toml_text
 from ema_model.quantities.axes import Axes
 
 _COMMENTS_AT = 64  # characters from the left

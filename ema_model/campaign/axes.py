@@ -1,25 +1,215 @@
-"""The axes of a plan's group: what each of its entries may be, and the choices that they stand for.
-
-An entry is one choice, or a list of them, which makes it an axis.  What is drawn at random is a choice too: a table
-that says how, drawn anew from each seed.
-"""
+"""Axes of a plan and what is drawn along them."""
 
 from __future__ import annotations
 
+import hashlib
 import itertools
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ema_model import faults
 from ema_model.actuator import Actuator
-from ema_model.campaign import draws
-from ema_model.campaign.given import effects_of
-from ema_model.effects import CATALOGUE
+from ema_model.actuator.file import parse_actuator
+from ema_model.campaign.task import Excitation, File, Simulated, Task
+from ema_model.commands import command
+from ema_model.effects import CATALOGUE, find
+from ema_model.effects.effect import Effect
+from ema_model.effects.user.entries import kind_of, read_entries
 from ema_model.errors import InputError, did_you_mean, quoted
-from ema_model.files.refusal import listed
+from ema_model.estimation import default_free
+from ema_model.faults import vector
+from ema_model.files.opened import listed, open_user_file
 from ema_model.quantities.numbers import as_number
+from ema_model.recordings import Measurement, find_side_file, read
+from ema_model.recordings.recording_set import check_held_out
+from ema_model.simulation.plant import simulate
+from ema_model.simulation.run import Run, Sensors
+
+SEVERITIES = ("slight", "clear", "strong")
+NEEDS_LOAD = ("gear_load_friction", "load_dependent_friction")  # do nothing to an actuator without a load
+_TEETH = 12.0  # the order of what is periodic
+_FAULTS_ALONE = ("k1", "k2", "k3", "k6", "k8")
+_BESIDE = ("cogging_torque", "stribeck_friction", "hinge_moment", "asymmetric_friction", "position_sensor_delay")
+
+
+def base_parameters(actuator: Actuator, which: str, scale: float, seed: int) -> dict[str, float]:
+    """Values drawn about the file's, normal with `scale` σ of their tolerances; the sensors' are left.
+
+    which: "free", those that a calibration moves; or "all", within 3 σ.
+    """
+    if which == "free":
+        random = np.random.default_rng(seed)
+        paths = [path for path in default_free(actuator) if not path.startswith("sensors.")]
+        size = {path: float(random.standard_normal()) for path in paths}
+    else:
+        random = np.random.default_rng([seed, 78])
+        paths = [path for path in actuator.tolerances if not path.startswith("sensors.")]
+        size = {path: float(np.clip(random.standard_normal(), -3.0, 3.0)) for path in paths}
+    return {path: actuator.value(path) + scale * actuator.tolerances[path].sigma * size[path] for path in paths}
+
+
+def load(low: float, high: float, seed: int) -> float:
+    """N·m, uniform."""
+    return float(np.random.default_rng([seed, 79]).uniform(low, high))
+
+
+def uniform_faults(ranges: Mapping[str, Sequence[float]], seed: int) -> dict[str, float]:
+    """Each k uniform in its own range."""
+    random = np.random.default_rng([seed, 80])
+    return {name: float(random.uniform(low, high)) for name, (low, high) in ranges.items()}
+
+
+def worn(seed: int) -> dict[str, float]:
+    """k1, k2, k6 and one shorted phase from U(0, 0.5), k7 from U(0, 1), k8 from U(0.2, 0.8)."""
+    random = np.random.default_rng([seed, 77])
+    k = faults.HEALTHY.copy()
+    k[[0, 1, 5]] = random.uniform(0.0, 0.5, 3)
+    k[2 + random.integers(3)] = random.uniform(0.0, 0.5)
+    k[6], k[7] = random.random(), random.uniform(0.2, 0.8)
+    return faults.named(k)
+
+
+def one_fault(seed: int) -> dict[str, float]:
+    """One fault of 0.15 … 0.6 (the gain to either side); which one follows from the seed."""
+    return _one_fault(seed)[0]
+
+
+def one_effect_beside(seed: int) -> dict[str, dict[str, Any]]:
+    """A clear effect for the plant of `one_fault`, of any phase; which one follows from the seed."""
+    random = _one_fault(seed)[1]
+    effect = CATALOGUE[_BESIDE[(seed // len(_FAULTS_ALONE)) % len(_BESIDE)]]
+    settings = {effect.parameters[0].name: effect.severities[1]}
+    if effect.is_periodic:
+        settings |= {"order": _TEETH, "phase_rad": float(random.uniform(-3.0, 3.0))}
+    return {effect.name: settings}
+
+
+def effect_of(name: str, severity: int, seed: int) -> dict[str, float]:
+    """An effect's settings at a severity; what is periodic has the teeth's order and any phase."""
+    effect = CATALOGUE[name]
+    settings = {effect.parameters[0].name: effect.severities[severity]}
+    if _has_order(effect):
+        settings |= {"order": _TEETH, "phase_rad": float(np.random.default_rng(seed).uniform(-3.0, 3.0))}
+    return settings
+
+
+def pair_of_effects(names: Sequence[str], severities: Sequence[int], seed: int) -> dict[str, dict[str, float]]:
+    """Two of these effects, each of one of these neighbouring severities."""
+    random = np.random.default_rng(seed)
+    chosen = [str(name) for name in random.choice(list(names), 2, replace=False)]
+    drawn = {name: int(random.integers(severities[0], severities[-1] + 1)) for name in chosen}
+    return {name: effect_of(name, severity, seed) for name, severity in drawn.items()}
+
+
+FAULTS: dict[str, Callable[[int], dict[str, float]]] = {"worn": worn, "one": one_fault}
+EFFECTS: dict[str, Callable[[int], dict[str, dict[str, Any]]]] = {"one_beside_a_fault": one_effect_beside}
+
+
+def _has_order(effect: Effect) -> bool:
+    return "order" in {parameter.name for parameter in effect.parameters}
+
+
+def _one_fault(seed: int) -> tuple[dict[str, float], np.random.Generator]:
+    random = np.random.default_rng(seed)
+    name = _FAULTS_ALONE[seed % len(_FAULTS_ALONE)]
+    size = float(random.uniform(0.15, 0.6))
+    found = {name: 0.5 + 0.5 * float(random.choice([-1.0, 1.0])) * size if name == "k8" else size}
+    if name == "k6":
+        found["k7"] = float(random.uniform(0.1, 0.9))
+    return found, random
+
+
+# --- what a task works on: its actuator and its recordings, read or simulated -----------------------------------------
+
+_PIECE = 1 << 20
+_NEXT_NOISE = 7  # from one recording's seed to the next one's
+
+
+@dataclass(frozen=True)
+class Given:
+    """What a kind of task gets."""
+
+    actuator: Actuator  # as its file says: what is fitted
+    fitted: list[Measurement]
+    held: list[Measurement]
+    truth: NDArray[Any] | None = None  # (8,), of a simulated plant
+    effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)  # hidden in it
+
+
+def given(task: Task) -> Given:
+    """Reads or simulates; InputError and FloatingPointError as those do."""
+    actuator = _actuator(task.actuator)
+    if task.recorded is not None:
+        fitted, held = (
+            [_read(file, actuator, task.recorded.mapping) for file in files]
+            for files in (task.recorded.files, task.recorded.holdout)
+        )
+        check_held_out(fitted, held)
+        return Given(actuator, fitted, held)
+    if task.simulated is None:
+        return Given(actuator, [], [])
+    source = task.simulated
+    fitted, held = (recorded(source, runs, actuator) for runs in (source.runs, source.holdout))
+    check_held_out(fitted, held)
+    return Given(actuator, fitted, held, vector(source.faults), effects_of(source.effects))
+
+
+def recorded(source: Simulated, runs: Sequence[Excitation], actuator: Actuator) -> list[Measurement]:
+    """Recordings of the plant; every one of a list has noise of its own."""
+    plant = actuator.with_values(source.values)
+    sensors, effects = Sensors(source.noise_A, source.encoder_bits), effects_of(source.effects)
+    found = []
+    for i, one in enumerate(runs):
+        clean = simulate(run_of(one, source.load_torque_Nm), plant, vector(source.faults), effects)
+        if not source.load_recorded:
+            clean = replace(clean, signals={n: y for n, y in clean.signals.items() if n != "load_torque_Nm"})
+        found.append(sensors.record(clean, source.noise_seed + _NEXT_NOISE * i))
+    return found
+
+
+def run_of(one: Excitation, load_torque_Nm: float) -> Run:
+    """The run as the simulation takes it; InputError for names and values that it does not."""
+    return Run(command(one.command, one.settings), one.duration_s, one.sample_rate_Hz, load_torque_Nm)
+
+
+def effects_of(tables: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, float]]:
+    """Settings by effect; a user's own are registered.  InputError for names and values that there are not."""
+    effects = {}
+    for name, table in tables.items():
+        kind = kind_of(name)
+        effect, numbers = (find(name), dict(table)) if kind is None else read_entries(kind, table)
+        effects[effect.name] = effect.settings(numbers)
+    return effects
+
+
+def digest(path: str) -> str:
+    """Of a recording and its side file; InputError where one is no file."""
+    whole = hashlib.sha256()
+    for one in filter(None, (path, find_side_file(path))):
+        with open_user_file(one, "the file of a measurement") as file:
+            while piece := file.read(_PIECE):
+                whole.update(piece)
+    return whole.hexdigest()[:16]
+
+
+def _read(file: File, actuator: Actuator, mapping: Sequence[str]) -> Measurement:
+    if digest(file.path) != file.digest:
+        raise InputError(f"{file.path}: has changed since the campaign was planned; run it again into a new folder")
+    return read(file.path, actuator, mapping)
+
+
+@lru_cache(maxsize=16)
+def _actuator(text: str) -> Actuator:
+    return parse_actuator(text, "the campaign's actuator")
+
+
+# --- the axes of a plan's group: what each of its entries may be, and the choices that they stand for -----------------
 
 MOST_TASKS = 1_000_000  # of a plan
 
@@ -49,12 +239,12 @@ def _faults(entry: Any, actuator: Actuator) -> list[Choice]:
     table = _table(entry)
     if "draw" in table:
         name = _only(table, "draw")
-        return [Choice(f"{name} faults", _known(name, draws.FAULTS))]
+        return [Choice(f"{name} faults", _known(name, FAULTS))]
     if "uniform" in table:
         ranges = {name: _pair(one) for name, one in _table(_only(table, "uniform")).items()}
         for ends in zip(*ranges.values()):
             faults.vector(dict(zip(ranges, ends)))
-        return [Choice("uniform faults", lambda seed: draws.uniform_faults(ranges, seed))]
+        return [Choice("uniform faults", lambda seed: uniform_faults(ranges, seed))]
     if "grid" in table:
         grid = {name: [_number(v) for v in _list(one)] for name, one in _table(_only(table, "grid")).items()}
         check_count(len(values) for values in grid.values())
@@ -72,7 +262,7 @@ def _effects(entry: Any, actuator: Actuator) -> list[Choice]:
     table = _table(entry)
     if "draw" in table:
         name = _only(table, "draw")
-        return [Choice(f"effect {name}", _known(name, draws.EFFECTS))]
+        return [Choice(f"effect {name}", _known(name, EFFECTS))]
     if "each" in table or "pair_of" in table:
         return _library(table)
     for name, settings in table.items():
@@ -89,17 +279,17 @@ def _library(table: Mapping[str, Any]) -> list[Choice]:
     drawn = table.get("phases", "drawn")
     if drawn not in ("drawn", "default"):
         raise InputError(f'phases is "drawn" or "default", not {quoted(drawn, 40)!r}')
-    severities = [_severity(one) for one in _list(table.get("severities", list(draws.SEVERITIES)))]
+    severities = [_severity(one) for one in _list(table.get("severities", list(SEVERITIES)))]
     if not severities:
         return []
     if "pair_of" in table:
         names = _names(table["pair_of"])
         if len(names) < 2 or severities != list(range(severities[0], severities[-1] + 1)):
             raise InputError("pair_of needs two effects or more, and severities that are neighbours")
-        return [Choice("two effects", lambda seed: draws.pair_of_effects(names, severities, seed))]
+        return [Choice("two effects", lambda seed: pair_of_effects(names, severities, seed))]
     names = [name for name in _names(table["each"]) if name not in _names(table.get("but", []))]
     return [
-        Choice(f"{name}/{draws.SEVERITIES[severity]}", _of_the_library(name, severity, drawn == "drawn"))
+        Choice(f"{name}/{SEVERITIES[severity]}", _of_the_library(name, severity, drawn == "drawn"))
         for name in names
         for severity in severities
     ]
@@ -107,7 +297,7 @@ def _library(table: Mapping[str, Any]) -> list[Choice]:
 
 def _of_the_library(name: str, severity: int, phase_drawn: bool) -> Callable[[int], Any]:
     if phase_drawn:
-        return lambda seed: {name: draws.effect_of(name, severity, seed)}
+        return lambda seed: {name: effect_of(name, severity, seed)}
     effect = CATALOGUE[name]
     return lambda seed: {name: effect.at_severity(severity)}
 
@@ -117,7 +307,7 @@ def _load(entry: Any, actuator: Actuator) -> list[Choice]:
     if isinstance(entry, dict):
         if "uniform" in entry:
             low, high = _pair(_only(entry, "uniform"))
-            return [Choice(f"load {low:g} … {high:g} N·m", lambda seed: draws.load(low, high, seed))]
+            return [Choice(f"load {low:g} … {high:g} N·m", lambda seed: load(low, high, seed))]
         where = _number(_only(entry, "where_needed"))
         return [Choice(f"load {where:g} N·m where needed", lambda seed: ("where_needed", where))]
     value = _number(entry)
@@ -184,9 +374,9 @@ def _known(name: Any, named: Mapping[str, Callable[[int], Any]]) -> Callable[[in
 
 
 def _severity(name: Any) -> int:
-    if name not in draws.SEVERITIES:
-        raise InputError(f"no severity {quoted(name, 40)!r}; there are {', '.join(draws.SEVERITIES)}")
-    return draws.SEVERITIES.index(name)
+    if name not in SEVERITIES:
+        raise InputError(f"no severity {quoted(name, 40)!r}; there are {', '.join(SEVERITIES)}")
+    return SEVERITIES.index(name)
 
 
 def _names(entry: Any) -> list[str]:

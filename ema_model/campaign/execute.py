@@ -30,8 +30,8 @@ def execute(task: Any, version: dict[str, str]) -> dict[str, Any]:
     """
     prepare()
     from ema_model.campaign.kinds import KINDS
-    from ema_model.campaign.version import differences
-    from ema_model.campaign.version import version as own_version
+    from ema_model.campaign.store import differences
+    from ema_model.campaign.store import version as own_version
 
     if other := differences(own_version(), version):
         raise OtherVersion(f"{worker_name()} differs from the campaign: {other}")
@@ -113,6 +113,6 @@ def memory_MB() -> float | None:
 def _answer(task: Any, kind: Any) -> dict[str, Any]:
     import msgspec
 
-    from ema_model.campaign.given import given
+    from ema_model.campaign.axes import given
 
     return kind.run(given(task), msgspec.convert(task.settings, kind.settings), task.seed)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import suppress
 from pathlib import Path
 
-from ema_model.files.lock import FileLock
+from ema_model.files.written import FileLock
 from ema_model.kernel_cache import kept
 
 _LONGEST_S = 300.0  # to wait: a compilation takes seconds, and whoever holds the lock may have been stopped

@@ -12,9 +12,8 @@ from ema_model.campaign.execute import common
 from ema_model.campaign.kinds import KINDS
 from ema_model.campaign.plan import Plan
 from ema_model.campaign.schedulers import Died, Outcome, Scheduler
-from ema_model.campaign.store import Store, header_of
+from ema_model.campaign.store import Store, header_of, version
 from ema_model.campaign.task import Task
-from ema_model.campaign.version import version
 
 Progress = Callable[["Status"], None]
 

@@ -1,19 +1,16 @@
-"""A campaign's folder: the plan, the actuators, and the rows so far, each file written whole or not at all.
-
-campaign.json      what is computed, with which version
-plan.toml          a copy of the plan
-actuators/*.toml   the files' texts, by hash
-parts/*.parquet    rows as they came, by kind: what is there is never computed again
-KIND.parquet       the table: all rows of a kind, sorted by name, once a run has ended
-"""
+"""The rows of a campaign on disk."""
 
 from __future__ import annotations
 
+import hashlib
+import importlib.metadata
 import os
 import secrets
+import subprocess
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, TypedDict
 
@@ -24,11 +21,51 @@ from msgspec import Meta
 
 from ema_model.campaign.kinds import COMMON, HOW, KINDS
 from ema_model.campaign.task import Task, from_json, text_hash
-from ema_model.campaign.version import commit, differences, version
 from ema_model.errors import InputError, quoted
-from ema_model.files.lock import FileLock
-from ema_model.files.refusal import reason, refusal
-from ema_model.files.whole_file import remove_abandoned, whole_file
+from ema_model.files.opened import reason, refusal
+from ema_model.files.written import FileLock, remove_abandoned, whole_file
+
+_PACKAGE = Path(__file__).parents[1]
+_LIBRARIES = ("numpy", "scipy", "numba", "llvmlite")
+_OF_A_RESULT = ("task.py", "given.py", "showable.py", "kinds/")  # of this folder; the rest only moves tasks and rows
+
+
+@cache
+def version() -> dict[str, str]:
+    """By what: the package's version, a hash of its sources, the libraries' versions."""
+    try:
+        package = importlib.metadata.version("emaviz")
+    except importlib.metadata.PackageNotFoundError:  # run from the sources without an installation
+        package = "0+source"
+    digest = hashlib.sha256()
+    for path in sorted(_PACKAGE.rglob("*.py")):
+        inside = path.relative_to(_PACKAGE).as_posix()
+        if not inside.startswith("campaign/") or inside.removeprefix("campaign/").startswith(_OF_A_RESULT):
+            digest.update(inside.encode() + b"\0" + path.read_bytes() + b"\0")
+    libraries = {name: importlib.metadata.version(name) for name in _LIBRARIES}
+    return {"emaviz": package, "sources": digest.hexdigest()[:12], **libraries}
+
+
+def differences(one: dict[str, str], other: dict[str, str]) -> str:
+    """In what two versions differ: 'emaviz 0.1.0 / 0.2.0, numpy 2.4.6 / 2.5.0'; empty where they are the same."""
+    names = [name for name in {**one, **other} if one.get(name) != other.get(name)]
+    return ", ".join(f"{name} {one.get(name, 'none')} / {other.get(name, 'none')}" for name in names)
+
+
+def commit() -> str:
+    """The commit of the sources, with a + where they were changed since; empty where they are in no repository."""
+
+    def git(*arguments: str) -> str:
+        command = ["git", "-C", str(_PACKAGE), *arguments]
+        return subprocess.run(command, capture_output=True, text=True, timeout=10, check=True).stdout.strip()
+
+    try:
+        return git("rev-parse", "--short=10", "HEAD") + ("+" if git("status", "--porcelain", ".") else "")
+    except (OSError, subprocess.SubprocessError):
+        return ""
+
+
+# --- a campaign's folder: the plan, the actuators, and the rows so far, each file written whole or not at all---------
 
 _SCHEMA = 1
 _MOST_PARTS = 200  # small ones of a kind, before they are joined
@@ -266,3 +303,56 @@ def _cannot_write(folder: Path, error: OSError) -> InputError:
 def _write(path: Path, content: bytes) -> None:
     with whole_file(path) as draft:
         draft.write_bytes(content)
+
+
+# --- what a campaign's rows say together: a table a kind, a line a group, and one a case where a group has se----
+
+
+@dataclass(frozen=True)
+class Summary:
+    """The table of a kind's rows."""
+
+    kind: str
+    title: str
+    heads: list[str]
+    lines: list[list[str]]
+
+
+def summaries(store: Store) -> list[Summary]:
+    """The tables of the kinds that the campaign has rows of."""
+    found = []
+    for kind in sorted(set(store.header.kinds.values())):
+        rows = store.table(kind).to_pylist()
+        if rows:
+            found.append(_summary(kind, store, rows))
+    return found
+
+
+def failed(store: Store) -> list[dict[str, Any]]:
+    """The rows of tasks that ended in an error: group, case, seed, error, name."""
+    names = ["group", "case", "seed", "error", "name"]
+    rows = [row for kind in KINDS for row in store.table(kind).select(names).to_pylist()]
+    return [row for row in rows if row["error"] is not None]
+
+
+def _summary(kind: str, store: Store, rows: list[dict[str, Any]]) -> Summary:
+    lines = []
+    for group in (group for group, its in store.header.kinds.items() if its == kind):
+        own = [row for row in rows if row["group"] == group]
+        there = {row["case"] for row in own}
+        cases = [case for case in store.header.cases[group] if case in there]
+        if len(cases) > 1:
+            lines.append((group, "all", own))
+        lines += [(group, case, [row for row in own if row["case"] == case]) for case in cases]
+    told = [(group, case, its, [row for row in its if row["error"] is None]) for group, case, its in lines]
+    numbers = [KINDS[kind].told(whole) if whole else {} for *_, whole in told]
+    heads = list(dict.fromkeys(head for one in numbers for head in one))
+    return Summary(
+        kind,
+        KINDS[kind].title,
+        ["group", "case", "tasks", "errors", *heads],
+        [
+            [group, case, str(len(its)), str(len(its) - len(whole)), *(str(one.get(head, "–")) for head in heads)]
+            for (group, case, its, whole), one in zip(told, numbers)
+        ],
+    )

@@ -4,7 +4,6 @@
 solve a challenge reads `challenge.py` and `sealed_file.py` only; `truth.py` and `sealing.py` tell the answers.
 """
 
-from ema_model.challenges.challenge import Challenge, challenges, folder
-from ema_model.challenges.sealed_file import opened, sealed_challenge
+from ema_model.challenges.challenge import Challenge, challenges, folder, opened, sealed_challenge
 
 __all__ = ["Challenge", "challenges", "folder", "opened", "sealed_challenge"]

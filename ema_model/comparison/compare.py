@@ -17,20 +17,18 @@ from ema_model.effects import find
 from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.estimation import Calibration, Floor, after_fit, floor, of_unseen, taken_up
 from ema_model.estimation import calibrate as fit
-from ema_model.estimation.floor import twin_error
-from ema_model.estimation.floor_band import band, least, spread
+from ema_model.estimation.floor import band, least, spread, twin_error
 from ema_model.estimation.problem import SIGNALS
 from ema_model.faults import checked, named
 from ema_model.models import Model, Window, model_for
 from ema_model.models.delay_of_drive import with_delay_of_drive
-from ema_model.models.stretches import evaluation_stretches, fit_stretches
+from ema_model.models.measured_motion import evaluation_stretches, fit_stretches
 from ema_model.quantities.numbers import check_number
 from ema_model.recordings import Measurement
 from ema_model.recordings.health.card import health_of
-from ema_model.recordings.prepared import prepared
-from ema_model.recordings.read import check_same_actuator
+from ema_model.recordings.read import check_same_actuator, prepared
 from ema_model.recordings.recording_set import check_held_out
-from ema_model.recordings.side_file.read import stated
+from ema_model.recordings.side_file import stated
 from ema_model.simulation.one_stack import compile_behind
 
 Array = NDArray[np.float64]

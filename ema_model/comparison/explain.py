@@ -1,10 +1,4 @@
-"""What explains a residual: curves of each variable, times a modulator, judged on parts that were left out.
-
-The residual's share that a curve tells ahead is compared between variables.  Many go together — in a sine the
-speed follows from the position, the acceleration is the position turned over — so that of explanations that do
-equally well the simpler counts: the fewer knots, the plainer modulator, and the variable that an effect acts
-through more directly.
-"""
+"""What explains a residual: variables, orders, pitches, curves."""
 
 from __future__ import annotations
 
@@ -13,9 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 
 from ema_model.comparison.cross_validation import FOLDS, Folds, Given, LeftOut, nothing_given, share_out
-from ema_model.comparison.curves import families, harmonics, orders_in, quantile_knots
 from ema_model.comparison.residuals import Residuals
 from ema_model.comparison.sentences import explanation_sentence
 from ema_model.quantities.axes import Axes
@@ -23,6 +17,196 @@ from ema_model.quantities.variables import MODULATORS, VARIABLES
 from ema_model.recordings import SIGNALS
 
 Array = NDArray[np.float64]
+
+HIGHEST_ORDER = 96  # per revolution
+_KNOTS = (6, 16)
+LEAST_SEEN = 0.5  # of an order's amplitude that blocks must keep
+LEAST_CYCLES = 1.5  # of an order within the angles covered; fewer are a smooth curve of the position
+
+
+def families(values: Array) -> list[Array]:
+    """Columns of a straight line, and of piecewise linear curves with more and more knots: (n, columns) each."""
+    centre, scale = float(np.mean(values)), float(np.std(values)) or 1.0
+    found = [np.column_stack([np.ones_like(values), (values - centre) / scale])]
+    for count in _KNOTS:
+        knots = quantile_knots(values, count)
+        if len(knots) >= 4:
+            found.append(hats(values, knots))
+    return found
+
+
+def quantile_knots(values: Array, count: int) -> Array:
+    """Knots with as many values between any two, half of them evenly spaced so that rare extremes are seen."""
+    by_rank = np.quantile(values, np.linspace(0.0, 1.0, count))
+    evenly = np.linspace(values.min(), values.max(), count)
+    knots = np.unique(0.5 * (by_rank + evenly))
+    least = 1e-3 * (knots[-1] - knots[0])
+    return knots[np.concatenate([[True], np.diff(knots) > least])]
+
+
+def hats(values: Array, knots: Array) -> Array:
+    """Hat functions: (n, knots), each row adds to 1."""
+    at = np.clip(np.searchsorted(knots, values, side="right") - 1, 0, len(knots) - 2)
+    share = np.clip((values - knots[at]) / (knots[at + 1] - knots[at]), 0.0, 1.0)
+    columns = np.zeros((len(values), len(knots)))
+    rows = np.arange(len(values))
+    columns[rows, at] = 1.0 - share
+    columns[rows, at + 1] = share
+    return columns
+
+
+def harmonics(angle: Array, orders: NDArray[np.intp], advance: Array | None = None) -> Array:
+    """Columns sin hθ, cos hθ for each order h: (n, 2·orders).
+
+    advance: the motor's turn during a block, rad: the mean of a sine over it is smaller by sinc(h·advance/2).
+    """
+    columns = np.empty((len(angle), 2 * len(orders)))
+    for j, h in enumerate(orders):
+        share = 1.0 if advance is None else np.sinc(h * advance / (2.0 * np.pi))
+        columns[:, 2 * j] = np.sin(h * angle) * share
+        columns[:, 2 * j + 1] = np.cos(h * angle) * share
+    return columns
+
+
+def orders_in(turns: float, advance: Array | None = None) -> NDArray[np.intp]:
+    """Orders that angles over so many turns can show, in blocks that advance so far (rad, each)."""
+    highest = HIGHEST_ORDER
+    if advance is not None:
+        typical = float(np.sqrt(np.mean(advance**2)))
+        kept = np.abs(np.sinc(np.arange(1, HIGHEST_ORDER + 1) * typical / (2.0 * np.pi)))
+        highest = int(np.argmax(kept < LEAST_SEEN)) if np.any(kept < LEAST_SEEN) else HIGHEST_ORDER
+    lowest = 1 if turns >= LEAST_CYCLES else int(np.ceil(LEAST_CYCLES / max(turns, 1e-9)))
+    return np.arange(lowest, highest + 1) if lowest <= highest else np.zeros(0, np.intp)
+
+
+# --- orders: how a residual repeats with each turn of the motor -------------------------------------------------------
+
+_RIDGE = 1e-3  # of the number of samples: directions that the angles hardly cover do not blow up
+_AROUND = 25  # orders, over which noise is as strong
+_MEDIAN_CHI2 = 2.0 * np.log(2.0)  # of 2 degrees of freedom
+_LEVEL = 0.01  # of recordings in which noise would show an order
+
+
+@dataclass(frozen=True)
+class Order:
+    """A sin(order·θ + phase), θ the motor's angle."""
+
+    order: float  # periods in each turn, whole; in 2π m of a linear axis, any number
+    amplitude: float  # in the signal's unit
+    phase: float  # rad
+    significance: float  # χ² of 2 degrees of freedom that noise of the same colour would give 2 of, on average
+
+    def is_significant(self, tried: int = HIGHEST_ORDER, level: float = _LEVEL) -> bool:
+        """Whether noise would reach this in less than `level` of the cases, with `tried` orders to choose from."""
+        return self.significance > 2.0 * np.log(max(1, tried) / level)
+
+
+def residual_orders(residuals: Residuals, signal: str) -> list[Order]:
+    """The significant orders of a signal's residual, strongest first; none where the motor's angle is not known."""
+    used = used_blocks(residuals, signal)
+    angle = residuals.variables.get("motor_angle")
+    if used is None or angle is None or not np.all(np.isfinite(angle[used.chosen])):
+        return []
+    found = orders(angle[used.chosen], used.values, residuals.turns, advance_of(residuals, used))
+    return [one for one in found if one.is_significant()]
+
+
+def orders(angle: Array, values: Array, turns: float, advance: Array | None = None) -> list[Order]:
+    """The orders that so many turns can show, strongest first.
+
+    angle, values: (samples,), rad and the signal's unit; advance: the turn during a sample, rad.
+    """
+    tried = orders_in(turns, advance)[: max(0, (len(angle) - 2) // 4)]
+    if not len(tried):
+        return []
+    columns = np.column_stack([np.ones(len(angle)), harmonics(angle, tried, advance)])
+    gram = columns.T @ columns
+    scale = float(np.mean(np.diag(gram)[1:]))
+    inverse = np.linalg.inv(gram + 2.0 * _RIDGE * scale * np.diag([0.0, *np.ones(2 * len(tried))]))
+    coefficients = inverse @ (columns.T @ values)
+    left = values - columns @ coefficients
+    freedom = max(1.0, len(values) - float(np.sum(inverse * gram)))
+    covariance = inverse @ gram @ inverse * max(float(left @ left) / freedom, 1e-300)
+    pairs = [slice(2 * j + 1, 2 * j + 3) for j in range(len(tried))]
+    white = np.array([float(coefficients[at] @ np.linalg.solve(covariance[at, at], coefficients[at])) for at in pairs])
+    found = []
+    for h, at, chi2 in zip(tried, pairs, white / colour(white)):
+        a, b = coefficients[at]
+        found.append(Order(int(h), float(np.hypot(a, b)), float(np.arctan2(b, a)), float(chi2)))
+    return sorted(found, key=lambda order: -order.amplitude)
+
+
+def colour(chi2: Array) -> Array:
+    """How many times stronger than white noise the noise is around each order, at least 1.
+
+    The median over neighbouring orders does not see those few that stand out.
+    """
+    around = median_filter(chi2, size=min(_AROUND, len(chi2)), mode="nearest")
+    return np.maximum(1.0, around / _MEDIAN_CHI2)
+
+
+# --- pitches: how a residual repeats along a linear motor, which has no turn that would make its orders whole---------
+
+HIGHEST = 20_000.0  # periods in 2π m: a pitch of 0.3 mm
+_PER_TRAVEL = 3.0  # orders tried for one that the travel can tell from its neighbour
+_REFINED = 16  # orders tried between two neighbours about a peak
+_MOST = 24  # peaks
+_AT_ONCE = 2_000_000  # values × orders, which the periodogram holds in memory
+
+
+def pitches(position: Array, values: Array, advance: Array | None = None) -> list[Order]:
+    """The orders h of A sin(h x + φ) that the travel can show, the most significant first.
+
+    position: (samples,), m; values: (samples,), of any unit; advance: the way during a sample, m.
+    """
+    known = np.isfinite(position) & np.isfinite(values)
+    x, y = position[known], values[known]
+    travel = float(np.ptp(x)) if x.size else 0.0
+    if travel == 0.0 or np.ptp(y) == 0.0:
+        return []
+    y = y - np.mean(y)
+    grid = np.arange(LEAST_CYCLES, min(HIGHEST, _seen_to(advance)) * travel / (2.0 * np.pi), 1.0 / _PER_TRAVEL)
+    grid *= 2.0 * np.pi / travel
+    if grid.size < 3:
+        return []
+    step = grid[1] - grid[0]
+    from scipy.signal import find_peaks  # takes a third of a second to import
+
+    chi2 = _explained(x, y, grid)
+    peaks, _ = find_peaks(chi2)
+    strongest = peaks[np.argsort(-chi2[peaks])[:_MOST]]
+    noise = colour(chi2)
+    found = []
+    for at in strongest:
+        near = grid[at] + step * np.linspace(-1.0, 1.0, 2 * _REFINED + 1)
+        order = float(near[int(np.argmax(_explained(x, y, near)))])
+        columns = np.column_stack([np.sin(order * x), np.cos(order * x), np.ones(x.size)])
+        a, b, _ = np.linalg.lstsq(columns, y, rcond=None)[0]
+        found.append(Order(order, float(np.hypot(a, b)), float(np.arctan2(b, a)), float(chi2[at] / noise[at])))
+    return sorted(found, key=lambda one: -one.significance)
+
+
+def _seen_to(advance: Array | None) -> float:
+    """The highest order of which blocks that advance so far keep enough."""
+    typical = 0.0 if advance is None else float(np.sqrt(np.mean(advance**2)))
+    if typical == 0.0:
+        return np.inf
+    shares = np.linspace(0.0, 1.0, 1001)
+    return float(2.0 * np.pi * shares[np.argmax(np.sinc(shares) < LEAST_SEEN)] / typical)
+
+
+def _explained(x: Array, y: Array, orders: Array) -> Array:
+    """χ² that a sine of each order explains, of values whose noise is what it leaves: (orders,)."""
+    from scipy.signal import lombscargle
+
+    size = max(1, _AT_ONCE // x.size)
+    parts = [orders[first : first + size] for first in range(0, orders.size, size)]
+    told = [lombscargle(x, y, part, normalize=True, floating_mean=True) for part in parts]
+    power = np.hstack(told)  # of one order it is a number
+    return x.size * power / np.maximum(1.0 - power, 1e-9)
+
+
+# --- what explains a residual: curves of each variable, times a modulator, judged on parts that were left out---------
 
 _PAIRS = (1, 3, 6)  # orders that a curve of the angle is made of
 _LEAST_T = 4.0  # of the mean gain over its standard error, so that 1 % of all recordings raise a false alarm

@@ -9,8 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from ema_model.comparison.curves import quantile_knots
-from ema_model.comparison.explain import Explanation, used_blocks
+from ema_model.comparison.explain import Explanation, quantile_knots, used_blocks
 from ema_model.comparison.residuals import Residuals
 from ema_model.comparison.result import Region
 from ema_model.comparison.sentences import range_text, region_sentence

@@ -17,7 +17,7 @@ from ema_model.text import InWords
 if TYPE_CHECKING:
     from ema_model.actuator import Actuator
     from ema_model.comparison.events import Event
-    from ema_model.comparison.orders import Order
+    from ema_model.comparison.explain import Order
     from ema_model.estimation.calibrate import Calibration
     from ema_model.recordings import Measurement
     from ema_model.recordings.health.card import Health

@@ -12,7 +12,7 @@ from ema_model.comparison.events import Event
 from ema_model.comparison.result import Compared, Comparison, Region, SignalError
 from ema_model.estimation import Calibrated, Calibration
 from ema_model.quantities.axes import Axes
-from ema_model.quantities.interval import IntervalJson
+from ema_model.quantities.numbers import IntervalJson
 from ema_model.recordings.health.card import HealthJson
 
 _Value = TypeVar("_Value")

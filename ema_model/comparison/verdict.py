@@ -12,8 +12,7 @@ from ema_model.actuator import Actuator
 from ema_model.actuator.naming import on_axes
 from ema_model.comparison.criteria import BEYOND, SLOW
 from ema_model.comparison.events import Event, events
-from ema_model.comparison.explain import Explanation, explain, used_blocks
-from ema_model.comparison.orders import Order, residual_orders
+from ema_model.comparison.explain import Explanation, Order, explain, residual_orders, used_blocks
 from ema_model.comparison.regions import worst_regions
 from ema_model.comparison.residuals import Residuals
 from ema_model.comparison.result import Region, SignalError

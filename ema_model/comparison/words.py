@@ -9,7 +9,7 @@ import numpy as np
 
 from ema_model.comparison.result import Compared, Comparison, Region, SignalError
 from ema_model.comparison.sentences import dependence
-from ema_model.estimation.words import calibration_table
+from ema_model.estimation.calibrate import calibration_table
 from ema_model.quantities.axes import ROTARY
 from ema_model.quantities.numbers import number
 from ema_model.quantities.shown import of_residual, of_signal

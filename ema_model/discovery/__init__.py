@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from ema_model.discovery.discover import discover, result_of, settings_of
 from ema_model.discovery.result import Added, Candidate, Discovery, Experiment, Rung
-from ema_model.discovery.shown.summary import as_dict
 from ema_model.discovery.steps.begin import begun
 from ema_model.discovery.steps.path import Story
 from ema_model.discovery.steps.walking import walk
 from ema_model.discovery.verify import Verified, verified
+from ema_model.discovery.words import as_dict
 
 __all__ = [
     "Added",

@@ -17,13 +17,13 @@ from ema_model.discovery.evidence.remaining import left_by
 from ema_model.discovery.evidence.uncertainty import with_intervals
 from ema_model.discovery.observed.repeated import repeated
 from ema_model.discovery.result import Candidate, Discovery, Experiment
-from ema_model.discovery.shown.sentences import as_well, held_back, mismatch, untold
 from ema_model.discovery.steps.begin import begun
 from ema_model.discovery.steps.path import Story
 from ema_model.discovery.steps.second_opinion import support_of
 from ema_model.discovery.steps.step import refreshed
 from ema_model.discovery.steps.verdict import explains_all, verdict_of
 from ema_model.discovery.steps.walking import named_in, walk
+from ema_model.discovery.words import as_well, held_back, mismatch, untold
 from ema_model.effects import CATALOGUE
 from ema_model.errors import InputError, quoted
 from ema_model.quantities.numbers import as_number

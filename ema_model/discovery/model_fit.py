@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from ema_model.actuator import Actuator, Tolerance
 from ema_model.effects import find
 from ema_model.estimation import Calibration, Floor, after_fit, calibrate, default_free, floor, of_unseen, taken_up
-from ema_model.estimation.floor import twin_error
-from ema_model.estimation.floor_band import band, least, spread
+from ema_model.estimation.floor import band, least, spread, twin_error
 from ema_model.models import Model, model_for
 from ema_model.models.model import Signals
 from ema_model.recordings import Measurement

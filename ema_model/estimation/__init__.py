@@ -2,8 +2,15 @@
 
 from __future__ import annotations
 
-from ema_model.estimation.after_fit import after_fit, of_unseen, taken_up
-from ema_model.estimation.calibrate import Calibrated, Calibration, calibrate, default_free
+from ema_model.estimation.calibrate import (
+    Calibrated,
+    Calibration,
+    after_fit,
+    calibrate,
+    default_free,
+    of_unseen,
+    taken_up,
+)
 from ema_model.estimation.floor import Floor, floor
 
 __all__ = [

@@ -1,8 +1,8 @@
-"""Fits the actuator's parameters to recordings: least squares with the tolerances as a prior."""
+"""Calibration within tolerances, what it says, and what is identifiable."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,16 +10,193 @@ from numpy.typing import ArrayLike, NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.actuator.naming import on_axes
-from ema_model.estimation.floor import CORRELATED_S, Floor
+from ema_model.estimation.floor import CORRELATED_S, Floor, local_rms
 from ema_model.estimation.least_squares import descended
 from ema_model.estimation.problem import Problem
 from ema_model.estimation.unknowns import ECCENTRICITY, K_SIGMA, Unknown, polar, starts_of, unknowns_of
-from ema_model.faults import named
+from ema_model.faults import NAMES, named
 from ema_model.models import Model
-from ema_model.quantities.interval import HALF_90
+from ema_model.models.model import Signals
+from ema_model.quantities.axes import Axes
+from ema_model.quantities.numbers import HALF_90, number
+from ema_model.quantities.titles import in_sentence
 from ema_model.side_by_side import windows
+from ema_model.text import Severity, Table
+
+_NOTHING = 0.9  # of the prior's σ that is left were all others known, from which on the recording told nothing
+_MUCH = 0.45  # of it that is left: n parameters of which only a ratio shows keep 1/√n each
+_BY_OTHERS = 3.0  # how many times more is left than were all others known, where they take it up
+_TOGETHER = 0.7  # correlation from which on a parameter is named as one of them
+
+
+@dataclass(frozen=True)
+class Told:
+    """How far a recording narrows one free parameter."""
+
+    name: str  # "section.parameter"
+    left: float  # posterior σ over the tolerance's, 0 … 1
+    alone: float  # the same if all others were known
+    like: tuple[str, ...]  # free parameters that it trades against, most of all first
+
+    @property
+    def is_unseen(self) -> bool:
+        """Whether the recording tells nothing of it, even were all else known."""
+        return self.alone > _NOTHING
+
+    @property
+    def is_confounded(self) -> bool:
+        """Whether it shows, but others of its direction take it up."""
+        return not self.is_unseen and self.left > max(_MUCH, _BY_OTHERS * self.alone) and bool(self.like)
+
+
+def told(calibration: Calibration) -> tuple[Told, ...]:
+    """One for each free parameter, in the file's order."""
+    jacobian = calibration.weighted_jacobian
+    information = jacobian.T @ jacobian / calibration.covariance_scale
+    covariance = np.linalg.inv(information + np.eye(len(information)))
+    left = np.sqrt(np.diag(covariance))
+    alone = 1.0 / np.sqrt(1.0 + np.diag(information))
+    correlation = np.abs(covariance / np.outer(left, left))
+    names = calibration.free
+    found = []
+    for i, name in enumerate(names):
+        with_it = correlation[i, : len(names)]
+        order = [int(j) for j in np.argsort(-with_it) if j != i and with_it[j] > _TOGETHER]
+        found.append(Told(name, float(left[i]), float(alone[i]), tuple(names[j] for j in order)))
+    return tuple(found)
+
+
+# --- what a fit takes up of the difference between its model and the three-phase twin ---------------------------------
 
 Array = NDArray[np.float64]
+
+_OF_TWINS = 0.25  # of the squares that the twins before and after the fit differ by: as much is left of true models
+
+
+def after_fit(
+    floors: Sequence[Floor], calibration: Calibration, twins: Sequence[Signals], taken: Array | None = None
+) -> list[Floor]:
+    """The floors of a calibration's windows with `left`: what no parameter takes up of the twin's difference t.
+
+    t − J(JᵀJ + I)⁻¹Jᵀt, weighted as the fit was: J are its sensitivities, and I is the prior.  twins: as of
+    `twin_error`, by window, with the calibrated parameters; taken: as of `taken_up`, where it is known.  Floors
+    without a twin stay as they are.
+    """
+    taken = taken_up(floors, calibration, twins) if taken is None else taken
+    return _floors_left(floors, twins, calibration.weighted_sensitivities, taken)
+
+
+def taken_up(floors: Sequence[Floor], calibration: Calibration, twins: Sequence[Signals]) -> Array:
+    """By how much a calibration's unknowns are off, as they take up what its twins differ by: (unknowns,), in σ."""
+    return _solved(_parts(floors, twins, calibration.weighted_sensitivities), calibration.x.size)
+
+
+def of_unseen(
+    model: Model,
+    floors: Sequence[Floor],
+    calibration: Calibration,
+    taken: Array,
+    twins: Sequence[Signals],
+    signals: Mapping[str, float],
+) -> list[Floor]:
+    """Floors of recordings that were not fitted, with `left` as of `after_fit`.
+
+    model: the calibrated one beside them; taken: as of `taken_up`, there; twins: here.  The parameters are off by what
+    they took up elsewhere, which moves this model, too; only where it starts is fitted here.
+    """
+    problem = problem_of(model, floors, free=calibration.free, signals=signals)
+    if not problem.count:
+        return list(floors)
+    _, jacobian = problem.jacobians(np.zeros((1, problem.count)), in_whole_blocks=True)
+    slopes = by_window(problem, jacobian[0], weighted=True)
+    shared = len(calibration.free)
+    moved = np.concatenate([taken[:shared], np.zeros(problem.count - shared)])
+    rest = [(place, name, part, own - part @ moved) for place, name, part, own in _parts(floors, twins, slopes)]
+    own_starts = [(place, name, part[:, shared:], own) for place, name, part, own in rest]
+    moved[shared:] = _solved(own_starts, problem.count - shared)
+    return _floors_left(floors, twins, slopes, moved)
+
+
+_Part = tuple[int, str, Array, Array]  # window, signal; weighted: sensitivities (blocks, unknowns), twin's difference
+
+
+def _parts(floors: Sequence[Floor], twins: Sequence[Signals], slopes: Sequence[Mapping[str, Array]]) -> list[_Part]:
+    return [
+        (place, name, part[name], twins[place][name] / floors[place].fit_sigma(name))
+        for place, part in enumerate(slopes)
+        for name in part
+        if name in twins[place]
+    ]
+
+
+def _solved(parts: Sequence[_Part], unknowns: int) -> Array:
+    """(JᵀJ + I)⁻¹Jᵀt"""
+    if not parts or not unknowns:
+        return np.zeros(unknowns)
+    jacobian, twin = (np.concatenate(one) for one in zip(*((j, t) for _, _, j, t in parts)))
+    return np.asarray(np.linalg.solve(jacobian.T @ jacobian + np.eye(unknowns), jacobian.T @ twin), dtype=float)
+
+
+def _floors_left(
+    floors: Sequence[Floor], twins: Sequence[Signals], slopes: Sequence[Mapping[str, Array]], taken: Array
+) -> list[Floor]:
+    """With `left`, where unknowns that are off by `taken` move the model by its weighted sensitivities."""
+    if not taken.size:
+        return list(floors)
+    left: list[dict[str, Array]] = [{} for _ in floors]
+    for place, name, part, own in _parts(floors, twins, slopes):
+        one = floors[place]
+        before, after = (local_rms(t * one.fit_sigma(name), one.block_s) for t in (own, own - part @ taken))
+        besides = _OF_TWINS * (np.maximum(one.model[name], before) ** 2 - before**2)
+        left[place][name] = np.sqrt(besides + np.minimum(before, after) ** 2)
+    return [replace(one, left=its) for one, its in zip(floors, left)]
+
+
+# --- a calibration in words: whether it has converged, what it moved and how surely, what it cannot tell apar--------
+
+
+def convergence(fit: Calibration) -> str:
+    """'It has converged; χ² per value 1.02 (1 is the floor), 87 evaluations.'"""
+    how = "It has converged" if fit.converged else "It has not converged: its values are not to be trusted"
+    return f"{how}; χ² per value {number(fit.chi2_per_value)} (1 is the floor), {fit.evaluations} evaluations."
+
+
+def calibration_table(fit: Calibration, axes: Axes, among: Collection[str] | None = None) -> Table | None:
+    """What each parameter, or some, was in the file and is now, with its interval, and how many σ that is apart."""
+    rows, remarks = [], []
+    fitted = {path: one for path, one in fit.parameters.items() if among is None or path in among}
+    for path, one in fitted.items():
+        low, high = (number(edge, 4) for edge in one.interval90)
+        moved = f"{round(one.z, 2) + 0.0:+.2f}".replace("-", "−")
+        rows.append([_title(path, axes), number(one.initial, 4), number(one.value, 4), f"{low} … {high}", moved])
+        remarks.append(f"{one.unit}{'  at its bound' if one.at_bound else ''}".strip())
+    if not rows:
+        return None
+    state = "converged" if fit.converged else "NOT converged"
+    severities: list[Severity | None] = ["bad" if one.at_bound else None for one in fitted.values()]
+    head = ("file", "value", "90 % interval", "moved [σ]")
+    return Table(head, rows, f"calibration {state}", remarks, severities=severities)
+
+
+def warnings(fit: Calibration, axes: Axes) -> list[str]:
+    """The parameters at their bounds, and those that are only known together."""
+    found = [
+        f"{_title(path, axes)} stands at the bound of its tolerance: the model wants more than the file allows."
+        for path, one in fit.parameters.items()
+        if one.at_bound
+    ]
+    return found + [
+        f"{_title(a, axes)} and {in_sentence(_title(b, axes))} trade against each other here: "
+        "only both together are known."
+        for a, b in fit.confounded
+    ]
+
+
+def _title(path: str, axes: Axes) -> str:
+    return path if path in NAMES else on_axes(path, axes).title
+
+
+# --- fits the actuator's parameters to recordings: least squares with the tolerances as a prior -----------------------
 
 _OUTSIDE_Z = 2.99  # from which on a parameter stands at the edge of its tolerance
 _AS_IN_THE_FILE = 0.05  # σ, up to which a parameter is where it was

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import i0e
 
-from ema_model.quantities.interval import HALF_90
+from ema_model.quantities.numbers import HALF_90
 
 Array = NDArray[np.float64]
 

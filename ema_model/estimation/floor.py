@@ -1,17 +1,8 @@
-"""The floor of a comparison: what a perfect Monitor Model would still differ from a recording by.
-
-Two parts, for each signal and block: the sensors' noise, estimated from the recording itself, and the model
-floor, how far the Monitor Model is from its three-phase twin under the same command (MODEL §2).  The twin
-differs most in transients, so its floor is local: the rms within 12.5 ms on either side.  Where the motor stands,
-friction holds it at any place in a band, and the model's error there is one error, however long it stands.
-When a command jumped is known to within a sample, which moves the transient that follows.
-
-A fit takes part of the twin's difference up in its parameters: `after_fit` tells what a true model then leaves.
-"""
+"""The floor: what a true model would leave, and its band."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -21,9 +12,57 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter1d
 from ema_model.actuator import Actuator
 from ema_model.models import Model, Window
 from ema_model.models.model import Signals
-from ema_model.recordings.noise import white_noise
+from ema_model.quantities.numbers import HALF_90
+from ema_model.recordings.noise import SCATTER, white_noise
 
 Array = NDArray[np.float64]
+
+_ROUNDING = 1e-9
+_KNOWN_TO = 0.02  # of a floor: a few in a hundred of the noise and of what a fit takes up remain a guess
+
+
+def spread(floors: Sequence[Floor], signals: Sequence[Collection[str]]) -> float:
+    """Standard deviation of a true model's error in floors, pooled over windows and over each window's signals.
+
+    The squared error is a mean: of noise, block by block (or as often as a filter leaves it alike), whose size is
+    itself estimated, unless it is a grid's; and of the model's own error, which is one value in 25 ms, or a standstill,
+    for all signals.
+    A square of a normal value scatters by √2 of its mean.
+    """
+    variance = total = 0.0
+    for one, names in zip(floors, signals):
+        size = max(1, round(CORRELATED_S / one.block_s))
+        lasting = np.zeros(len(one.counts))
+        for name in names:
+            of_noise = one.counts * (one.white_part(name) / one.sigma(name)) ** 2
+            lasting += one.counts - of_noise
+            estimated = 0.0 if name in one.exact else 4.0 * SCATTER / len(of_noise)
+            variance += 2.0 * one.alike * float(of_noise @ of_noise) + estimated * float(of_noise.sum()) ** 2
+            total += float(one.counts.sum())
+        value = np.ceil(np.cumsum(one.counts) / size - _ROUNDING).astype(int)  # a standstill counts 25 ms, in all
+        together = np.bincount(value, lasting)
+        variance += 2.0 * float(together @ together)
+    return float(np.hypot(0.5 * np.sqrt(variance) / total, _KNOWN_TO)) if total else _KNOWN_TO
+
+
+def least(floors: Sequence[Floor], signals: Sequence[Collection[str]]) -> float:
+    """The error in floors of a true model of which nothing is there that the floors only allow for, pooled likewise."""
+    left = total = 0.0
+    for one, names in zip(floors, signals):
+        for name in names:
+            allowed = (one.allowed[name] / one.sigma(name)) ** 2 if name in one.allowed else np.zeros(len(one.counts))
+            left += float(one.counts @ (1.0 - allowed))
+            total += float(one.counts.sum())
+    return float(np.sqrt(left / total)) if total else 1.0
+
+
+def band(spread: float, least: float = 1.0) -> tuple[float, float]:
+    """Between which multiples of the floor nine of ten true models' errors lie; `least`: what a floor is made of."""
+    half = HALF_90 * spread
+    return max(0.0, 1.0 - half) * least, 1.0 + half
+
+
+# --- the floor of a comparison: what a perfect Monitor Model would still differ from a recording by -------------------
 
 BAND_SIGMAS = 2.0  # σ on either side: 95 of 100 blocks of a perfect model lie within
 CORRELATED_S = 0.025  # how long the model's error, and a sensor's inaccuracy, stay alike

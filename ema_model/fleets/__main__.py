@@ -7,8 +7,7 @@ from pathlib import Path
 
 from ema_model.actuator import load_actuator
 from ema_model.errors import InputError
-from ema_model.fleets.files import TRUTH, read_truth, write
-from ema_model.fleets.fleet import draw
+from ema_model.fleets.fleet import TRUTH, draw, read_truth, write
 
 
 def main() -> int:

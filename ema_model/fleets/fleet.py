@@ -1,18 +1,85 @@
-"""A fleet: what its units share, and in which parameters which of them differ."""
+"""Made-up fleets: units, their own deviations, recordings, files."""
 
 from __future__ import annotations
 
+import base64
+import binascii
+import json
+import zlib
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ema_model.actuator import Actuator
+from ema_model.actuator import Actuator, parse_actuator, save_actuator
+from ema_model.actuator.write import as_toml
+from ema_model.commands import command
 from ema_model.errors import InputError
-from ema_model.fleets.own import Own, own
-from ema_model.fleets.recorded import RUNS
+from ema_model.files.opened import shown
+from ema_model.files.written import whole_file
+from ema_model.recordings import Measurement, write_measurement
+from ema_model.simulation.run import Run, Sensors, simulate_reference
+from ema_model.units.block import linearised, pooled, unit_of
+
+_LENGTH_S = 0.4
+RUNS = {
+    "chirp": Run(command("chirp"), _LENGTH_S),
+    "step": Run(command("step", {"final_rad": 0.05}), _LENGTH_S),
+    "loaded": Run(command("sine", {"amplitude_rad": 0.03, "frequency_Hz": 5.0}), _LENGTH_S, load_torque_Nm=20.0),
+}
 
 Array = NDArray[np.float64]
+
+_ROUNDS = 8  # of twins: their spread is known to a tenth
+_KNOWN = 0.4  # of a tolerance, up to which a parameter is told by itself
+_SHOWS = 0.2  # of it, up to which one shows at all, were all others known
+_TOGETHER = 0.7  # correlation from which on two that are not told by themselves are only known together
+
+
+@dataclass(frozen=True)
+class Own:
+    """One parameter, or one of those that are only known together."""
+
+    parameter: str  # "section.parameter"
+    together: tuple[str, ...]  # with itself, in the file's order
+    sigma: float  # of the file's tolerance: what is not known of it, were the others of `together` known
+
+
+def own(actuator: Actuator, runs: tuple[str, ...]) -> tuple[Own, ...]:
+    """Of each parameter that shows in these runs."""
+    return _own(as_toml(actuator), runs)
+
+
+@lru_cache(maxsize=4)
+def _own(text: str, runs: tuple[str, ...]) -> tuple[Own, ...]:
+    actuator = parse_actuator(text, "the fleet's actuator")
+    unit = unit_of("", list(recorded(actuator, 0, runs=runs).values()), actuator)
+    part = linearised(unit, np.zeros(len(unit.parameters)), rounds=_ROUNDS)
+    return _told(unit.parameters, pooled([part])[0].information)
+
+
+def _told(names: Sequence[str], information: Array) -> tuple[Own, ...]:
+    whole = information + np.eye(len(information))
+    covariance = np.linalg.inv(whole)
+    sigma = np.sqrt(np.diag(covariance))
+    alone = 1.0 / np.sqrt(np.diag(whole))
+    correlation = np.abs(covariance / np.outer(sigma, sigma))
+    found = []
+    for i, name in enumerate(names):
+        mates = [i]
+        if sigma[i] > _KNOWN:
+            mates = [j for j in range(len(names)) if j == i or (sigma[j] > _KNOWN and correlation[i, j] > _TOGETHER)]
+        rest = [j for j in range(len(names)) if j == i or j not in mates]
+        of_group = float(np.sqrt(np.linalg.inv(whole[np.ix_(rest, rest)])[rest.index(i), rest.index(i)]))
+        if of_group <= _KNOWN and alone[i] <= _SHOWS and not name.startswith("sensors."):
+            found.append(Own(name, tuple(names[j] for j in mates), of_group))
+    return tuple(found)
+
+
+# --- a fleet: what its units share, and in which parameters which of them differ --------------------------------------
 
 FEWEST, MOST = 2, 20  # units
 MOST_DIFFERING = 3  # parameters
@@ -97,3 +164,81 @@ def draw(
         known = [other for other in known if not set(other.together) & set(one.together)]
     names = tuple(f"unit_{number:02d}" for number in range(1, count + 1))
     return Fleet(seed, actuator, size, spread, runs, names, paths, x, tuple(differences))
+
+
+# --- the recordings of a fleet: the same commands for each unit, as a test bench gives them, and one to hold ------
+
+SENSORS = Sensors(current_noise_A=0.45, encoder_bits=12)
+UNSEEN = {
+    "unseen": Run(command("multisine", {"amplitude_rad": 8e-3, "frequencies_Hz": (2.0, 6.0, 14.0)}), _LENGTH_S),
+}
+_KEPT = ("time_s", "command_rad", "user_position_rad", "motor_position_rad", "current_A", "load_torque_Nm")
+_START_RAD = 1e-2  # 1 σ, of the motor
+
+
+def recorded(
+    actuator: Actuator, seed: int, unit: int = 0, runs: Iterable[str] = (*RUNS, *UNSEEN)
+) -> dict[str, Measurement]:
+    """The recordings of one unit by name; FloatingPointError if the model diverges."""
+    every = {**RUNS, **UNSEEN}
+    transmission = actuator.transmission
+    half_play = 0.5 * transmission.backlash_rad / transmission.gear_ratio
+    found = {}
+    for number, name in enumerate(every):
+        random = np.random.default_rng([seed, 52, unit, number])
+        start, play = _START_RAD * random.standard_normal(), half_play * random.uniform(-1.0, 1.0)
+        if name in runs:
+            clean = simulate_reference(
+                every[name],
+                actuator,
+                start_rad=start * transmission.gear_ratio,
+                start_play_rad=play,
+            )
+            one = SENSORS.record(clean, int(random.integers(2**62)))
+            found[name] = Measurement({key: one[key] for key in _KEPT if key in one}, name=name)
+    return found
+
+
+# --- a fleet as a folder: UNIT/RECORDING.parquet, the actuator's file, and what differs, packed so that none ---
+
+TRUTH, ACTUATOR = "truth.sealed", "actuator.toml"
+_MOST_BYTES = 100_000
+
+
+def write(fleet: Fleet, folder: Path) -> None:
+    """Into a folder that must be empty, or is made; InputError where that cannot be."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if any(folder.iterdir()):
+            raise InputError(f"{shown(folder)}: is not empty; name another folder")
+        for name in fleet.names:
+            (folder / name).mkdir()
+    except OSError as error:
+        raise InputError(f"{shown(folder)}: cannot be made ({error.strerror}); name another folder") from None
+    save_actuator(fleet.actuator, folder / ACTUATOR)
+    for number, name in enumerate(fleet.names):
+        for run, one in recorded(fleet.unit(number), fleet.seed, number, (*fleet.runs, *UNSEEN)).items():
+            write_measurement(one, folder / name / f"{run}.parquet")
+    with whole_file(folder / TRUTH) as draft:
+        draft.write_bytes(base64.b64encode(zlib.compress(json.dumps(told(fleet)).encode(), 9)))
+
+
+def told(fleet: Fleet) -> list[dict[str, object]]:
+    """What differs, in plain values: units by name, the parameter, by how much of the file's value."""
+    found = []
+    for one in fleet.differences:
+        value, sigma = fleet.actuator.value(one.parameter), fleet.actuator.tolerances[one.parameter].sigma
+        share = one.change * sigma / value if value else None
+        units = [fleet.names[i] for i in one.units]
+        found.append({"units": units, "parameter": one.parameter, "change": one.change * sigma, "share": share})
+    return found
+
+
+def read_truth(folder: Path) -> list[dict[str, object]]:
+    """What `told` said when the folder was written; InputError for one that has none."""
+    try:
+        unpacking = zlib.decompressobj()
+        text = unpacking.decompress(base64.b64decode((folder / TRUTH).read_bytes(), validate=True), _MOST_BYTES)
+        return list(json.loads(text))
+    except (OSError, binascii.Error, zlib.error, ValueError, RecursionError):
+        raise InputError(f"{shown(folder / TRUTH)}: no truth of a fleet can be read there; name its folder") from None

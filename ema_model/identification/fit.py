@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ema_model.estimation.descent import Descent
 from ema_model.estimation.floor import Floor, floor
+from ema_model.estimation.least_squares import Descent
 from ema_model.estimation.problem import DIVERGED, TOGETHER, Problem
 from ema_model.estimation.unknowns import K_SIGMA, Unknown, lags_of, loads_of, starts_of, unknowns_of
 from ema_model.faults import HEALTHY, NAMES

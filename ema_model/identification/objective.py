@@ -17,7 +17,7 @@ from ema_model.physics.rows import LANES
 from ema_model.recordings import Measurement
 from ema_model.simulation.pack import initial_state, monitor_rows
 from ema_model.simulation.plant import FITNESSES
-from ema_model.simulation.traced import traced
+from ema_model.simulation.run import traced
 from ema_model.stacks import exclusive
 
 Array = NDArray[np.float64]

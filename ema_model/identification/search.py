@@ -1,22 +1,144 @@
-"""The global part of a robust identification: many niches descend together, and the fewer the better known.
-
-A first draw covers the box evenly; the best of it, kept apart from each other, become niches that all go downhill
-by least squares.  As they settle, niches in one basin are merged and the hopeless are left.  What is left is
-the distinct basins, the deepest first.
-"""
+"""The searches: what is minimised, landscape, runs of optimisers."""
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ema_model.estimation.descent import Descent
+from ema_model.errors import InputError
+from ema_model.estimation.least_squares import Descent
 from ema_model.estimation.problem import Problem
 from ema_model.estimation.unknowns import K_SIGMA
 from ema_model.faults import HEALTHY, NAMES
+from ema_model.identification.fit import Fitted
+from ema_model.quantities.numbers import amount
+
+_SAMPLES = 0.3  # from which on it is worth saying
+_SIGMAS = 4.0  # of its own uncertainty
+
+
+def logged_apart(found: Fitted, covariance: NDArray[np.float64]) -> tuple[str, ...]:
+    """A sentence for each recording whose current surely comes before its positions, or after them.
+
+    covariance: of the fit's x (unknowns, unknowns).
+    """
+    told = []
+    for one, x, variance in zip(found.problem.unknowns, found.x, np.diag(covariance)):
+        if one.kind == "lag" and abs(x) > max(_SAMPLES, _SIGMAS * np.sqrt(variance)):  # 1 σ of the prior is a sample
+            name = found.problem.model.measurements[one.place].name
+            when = f"{amount(abs(one.sigma * x), 's')} {'after' if x > 0.0 else 'before'}"
+            told.append(f"The current of {name} is logged {when} its positions, which is allowed for.")
+    return tuple(told)
+
+
+# --- the cost over two k around an answer, the six others held there, and the ways from where searches ended ----------
+
+landscape_Array = NDArray[np.floating]
+Cost = Callable[[landscape_Array], landscape_Array]  # k (n, 8) → (n,), A: of an answer its corrected error
+
+POINTS = 41  # along each axis
+_ROWS = 2  # simulated at once: about two iterations of a usual search
+_WAY_POINTS = 33
+_CLOSE = 0.04  # least half width of a close-up
+_WIDER = 3.0  # a close-up is so many intervals wide
+_RISE = 1.01  # of the error along a way, above which it leads over a ridge
+_WORSE = 1.05  # than the answer, above which a search has ended elsewhere
+
+
+@dataclass(frozen=True, eq=False)
+class Landscape:
+    """A slice; rows that are not simulated yet, and models that diverge, are NaN."""
+
+    x: int  # number of the k across, 0 … 7
+    y: int  # and upwards
+    through: landscape_Array  # (8,), what the others are held at
+    across: landscape_Array  # (POINTS,), values of k x
+    upwards: landscape_Array  # (POINTS,)
+    error_A: landscape_Array  # (upwards, across)
+    rows: int  # done
+
+    @property
+    def share(self) -> float:
+        """Of the rows that are done."""
+        return self.rows / len(self.upwards)
+
+
+@dataclass(frozen=True)
+class Way:
+    """From where a search ended straight to the answer."""
+
+    error_A: float  # where it ended
+    highest_A: float  # on the way
+    answer_A: float  # at the answer
+
+    @property
+    def is_trap(self) -> bool:
+        """A worse place, and a ridge before the answer."""
+        return self.is_worse and self.highest_A > _RISE * self.error_A
+
+    @property
+    def is_worse(self) -> bool:
+        """Than the answer."""
+        return self.error_A > _WORSE * self.answer_A
+
+
+def extent(
+    through: landscape_Array, k: int, interval90: landscape_Array | None = None, close: bool = False
+) -> tuple[float, float]:
+    """From and to along one k: all of 0 … 1, or close to the answer, a few of its 90 % intervals wide."""
+    if not close:
+        return 0.0, 1.0
+    width = 0.0 if interval90 is None else float(np.ptp(interval90[k]))
+    half = min(max(_CLOSE, _WIDER * width), 0.5)
+    low = min(max(float(through[k]) - half, 0.0), 1.0 - 2.0 * half)
+    return low, low + 2.0 * half
+
+
+def slices(
+    cost: Cost,
+    through: landscape_Array,
+    x: int,
+    y: int,
+    across: tuple[float, float] = (0.0, 1.0),
+    upwards: tuple[float, float] = (0.0, 1.0),
+    points: int = POINTS,
+) -> Generator[Landscape, None, None]:
+    """The slice as it grows, a few rows of one population each time; on the compute thread.
+
+    Raises InputError unless x and y are two different k of 0 … 7.
+    """
+    if x == y or not {x, y} <= set(range(8)):
+        raise InputError("a landscape needs two different k; choose another for one axis")
+    xs, ys = np.linspace(*across, points), np.linspace(*upwards, points)
+    error = np.full((points, points), np.nan)
+    for first in range(0, points, _ROWS):
+        some = ys[first : first + _ROWS]
+        k = np.tile(np.asarray(through, dtype=float), (len(some) * points, 1))
+        k[:, x], k[:, y] = np.tile(xs, len(some)), np.repeat(some, points)
+        found = cost(k).reshape(len(some), points)
+        error[first : first + len(some)] = np.where(np.isfinite(found), found, np.nan)
+        yield Landscape(x, y, np.array(through), xs, ys, error.copy(), first + len(some))
+
+
+def ways(cost: Cost, ends: Mapping[str, landscape_Array], answer: landscape_Array) -> dict[str, Way]:
+    """The straight ways from the searches' ends (8,) to the answer (8,), by the searches' names; k7 is an angle."""
+    share = np.linspace(0.0, 1.0, _WAY_POINTS)[:, None]
+    found = {}
+    for name, end in ends.items():
+        step = np.asarray(answer, dtype=float) - end
+        step[6] -= np.round(step[6])
+        k = end + share * step
+        k[:, 6] %= 1.0
+        k[0], k[-1] = end, answer
+        error = cost(k)
+        found[name] = Way(float(error[0]), float(np.max(error)), float(error[-1]))
+    return found
+
+
+# --- the global part of a robust identification: many niches descend together, and the fewer the better known---------
 
 Array = NDArray[np.float64]
 

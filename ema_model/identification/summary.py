@@ -13,7 +13,7 @@ from ema_model.actuator import Actuator
 from ema_model.actuator.naming import on_axes
 from ema_model.actuator.readings import readings
 from ema_model.identification.run import Identification, Progress
-from ema_model.quantities.interval import IntervalJson
+from ema_model.quantities.numbers import IntervalJson
 
 
 class HistoryJson(TypedDict):

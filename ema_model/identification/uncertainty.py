@@ -21,10 +21,10 @@ from ema_model.estimation.feldman_cousins import above_zero, length_of_vector
 from ema_model.estimation.unknowns import ECCENTRICITY, K_SIGMA, polar, to_vector
 from ema_model.identification.adequacy import Adequacy, adequacy
 from ema_model.identification.fit import FAULTS, Fitted
-from ema_model.identification.logged_apart import logged_apart
 from ema_model.identification.model_bias import TWINS
 from ema_model.identification.next_experiment import Suggestion, separating
-from ema_model.quantities.interval import HALF_90
+from ema_model.identification.search import logged_apart
+from ema_model.quantities.numbers import HALF_90
 
 Array = NDArray[np.float64]
 

@@ -8,11 +8,11 @@ import numpy as np
 
 from ema_model import faults
 from ema_model.actuator.readings import between, sentences
-from ema_model.identification.landscape import Landscape, Way
 from ema_model.identification.run import Identification, algorithm_title
+from ema_model.identification.search import Landscape, Way
 from ema_model.quantities.numbers import amount
 from ema_model.quantities.titles import in_sentence
-from ema_model.simulation.words import run_in_words
+from ema_model.simulation.run import run_in_words
 from ema_model.text import Document, Lines, Remark, Remarks, Table
 
 CORRECTED = (

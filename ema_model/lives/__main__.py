@@ -1,6 +1,6 @@
 """`python -m ema_model.lives`: finds anew how well identifications tell k."""
 
-from ema_model.lives.accuracy import write
+from ema_model.lives.life import accuracy_write
 
 if __name__ == "__main__":
-    print(write())
+    print(accuracy_write())

@@ -20,16 +20,15 @@ from ema_model.effects import find
 from ema_model.errors import InputError
 from ema_model.models.later import later
 from ema_model.models.loop_window import BLOCK_S, COMPARED, LoopWindow, cut
+from ema_model.models.measured_motion import check_steps, on_even_grid
 from ema_model.models.model import Effects, Signals
-from ema_model.models.sampling import check_steps, on_even_grid
 from ema_model.physics.rows import LANES
 from ema_model.recordings import Measurement
 from ema_model.recordings.noise import least_noise, sample_noise
 from ema_model.simulation.one_stack import own_stack, stack_at_hand
 from ema_model.simulation.pack import initial_state, monitor_rows
-from ema_model.simulation.reference_runs import simulate_references
-from ema_model.simulation.run import Run, simulate_reference
-from ema_model.simulation.traced import traced
+from ema_model.simulation.plant import simulate_references
+from ema_model.simulation.run import Run, simulate_reference, traced
 
 Array = NDArray[np.float64]
 

@@ -16,15 +16,14 @@ from ema_model.actuator import Actuator
 from ema_model.effects import find
 from ema_model.errors import InputError
 from ema_model.models.later import later
-from ema_model.models.measured_motion import Stretch, stretches_of
+from ema_model.models.measured_motion import Stretch, on_even_grid, stretches_of
 from ema_model.models.model import Effects, Signals
-from ema_model.models.sampling import on_even_grid
 from ema_model.physics.rows import LANES
 from ema_model.recordings import Measurement
 from ema_model.recordings.noise import least_noise
 from ema_model.simulation.one_stack import stack_at_hand
 from ema_model.simulation.pack import monitor_rows
-from ema_model.simulation.traced import needed_currents
+from ema_model.simulation.run import needed_currents
 
 Array = NDArray[np.float64]
 

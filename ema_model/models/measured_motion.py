@@ -1,16 +1,8 @@
-"""A recording's motion for inverse dynamics: filtered, with the blocks in which friction's law is known.
-
-It is held to what differentiation can tell.  What the position is off by (quantisation, jitter of its time stamps) acts
-on the current through the inertia; after the filter it lasts as long as the filter does, and stands in the floor as
-such: a regression that took it for white would be too sure of all that it finds (Janot, Vandanjon and Gautier, IEEE
-Trans. Control Syst. Technol. 22 (2014), on noise in the regressors).
-About a reversal, friction is no step of the measured speed's sign, and until a stroke is on its way bristles may bend
-where the motor seems to slide.  Where the actuator asks for it, as a second opinion does, blocks within the filter's
-reach of either are left out, as usual in the identification of robots.
-"""
+"""Measured motion: sampling, stretches, derivatives."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,14 +11,167 @@ from scipy.ndimage import maximum_filter1d, median_filter, uniform_filter1d
 
 from ema_model.actuator import Actuator
 from ema_model.errors import InputError, quoted
-from ema_model.models.loop_window import CONTEXT
+from ema_model.models.loop_window import BLOCK_S, CONTEXT
 from ema_model.models.model import Window
-from ema_model.models.motion import Motion, motion_of
-from ema_model.models.sampling import check_period
 from ema_model.recordings import Measurement
 from ema_model.recordings.noise import NEAR, WITHIN, sample_noise
+from ema_model.simulation.run import FASTEST_HZ, SLOWEST_HZ, steps_per_sample
+
+MOST_STEPS = 20_000_000  # of the model, over all recordings at once: 200 s at 10 µs, half a gigabyte of inputs
+_MOST_FILLED = 10.0  # samples on an even grid for each that was recorded, before its time counts as full of gaps
+_SLOWEST = 100.0  # half widths of the motion's filter
+_ADVICE = "check the unit of time_s"
+
+
+def on_even_grid(measurement: Measurement) -> Measurement:
+    """The measurement on a grid of its own median period; InputError where that would mostly fill gaps."""
+    period = measurement.sample_period_s
+    if not period > 0.0:  # NaN: every run is one sample
+        raise InputError(f"{measurement.name}: no run has two samples; check the column segment")
+    if measurement.is_uniform:
+        return measurement
+    if measurement.duration_s > _MOST_FILLED * measurement.samples * period:
+        seen = f"{measurement.samples} samples, {period:g} s apart at the median, last for {measurement.duration_s:g} s"
+        raise InputError(f"{measurement.name}: {seen}; {_ADVICE}, or number the runs between gaps in a column segment")
+    return measurement.resampled(period)
+
+
+def check_steps(measurements: Sequence[Measurement], parts: Sequence[list[slice] | None], actuator: Actuator) -> None:
+    """Raises InputError where a closed loop cannot be simulated beside recordings on even grids, whole or in parts."""
+    total, steps = 0, actuator.step_s
+    for measurement, slices in zip(measurements, parts):
+        period = measurement.sample_period_s
+        if actuator.has_reference_model and not 0.999 / FASTEST_HZ <= period <= 1.001 / SLOWEST_HZ:
+            raise InputError(
+                f"{measurement.name}: its sampling period of {period:g} s is not between {1.0 / FASTEST_HZ:g} and "
+                f"{1.0 / SLOWEST_HZ:g} s, which the reference model can follow; {_ADVICE}, or record at another rate"
+            )
+        samples = sum(one.stop - one.start for one in slices or measurement.runs)
+        total += samples * steps_per_sample(period, steps)
+        if total > MOST_STEPS:
+            raise InputError(
+                f"{measurement.name}: {samples} samples every {period:g} s take it to {total:.2g} steps of the model "
+                f"({steps:g} s), and at most {MOST_STEPS:g} are simulated; {_ADVICE}, or take a shorter part"
+            )
+
+
+def check_period(measurement: Measurement, filter_s: float) -> None:
+    """Raises InputError where samples are too far apart to tell speed and acceleration."""
+    period = measurement.sample_period_s
+    if period > _SLOWEST * filter_s:
+        seen = f"its sampling period of {period:g} s is far too long to differentiate the motion over {filter_s:g} s"
+        raise InputError(f"{measurement.name}: {seen}; {_ADVICE}, or record faster")
+
+
+# --- which parts of long recordings are simulated: a fit takes seconds, not the hours that a rig can record -----------
+
+_FIT_STEPS = 300_000  # of the model over all recordings, for a calibration: 3 s at 1e-5 s
+_FIT_BLOCKS = 16_000  # of a closed loop over all recordings, for a calibration: more tell no more, and take longer
+_MOST_STEPS = 12_000_000  # for the evaluation: 120 s
+_PARTS = 6  # that a long recording is fitted on
+_LEAST_S = 0.05
+_STEPS_A_SAMPLE = 2.0
+
+
+def fit_stretches(measurements: Sequence[Measurement], actuator: Actuator) -> list[list[slice] | None] | None:
+    """Parts of each recording to calibrate on, spread over its length; None if all can be taken whole."""
+    return _stretches(measurements, actuator, _FIT_STEPS, _PARTS, _FIT_BLOCKS)
+
+
+def evaluation_stretches(measurements: Sequence[Measurement], actuator: Actuator) -> list[list[slice] | None] | None:
+    """Parts of each recording to simulate for the residuals; None, whole, for all but very long ones."""
+    return _stretches(measurements, actuator, _MOST_STEPS, 10 * _PARTS)
+
+
+def _stretches(
+    measurements: Sequence[Measurement], actuator: Actuator, budget: int, parts: int, most_blocks: float = np.inf
+) -> list[list[slice] | None] | None:
+    if any(measurement.is_map for measurement in measurements):
+        return None
+    measurements = [on_even_grid(measurement) for measurement in measurements]  # whose samples the slices count
+    if actuator.controller.kind == "unknown":  # a sample costs as much as some steps of a simulation
+        steps = [_STEPS_A_SAMPLE * measurement.samples for measurement in measurements]
+        blocks = 0.0
+    else:
+        steps = [measurement.duration_s / actuator.step_s for measurement in measurements]
+        blocks = sum(one.duration_s / max(one.sample_period_s, BLOCK_S) for one in measurements)
+    share = min(budget / max(sum(steps), 1.0), most_blocks / max(blocks, 1.0))
+    if share >= 1.0:
+        return None
+    return [_of(measurement, share, parts, actuator) for measurement in measurements]
+
+
+def _of(measurement: Measurement, share: float, parts: int, actuator: Actuator) -> list[slice]:
+    """Stretches of the runs, `share` of their length together; the first starts with the recording."""
+    period = measurement.sample_period_s
+    wanted = share * measurement.samples
+    least = max(200, int(_LEAST_S / period))
+    count = int(np.clip(wanted // least, 1, parts))
+    length = max(least, int(wanted / count))
+    runs = measurement.runs
+    starts = np.linspace(0, max(0, measurement.samples - length), count).astype(int)
+    found: list[slice] = []
+    for start in starts:
+        run = next(run for run in runs if start < run.stop)
+        first = max(run.start, min(start, run.stop - length))
+        piece = slice(int(first), int(min(first + length, run.stop)))
+        if not found or piece.start >= found[-1].stop:
+            found.append(piece)
+    return found
+
+
+# --- speed and acceleration of a measured position, and the filter that they have passed ------------------------------
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Filtered position (rad), speed (rad/s) and acceleration (rad/s²), (samples,) each, on an even grid."""
+
+    position: Array
+    speed: Array
+    acceleration: Array
+    kernel: Array  # h, sums to 1
+
+    def filtered(self, values: Array) -> Array:
+        """Values (…, samples) through h, the ends held."""
+        return _convolved(values, self.kernel)
+
+
+def motion_of(position: Array, period_s: float, half_s: float) -> Motion:
+    """The motion of a run, sampled every period_s; half_s: half width of the parabolas, s."""
+    from scipy.signal import savgol_coeffs  # takes a third of a second to import
+
+    half = max(2, round(half_s / period_s))
+    half = max(1, min(half, (position.size - 1) // 2 - 1))
+    size = 2 * half + 1
+    second = savgol_coeffs(size, 2, deriv=2, delta=period_s, use="conv")
+    kernel = np.cumsum(np.cumsum(second))[:-2] * period_s**2
+    kernel /= kernel.sum()
+    first = np.convolve([0.5 / period_s, 0.0, -0.5 / period_s], kernel)
+    return Motion(
+        position=_convolved(position, kernel),
+        speed=_convolved(position, first),
+        acceleration=_convolved(position, second),
+        kernel=kernel,
+    )
+
+
+def _convolved(values: Array, kernel: Array) -> Array:
+    """The middle part of a convolution along the last axis; beyond the ends the line goes straight on."""
+    from scipy.signal import fftconvolve
+
+    reach = kernel.size // 2
+    first, last = values[..., :1], values[..., -1:]
+    before = 2.0 * first - values[..., reach:0:-1]
+    after = 2.0 * last - values[..., -2 : -reach - 2 : -1]
+    padded = np.concatenate([before, values, after], axis=-1)
+    shape = (1,) * (values.ndim - 1) + (-1,)
+    return fftconvolve(padded, kernel.reshape(shape), mode="valid", axes=-1)
+
+
+# --- a recording's motion for inverse dynamics: filtered, with the blocks in which friction's law is known ------------
 
 _BLOCKS_PER_FILTER = 6  # compared values in a half width of the motion's filter
 _STILL_STEPS = 3.0  # of the encoder within the filter, under which the motor counts as standing

@@ -16,7 +16,7 @@ from numba.core import config
 from numba.core.codegen import get_host_cpu_features
 from numba.extending import register_jitable
 
-from ema_model.kernel_cache.kept import kept
+from ema_model.kernel_cache import kept
 
 # Waiting threads sleep: spinning ones would take the cores from the browser, and from a kernel next to them.
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")

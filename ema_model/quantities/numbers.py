@@ -1,16 +1,36 @@
-"""Numbers as files and people write them: read, shown with so many digits, in a unit that suits their size."""
+"""Numbers as they are written: rounding, intervals, units' prefixes."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import ArrayLike
 
 from ema_model.errors import InputError, quoted
-from ema_model.quantities.si import BY_SHOWN
+from ema_model.quantities.units import BY_SHOWN
+
+HALF_90 = 1.645  # σ of a normal distribution, on either side
+IntervalJson = Annotated[list[float], Meta(min_length=2, max_length=2)]  # its lower and its upper end
+
+
+# --- round numbers in a range, for axes -------------------------------------------------------------------------------
+
+
+def round_numbers(low: float, high: float, about: float, steps: Sequence[float] = ()) -> list[float]:
+    """About so many from low to high: 1, 2 or 5 times a power of ten apart, or the first of the steps that suffices."""
+    rough = ((high - low) or 1.0) / about
+    size = 10.0 ** math.floor(math.log10(rough))
+    step = next(one for one in steps or (size, 2.0 * size, 5.0 * size, 10.0 * size) if one >= 0.999 * rough)
+    first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
+    return [step * i for i in range(first, last + 1)]
+
+
+# --- numbers as files and people write them: read, shown with so many digits, in a unit that suits their size---------
 
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _SMALLEST = 0.09995  # reads as 0.1, and is shown as it is; what is smaller gets the next prefix

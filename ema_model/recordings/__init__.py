@@ -3,17 +3,25 @@
 from __future__ import annotations
 
 from ema_model.quantities.signals import SIGNALS, Signal
-from ema_model.recordings.checks import check_needed
-from ema_model.recordings.columns.guess import guess_mapping
-from ema_model.recordings.columns.mapping import ColumnMapping, MappedColumn, apply_mapping, parse_mapping
-from ema_model.recordings.columns.reading import Reading
-from ema_model.recordings.equivalent_current import can_have_current, with_equivalent_current
-from ema_model.recordings.file import hints_of, read_columns, read_head, read_header
-from ema_model.recordings.measurement import Measurement
-from ema_model.recordings.prepared import prepared
-from ema_model.recordings.read import read
-from ema_model.recordings.side_file.read import SideFile, check_one_actuator, find_side_file, read_side_file, side_path
-from ema_model.recordings.side_file.write import change_side_file, write_side_file
+from ema_model.recordings.columns import (
+    ColumnMapping,
+    MappedColumn,
+    Reading,
+    apply_mapping,
+    guess_mapping,
+    parse_mapping,
+)
+from ema_model.recordings.measurement import Measurement, can_have_current, with_equivalent_current
+from ema_model.recordings.read import check_needed, hints_of, prepared, read, read_columns, read_head, read_header
+from ema_model.recordings.side_file import (
+    SideFile,
+    change_side_file,
+    check_one_actuator,
+    find_side_file,
+    read_side_file,
+    side_path,
+    write_side_file,
+)
 from ema_model.recordings.write import check_target, write_measurement
 
 __all__ = [

@@ -1,7 +1,8 @@
-"""Signals of one run on a common time base."""
+"""A measurement: signals over time, at hand, made even, delayed, and as words."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -12,15 +13,118 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ema_model.errors import InputError
-from ema_model.files.refusal import listed, shown
+from ema_model.files.opened import listed, shown
 from ema_model.quantities.axes import Axes
+from ema_model.quantities.numbers import number
 from ema_model.quantities.signals import SIGNALS
-from ema_model.recordings.columns.reading import Reading
-from ema_model.recordings.formats.clocks import GAP
-from ema_model.recordings.side_file.read import SideFile
-from ema_model.text import InWords
+from ema_model.recordings.columns import ColumnMapping, Reading
+from ema_model.recordings.formats.clocks import GAP, between
+from ema_model.recordings.health.estimates import rotation_order
+from ema_model.recordings.side_file import SideFile
+from ema_model.text import Document, InWords, Lines, Table
+
+
+def document_of(measurement: Measurement) -> Document:
+    """Signals by their names in files, in SI; beside each the column that it was read from."""
+    size = f"{measurement.samples} samples"
+    if not measurement.is_map:
+        size += f" over {number(measurement.duration_s)} s"
+    mapping = measurement.reading.mapping
+    columns = {entry.signal: entry.column for entry in mapping.entries}
+    rows, units, remarks = [], [], []
+    for name, values in measurement.signals.items():
+        outside = measurement.shown(name)
+        rows.append([outside, number(float(np.min(values))), number(float(np.max(values)))])
+        units.append(SIGNALS[outside].unit if outside in SIGNALS else "")
+        remarks.append(f"from {shown(columns[outside])}" if columns.get(outside, outside) != outside else "")
+    said = [measurement.reading.told, *(f"left aside: {shown(column)} ({why})" for column, why in mapping.unmapped)]
+    beside = [f"{unit}   {remark}".strip() for unit, remark in zip(units, remarks)]
+    return Document(
+        [
+            Lines([f"{measurement.name or 'recording'}: {size}", *filter(None, said)]),
+            Table(("least", "most"), rows, "signal", beside),
+        ]
+    )
+
+
+# --- signals that a mapping says to come late, moved back to the time at which they were ------------------------------
+
+
+def without_delays(measurement: Measurement, mapping: ColumnMapping) -> Measurement:
+    """The measurement with each delay of its mapping taken out, run by run, without the ends that one then lacks."""
+    late = {entry.signal: entry.delay_s for entry in mapping.entries if entry.delay_s and entry.signal in measurement}
+    if not late:
+        return measurement
+    parts: list[dict[str, np.ndarray]] = []
+    for run in measurement.runs:
+        time = measurement.time_s[run]
+        whole = (time + min(0.0, *late.values()) >= time[0]) & (time + max(0.0, *late.values()) <= time[-1])
+        part = {name: measurement[name][run] for name in measurement}
+        for name, delay in late.items():
+            part[name] = between(time + delay, time, part[name], SIGNALS[name].kind == "state")
+        parts.append({name: values[whole] for name, values in part.items()})
+    signals = {name: np.concatenate([part[name] for part in parts]) for name in measurement}
+    told = tuple(f"{name} is moved {1e3 * delay:.6g} ms back, as its mapping says" for name, delay in late.items())
+    return replace(measurement, signals=signals, notes=(*measurement.notes, *told))
+
+
+# --- the equivalent current from three phase currents (T 3.14) --------------------------------------------------------
+
+PHASES = ("phase_a_current_A", "phase_b_current_A", "phase_c_current_A")
 
 Array = NDArray[np.float64]
+
+_CLEAR = 0.5  # likeness of the currents to a turning field, from which on its angle counts
+
+
+def equivalent_current(a: Array, b: Array, c: Array, motor_position_rad: Array, pole_pairs: float) -> Array:
+    """I_3eq = [−I_A + ½(I_B + I_C)] sin θ_e + (√3/2)(I_B − I_C) cos θ_e, A; θ_e is pole_pairs times the position."""
+    angle = pole_pairs * motor_position_rad
+    return (0.5 * (b + c) - a) * np.sin(angle) + 0.5 * math.sqrt(3.0) * (b - c) * np.cos(angle)
+
+
+def can_have_current(measurement: Measurement) -> bool:
+    """Whether the equivalent current is missing and can be made."""
+    return "current_A" not in measurement and all(name in measurement for name in (*PHASES, "motor_position_rad"))
+
+
+def with_equivalent_current(measurement: Measurement, pole_pairs: float, rotor_offset_rad: float = 0.0) -> Measurement:
+    """The measurement with `current_A` made from its phase currents and motor position; one that has it is kept.
+
+    `rotor_offset_rad` is the rotor's angle where the motor position is zero.  Raises InputError if a phase
+    or the position is missing.
+    """
+    if "current_A" in measurement:
+        return measurement
+    measurement.require(*PHASES, "motor_position_rad")
+    if not (math.isfinite(pole_pairs) and pole_pairs > 0.0):
+        raise InputError(f"the pole pairs must be a number above 0, not {pole_pairs:g}")
+    angle = measurement["motor_position_rad"] + rotor_offset_rad
+    a, b, c = (measurement[name] for name in PHASES)
+    current = equivalent_current(a, b, c, angle, pole_pairs)
+    note = f"current_A is made from the phase currents with {pole_pairs:g} pole pairs"
+    return measurement.with_signals(current_A=current).with_notes(note)
+
+
+def with_current(measurement: Measurement, pole_pairs: float, rotor_offset_rad: float) -> Measurement:
+    """The same where a current can be made, at the rotor offset that the phase currents themselves show.
+
+    They show it up to a multiple of π/pole_pairs; of these the nearest to `rotor_offset_rad` is taken.
+    """
+    if not can_have_current(measurement):
+        return measurement
+    phases = np.array([measurement[name] for name in PHASES])
+    _, forward, backward, shown = rotation_order(phases, measurement["motor_position_rad"], pole_pairs)
+    offset = rotor_offset_rad
+    if forward > _CLEAR and forward > 2.0 * backward and math.isfinite(shown):
+        step = math.pi / pole_pairs
+        offset = shown + step * round((rotor_offset_rad - shown) / step)
+    made = with_equivalent_current(measurement, pole_pairs, offset)
+    return made.with_notes(f"the rotor's offset is taken as {offset:.4g} rad") if offset != rotor_offset_rad else made
+
+
+# --- signals of one run on a common time base -------------------------------------------------------------------------
+
 Default = TypeVar("Default")
 
 _MOST_SAMPLES = 100_000_000

@@ -1,34 +1,370 @@
-"""The one door: any file of a known actuator becomes the measurement as the model needs it.
-
-Which column is which signal is said by hand, else by the file's side file, else by the actuator's file; canonical
-names speak for themselves, and what is then still open is guessed.  A guess that is not sure is asked about.
-"""
+"""The one way in: a file, its columns, units and checks, as a measurement."""
 
 from __future__ import annotations
 
 import os
 import shlex
-from collections.abc import Collection, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
-from ema_model.errors import InputError
-from ema_model.files.limits import FILE_BYTES
-from ema_model.files.refusal import listed, refusal, shown
-from ema_model.quantities.signals import SIGNALS
-from ema_model.recordings.columns.guess import doubt, guess_mapping
-from ema_model.recordings.columns.mapping import ColumnMapping, MappedColumn, parse_mapping, unit_in_name
-from ema_model.recordings.columns.reading import Reading, without_unit
-from ema_model.recordings.equivalent_current import PHASES
-from ema_model.recordings.file import NONE, check_file, hints_of, read_columns, read_header, read_measurement
-from ema_model.recordings.formats.text_layout import Hints
-from ema_model.recordings.measurement import Measurement
-from ema_model.recordings.prepared import prepared
-from ema_model.recordings.side_file.read import SideFile, find_side_file, read_side_file
+from ema_model.errors import InputError, did_you_mean, quoted
+from ema_model.files.opened import check_user_file, listed, reason, refusal, shown
+from ema_model.files.sandbox import COLUMNS, FILE_BYTES, RUNS, megabytes
+from ema_model.quantities.signals import SIGNALS, lookalikes, looks_like_time
+from ema_model.recordings.columns import (
+    ColumnMapping,
+    MappedColumn,
+    Reading,
+    apply_mapping,
+    doubt,
+    guess_mapping,
+    parse_mapping,
+    unit_in_name,
+    without_unit,
+)
+from ema_model.recordings.formats import Format, format_of
+from ema_model.recordings.formats.clocks import Clocks
+from ema_model.recordings.formats.text_layout import Head, Hints
+from ema_model.recordings.measurement import PHASES, Measurement, with_current, without_delays
+from ema_model.recordings.side_file import SideFile, find_side_file, read_side_file
+
+Array = NDArray[np.float64]
+NONE = Hints()
+
+
+def read_measurement(
+    path: str | os.PathLike[str],
+    mapping: ColumnMapping | Sequence[str] | None = None,
+    *,
+    side: SideFile | None = None,
+    max_bytes: int = FILE_BYTES,
+    hints: Hints = NONE,
+) -> Measurement:
+    """The measurement in a file, its name the file's stem, its notes what was found and left aside.
+
+    `mapping`, or texts as of `--map`, says which columns are which signals; columns with canonical names
+    need none.  `side` is what else is known; without it the file's side file is read, or its folder's, if there
+    is one, and its mapping, window and segments are used.  A given mapping's entries go before the side file's.
+    Raises InputError, one line with the file, the place in it and what to do, for whatever is wrong with the
+    file; `max_bytes` bounds its size, on the disk and in memory.
+    """
+    path = os.fspath(path)
+    check_file(path, max_bytes)
+    notes = []
+    if side is None:
+        found = find_side_file(path)
+        side = read_side_file(found) if found else SideFile()
+        if found:
+            notes.append(f"the side file {shown(found.name, 100)} is used")
+    file_format = said_format(path, hints_of(path, side, hints))
+    with _told(path):
+        header = file_format.header(path, max_bytes)
+        used = _merged(path, side, mapping, header)
+        known, foreign = choose_columns(
+            path, header, used, needs_time=side.kind == "run", looked_at=isinstance(mapping, ColumnMapping)
+        )
+        columns = file_format.read(path, known, max_bytes, True)
+        check_length(path, next(iter(columns.arrays.values())).size)
+        check_finite(path, columns.arrays, columns.place)
+        signals, done = apply_mapping(columns.arrays, used)
+        columns.arrays.clear()  # they are copied, and large; Arrow would keep their memory for later
+        pa.default_memory_pool().release_unused()
+    if side.kind == "map" and "time_s" not in signals:
+        signals = {"time_s": np.arange(float(next(iter(signals.values())).size)), **signals}
+        done = (*done, "a static map without time: time_s counts the samples")
+    check_values(path, signals, columns.place)
+    told = (*([columns.layout] if columns.layout else []), *columns.notes, *notes, *done)
+    bare = _measurement(path, signals, told, foreign, side)
+    name = " ".join(filter(None, (bare.name, columns.title)))
+    clocks = columns.clocks and _of_signals(columns.clocks, used)
+    measurement = replace(bare, name=name, reading=Reading(clocks=clocks, layout=columns.layout))
+    measurement = without_delays(measurement, used)
+    check_length(path, measurement.samples)
+    if side.window_s is not None or side.segments is not None:
+        try:
+            measurement = measurement.selected(side.window_s, side.segments)
+        except InputError as error:
+            raise refusal(path, str(error).removeprefix(f"{shown(measurement.name, 100)}: ")) from None
+        check_length(path, measurement.samples)
+    return measurement
+
+
+def read_header(path: str, max_bytes: int, hints: Hints = NONE) -> list[str]:
+    """The columns' names in the file's order; InputError for a file that cannot be read as a table."""
+    check_file(path, max_bytes)
+    with _told(path):
+        return said_format(path, hints).header(path, max_bytes)
+
+
+def read_head(path: str | os.PathLike[str], *, max_bytes: int = FILE_BYTES, hints: Hints = NONE) -> Head | None:
+    """The first lines of a text and the layout found in them, for a person to look at; None for another format.
+
+    Raises InputError for what is no text, and for hints that do not fit it.
+    """
+    path = os.fspath(path)
+    check_file(path, max_bytes)
+    with _told(path):
+        head = said_format(path, hints).head
+        return head(path, max_bytes) if head is not None else None
+
+
+def read_columns(path: str | os.PathLike[str], *, max_bytes: int = FILE_BYTES, hints: Hints = NONE) -> dict[str, Array]:
+    """The columns of numbers as they stand in the file, for a mapping step to show; others are left out.
+
+    Raises InputError for a file that cannot be read as a table at all; the values are not checked.
+    """
+    path = os.fspath(path)
+    check_file(path, max_bytes)
+    file_format = said_format(path, hints)
+    with _told(path):
+        names = [name for name in file_format.header(path, max_bytes) if name]
+        check_names(path, names)
+        if not names:
+            raise refusal(path, "has no columns")
+        # What is wrong with all of them is told as for a measurement.
+        return (
+            file_format.read(path, names, max_bytes, False).arrays
+            or file_format.read(path, names, max_bytes, True).arrays
+        )
+
+
+def hints_of(path: str, side: SideFile, given: Hints = NONE) -> Hints:
+    """What is said of a text's layout: as given, then as in the side file, which may stand beside other formats too."""
+    return given.before(side.text) if format_of(path).hinted is not None else given
+
+
+def said_format(path: str, hints: Hints) -> Format:
+    """The file's format, reading it as somebody has said that it is laid out; InputError where it is no text."""
+    found = format_of(path)
+    if hints == NONE:
+        return found
+    if found.hinted is None:
+        raise refusal(path, f"is {found.title}, no text; leave --header-line and --encoding out")
+    return found.hinted(hints)
+
+
+@contextmanager
+def _told(path: str) -> Iterator[None]:
+    """What the system cannot do becomes an InputError."""
+    try:
+        yield
+    except OSError as error:
+        raise refusal(path, f"cannot be read ({reason(error)}); check the disk and the permissions") from None
+    except MemoryError:
+        raise refusal(path, "does not fit into memory; split it, or keep fewer columns") from None
+
+
+def _merged(
+    path: str, side: SideFile, given: ColumnMapping | Sequence[str] | None, header: Sequence[str]
+) -> ColumnMapping:
+    """The mapping to use, given entries before the side file's; InputError if a column is missing."""
+    if isinstance(given, str):
+        given = [given]
+    if given is not None and not isinstance(given, ColumnMapping):
+        given = parse_mapping(given, header)
+    merged = side.mapping or ColumnMapping()
+    for entry in given.entries if given else ():
+        merged = merged.with_entry(entry)
+    for entry in merged.entries:
+        if entry.column not in header:
+            by_side = side.mapping is not None and entry in side.mapping.entries and side.path
+            asker = f", which {shown(Path(side.path).name, 100)} asks for" if by_side and side.path else ""
+            missing = f"no column {shown(entry.column)!r} for {entry.signal}{asker}"
+            meant = did_you_mean(entry.column, header)
+            raise refusal(path, f"{missing}; correct the mapping (present: {listed(header)}){meant}")
+    return merged
+
+
+def _of_signals(clocks: Clocks, mapping: ColumnMapping) -> Clocks:
+    mapped = {entry.column for entry in mapping.entries}
+    of = {name: clock for name, clock in clocks.of.items() if name not in mapped}
+    of |= {entry.signal: clocks.of[entry.column] for entry in mapping.entries if entry.column in clocks.of}
+    return replace(clocks, of=of)
+
+
+def check_file(path: str, max_bytes: int) -> None:
+    """Raises InputError for what is no file, an empty or too large a one."""
+    status = check_user_file(path, "the file of a measurement")
+    if status.st_size == 0:
+        raise refusal(path, "is empty; a measurement of 100 samples or more is expected")
+    if status.st_size > max_bytes:
+        size = f"is {megabytes(status.st_size)} large, over the limit of {megabytes(max_bytes)}"
+        raise refusal(path, f"{size}; split it, or record fewer samples")
+
+
+def _measurement(
+    path: str, signals: dict[str, Array], notes: Sequence[str], foreign: Sequence[str], side: SideFile
+) -> Measurement:
+    for values in signals.values():
+        values.flags.writeable = False  # ours alone, so that it need not be copied
+    notes = list(notes)
+    named = [name for name in foreign if name]
+    if named:
+        notes.append(f"left aside, as their names are not known: {listed(named)}")
+    bare = Measurement(signals)
+    if not bare.is_uniform:
+        off = f"samples lie up to {100.0 * bare.jitter:.3g} % of a period off a regular grid"
+        notes.append(f"{off}; the median step is {bare.sample_period_s:.6g} s")
+    return Measurement(bare.signals, Path(path).stem, tuple(notes), side)
+
+
+# --- what a file's columns must fulfil before they become a measurement, and a measurement before it is used ----------
+
+Place = Callable[[int], str]
+
+FEWEST_SAMPLES = 100
+LARGEST = 1e30  # absolute value, in any unit
+_SHORTEST_STEP_S = 1e-12
+_LONGEST_NAME = 1_000  # characters
+_NONE = ColumnMapping()
+
+
+class TooShort(InputError):
+    """A recording has fewer samples than a fit can use; one of several can be left out for that."""
+
+
+def choose_columns(
+    path: str,
+    header: Sequence[str],
+    mapping: ColumnMapping = _NONE,
+    *,
+    needs_time: bool = True,
+    looked_at: bool = False,
+) -> tuple[list[str], list[str]]:
+    """The columns of a header to read, canonical or mapped, and the foreign ones to be left aside.
+
+    Raises InputError if a name stands twice, the time is missing, or a foreign name looks like a canonical
+    one that is missing; the last is no matter once columns are mapped, or somebody has looked at them.
+    """
+    check_names(path, header)
+    mapped = {entry.column for entry in mapping.entries}
+    signals = {entry.signal for entry in mapping.entries}
+    known = [name for name in header if name in mapped or (name in SIGNALS and name not in signals)]
+    foreign = [name for name in header if name not in known]
+    if needs_time and "time_s" not in signals and ("time_s" not in known or "time_s" in mapped):
+        hints = [shown(name) for name in foreign if looks_like_time(name)]
+        advice = "name the column of time, in seconds, time_s"
+        if hints:
+            advice = f"{hints[0]!r} looks like time: in seconds, name it time_s, or map it: --map 'time_s={hints[0]}'"
+        raise refusal(path, f"no column time_s; {advice} (present: {listed(header)})")
+    if not known:
+        raise refusal(path, f"no column has a known name; map them with --map (present: {listed(header)})")
+    for name in foreign if not mapping.entries and not looked_at else ():
+        candidates = lookalikes(name)
+        if candidates and not set(candidates) & set(known):
+            meant = " or ".join(candidates)
+            advice = "if it is that, map it, or convert it to the unit and rename it"
+            raise refusal(path, f"column {shown(name)!r} looks like {meant}; {advice}; otherwise rename or remove it")
+    return known, foreign
+
+
+def check_names(path: str, header: Sequence[str]) -> None:
+    """Raises InputError if there are too many names, one is too long, or stands twice."""
+    if len(header) > COLUMNS:
+        raise refusal(path, f"has {len(header)} columns, over the limit of {COLUMNS}; keep fewer columns")
+    longest = max(map(len, header), default=0)
+    if longest > _LONGEST_NAME:
+        raise refusal(path, f"a column's name has {longest} characters, over the limit of {_LONGEST_NAME}; shorten it")
+    twice = [name for name, count in Counter(header).items() if count > 1 and name]
+    if twice:
+        raise refusal(path, f"column {shown(twice[0])!r} stands twice in the header; rename or remove one")
+
+
+def check_values(path: str, arrays: Mapping[str, Array], place: Place) -> None:
+    """Raises InputError for values that no sensor gives, states that are not whole and time that does not increase.
+
+    `arrays` are columns of one length with `time_s`; `place` says where a sample stands in the file.
+    """
+    check_finite(path, arrays, place)
+    for name in ("segment", "drive_enabled"):
+        if name in arrays:
+            values = arrays[name]
+            whole = (values == np.round(values)) if name == "segment" else (values == 0.0) | (values == 1.0)
+            expected = "a whole number" if name == "segment" else "0 or 1"
+            for row in np.flatnonzero(~whole)[:1]:
+                raise refusal(
+                    path, f"{place(row)}, column {quoted(name)!r}: {expected} is expected, found {values[row]:g}"
+                )
+    if "segment" in arrays and (runs := np.count_nonzero(np.diff(arrays["segment"])) + 1) > RUNS:
+        found = f"column 'segment' tells {runs} runs apart, over the limit of {RUNS}"
+        raise refusal(path, f"{found}; correct it, or split the file")
+    time = arrays["time_s"]
+    wrong = np.diff(time) < _SHORTEST_STEP_S
+    if "segment" in arrays:
+        wrong &= np.diff(arrays["segment"]) == 0.0
+    for row in np.flatnonzero(wrong)[:1] + 1:
+        problem = f"{time[row]!s} follows {time[row - 1]!s}, but time must increase"
+        advice = "sort or remove the row, or number the runs in a column segment"
+        raise refusal(path, f"{place(row)}, column 'time_s': {problem}; {advice}")
+
+
+def check_finite(path: str, arrays: Mapping[str, Array], place: Place) -> None:
+    """Raises InputError for the first NaN, infinite or absurd value, column by column.
+
+    No quantity is that large; loggers write such numbers for a missing one, and their squares overflow.
+    """
+    for name, values in arrays.items():
+        for row in np.flatnonzero(~(np.abs(values) <= LARGEST))[:1]:
+            value = values[row]
+            found = "NaN" if np.isnan(value) else "an infinite value" if np.isinf(value) else f"{value:.3g}"
+            expected = "a finite number is expected" if not np.isfinite(value) else "no quantity is that large"
+            problem = f"{found}; {expected}, correct it or remove the row"
+            raise refusal(path, f"{place(row)}, column {quoted(name)!r}: {problem}")
+
+
+def check_length(path: str, samples: int) -> None:
+    """Raises TooShort for fewer samples than a fit can use."""
+    if samples < FEWEST_SAMPLES:
+        found = f"{samples} sample{'s' * (samples != 1)}"
+        line = refusal(path, f"has {found}; {FEWEST_SAMPLES} or more are expected, record for longer or faster")
+        raise TooShort(str(line))
+
+
+def check_needed(measurement: Measurement, *names: str) -> None:
+    """Raises InputError if a signal that an analysis needs is missing, empty or constant."""
+    measurement.require(*names)
+    for name in names:
+        values = measurement[name]
+        if not values.size or np.all(values == values[0]):
+            value = f"is constant ({values[0]:g})" if values.size else "is empty"
+            where = f"{quoted(measurement.name)}: " if measurement.name else ""
+            column = quoted(measurement.shown(name))
+            raise InputError(f"{where}column {column!r} {value}, but it must vary here; record it while the axis moves")
+
+
+# --- a measurement as the model needs it: under the names inside, with an equivalent current --------------------------
+
+
+def prepared(measurement: Measurement, actuator: Actuator) -> Measurement:
+    """The measurement with the signals' rotary names, which the model has, and a current from its phase currents.
+
+    One that is so already stays as it is.  Raises InputError for one that was prepared for other axes: the signals
+    of the axes that it was read for are all that it has left.
+    """
+    if measurement.axes is not None:
+        if measurement.axes != actuator.axes:
+            raise InputError(f"{measurement.name}: it was read for an actuator with other axes; read it for this one")
+        return measurement
+    axes = actuator.axes
+    others = axes.of_other_axes(measurement)
+    inside = replace(measurement, signals=axes.inside(measurement.signals), axes=axes, of_other_axes=others)
+    if others:
+        inside = inside.with_notes(f"left aside, as the actuator's axes are of another kind: {listed(others)}")
+    made = with_current(inside, actuator.motor.pole_pairs, actuator.motor.rotor_offset_rad)
+    if made is inside:
+        return made
+    return replace(made, reading=replace(made.reading, made=("current_A",)))
+
+
+# --- the one door: any file of a known actuator becomes the measurement as the model needs it -------------------------
 
 Needs = Sequence[Sequence[str]]  # of each group one signal, the first that there is; names inside
 COMMAND_ALONE: Needs = (("time_s",), ("command_rad",))

@@ -12,10 +12,10 @@ from typing import TypeVar
 import numpy as np
 
 from ema_model.errors import InputError
-from ema_model.files.refusal import listed, refusal, shown
-from ema_model.recordings.checks import TooShort
+from ema_model.files.opened import listed, refusal, shown
 from ema_model.recordings.formats import FORMATS, robot_dataset
 from ema_model.recordings.measurement import Measurement
+from ema_model.recordings.read import TooShort
 
 File = TypeVar("File")
 Read = TypeVar("Read")

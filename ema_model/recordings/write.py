@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 
-from ema_model.files.refusal import reason, refusal, shown
-from ema_model.files.whole_file import whole_file
-from ema_model.recordings.checks import check_finite
+from ema_model.files.opened import reason, refusal, shown
+from ema_model.files.written import whole_file
 from ema_model.recordings.formats import WRITTEN, format_of
 from ema_model.recordings.measurement import Measurement
+from ema_model.recordings.read import check_finite
 
 
 def write_measurement(measurement: Measurement, path: str | os.PathLike[str]) -> None:

@@ -21,7 +21,7 @@ import numpy as np
 from ema_model.actuator import load_actuator
 from ema_model.child_processes import end_with_parent, start_python
 from ema_model.faults import HEALTHY
-from ema_model.kernel_cache.folder import cache_folder
+from ema_model.kernel_cache import cache_folder
 from ema_model.physics.rows import LANES
 from ema_model.simulation.pack import initial_reference_state, initial_state, monitor_rows, reference_rows
 from ema_model.stacks import Stack, find_stack

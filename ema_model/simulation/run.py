@@ -1,8 +1,9 @@
-"""One run of a model: a command and a load in, signals out."""
+"""One run: load, sensors, simulation, words."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,20 +11,193 @@ from numpy.typing import ArrayLike, NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.actuator.layout import WITHOUT_DRIVE
-from ema_model.commands import Command, command
+from ema_model.commands import COMMANDS, Command, command
 from ema_model.effects import find
-from ema_model.errors import InputError, quoted
+from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.physics.rows import LANES
-from ema_model.quantities.axes import Axes
-from ema_model.quantities.numbers import check_number
+from ema_model.quantities.axes import ROTARY, Axes
+from ema_model.quantities.numbers import check_number, check_seed
+from ema_model.quantities.sides import USER
+from ema_model.quantities.titles import in_sentence, parameter_title, unit_of
 from ema_model.recordings import Measurement
-from ema_model.simulation.load_profile import LoadProfile, RecordedLoad
+from ema_model.side_by_side import blocks
 from ema_model.simulation.one_stack import stack_at_hand
 from ema_model.simulation.pack import initial_reference_state, initial_state, monitor_rows, reference_rows
 from ema_model.simulation.precompile import wait_for
-from ema_model.simulation.traced import traced
+from ema_model.stacks import Stack
+
+
+def run_in_words(command: str, settings: Mapping[str, float], duration_s: float, axes: Axes = ROTARY) -> str:
+    """'a sine with amplitude 0.03 rad, frequency 2 Hz, for 0.5 s'."""
+    title = COMMANDS[command].title
+    named = {axes.name(name, USER): value for name, value in settings.items()}
+    parts = (
+        f"{in_sentence(parameter_title(name))} {value:.4g} {unit_of(name)}".rstrip() for name, value in named.items()
+    )
+    article = "an" if title[:1] in "AEIOU" else "a"
+    return f"{article} {in_sentence(title)} with {', '.join(parts) or 'its usual settings'}, for {duration_s:g} s"
+
+
+# --- the Monitor Model's and inverse dynamics' kernels called for a population, its blocks of lanes side by s------
 
 Array = NDArray[np.float64]
+AnyFloat = NDArray[np.floating]
+
+
+def traced(
+    stack: Stack,
+    state: Array,
+    rows: Array,
+    run: tuple[AnyFloat, AnyFloat, AnyFloat],
+    period: int,
+    group: int,
+    step_s: float,
+) -> Array:
+    """The four signals of `monitor.traces`: (blocks, values, 4, LANES).
+
+    run: command, load and supply at each step.  state and rows: a block of lanes each; state is left as it is at the
+    end.
+    """
+    wait_for(stack, "traces")
+    result = np.empty((len(rows), len(run[0]) // (period * group), 4, LANES))
+
+    def simulate(part: slice) -> None:
+        stack.monitor.traces(state[part], rows[part], *run, period, group, step_s, result[part])
+
+    blocks(simulate, len(rows))
+    return result
+
+
+def needed_currents(stack: Stack, rows: Array, motion: tuple[Array, Array, Array, Array, Array], still: float) -> Array:
+    """The current of `inverse.currents`, A: (blocks, samples, LANES).
+
+    motion: position, speed, acceleration, load and time at each sample; rows: a block of lanes each.
+    """
+    wait_for(stack, "currents")
+    result = np.empty((len(rows), len(motion[0]), LANES))
+
+    def compute(part: slice) -> None:
+        stack.inverse.currents(rows[part], *motion, still, result[part])
+
+    blocks(compute, len(rows))
+    return result
+
+
+# --- how the load on the user shaft goes over time: constant, a step, a sine or a chirp (the thesis's load bl-----
+
+
+@dataclass(frozen=True)
+class LoadProfile:
+    """Shares of the run's load torque over time.
+
+    time_s: when a step comes, and how long a chirp's frequency rises; frequency_Hz: of a sine, and where a chirp ends.
+    Raises InputError for a shape that does not exist, for what is no number and for numbers that make no sense.
+    """
+
+    shape: str = "constant"
+    time_s: float = 0.1
+    frequency_Hz: float = 5.0
+
+    def __post_init__(self) -> None:
+        if self.shape not in SHAPES:
+            like = did_you_mean(self.shape, SHAPES)
+            raise InputError(
+                f"the load's shape must be one of {', '.join(SHAPES)}, not {quoted(self.shape, 40)!r}{like}"
+            )
+        for name in ("time_s", "frequency_Hz"):
+            value = getattr(self, name)
+            check_number(value, f"the load's {name}")
+            if not (math.isfinite(value) and value > 0.0):
+                raise InputError(f"the load's {name} must be above 0, not {value:g}")
+
+    def at(self, time_s: NDArray[np.floating]) -> Array:
+        """Shares of the torque at these times, −1 … 1, (n,)."""
+        return _SHAPES[self.shape](np.asarray(time_s, dtype=float), self)
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedLoad:
+    """Shares of the run's load torque as they were recorded, (n,) each; the last one stays."""
+
+    time_s: Array
+    shares: Array
+
+    def at(self, time_s: NDArray[np.floating]) -> Array:
+        """As `LoadProfile.at`."""
+        return np.interp(time_s, self.time_s, self.shares)
+
+
+def _constant(time_s: Array, _: LoadProfile) -> Array:
+    return np.ones_like(time_s)
+
+
+def _step(time_s: Array, profile: LoadProfile) -> Array:
+    return np.where(time_s < profile.time_s - 1e-12, 0.0, 1.0)
+
+
+def _sine(time_s: Array, profile: LoadProfile) -> Array:
+    return np.sin(2.0 * np.pi * profile.frequency_Hz * time_s)
+
+
+def _chirp(time_s: Array, profile: LoadProfile) -> Array:
+    swept = np.minimum(time_s, profile.time_s)
+    cycles = profile.frequency_Hz * (0.5 * swept**2 / profile.time_s + time_s - swept)
+    return np.sin(2.0 * np.pi * cycles)
+
+
+SHAPES = ("constant", "step", "sine", "chirp")
+_SHAPES: dict[str, Callable[[Array, LoadProfile], Array]] = dict(zip(SHAPES, (_constant, _step, _sine, _chirp)))
+
+
+# --- what sensors do to the signals: noise and quantisation, in the recording only (the loop does not see the-------
+
+_USER_STEP_RAD = 1e-6
+
+
+@dataclass(frozen=True)
+class Sensors:
+    """Accuracy of a rig's sensors; zeros are perfect ones."""
+
+    current_noise_A: float = 0.0  # rms, white at the sample rate
+    encoder_bits: int = 0  # per motor turn
+
+    def __post_init__(self) -> None:
+        check_number(self.current_noise_A, "the current noise")
+        check_number(self.encoder_bits, "the encoder's bits")
+        if not 0.0 <= self.current_noise_A < 1e3:
+            raise InputError(f"the current noise must lie between 0 and 1000 A rms, not {self.current_noise_A:g}")
+        if not 0 <= self.encoder_bits <= 32:
+            raise InputError(f"the encoder must have 0 (perfect) to 32 bits, not {self.encoder_bits}")
+
+    def record(self, measurement: Measurement, seed: int) -> Measurement:
+        """The measurement as these sensors would record it; reproducible by the seed.
+
+        InputError for a seed that is no whole number.
+        """
+        check_seed(seed)
+        random = np.random.default_rng(seed)
+        changed = {}
+        if self.current_noise_A:
+            for name in ("current_A", "phase_a_current_A", "phase_b_current_A", "phase_c_current_A"):
+                if name in measurement:
+                    true = measurement[name]
+                    changed[name] = true + self.current_noise_A * random.standard_normal(len(true))
+        if self.encoder_bits:
+            period = measurement.sample_period_s
+            steps = {"motor_position_rad": 2.0 * np.pi / 2**self.encoder_bits, "user_position_rad": _USER_STEP_RAD}
+            for name, step in steps.items():
+                if name in measurement:
+                    changed[name] = np.round(measurement[name] / step) * step
+            if {"motor_position_rad", "motor_speed_rad_s"} <= measurement.signals.keys():
+                # a rig's speed is the encoder's difference
+                difference = np.diff(changed["motor_position_rad"], prepend=0.0) / period
+                difference[0] = measurement["motor_speed_rad_s"][0]
+                changed["motor_speed_rad_s"] = difference
+        return measurement.with_signals(**changed)
+
+
+# --- one run of a model: a command and a load in, signals out ---------------------------------------------------------
+
 Effects = Mapping[str, Mapping[str, float]]
 
 MONITOR_STEP_S = 1e-5

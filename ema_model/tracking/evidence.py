@@ -1,22 +1,93 @@
-"""Evidence for a trend of each k that may be looked at after each flight.
-
-Without a trend k̂_t = c + s_t · u + e_t: c any constant, u the base parameters (σ = 1 each), e_t the flight's own noise;
-s_t is stated for one state of wear (`tracking.sensitivity`).
-With one, a slope is added from an onset on.  The marginal likelihoods' ratio, c flat in both (the ratio is then one of
-the differences alone, whatever c), averaged over onsets and slopes, is a martingale without a trend: the probability
-that it ever reaches 1/α is α at most (Ville; Ramdas et al., Statistical Science 38, 2023, for such e-processes).
-The noise is the stated one, or what successive flights differ by where that is more.
-"""
+"""Evidence of a trend or a jump, flight after flight."""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import log_ndtr
 
-from ema_model.tracking.criteria import LEAST_FLIGHTS, NOISE_PRIOR, ONSET_EVERY, SLOPES
+FALSE_TREND = 0.01  # probability of a trend that is none, of a unit's whole life, all k and all looks together
+ONSET_EVERY = 4  # flights between two onsets that are looked at
+SLOPES = (1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2)  # of k in a flight, spread of what a trend may be
+GROWN_BY = 10  # flights before one, by which it is told how far its sensitivities have grown with k
+NOISE_PRIOR = 3.0  # flights, by which the stated noise counts beside the one that is seen
+
+JUMP_BACK = 6.0  # of the differences' spread: towards healthy, a part replaced
+JUMP_ON = 12.0  # the same away from healthy, where wear itself is uneven
+JUMP_LEAST = 0.02  # of k, and no less
+JUMP_AFTER = 3  # flights that must follow it
+JUMP_SURE = 6  # flights after which one towards healthy is looked for once more
+JUMP_WINDOW = 12  # flights beside it, by which its size is judged
+
+LEAST_FLIGHTS = 8  # usable ones, before which nothing is told
+MISFIT_WINDOW, MISFIT_SHARE = 10, 0.5  # of the last flights that the model fits badly: trends are then not trusted
+WORN_BEFORE = 0.05  # of k, 1 σ of what a unit or a new part has already when its first flight is seen
+
+LONGEST = 100_000.0  # flights; what would remain longer has no end that could be told
+AHEAD = (1, 2, 5, 10, 20, 50, 100, 200)  # flights within which the probability of crossing is told
+SAMPLES = 2000  # of the remaining life
+
+
+# --- a sudden step of k between two flights: a part replaced, or a fault that came at once ----------------------------
 
 Array = NDArray[np.float64]
+
+
+def jump(k: Array, variance: Array, common: Array, healthy: float) -> int | None:
+    """The place of the first flight after a step, of the flights (n,) of one k; None where there is none.
+
+    Only one that JUMP_AFTER flights follow is looked for, so that it is found as soon as it can be, and once more, if
+    k went back towards healthy, after JUMP_SURE.  What the base parameters may add in other commands is no step: k is
+    without what is known of it, common (flights, parameters) is what is not.
+    """
+    soon = _step(k, variance, common, JUMP_AFTER, healthy)
+    if soon.sure > (JUMP_BACK if soon.back else JUMP_ON):
+        return soon.at
+    later = _step(k, variance, common, JUMP_SURE, healthy)
+    return later.at if later.back and later.sure > JUMP_BACK else None
+
+
+class _Step(NamedTuple):
+    at: int  # place of the first flight after it
+    sure: float  # its size over the spread
+    back: bool  # towards healthy
+
+
+def _step(k: Array, variance: Array, common: Array, after: int, healthy: float) -> _Step:
+    """One that so many flights follow.
+
+    Medians of as many flights on either side tell its size, less what wear adds meanwhile; the differences of the
+    flights beside it tell the spread.
+    """
+    at = len(k) - after
+    if at < after + 1:
+        return _Step(at, 0.0, False)
+    low, high = float(np.median(k[at - after : at])), float(np.median(k[at:]))
+    first = max(0, at - JUMP_WINDOW)
+    beside = np.delete(np.diff(k[first:]), at - first - 1)
+    spread = max(
+        1.4826 * float(np.median(np.abs(beside - np.median(beside)))),
+        float(np.sqrt(2.0 * np.median(variance[first:]))),
+    )
+    # The median of a few differences is no slope for long; the flights before a step tell one, it itself does not.
+    wear = float(np.median(beside)) if after == JUMP_AFTER else _slope(k[first:at])
+    of_unit = np.linalg.norm(np.mean(common[at:], axis=0) - np.mean(common[at - after : at], axis=0))
+    spread = float(np.hypot(spread * np.sqrt(JUMP_AFTER / after), of_unit))
+    size = abs(high - low - after * wear)
+    near = k[at - 2 : at + 2]  # medians leave it open by one
+    back = abs(high - healthy) < abs(low - healthy)
+    return _Step(at - 1 + int(np.argmax(np.abs(np.diff(near)))), size / spread if size > JUMP_LEAST else 0.0, back)
+
+
+def _slope(k: Array) -> float:
+    """Of a flight, by Theil and Sen: the median of those between any two."""
+    sooner, later = np.triu_indices(len(k), 1)
+    return float(np.median((k[later] - k[sooner]) / (later - sooner)))
+
+
+# --- evidence for a trend of each k that may be looked at after each flight -------------------------------------------
 
 
 class Evidence:

@@ -11,7 +11,7 @@ from ema_model.errors import InputError, quoted
 from ema_model.recordings import check_one_actuator
 from ema_model.recordings.formats import FORMATS
 from ema_model.recordings.recording_set import recordings_in
-from ema_model.tracking.criteria import LEAST_FLIGHTS
+from ema_model.tracking.evidence import LEAST_FLIGHTS
 
 _NUMBER = re.compile(r"\d+")
 

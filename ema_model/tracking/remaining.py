@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
-from ema_model.tracking.criteria import AHEAD, LONGEST, SAMPLES
+from ema_model.tracking.evidence import AHEAD, LONGEST, SAMPLES
 from ema_model.tracking.wear import Wear
 
 Array = NDArray[np.float64]

@@ -7,10 +7,17 @@ from math import log
 import numpy as np
 from numpy.typing import NDArray
 
-from ema_model.tracking.criteria import FALSE_TREND, GROWN_BY, JUMP_AFTER, JUMP_LEAST, JUMP_SURE, JUMP_WINDOW
-from ema_model.tracking.evidence import Evidence
+from ema_model.tracking.evidence import (
+    FALSE_TREND,
+    GROWN_BY,
+    JUMP_AFTER,
+    JUMP_LEAST,
+    JUMP_SURE,
+    JUMP_WINDOW,
+    Evidence,
+    jump,
+)
 from ema_model.tracking.flight import Flight
-from ema_model.tracking.jumps import jump
 from ema_model.tracking.sensitivity import growth
 from ema_model.tracking.unit import Unit
 

@@ -7,7 +7,7 @@ from typing import Annotated, NotRequired, TypedDict
 
 from msgspec import Meta
 
-from ema_model.quantities.interval import IntervalJson
+from ema_model.quantities.numbers import IntervalJson
 from ema_model.tracking.result import FaultTrack, Tracked
 from ema_model.tracking.words import answer
 

@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from ema_model import faults
 from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.estimation.unknowns import ECCENTRICITY
-from ema_model.quantities.interval import HALF_90
-from ema_model.quantities.numbers import check_number
-from ema_model.tracking.criteria import LEAST_FLIGHTS, LONGEST, MISFIT_SHARE, MISFIT_WINDOW, WORN_BEFORE
+from ema_model.quantities.numbers import HALF_90, check_number
+from ema_model.tracking.evidence import LEAST_FLIGHTS, LONGEST, MISFIT_SHARE, MISFIT_WINDOW, WORN_BEFORE
 from ema_model.tracking.flight import Flight
 from ema_model.tracking.remaining import remaining
 from ema_model.tracking.result import FaultTrack, Jump, Tracked

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.physics.jit import recursion
-from ema_model.tracking.criteria import WORN_BEFORE
+from ema_model.tracking.evidence import WORN_BEFORE
 from ema_model.tracking.sensitivity import growth
 
 Array = NDArray[np.float64]

@@ -10,7 +10,7 @@ from ema_model.estimation.unknowns import ECCENTRICITY
 from ema_model.quantities.numbers import number
 from ema_model.quantities.titles import in_sentence
 from ema_model.text import Document, Lines, Note, Table
-from ema_model.tracking.criteria import AHEAD
+from ema_model.tracking.evidence import AHEAD
 from ema_model.tracking.history import Came
 from ema_model.tracking.result import FaultTrack, Tracked
 

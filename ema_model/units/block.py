@@ -23,7 +23,7 @@ from ema_model.estimation.problem import SIGNALS, Problem
 from ema_model.estimation.unknowns import starts_of, unknowns_of
 from ema_model.identification.model_bias import TWINS, Twins, twins
 from ema_model.models import Model, model_for
-from ema_model.models.stretches import fit_stretches
+from ema_model.models.measured_motion import fit_stretches
 from ema_model.recordings import Measurement
 from ema_model.units.candidates import Candidate, candidates_of
 

@@ -13,10 +13,9 @@ from ema_model.actuator.naming import on_axes, path_inside
 from ema_model.actuator.parameters import low_limit
 from ema_model.errors import InputError, quoted
 from ema_model.estimation import default_free
-from ema_model.quantities.interval import HALF_90
+from ema_model.quantities.numbers import HALF_90
 from ema_model.recordings import Measurement
-from ema_model.recordings.prepared import prepared
-from ema_model.recordings.read import check_same_actuator
+from ema_model.recordings.read import check_same_actuator, prepared
 from ema_model.recordings.recording_set import check_held_out
 from ema_model.units.block import Block, pooled, starts_at, unit_of
 from ema_model.units.block import linearised as linearised_at

@@ -13,8 +13,8 @@ from typing import Any
 from ema_model.actuator import Actuator, save_actuator
 from ema_model.comparison.summary import plain
 from ema_model.errors import InputError, did_you_mean, quoted
-from ema_model.files.limits import FILE_BYTES
-from ema_model.files.refusal import listed
+from ema_model.files.opened import listed
+from ema_model.files.sandbox import FILE_BYTES
 from ema_model.recordings import Measurement, read_header
 from ema_model.recordings.formats.text_layout import Hints
 from ema_model.recordings.recording_set import RUN, held_out, is_pattern
@@ -30,7 +30,7 @@ _Units = dict[str, list[Measurement]]
 def run(arguments: argparse.Namespace, actuator: Actuator) -> int:
     """Reads, compares the units, writes and prints."""
     from ema_model.units.compare import compare_units
-    from ema_model.units.summary import as_dict
+    from ema_model.units.result import as_dict
 
     _refuse(arguments, _NOT_OF_UNITS)
     actuator = replace(actuator, effects={**actuator.effects, **given.effects_of(arguments, actuator.axes)})

@@ -16,8 +16,7 @@ from typing import Generic, NamedTuple, TypeVar
 
 # What reads recordings takes a while to import: it is imported where it is asked.
 from ema_model.errors import InputError
-from ema_model.files.refusal import shown
-from ema_model.files.user_file import check_user_file
+from ema_model.files.opened import check_user_file, shown
 
 
 @dataclass(frozen=True)
@@ -116,7 +115,7 @@ def check_files(parser: argparse.ArgumentParser, arguments: argparse.Namespace) 
 
     To be asked before any work.  Where the outputs go, what killed processes left of theirs is removed.
     """
-    from ema_model.files.whole_file import remove_abandoned
+    from ema_model.files.written import remove_abandoned
 
     inputs = [one for one in _named(Input, parser, arguments) if one.declared.is_file(str(one.path))]
     outputs = _named(Output, parser, arguments)
@@ -159,7 +158,7 @@ def _taken(one: _Named[_Declared]) -> list[tuple[Path, str]]:
     """Where no other output may go, and why: the file itself, and what would be read as its side file."""
     taken = [(one.path, f"is what {one.option} names" if one.option else "is a file to read")]
     if one.declared.has_side_file:
-        from ema_model.recordings.side_file.read import OF_A_FOLDER, side_path
+        from ema_model.recordings.side_file import OF_A_FOLDER, side_path
 
         own = side_path(one.path)
         why = f"is the place of the side file of {shown(one.path.name, 100)}"

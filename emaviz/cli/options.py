@@ -1,21 +1,54 @@
-"""Options that several commands share; what they give is read by `given`.
-
-Names of commands, effects and the like are read from the sources that state them: the parser must answer at once, and
-to import what computes takes a second.
-"""
+"""Options that verbs share, and what they give."""
 
 from __future__ import annotations
 
 import argparse
+import math
 import re
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
 from ema_model.errors import did_you_mean, quoted
+from ema_model.files.opened import shown
 from ema_model.members import stated, stated_in
 from emaviz.cli import files
-from emaviz.cli.numbers import FINITE, SEED, whole
+
+
+@dataclass(frozen=True)
+class Number:
+    """The type of an option that takes a finite number, from `low` to `high`."""
+
+    low: float = -math.inf
+    high: float = math.inf
+    whole: bool = False
+
+    def __call__(self, text: str) -> float:
+        try:
+            value = int(text) if self.whole else float(text)
+        except ValueError:  # no number, or one of thousands of digits
+            value = math.nan
+        if not (self.low <= value <= self.high and math.isfinite(value)):
+            raise argparse.ArgumentTypeError(f"must be {self._expected}, not {shown(text)!r}")
+        return value
+
+    @property
+    def _expected(self) -> str:
+        kind = "a whole number" if self.whole else "a finite number"
+        return kind if math.isinf(self.low) else f"{kind} from {self.low} to {self.high}"
+
+
+FINITE = Number()
+SAMPLE_RATE = Number(1e-3, 1e9)  # Hz
+SEED = Number(0, 2**63 - 1, whole=True)
+
+
+def whole(low: int, high: int) -> Number:
+    """The type of an option that takes a whole number from `low` to `high`."""
+    return Number(low, high, whole=True)
+
+
+# --- options that several commands share; what they give is read by `given` -------------------------------------------
 
 
 @cache
@@ -40,7 +73,7 @@ class _CommandOrFile(files.Input):
 
 
 _LAST = 9  # the place of a command that states none
-_LOAD = "ema_model.simulation.load_profile"
+_LOAD = "ema_model.simulation.run"
 
 COMMAND_OR_FILE = _CommandOrFile(
     "the file of a measurement",

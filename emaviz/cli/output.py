@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ema_model.errors import InputError
-from ema_model.files.whole_file import whole_file
+from ema_model.files.written import whole_file
 from emaviz import __version__
-from emaviz.text.time_left import time_left
+from emaviz.text.results import time_left
 
 if TYPE_CHECKING:
     from emaviz.cli.documents import HeadJson

@@ -28,8 +28,7 @@ def opened(path: str, most_bytes: int) -> Iterator[Log]:
 
 
 def _sound(path: str) -> Iterator[Any]:
-    from emaviz.recording.errors import RecordingError
-    from emaviz.recording.sound import sound_chunks
+    from emaviz.recording.file import RecordingError, sound_chunks
 
     try:
         return sound_chunks(Path(path))

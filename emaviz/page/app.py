@@ -16,7 +16,7 @@ import viser
 from ema_model.actuator import load_actuator
 from ema_model.simulation import plant
 from emaviz.page import compare, explore
-from emaviz.page.chart_tools import add_chart_tools
+from emaviz.page.charts import add_chart_tools
 from emaviz.page.docked import LEFT_PX, Docked
 from emaviz.page.explore.tab import ExploreTab
 from emaviz.page.keys import add_keys
@@ -34,7 +34,7 @@ from emaviz.server.safe_server import open_server
 from emaviz.server.uploads import Uploads
 from emaviz.server.viser_private import Inside
 from emaviz.session.campaigns import Campaigns
-from emaviz.session.compare.comparing import Comparing
+from emaviz.session.compare import Comparing
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.discover.discovering import Discovering
 from emaviz.session.session import Session

@@ -15,7 +15,7 @@ from emaviz.server.beside import say_beside
 from emaviz.server.viser_private import Inside, id_of
 from emaviz.session.session import Session
 from emaviz.session.worker import Worker
-from emaviz.text.sentence import begun, within
+from emaviz.text.results import begun, within
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,8 @@ import viser
 from ema_model.actuator import Actuator
 from emaviz.colours import rgb
 from emaviz.figures.theme import DARK, LIGHT
+from emaviz.page.charts import send_picture
 from emaviz.page.page import Page
-from emaviz.page.picture import send_picture
 from emaviz.page.style import STRIP, caption, figures
 from emaviz.page.style import page as style
 from emaviz.scene.actuator import ActuatorScene

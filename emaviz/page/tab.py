@@ -17,7 +17,7 @@ from emaviz.page.workspaces import Workspace
 from emaviz.recording.viewer import ViewerHost
 from emaviz.server.uploads import Uploads
 from emaviz.session.campaigns import Campaigns
-from emaviz.session.compare.comparing import Comparing
+from emaviz.session.compare import Comparing
 from emaviz.session.discover.discovering import Discovering
 from emaviz.session.inputs import Provenance, results_part
 from emaviz.session.saved import Part

@@ -14,8 +14,8 @@ from typing import Any
 
 import viser
 
-from emaviz.page import chart_heights, docked, inset
-from emaviz.page.chart_heights import ChartHeights
+from emaviz.page import charts, docked, inset
+from emaviz.page.charts import ChartHeights
 from emaviz.page.docked import Docked
 from emaviz.page.in_front import InFront
 from emaviz.page.style import unseen
@@ -133,7 +133,7 @@ class Workspaces:
         sizes: dict[str, list[dict[str, Any]]] = {}
         fits: list[tuple[str, Sequence[int], Callable[[int, int], None]]] = [
             ("innerWidth", docked.WINDOWS_PX, self._fit_width),
-            ("innerHeight", chart_heights.WINDOWS_PX, self.heights.fit),
+            ("innerHeight", charts.WINDOWS_PX, self.heights.fit),
         ]
         for side, steps, fit in fits:
             sizes[side] = []

@@ -14,14 +14,12 @@ from ema_model.comparison.result import Compared, Comparison
 from ema_model.comparison.summary import as_dict
 from ema_model.comparison.words import details, verdict
 from ema_model.errors import InputError
+from ema_model.estimation.calibrate import convergence, warnings
 from ema_model.estimation.floor import BAND_SIGMAS
-from ema_model.estimation.words import convergence, warnings
 from ema_model.text import Lines, Note
-from emaviz.recording.configured import configured
-from emaviz.recording.errors import RecordingError
-from emaviz.recording.markdown import written
-from emaviz.recording.style import COMPARISON, plain
-from emaviz.recording.writer import RecordingWriter
+from emaviz.recording.file import RecordingError, configured
+from emaviz.recording.layout import COMPARISON, plain
+from emaviz.recording.writer import RecordingWriter, written
 
 Array = NDArray[np.float64]
 

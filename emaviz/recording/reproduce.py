@@ -11,19 +11,24 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import ArrayLike
 
-from ema_model.campaign.thesis import Evaluation
-from ema_model.campaign.thesis.cases import ALGORITHMS, CASES, MULTIPLE, case_of
-from ema_model.campaign.thesis.responses import FAMILIES, SIGNALS, Drawn
-from ema_model.campaign.thesis.result import AS_THE_THESIS
+from ema_model.campaign.thesis import (
+    ALGORITHMS,
+    AS_THE_THESIS,
+    CASES,
+    FAMILIES,
+    MULTIPLE,
+    SIGNALS,
+    Drawn,
+    Evaluation,
+    case_of,
+)
 from ema_model.errors import InputError
 from emaviz import colours
-from emaviz.recording import dashboard, series, style
-from emaviz.recording.blueprint import plot
-from emaviz.recording.dashboard import Array, Chart
-from emaviz.recording.errors import RecordingError
-from emaviz.recording.markdown import escaped
-from emaviz.recording.style import algorithm_colour, signal_title
-from emaviz.recording.writer import RecordingWriter
+from emaviz.recording import layout
+from emaviz.recording import writer as writer_recording
+from emaviz.recording.file import RecordingError
+from emaviz.recording.layout import Array, Chart, algorithm_colour, plot, signal_title
+from emaviz.recording.writer import RecordingWriter, escaped
 from emaviz.text.reproduce import NAMES, answer, coefficient_table, row_table
 
 ROOT = "/reproduce"
@@ -83,11 +88,11 @@ class ReproductionWriter(RecordingWriter):
             for place, (name, curve) in enumerate(curves.items(), 1):
                 colour = algorithm_colour(name)
                 named = place * last // (len(curves) + 1)  # each at another place: the curves come to lie together
-                there = dashboard.name_at(chart.strip([named], [curve[1, named]])[0], NAMES[name], colour)
+                there = layout.name_at(chart.strip([named], [curve[1, named]])[0], NAMES[name], colour)
                 self._file.do(lambda stream, at=f"{root}/{name}/name", there=there: stream.log(at, there, static=True))
                 for (what, _, width), values in zip(_PERCENTILES, curve):
                     strip = chart.strip(np.arange(len(values)), values)
-                    drawn = dashboard.model(strip, colour, width)
+                    drawn = layout.model(strip, colour, width)
                     self._file.do(
                         lambda stream, at=f"{root}/{name}/{what}", one=drawn: stream.log(at, one, static=True)
                     )
@@ -98,17 +103,22 @@ class ReproductionWriter(RecordingWriter):
             for group, run in (("reference", pair.reference), ("monitor", pair.monitor)):
                 for name in _SIGNALS:
                     self._plotted(
-                        f"models/{pair.name}/{name}/{group}", series.signal_style(group, name), _time(run), run[name]
+                        f"models/{pair.name}/{name}/{group}",
+                        writer_recording.signal_style(group, name),
+                        _time(run),
+                        run[name],
                     )
         for family in FAMILIES:
             for command in ("chirp", "step"):
                 runs = drawn.families[family.name, command]
                 for at, (severity, run) in enumerate(runs.items()):
                     for name in SIGNALS:
-                        line = series.line(f"{severity}, {signal_title(name)}", _SHADES[at % len(_SHADES)], 1.5)
+                        line = writer_recording.line(
+                            f"{severity}, {signal_title(name)}", _SHADES[at % len(_SHADES)], 1.5
+                        )
                         self._plotted(f"severities/{family.name}/{command}/{name}/s{at}", line, _time(run), run[name])
 
-    def _plotted(self, place: str, drawn: series.Style, time: list[rr.TimeColumn], values: ArrayLike) -> None:
+    def _plotted(self, place: str, drawn: writer_recording.Style, time: list[rr.TimeColumn], values: ArrayLike) -> None:
         self._send(f"{ROOT}/{place}", drawn, time, np.asarray(values, dtype=float))
 
     def _layout(self) -> rrb.Blueprint:
@@ -117,7 +127,7 @@ class ReproductionWriter(RecordingWriter):
             first = sorted(self._searched, key=lambda case: case != MULTIPLE)
             tabs.append(
                 rrb.Grid(
-                    *[dashboard.view(_title(case), [f"{ROOT}/convergence/{case}/**"]) for case in first],
+                    *[layout.view(_title(case), [f"{ROOT}/convergence/{case}/**"]) for case in first],
                     name="Convergence (log10 RMSE [A], iterations)",
                 )
             )
@@ -134,7 +144,7 @@ class ReproductionWriter(RecordingWriter):
             rrb.Tabs(*tabs),
             rrb.BlueprintPanel(state="collapsed"),
             rrb.SelectionPanel(state="collapsed"),
-            rrb.TimePanel(state="collapsed", timeline=style.SIM_TIME, play_state="Paused"),
+            rrb.TimePanel(state="collapsed", timeline=layout.SIM_TIME, play_state="Paused"),
             auto_views=False,
             auto_layout=False,
         )
@@ -164,7 +174,7 @@ def _title(case: str) -> str:
 
 def _time(run: Any) -> list[rr.TimeColumn]:
     nanoseconds = np.rint(np.asarray(run.time_s) * 1e9).astype("timedelta64[ns]")
-    return [rr.TimeColumn(style.SIM_TIME, duration=nanoseconds)]
+    return [rr.TimeColumn(layout.SIM_TIME, duration=nanoseconds)]
 
 
 def _markdown(heads: Sequence[str], lines: Sequence[Sequence[str]]) -> str:

@@ -1,10 +1,10 @@
-"""Writes one recording: signals, identifications, configuration, and the layout in which it opens."""
+"""Writes a recording: signals, iterations, text, results."""
 
 from __future__ import annotations
 
 import json
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -15,17 +15,197 @@ import rerun.blueprint as rrb
 from numpy.typing import ArrayLike, NDArray
 
 from ema_model.identification.run import algorithm_title
-from emaviz.recording import dashboard, series, style
-from emaviz.recording.blueprint import Algorithm, Contents, build, send
-from emaviz.recording.dashboard import Chart
-from emaviz.recording.file import RrdFile
-from emaviz.recording.iterations import IterationBuffer, log10
-from emaviz.recording.markdown import table
-from emaviz.recording.paths import MIN_FREE_BYTES
+from ema_model.text import Block, Facts, Lines, Note, Remarks
+from emaviz.recording import layout
+from emaviz.recording.file import MIN_FREE_BYTES, RrdFile
+from emaviz.recording.layout import ITERATION, K_NAMES, Algorithm, Chart, Colour, Contents, algorithm_path, build, send
+
+_SIGNS = str.maketrans({"|": r"\|", "\n": " ", "\r": " ", "`": "'", "<": "&lt;", "[": r"\[", "*": r"\*", "_": r"\_"})
+
+
+def escaped(value: object) -> str:
+    """Text that Markdown shows as it is, and that cannot break a table."""
+    return str(value).translate(_SIGNS)
+
+
+def written(title: str, blocks: Iterable[Block]) -> str:
+    """A heading, and the blocks of a document below it."""
+    return "\n\n".join([f"# {escaped(title)}", *map(_block, blocks)]) + "\n"
+
+
+def _block(block: Block) -> str:
+    if isinstance(block, Lines):
+        return "\n\n".join([*_head(block.title), *map(escaped, block.lines)])
+    if isinstance(block, Note):
+        return f"- ⚠ {escaped(block.line)}"
+    if isinstance(block, Remarks):
+        return "\n".join(f"- **{escaped(one.head)}**: {escaped(one.line)}" for one in block.remarks)
+    if isinstance(block, Facts):
+        rows = _rows(["", ""], list(block.facts.items()))
+        return "\n\n".join([*_head(block.title), rows, *map(escaped, block.lines)])
+    remarks = block.remarks or [""] * len(block.rows)
+    beside = [block.unit] if block.unit or any(remarks) else []
+    rows = [[*row, *([remark] if beside else [])] for row, remark in zip(block.rows, remarks)]
+    return _rows([block.title, *block.head, *beside], rows)
+
+
+def _head(title: str) -> list[str]:
+    return [f"## {escaped(title)}"] if title else []
+
+
+def _rows(head: Sequence[object], rows: Sequence[Sequence[object]]) -> str:
+    lines = [head, *rows]
+    written = [f"| {' | '.join(escaped(cell) for cell in line)} |" for line in lines]
+    return "\n".join([written[0], "|---" * len(head) + "|", *written[1:]])
+
+
+def table(title: str, values: Mapping[str, Any]) -> str:
+    """A heading and a table of two columns; a cell's line breaks and bars cannot break the table."""
+    rows = "".join(f"| {_cell(name)} | {_cell(value)} |\n" for name, value in values.items())
+    return f"# {_cell(title)}\n\n| quantity | value |\n|---|---|\n{rows}"
+
+
+def _cell(value: object) -> str:
+    text = f"{value:.6g}" if isinstance(value, float) else str(value)
+    return " ".join(text.replace("|", "\\|").split())
+
+
+# --- how each plotted entity is drawn: a static line or point style beside its values ---------------------------------
+
+Style = rr.SeriesLines | rr.SeriesPoints
+
+
+def signal_style(group: str, name: str) -> Style:
+    """A signal's line: colour of its group, name with unit."""
+    return line(layout.series_title(group, name), layout.signal_colour(group, name), layout.GROUP_WIDTHS[group])
+
+
+def monitor_style(index: int) -> Style:
+    """The monitor's current on an iteration: the later, the more the monitor's own colour."""
+    return line(f"MM iteration {index} [A]", layout.iteration_colour(index), 1.2)
+
+
+def iteration_style(path: str) -> Style:
+    """The style of an entity over iterations, by its place under /identification/<algorithm>/."""
+    _, _, algorithm, kind, *rest = path.split("/")
+    colour, title = layout.algorithm_colour(algorithm), algorithm_title(algorithm)
+    name = rest[0] if rest else ""
+    if kind == "population":
+        return rr.SeriesPoints(
+            names=f"population {name}", colors=[layout.POPULATION_COLOUR], markers="circle", marker_sizes=[1.3]
+        )
+    if kind == "interval":
+        return rr.SeriesPoints(names=f"90 % interval {name}", colors=[colour], markers="diamond", marker_sizes=[5.0])
+    if kind == "best":
+        return line(f"{title} best {name} [-]", colour, 2.5)
+    if kind == "truth":
+        return line(f"true {name} [-]", layout.TRUTH_COLOUR, 2.0)
+    # Series of one name share an entry of the legend; the logarithm's plot says in its title what they are.
+    which = "corrected" if kind == "corrected_error" else "uncorrected"
+    if kind == "log10_rmse":
+        title = f"{title}, uncorrected"
+    return line(title if kind.startswith("log10") else f"{title}, {which} error of the best [A]", colour, 2.0)
+
+
+def line(name: str, colour: Colour, width: float) -> Style:
+    # The default aggregation averages, which hides the chopping ripple's peaks.
+    return rr.SeriesLines(names=name, colors=[colour], widths=[width], aggregation_policy="MinMax")
+
+
+# --- iterations of an identification, gathered so that they are sent a column at a time and not a row -----------------
+
+Array = NDArray[np.float64]
+Column = tuple[str, list[rr.TimeColumn], Any]
+
+
+class IterationBuffer:
+    """Rows of one algorithm that are not yet sent.  Not thread safe."""
+
+    def __init__(self, algorithm: str, widest: int = 0) -> None:
+        """widest: of the populations that were sent before."""
+        self.widest = widest
+        self._path = algorithm_path(algorithm)
+        self._index: list[int] = []
+        self._rmse: list[float] = []
+        self._best: list[Array] = []
+        self._population: list[tuple[int, Array]] = []
+        self._population_rmse: list[tuple[int, Array]] = []
+
+    def __len__(self) -> int:
+        return len(self._index)
+
+    def add(
+        self,
+        index: int,
+        rmse: float,
+        best: ArrayLike,
+        population: ArrayLike | None,
+        population_rmse: ArrayLike | None,
+    ) -> None:
+        """Keeps copies: best (8,), population (N, 8), population_rmse (N,).  ValueError on another shape."""
+        best = np.array(best, dtype=float)
+        if best.shape != (8,):
+            raise ValueError(f"best k must have the shape (8,), not {best.shape}")
+        row, error = int(index), float(rmse)
+        if population is not None:
+            individuals = np.array(population, dtype=float)
+            if individuals.ndim != 2 or individuals.shape[1] != 8:
+                raise ValueError(f"the population must have the shape (N, 8), not {individuals.shape}")
+            self._population.append((row, individuals))
+            self.widest = max(self.widest, len(individuals))
+        if population_rmse is not None:
+            self._population_rmse.append((row, np.array(population_rmse, dtype=float).reshape(-1)))
+        self._index.append(row)
+        self._rmse.append(error)
+        self._best.append(best)
+
+    def columns(self, truth: Array | None) -> Iterator[Column]:
+        """Path, times and columns for `send_columns`: all rows of an entity at once.
+
+        truth (8,) is repeated along the iterations, since a plot cannot draw what has no time.
+        """
+        index, rmse, best = self._index, np.array(self._rmse), np.array(self._best)
+        time = _time(index)
+        yield f"{self._path}/rmse", time, rr.Scalars.columns(scalars=rmse)
+        yield f"{self._path}/log10_rmse", time, rr.Scalars.columns(scalars=log10(rmse))
+        for j, k in enumerate(K_NAMES):
+            yield f"{self._path}/best/{k}", time, rr.Scalars.columns(scalars=best[:, j])
+            if truth is not None:
+                yield f"{self._path}/truth/{k}", time, rr.Scalars.columns(scalars=np.full(len(index), truth[j]))
+        if self._population:
+            for j, k in enumerate(K_NAMES):
+                rows = [(i, _padded(individuals[:, j], self.widest)) for i, individuals in self._population]
+                yield f"{self._path}/population/{k}", *_ragged(rows)
+        if self._population_rmse:
+            yield f"{self._path}/population/rmse", *_ragged(self._population_rmse)
+
+
+def log10(errors: Array) -> Array:
+    """For plots, which have no logarithmic axis; NaN where there is none."""
+    return np.log10(np.where(np.isfinite(errors) & (errors > 0.0), errors, np.nan))
+
+
+def _time(index: list[int]) -> list[rr.TimeColumn]:
+    return [rr.TimeColumn(ITERATION, sequence=np.array(index, dtype=np.int64))]
+
+
+def _padded(values: Array, count: int) -> Array:
+    """With no numbers behind: the viewer complains of a plot whose rows become shorter."""
+    return np.pad(values, (0, count - len(values)), constant_values=np.nan)
+
+
+def _ragged(rows: list[tuple[int, Array]]) -> tuple[list[rr.TimeColumn], Any]:
+    """One row per iteration, of as many values as the population then had."""
+    values = np.concatenate([values for _, values in rows])
+    lengths = [len(values) for _, values in rows]
+    return _time([i for i, _ in rows]), rr.Scalars.columns(scalars=values).partition(lengths)
+
+
+# --- writes one recording: signals, identifications, configuration, and the layout in which it opens ------------------
 
 _ROWS_PER_CHUNK = 25
 _FLUSH_EVERY_S = 0.25
-_MODEL = style.GROUP_COLOURS["monitor"]
+_MODEL = layout.GROUP_COLOURS["monitor"]
 
 
 class RecordingWriter:
@@ -89,20 +269,20 @@ class RecordingWriter:
         bundle = rr.AnyValues()
         for name, value in values.items():
             bundle.with_component_from_data(str(name), json.dumps(value, default=_for_json))
-        self._file.do(lambda stream: stream.send_property(style.PROPERTIES, bundle))
+        self._file.do(lambda stream: stream.send_property(layout.PROPERTIES, bundle))
 
     def signals(self, group: str, time_s: ArrayLike, signals: Mapping[str, ArrayLike]) -> None:
         """Signals (n,) by canonical name at time_s (n,), of reference, monitor, measurement or residual."""
-        if group not in style.GROUPS:
-            raise ValueError(f"no group {group!r}; groups are {', '.join(style.GROUPS)}")
+        if group not in layout.GROUPS:
+            raise ValueError(f"no group {group!r}; groups are {', '.join(layout.GROUPS)}")
         time, count = _durations(time_s)
-        arrays = {style.plain(name): _column(name, values, count) for name, values in signals.items()}
+        arrays = {layout.plain(name): _column(name, values, count) for name, values in signals.items()}
         with self._file.lock:
             names = self._contents.signals.setdefault(group, [])
             for name, values in arrays.items():
                 if name not in names:
                     names.append(name)
-                self._send(f"/{group}/{name}", series.signal_style(group, name), time, values)
+                self._send(f"/{group}/{name}", signal_style(group, name), time, values)
             self.flush()
 
     def gap(self, group: str, name: str, time_s: float) -> None:
@@ -113,10 +293,10 @@ class RecordingWriter:
 
     def truth(self, k: ArrayLike) -> None:
         """The true k (8,), if known: static values, and a line beside every identified k from now on."""
-        truth = _column("k", k, len(style.K_NAMES))
+        truth = _column("k", k, len(layout.K_NAMES))
         with self._file.lock:
             self._truth, self._contents.truth = truth, True
-            for name, value in zip(style.K_NAMES, truth, strict=True):
+            for name, value in zip(layout.K_NAMES, truth, strict=True):
                 scalar = rr.Scalars(value)
                 self._file.do(lambda stream, n=name, s=scalar: stream.log(f"/truth/{n}", s, static=True))
 
@@ -152,12 +332,12 @@ class RecordingWriter:
         In the plot it takes the place of the uncorrected one, which a static value hides there.
         """
         errors = np.asarray(errors_A, dtype=float)
-        time = [rr.TimeColumn(style.ITERATION, sequence=np.arange(len(errors)))]
-        root = style.algorithm_path(algorithm)
+        time = [rr.TimeColumn(layout.ITERATION, sequence=np.arange(len(errors)))]
+        root = layout.algorithm_path(algorithm)
         with self._file.lock:
             self._file.do(lambda stream: stream.log(f"{root}/log10_rmse", rr.Scalars([]), static=True))
             for kind, values in (("corrected_error", errors), ("log10_corrected_error", log10(errors))):
-                self._send(f"{root}/{kind}", series.iteration_style(f"{root}/{kind}"), time, values)
+                self._send(f"{root}/{kind}", iteration_style(f"{root}/{kind}"), time, values)
 
     def monitor_iteration(self, algorithm: str, index: int, time_s: ArrayLike, current_A: ArrayLike) -> None:
         """The best individual's current (n,) at time_s (n,) on this iteration."""
@@ -165,23 +345,23 @@ class RecordingWriter:
         current = _column("current_A", current_A, count)
         with self._file.lock:
             self._algorithm(algorithm).monitor = True
-            self._send(style.monitor_iteration_path(algorithm, index), series.monitor_style(index), time, current)
+            self._send(layout.monitor_iteration_path(algorithm, index), monitor_style(index), time, current)
 
     def fit(self, signal: str, time_s: ArrayLike, measured: ArrayLike, algorithms: Sequence[str]) -> None:
         """The measured curve (n,) of a signal that `fit_iteration` draws a model beside, and its axes."""
         chart = Chart.of(signal, time_s, measured)
-        drawn = dashboard.measured(chart.strip(time_s, measured))
+        drawn = layout.measured(chart.strip(time_s, measured))
         with self._file.lock:
-            self._contents.charts[style.plain(signal)] = chart
-            self._file.do(lambda stream: chart.log_axes(stream, dashboard.axes_path(signal)))
-            for path in [dashboard.fit_path(name, signal, "measured") for name in algorithms]:
+            self._contents.charts[layout.plain(signal)] = chart
+            self._file.do(lambda stream: chart.log_axes(stream, layout.axes_path(signal)))
+            for path in [layout.fit_path(name, signal, "measured") for name in algorithms]:
                 self._file.do(lambda stream, path=path: stream.log(path, drawn, static=True))
 
     def fit_iteration(self, algorithm: str, index: int, signal: str, time_s: ArrayLike, values: ArrayLike) -> None:
         """The best individual's curve (n,) on this iteration; `fit` has given the signal its axes."""
-        colour = style.algorithm_colour(algorithm)
-        columns = dashboard.model_columns(self._contents.charts[signal].strip(time_s, values), colour)
-        path, time = dashboard.fit_path(algorithm, signal, "model"), [rr.TimeColumn(style.ITERATION, sequence=[index])]
+        colour = layout.algorithm_colour(algorithm)
+        columns = layout.model_columns(self._contents.charts[signal].strip(time_s, values), colour)
+        path, time = layout.fit_path(algorithm, signal, "model"), [rr.TimeColumn(layout.ITERATION, sequence=[index])]
         self._file.do(lambda stream: stream.send_columns(path, time, columns))
 
     def curve(self, signal: str, which: str, time_s: ArrayLike, values: ArrayLike) -> None:
@@ -189,26 +369,26 @@ class RecordingWriter:
         with self._file.lock:
             chart = self._contents.curves.get(signal)
             if chart is None:
-                chart = self._contents.curves[style.plain(signal)] = Chart.of(signal, time_s, values)
-                self._file.do(lambda stream: chart.log_axes(stream, f"{dashboard.CURVES}/{signal}"))
+                chart = self._contents.curves[layout.plain(signal)] = Chart.of(signal, time_s, values)
+                self._file.do(lambda stream: chart.log_axes(stream, f"{layout.CURVES}/{signal}"))
             points = chart.strip(time_s, values)
-            drawn = dashboard.measured(points) if which == "measured" else dashboard.model(points, _MODEL)
-            self._file.do(lambda stream: stream.log(f"{dashboard.CURVES}/{signal}/{which}", drawn, static=True))
+            drawn = layout.measured(points) if which == "measured" else layout.model(points, _MODEL)
+            self._file.do(lambda stream: stream.log(f"{layout.CURVES}/{signal}/{which}", drawn, static=True))
 
     def answer(self, markdown: str) -> None:
         """The answer in words, on the dashboard."""
         with self._file.lock:
             self._contents.answer = True
-            self._text(style.ANSWER, markdown)
+            self._text(layout.ANSWER, markdown)
 
     def interval(self, algorithm: str, index: int, ends: ArrayLike) -> None:
         """The interval (8, 2) of each k at the last iteration."""
         ends = np.asarray(ends, dtype=float)
-        time = [rr.TimeColumn(style.ITERATION, sequence=[index])]
-        for row, k in enumerate(style.K_NAMES):
-            path = f"{style.algorithm_path(algorithm)}/interval/{k}"
+        time = [rr.TimeColumn(layout.ITERATION, sequence=[index])]
+        for row, k in enumerate(layout.K_NAMES):
+            path = f"{layout.algorithm_path(algorithm)}/interval/{k}"
             columns = rr.Scalars.columns(scalars=ends[row]).partition([2])
-            self._send_columns(path, series.iteration_style(path), time, columns)
+            self._send_columns(path, iteration_style(path), time, columns)
 
     def result(self, values: Mapping[str, Any], algorithm: str | None = None) -> None:
         """The answer, as a table; `algorithm` can be left out if its iterations came before."""
@@ -218,7 +398,7 @@ class RecordingWriter:
                 raise ValueError("a result needs its algorithm's name when no iteration came before it")
             self._algorithm(algorithm).result = True
             self._text(
-                f"{style.algorithm_path(algorithm)}/result",
+                f"{layout.algorithm_path(algorithm)}/result",
                 table(f"Result of {algorithm_title(algorithm)}", values),
             )
 
@@ -274,20 +454,20 @@ class RecordingWriter:
         for algorithm, buffer in taken.items():
             self._algorithm(algorithm).iterations = True
             for path, time, columns in buffer.columns(self._truth):
-                self._send_columns(path, series.iteration_style(path), time, columns)
+                self._send_columns(path, iteration_style(path), time, columns)
 
     def _algorithm(self, name: str) -> Algorithm:
-        return self._contents.algorithms.setdefault(style.plain(name), Algorithm())
+        return self._contents.algorithms.setdefault(layout.plain(name), Algorithm())
 
     def _text(self, path: str, markdown: str) -> None:
         document = rr.TextDocument(markdown, media_type=rr.MediaType.MARKDOWN)
         self._file.do(lambda stream: stream.log(path, document, static=True))
         self.flush()
 
-    def _send(self, path: str, drawn: series.Style, time: list[rr.TimeColumn], values: NDArray[np.float64]) -> None:
+    def _send(self, path: str, drawn: Style, time: list[rr.TimeColumn], values: NDArray[np.float64]) -> None:
         self._send_columns(path, drawn, time, rr.Scalars.columns(scalars=values))
 
-    def _send_columns(self, path: str, drawn: series.Style, time: list[rr.TimeColumn], columns: Any) -> None:
+    def _send_columns(self, path: str, drawn: Style, time: list[rr.TimeColumn], columns: Any) -> None:
         """Values, and the first time how to draw them."""
         if path not in self._styled:
             self._styled.add(path)
@@ -301,7 +481,7 @@ def _durations(time_s: ArrayLike) -> tuple[list[rr.TimeColumn], int]:
     if seconds.ndim != 1 or not np.isfinite(seconds).all():
         raise ValueError(f"times must be finite and of the shape (n,), not {seconds.shape}")
     nanoseconds = np.rint(seconds * 1e9).astype("timedelta64[ns]")
-    return [rr.TimeColumn(style.SIM_TIME, duration=nanoseconds)], len(seconds)
+    return [rr.TimeColumn(layout.SIM_TIME, duration=nanoseconds)], len(seconds)
 
 
 def _column(name: str, values: ArrayLike, count: int) -> NDArray[np.float64]:

@@ -10,13 +10,13 @@ from ema_model.effects import CATALOGUE, Effect
 from ema_model.effects.effect import FAMILIES
 from ema_model.effects.user.entries import KEYS, TITLES
 from ema_model.errors import InputError, quoted
-from ema_model.files.whole_file import whole_file
+from ema_model.files.written import whole_file
 from ema_model.quantities.axes import Axes
 from ema_model.quantities.variables import VARIABLES
 from ema_model.simulation.with_effect import EffectRuns
-from emaviz.figures.effect_residual import legend, pictures
-from emaviz.report.markup import escape, paragraph, table
-from emaviz.text.mathml import mathml
+from emaviz.figures.discovery import effect_residual_legend, pictures
+from emaviz.report.page import escape, paragraph, table
+from emaviz.text.html import mathml
 
 _STYLE = (
     ":root{color-scheme:light dark}"
@@ -106,8 +106,9 @@ def _picture(effect: Effect, runs: EffectRuns) -> str:
     felt = runs.severities(effect)
     if not felt:
         return ""
-    told = f"In a {felt[0].run}, with the effect minus without:"
-    return f"<h2>How it looks in the residual</h2>{paragraph(told)}{legend(effect)}{pictures(effect, felt)}"
+    lead = paragraph(f"In a {felt[0].run}, with the effect minus without:")
+    drawn = effect_residual_legend(effect) + pictures(effect, felt)
+    return f"<h2>How it looks in the residual</h2>{lead}{drawn}"
 
 
 def _users(name: str) -> str:

@@ -1,23 +1,131 @@
-"""A whole page: styles, sections, figures and the script that draws them, in one file that asks no network."""
+"""What a report is made of: markup, sections with their figures, and the page that holds them."""
 
 from __future__ import annotations
 
 import base64
 import hashlib
+import html
 import json
-from collections.abc import Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Sequence
 from datetime import datetime
 from importlib import resources
 from pathlib import Path
+from typing import Generic, TypeVar
 
+import plotly.graph_objects as go
 from plotly.offline import get_plotlyjs
 
 from ema_model.errors import InputError, quoted
-from ema_model.files.whole_file import whole_file
+from ema_model.files.written import whole_file
+from ema_model.text import InWords, Lines, Note, Table
 from emaviz import __version__
 from emaviz.figures.theme import DARK, LIGHT
-from emaviz.report.markup import escape
-from emaviz.report.section import Figures, Section, Subject
+
+_STRONG = "\x1e"  # before the number that a row is marked by
+
+
+def escape(text: object) -> str:
+    """Text as HTML shows it, in an element or in a quoted attribute."""
+    return html.escape(str(text), quote=True)
+
+
+def paragraph(text: object, kind: str = "") -> str:
+    """A paragraph of plain text."""
+    return f"<p{_class(kind)}>{escape(text)}</p>"
+
+
+def bullets(texts: Iterable[object], kind: str = "") -> str:
+    """A list of plain texts; nothing for none."""
+    items = "".join(f"<li>{escape(text)}</li>" for text in texts)
+    return f"<ul{_class(kind)}>{items}</ul>" if items else ""
+
+
+def table(heads: Sequence[str], rows: Iterable[Sequence[object]], *, text_columns: int = 1, marked: str = "") -> str:
+    """A table of plain texts; the first `text_columns` are set left, the others, numbers, right.
+
+    marked: a cell that starts with this sign is set strongly, without the sign.
+    """
+
+    def cell(tag: str, at: int, value: object) -> str:
+        text = str(value)
+        strong = bool(marked) and text.startswith(marked)
+        kind = " ".join(["" if at < text_columns else "n", "strong" if strong else ""]).strip()
+        return f"<{tag}{_class(kind)}>{escape(text.removeprefix(marked) if strong else text)}</{tag}>"
+
+    head = "".join(cell("th", i, title) for i, title in enumerate(heads))
+    body = "".join("<tr>" + "".join(cell("td", i, v) for i, v in enumerate(row)) + "</tr>" for row in rows)
+    return f'<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
+
+
+def document_table(told: Table | None, title: str) -> str:
+    """A table of a result's document, with what stands beside its rows as a last column; nothing for none."""
+    if told is None:
+        return ""
+    return folded(f"{title} {told.unit}".rstrip(), with_remarks(told))
+
+
+def with_remarks(told: Table) -> str:
+    """A table of a result's document; what stands beside its rows is a last column."""
+    remarks = told.remarks or [""] * len(told.rows)
+    beside = any(remarks)
+    strong = [one in ("warning", "bad") for one in told.severities] or [False] * len(told.rows)
+    rows = [
+        [*row[:-1], f"{_STRONG if marked else ''}{row[-1]}", *([remark] if beside else [])]
+        for row, remark, marked in zip(told.rows, remarks, strong)
+    ]
+    return table([told.title, *told.head, *([""] if beside else [])], rows, marked=_STRONG)
+
+
+def link(anchor: str, text: object) -> str:
+    """A link to a place in the same page."""
+    return f'<a href="#{escape(anchor)}">{escape(text)}</a>'
+
+
+def folded(title: object, body: str) -> str:
+    """A part that opens with a click; body is HTML."""
+    return f"<details><summary>{escape(title)}</summary>{body}</details>"
+
+
+def _class(kind: str) -> str:
+    return f' class="{kind}"' if kind else ""
+
+
+# --- what a report is made of: sections that write HTML, and the figures that they place ------------------------------
+
+Subject = TypeVar("Subject")
+
+
+class Figures:
+    """The figures of a page in their order; drawn in the browser when they come into sight."""
+
+    def __init__(self) -> None:
+        self.placed: list[go.Figure] = []
+
+    def place(self, figure: go.Figure, height_px: int = 320, anchor: str = "") -> str:
+        """The element in which the figure will stand; anchor: what links to it name."""
+        self.placed.append(figure)
+        named = f' id="{escape(anchor)}"' if anchor else ""
+        return f'<div class="figure"{named} style="height:{height_px}px" data-figure="{len(self.placed) - 1}"></div>'
+
+
+def pair(*figures: str) -> str:
+    """Placed figures side by side where there is room, else one below the other."""
+    return f'<div class="pair">{"".join(figures)}</div>'
+
+
+class Section(ABC, Generic[Subject]):
+    """One part of a report, with a heading of its own and an anchor to link to."""
+
+    title: str
+    anchor: str
+
+    @abstractmethod
+    def body(self, subject: Subject, figures: Figures) -> str:
+        """The HTML below the heading; "" leaves the section out."""
+
+
+# --- a whole page: styles, sections, figures and the script that draws them, in one file that asks no network---------
 
 
 def page(title: str, lead: str, sections: Sequence[Section[Subject]], subject: Subject) -> str:
@@ -85,3 +193,27 @@ def _policy(*scripts: str) -> str:
 
 def _own(name: str) -> str:
     return resources.files("emaviz.report").joinpath(name).read_text(encoding="utf-8")
+
+
+# --- the section that says what the terminal says ---------------------------------------------------------------------
+
+
+class WordsSection(Section[Subject]):
+    """The document of a result, block by block; a report's own file gives it to it."""
+
+    title = "The answer"
+    anchor = "answer"
+
+    def body(self, subject: Subject, figures: Figures) -> str:
+        """Always there."""
+        assert isinstance(subject, InWords)
+        written = []
+        for block in subject.document.blocks:
+            if isinstance(block, Lines):
+                written += [paragraph(block.title)] if block.title else []
+                written += [paragraph(line) for line in block.lines]
+            elif isinstance(block, Note):
+                written.append(bullets([block.line], "warning"))
+            elif isinstance(block, Table):
+                written.append(with_remarks(block))
+        return "".join(written)

@@ -1,7 +1,4 @@
-"""Names and callouts in the picture, laid out so that none covers another where the camera stands at first.
-
-They hang in a scene, which windows may share: they are laid out for the picture that was framed last.
-"""
+"""Labels and callouts of the scene."""
 
 from __future__ import annotations
 
@@ -13,10 +10,59 @@ from typing import Any
 
 import numpy as np
 import viser
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from ema_model.actuator import Actuator
+from ema_model.actuator.readings import sentences
+from ema_model.faults import FAULTS
 from emaviz.scene.framing import BOXES, Frame, frame
-from emaviz.scene.palette import FAULT, SATIN
+from emaviz.scene.solids import FAULT, SATIN
+
+_LEAST = 0.005  # of a k beyond healthy: a step of its slider
+Place = tuple[float, float, float]
+PLACES: dict[str, Place] = {
+    "k1": (-0.335, -0.05, 0.055),
+    "k2": (0.80, -0.02, -0.07),
+    "k3": (-0.1, 0.06, 0.235),
+    "k4": (-0.25, 0.235, -0.06),
+    "k5": (-0.1, -0.235, -0.08),
+    "k6": (-0.25, 0.0, 0.125),
+    "k7": (-0.25, -0.12, 0.0),
+    "k8": (0.44, 0.40, -0.10),
+}
+
+
+@dataclass(frozen=True)
+class Callout:
+    """One fault, what is to be read of it, and where it sits."""
+
+    fault: str  # k1 … k8
+    text: str
+    place: Place
+
+
+def callouts(k: ArrayLike, actuator: Actuator, play_enlarged: float, gap_enlarged: float) -> tuple[Callout, ...]:
+    """Of every component of k (8,) that is not healthy; the factors are those by which play and gap are drawn larger.
+
+    The direction of an eccentricity (k7) that is not there is said to do nothing.
+    """
+    values = np.asarray(k, dtype=float)
+    off = {
+        fault.name: said
+        for fault, value, said in zip(FAULTS, values, sentences(values, actuator))
+        if abs(value - fault.healthy) >= _LEAST
+    }
+    more = {
+        "k2": f"shown × {play_enlarged:g}",
+        "k6": f"shown × {gap_enlarged:g}",
+        "k7": "" if "k6" in off else "(no effect: ζ = 0)",
+    }
+    return tuple(
+        Callout(name, "\n".join(filter(None, (said, more.get(name)))), PLACES[name]) for name, said in off.items()
+    )
+
+
+# --- names and callouts in the picture, laid out so that none covers another where the camera stands at first---------
 
 _EM_PX = 12.0  # of viser's labels, at scale 1
 _WIDE_EM, _LINE_EM, _PADDING_EM = 0.58, 1.3, 0.5  # of a letter on average, a line, and around the text

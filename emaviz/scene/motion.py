@@ -11,10 +11,8 @@ from ema_model.actuator import Actuator
 from ema_model.faults import physical
 from ema_model.quantities.sides import USER
 from ema_model.recordings import Measurement
-from emaviz.scene.actuator import Machine
-from emaviz.scene.callouts import Callout, callouts
-from emaviz.scene.drive_box import said
-from emaviz.scene.drivetrain import ARM
+from emaviz.scene.actuator import ARM, Machine, said
+from emaviz.scene.labels import Callout, callouts
 
 _LARGEST_TURN_RAD = 0.6  # to which the surface's motion is enlarged
 _PLAY_MORE = 4.0  # play is enlarged more than motion

@@ -1,9 +1,4 @@
-"""Solids of few triangles, as arrays of vertices (n, 3) and faces (m, 3).
-
-The actuator's axis is x; an azimuth is counted about it from +y towards +z, as a positive turn goes.
-Each face of a solid has vertices of its own, so that edges stay sharp and round sides look round; and every
-triangle winds so that it is seen from outside, which spares the browser the drawing of insides.
-"""
+"""Meshes of the actuator."""
 
 from __future__ import annotations
 
@@ -12,7 +7,61 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
+import viser
 from numpy.typing import ArrayLike, NDArray
+
+from emaviz import colours
+
+
+def add_mesh(
+    scene: viser.SceneApi,
+    name: str,
+    solid: Solid,
+    colour: Colour,
+    *,
+    flat: bool = False,
+    opacity: float | None = None,
+    position: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> viser.MeshHandle:
+    """Without shadows, which cost software GL most; flat: its edges are seen."""
+    return scene.add_mesh_simple(
+        name,
+        solid.vertices,
+        solid.faces,
+        color=colour,
+        flat_shading=flat,
+        opacity=opacity,
+        position=position,
+        cast_shadow=False,
+        receive_shadow=False,
+    )
+
+
+# --- colours of the actuator: greys, phases in subdued tones, one colour for what is broken, another for an e-----
+
+Colour = tuple[int, int, int]
+
+
+def between(one: Colour, other: Colour, share: float) -> Colour:
+    """From one colour at share 0 to the other at 1."""
+    red, green, blue = (round(a + (b - a) * share) for a, b in zip(one, other))
+    return red, green, blue
+
+
+GLASS: Colour = (150, 160, 176)  # the housing
+LIGHT: Colour = (212, 216, 222)
+STEEL: Colour = (172, 177, 186)
+SATIN: Colour = (140, 146, 156)
+IRON: Colour = (104, 109, 119)
+DARK: Colour = (76, 81, 91)
+WHITE: Colour = (255, 255, 255)
+FAULT = colours.rgb(colours.FAULT)
+RESIDUAL = colours.rgb(colours.DIFFERENCE)
+PHASES = tuple(colours.rgb(one) for one in colours.PHASES)
+AT_REST = tuple(between(between(one, IRON, 0.5), DARK, 0.35) for one in PHASES)  # a phase without current
+
+
+# --- solids of few triangles, as arrays of vertices (n, 3) and faces (m, 3) -------------------------------------------
 
 TURN = 2.0 * np.pi
 

@@ -6,7 +6,7 @@ import json
 from typing import Any
 
 from emaviz.server.viser_private import Inside, id_of
-from emaviz.text.sentence import begun
+from emaviz.text.results import begun
 
 _SAY = r"""
 ((id, text) => {

@@ -7,7 +7,7 @@ import sys
 import threading
 import time
 
-from ema_model.files.refusal import shown
+from ema_model.files.opened import shown
 
 _LINES = 10  # of one period; what comes beyond is counted
 _PERIOD_S = 60.0

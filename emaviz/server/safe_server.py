@@ -26,10 +26,8 @@ from websockets.http11 import Request, Response
 
 from ema_model.errors import InputError
 from emaviz.server.complaints import Complaints
-from emaviz.server.door import Door
-from emaviz.server.gate import Gate
+from emaviz.server.door import Door, Gate, protect
 from emaviz.server.messages import LARGEST_FRAME
-from emaviz.server.policy import protect
 from emaviz.server.viser_private import keep_icons
 
 SCENES = "/scenes/"  # below which the actuator's saved scenes are served

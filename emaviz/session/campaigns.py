@@ -9,14 +9,14 @@ from typing import Any
 
 import msgspec
 
-from ema_model.campaign.given import Given, given
+from ema_model.campaign.axes import Given, given
 from ema_model.campaign.kinds import KINDS
 from ema_model.campaign.store import Store
 from ema_model.campaign.task import Task
 from ema_model.comparison import compare
 from ema_model.discovery import discover
 from ema_model.errors import InputError
-from ema_model.files.refusal import shown
+from ema_model.files.opened import shown
 from ema_model.identification.objective import Objective
 from ema_model.identification.run import Progress, identify
 from ema_model.recordings import Measurement
@@ -85,7 +85,7 @@ class Campaigns:
         self._recorded = path, it.fitted[0], f"{path.name}: {_named(task)}"
 
     def _path(self, task: Task) -> Path:
-        from emaviz.recording.paths import free_name  # rerun takes a second to import
+        from emaviz.recording.file import free_name  # rerun takes a second to import
 
         return free_name(self._session.folder, f"{datetime.now():%Y%m%d-%H%M%S}-{task.kind}-{task.name[:8]}", ".rrd")
 
@@ -145,7 +145,7 @@ def _compared(task: Task, it: Given, path: Path, tell: Tell) -> None:
 
 
 def _discovered(task: Task, it: Given, path: Path, tell: Tell) -> None:
-    from emaviz.recording.discovery.write import write_discovery
+    from emaviz.recording.discovery import write_discovery
 
     own = msgspec.convert(task.settings, KINDS["discover"].settings)
     signals = ["current_A"] if own.signals == "current" else None

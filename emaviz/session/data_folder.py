@@ -15,12 +15,10 @@ from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
 
-from ema_model.challenges.sealed_file import SUFFIX as CHALLENGE_SUFFIX
+from ema_model.challenges.challenge import SUFFIX as CHALLENGE_SUFFIX
 from ema_model.errors import InputError
-from ema_model.files.lock import FileLock
-from ema_model.files.refusal import shown
-from ema_model.files.user_file import check_user_file
-from ema_model.files.whole_file import new_draft, remove_abandoned, whole_file
+from ema_model.files.opened import check_user_file, shown
+from ema_model.files.written import FileLock, new_draft, remove_abandoned, whole_file
 from ema_model.recordings import side_path
 from ema_model.recordings.formats import FORMATS, robot_dataset
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from ema_model.discovery.shown.labels import effect_title
+from ema_model.discovery.words import effect_title
 from ema_model.quantities.numbers import number
 from ema_model.quantities.titles import in_sentence
 

@@ -1,27 +1,141 @@
-"""A session as one file: what the page is set to and has found, with the measured files that it needs.
-
-NAME.emaviz is a zip of `session.json` and the files under `files/`, so that it opens on another computer.
-"""
+"""A session as one file: parts, archive."""
 
 from __future__ import annotations
 
 import filecmp
 import json
+import os
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ema_model.errors import InputError, quoted
-from ema_model.files.limits import SESSION_BYTES, SESSION_FILES, SETTINGS_BYTES
-from ema_model.files.refusal import shown
-from ema_model.files.safe_zip import Damaged, Refused, SafeZip, opened_zip
-from ema_model.files.user_file import check_user_file
-from ema_model.files.whole_file import whole_file
+from ema_model.files.opened import Damaged, Refused, SafeZip, check_user_file, opened_zip, shown
+from ema_model.files.sandbox import SESSION_BYTES, SESSION_FILES, SETTINGS_BYTES
+from ema_model.files.written import whole_file
 from ema_model.recordings import side_path
 from emaviz import __version__
+from emaviz.recording.file import Entry
 from emaviz.session.data_folder import SESSION_SUFFIX, DataFolder, sanitised
+from emaviz.session.run_summary import summary
+
+if TYPE_CHECKING:
+    from emaviz.recording.read import Recording
+
+_ENDING = ".rrd"
+
+
+class Recorded:
+    """The folder of recordings.  Raises InputError, one line, for what is refused.
+
+    Only the names that the folder lists are taken; what a file says of itself is kept until the file changes.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder.resolve()
+        self._known: dict[str, tuple[tuple[int, int], Entry]] = {}
+
+    def names(self) -> list[str]:
+        """Names of the recordings, the newest first."""
+        found = []
+        for one in os.scandir(self.folder):
+            if one.name.endswith(_ENDING) and not one.name.startswith(".") and one.is_file():
+                found.append((-one.stat().st_mtime_ns, one.name))
+        return [name for _, name in sorted(found)]
+
+    def entry(self, name: str) -> Entry:
+        """A recording with its settings and result, as far as it says them."""
+        path = self.path(name)
+        try:
+            status = path.stat()
+        except OSError as error:
+            raise InputError(f"{shown(name)}: cannot be read ({error.strerror})") from None
+        version = status.st_mtime_ns, status.st_size
+        known = self._known.get(name)
+        if known is None or known[0] != version:
+            said = _properties(path)
+            at = datetime.fromtimestamp(status.st_mtime)
+            known = version, Entry(name, at, status.st_size, **said)
+            self._known[name] = known
+        return known[1]
+
+    def read(self, name: str) -> Recording:
+        """Everything in it."""
+        from emaviz.recording import read
+
+        try:
+            return read(self.path(name))
+        except OSError as error:
+            raise InputError(str(error)) from None
+
+    def rename(self, name: str, wanted: Any) -> str:
+        """Gives it another name, made safe, and returns that; a name that is taken is refused."""
+        path = self.path(name)
+        stem = str(wanted).strip().removesuffix(_ENDING)
+        if not stem:
+            raise InputError("a run needs a name; type one first")
+        new = sanitised(stem + _ENDING)
+        target = self.folder / new
+        if new == name:
+            return name
+        if os.path.lexists(target):
+            raise InputError(f"{shown(new)} exists already; choose another name")
+        try:
+            path.rename(target)
+        except OSError as error:
+            raise InputError(f"{shown(name)}: cannot be renamed ({error.strerror})") from None
+        self._known.pop(name, None)
+        return new
+
+    def delete(self, name: str) -> None:
+        """Removes the file."""
+        try:
+            self.path(name).unlink()
+        except OSError as error:
+            raise InputError(f"{shown(name)}: cannot be deleted ({error.strerror})") from None
+        self._known.pop(name, None)
+
+    def path(self, name: str) -> Path:
+        """Where it is; refused unless the folder itself lists it."""
+        path = self.folder / name
+        try:
+            listed = Path(name).name == name and name.endswith(_ENDING) and path.is_file() and not path.is_symlink()
+        except OSError:  # longer than any name
+            listed = False
+        if not listed:
+            raise InputError(f"{shown(name)}: no such run; choose one of the list")
+        return path
+
+
+def _properties(path: Path) -> dict[str, Any]:
+    """What it is and came to; settings, answers and the best of an identification; nothing of damaged files."""
+    try:
+        from emaviz.recording.read import properties
+
+        said = properties(path)
+    except (OSError, ImportError):
+        return {}
+    kind, says = summary(said)
+    settings, found, best = said.get("settings"), said.get("found"), said.get("best")
+    if not (isinstance(settings, dict) and isinstance(found, dict) and isinstance(best, str)):
+        return {"kind": kind, "says": says}
+    return {"settings": settings, "found": found, "best": best, "kind": kind, "says": says}
+
+
+def recovered(recordings: Path) -> list[str]:
+    """What became of recordings of interrupted runs, a line each."""
+    try:
+        from emaviz.recording.read import recover
+
+        return [f"Recovered a recording of an interrupted run: {found}" for found in recover(recordings)]
+    except (OSError, ImportError) as error:
+        return [f"Interrupted recordings cannot be recovered: {error}"]
+
+
+# --- a session as one file: what the page is set to and has found, with the measured files that it needs --------------
 
 SCHEMA = 1
 _DOCUMENT, _FILES = "session.json", "files/"
@@ -62,7 +176,7 @@ def write(path: Path, parts: Mapping[str, Part], folder: DataFolder, names: Sequ
         raise InputError(f"{quoted(path.name)}: cannot be written ({error.strerror}); check the disk") from None
 
 
-def read(path: Path, parts: Mapping[str, Part], folder: DataFolder) -> None:
+def saved_read(path: Path, parts: Mapping[str, Part], folder: DataFolder) -> None:
     """Takes a session back, its files into the data folder.  InputError: no session, damaged, too large.
 
     The files are taken all or not at all.

@@ -22,7 +22,7 @@ from ema_model.recordings import Measurement
 from ema_model.simulation import plant
 from ema_model.simulation.run import simulate_monitor
 from emaviz.session.fan import Fan, fan_of
-from emaviz.session.identify.identifying import Identifying, inputs_of
+from emaviz.session.identify import Identifying, inputs_of
 from emaviz.session.inputs import Inputs
 from emaviz.session.settings import Settings
 from emaviz.session.signal import Signal

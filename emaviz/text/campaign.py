@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ema_model.campaign.store import Store
-from ema_model.campaign.summary import failed, summaries
+from ema_model.campaign.store import Store, failed, summaries
 
 _MOST_ERRORS = 10
 

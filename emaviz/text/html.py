@@ -1,17 +1,13 @@
-"""Text on the page: what comes from files and people is shown as it is, and never becomes markup.
-
-A name of a file, a column or an actuator, an expression, an error that quotes them: all are plain text.  `html` puts
-them into a template of ours, escaped.  `add_html` is the one place from which the page gets HTML: what was not made by
-`html` is plain text to it, and shown letter by letter.  Markdown on the page is for texts of our own alone, as its
-renderer takes HTML and turns bare addresses into links.
-"""
+"""HTML and MathML of the page and reports, escaped."""
 
 from __future__ import annotations
 
+import re
 import string
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from html import escape
 from html import escape as _escape
-from typing import TYPE_CHECKING, Any, LiteralString
+from typing import TYPE_CHECKING, Any, Literal, LiteralString
 
 if TYPE_CHECKING:
     import viser
@@ -26,10 +22,10 @@ class Html(str):
         return str.__new__(cls, literal)
 
     def __add__(self, other: str) -> Html:
-        return unescaped(str.__add__(self, escape(other)))
+        return unescaped(str.__add__(self, html_escape(other)))
 
     def __radd__(self, other: str) -> Html:
-        return unescaped(str.__add__(escape(other), self))
+        return unescaped(str.__add__(html_escape(other), self))
 
 
 def unescaped(text: str) -> Html:
@@ -37,7 +33,7 @@ def unescaped(text: str) -> Html:
     return str.__new__(Html, text)
 
 
-def escape(value: object) -> Html:
+def html_escape(value: object) -> Html:
     """As HTML shows it, in an element or in a quoted attribute; HTML stays what it is."""
     return value if isinstance(value, Html) else unescaped(_escape(str(value), quote=True))
 
@@ -49,7 +45,7 @@ def html(template: LiteralString, *values: object, **named: object) -> Html:
 
 def joined(parts: Iterable[str], between: LiteralString = "") -> Html:
     """Pieces one after another, escaped where they are plain text."""
-    return unescaped(between.join(escape(part) for part in parts))
+    return unescaped(between.join(html_escape(part) for part in parts))
 
 
 def add_html(gui: viser.GuiApi, content: str = "", *, visible: bool = True) -> HtmlPiece:
@@ -93,12 +89,130 @@ def said(text: str) -> Html:
 
 def _sent(content: str) -> str:
     """What goes to the browser, which viser packs only as a `str` and no kind of it."""
-    return str(escape(content))
+    return str(html_escape(content))
 
 
 class _Escaping(string.Formatter):
     def format_field(self, value: Any, format_spec: str) -> str:
-        return escape(value if isinstance(value, Html) and not format_spec else format(value, format_spec))
+        return html_escape(value if isinstance(value, Html) and not format_spec else format(value, format_spec))
 
 
 _ESCAPING = _Escaping()
+
+
+# --- an effect's equation, as its file has it, typeset: plain text to MathML, which browsers draw without a s----
+
+_TOKEN = re.compile(r"\s+|\d+(?:\.\d+)?|[^\W\d_]['̇]*(?:[^\W\d_]['̇]*)*|.", re.UNICODE)
+_FUNCTIONS = frozenset("sin cos tan exp sgn max min sat".split())
+_WORDS = frozenset(
+    "at controls current else for held holds in is its limit loop motion play read rest speed the while with".split()
+)
+_WORD = "<mtext>"
+_SPACE = '<mspace width="0.17em"/>'  # between factors, where the text has one
+_OPEN, _CLOSE = {"(": ")", "[": "]", "{": "}"}, frozenset(")]}")
+
+
+def mathml(equation: str, display: Literal["block", "inline"] = "block") -> Html:
+    """'<math …>…</math>' of an equation's text, on a line of its own or within one."""
+    tokens = [one.group() for one in _TOKEN.finditer(equation)]
+    rows, _ = _row(tokens, 0, "")
+    opened = f'<math xmlns="http://www.w3.org/1998/Math/MathML" display="{display}">'
+    return unescaped(f"{opened}<mrow>{''.join(rows)}</mrow></math>")
+
+
+def _row(tokens: list[str], at: int, until: str) -> tuple[list[str], int]:
+    """The pieces up to the closing bracket, and where it stands (or the end)."""
+    found: list[str] = []
+    apart = False
+    while at < len(tokens) and not (until and tokens[at] == until):
+        if tokens[at].isspace():
+            at, apart = at + 1, bool(found)
+            continue
+        is_fraction = tokens[at] == "/" and found and 0 < at < len(tokens) - 1
+        if is_fraction and not tokens[at - 1].isspace() and not tokens[at + 1].isspace():
+            below, at = _piece(tokens, at + 1)
+            found[-1] = f"<mfrac>{found[-1]}{below}</mfrac>"
+            continue
+        piece, at = _piece(tokens, at)
+        if piece.startswith(_WORD) and found and not found[-1].startswith(_WORD):
+            piece = piece.replace(_WORD, f"{_WORD}\u00a0", 1)
+        elif apart and not piece.startswith(("<mo>", _WORD)) and not found[-1].startswith(("<mo>", _WORD)):
+            found.append(_SPACE)
+        found.append(piece)
+        apart = False
+    return found, at
+
+
+def _piece(tokens: list[str], at: int) -> tuple[str, int]:
+    """One name, number, sign or bracket with what stands below and above it, and where the next begins."""
+    base, at = _bare(tokens, at)
+    parts = {}
+    while at < len(tokens) - 1 and tokens[at] in "_^" and tokens[at] not in parts:
+        sign = tokens[at]
+        part, at = _bare(tokens, at + 1)
+        parts[sign] = part.replace("\u00a0", "")
+    if len(parts) == 2:
+        return f"<msubsup>{base}{parts['_']}{parts['^']}</msubsup>", at
+    if parts:
+        tag = "msub" if "_" in parts else "msup"
+        return f"<{tag}>{base}{next(iter(parts.values()))}</{tag}>", at
+    return base, at
+
+
+def _bare(tokens: list[str], at: int) -> tuple[str, int]:
+    token = tokens[at]
+    if token in _OPEN:
+        inside, end = _row(tokens, at + 1, _OPEN[token])
+        shown = "".join(inside)
+        if token != "{":
+            closing = f"<mo>{_OPEN[token]}</mo>" if end < len(tokens) else ""
+            shown = f"<mo>{token}</mo>{shown}{closing}"
+        return f"<mrow>{shown}</mrow>", end + 1
+    if token == "|" and "|" in tokens[at + 1 :]:
+        inside, end = _row(tokens, at + 1, "|")
+        first, last = (f'<mo form="{form}" fence="true" stretchy="false">|</mo>' for form in ("prefix", "postfix"))
+        return f"<mrow>{first}{''.join(inside)}{last}</mrow>", end + 1
+    if token[0].isdigit():
+        return f"<mn>{token}</mn>", at + 1
+    if token[0].isalpha():
+        if token in _WORDS:
+            return f"{_WORD}{token}\u00a0</mtext>", at + 1
+        if token in _FUNCTIONS:
+            return f'<mi mathvariant="normal">{token}</mi>', at + 1
+        return f"<mi>{escape(token)}</mi>", at + 1
+    return f"<mo>{escape(token)}</mo>", at + 1
+
+
+# --- small texts between the page's controls --------------------------------------------------------------------------
+
+BOX = Html('style="padding:2px 12px 6px;font-size:13px;line-height:1.45"')
+DIM = Html('style="opacity:.65"')
+
+
+_CARD = (
+    "max-width:600px;margin:7vh auto 0;padding:18px 26px 20px;border:1px dashed rgba(134,142,150,.6);"
+    "border-radius:8px;font-size:14px;line-height:1.55"
+)
+
+
+def begin(title: str, steps: Sequence[str]) -> Html:
+    """Where there is no result yet: what to do, and what comes of it."""
+    rows = joined(html('<li style="padding:3px 0">{}</li>', step) for step in steps)
+    return html(
+        '<div class="emaviz-all-columns" style="{}">'
+        '<div style="font-size:17px;font-weight:600;padding-bottom:6px">{}</div>'
+        '<ol style="margin:0;padding-left:20px">{}</ol></div>',
+        _CARD,
+        title,
+        rows,
+    )
+
+
+def boxed(content: str) -> Html:
+    """Plain text or HTML, as wide as the controls' names."""
+    return html("<div {}>{}</div>", BOX, content)
+
+
+def note(text: str) -> Html:
+    """A line of small print."""
+    return boxed(html("<span {}>{}</span>", DIM, text))

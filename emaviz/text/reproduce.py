@@ -5,10 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from ema_model.campaign.thesis import Evaluation
-from ema_model.campaign.thesis.cases import ALGORITHMS, MULTIPLE, TITLES
-from ema_model.campaign.thesis.result import TARGET_PERCENT
-from ema_model.campaign.thesis.scores import MISSED_PERCENT, SINGLE, Spread
+from ema_model.campaign.thesis import (
+    ALGORITHMS,
+    MISSED_PERCENT,
+    MULTIPLE,
+    SINGLE,
+    TARGET_PERCENT,
+    TITLES,
+    Evaluation,
+    Spread,
+)
 from ema_model.identification.run import ROBUST
 
 NONE = "–"

@@ -12,7 +12,7 @@ from support.on_page import wait_until
 from support.one_tab import Tab
 
 from emaviz.page.app import App
-from emaviz.session.compare import comparing
+from emaviz.session import compare
 from emaviz.session.worker import Worker
 
 
@@ -99,7 +99,7 @@ def worker(errors: list[Any]) -> Iterator[Worker]:
 @pytest.fixture
 def reads(monkeypatch: pytest.MonkeyPatch) -> Iterator[threading.Event]:
     """Compare reads no file before this is set."""
-    go_on, plain = threading.Event(), comparing.read_opened
-    monkeypatch.setattr(comparing, "read_opened", lambda *asked: go_on.wait(30.0) and plain(*asked))
+    go_on, plain = threading.Event(), compare.read_opened
+    monkeypatch.setattr(compare, "read_opened", lambda *asked: go_on.wait(30.0) and plain(*asked))
     yield go_on
     go_on.set()

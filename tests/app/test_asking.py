@@ -11,7 +11,7 @@ from ema_model.actuator import load_actuator
 from ema_model.commands import command
 from ema_model.recordings import write_measurement
 from ema_model.simulation.run import Run, simulate_reference
-from emaviz.session.compare.comparing import Comparing
+from emaviz.session.compare import Comparing
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.session import Session
 

@@ -10,12 +10,12 @@ from support.on_page import wait_until
 
 from ema_model.actuator import load_actuator
 from ema_model.campaign import load_plan
+from ema_model.campaign.axes import given
 from ema_model.campaign.execute import common
-from ema_model.campaign.given import given
 from ema_model.campaign.kinds import KINDS
 from ema_model.campaign.store import Store, header_of
 from ema_model.errors import InputError
-from emaviz.page.campaigns.controls import label, tables
+from emaviz.page.campaigns import label, tables
 from emaviz.recording import read
 from emaviz.session.campaigns import Campaigns
 from emaviz.session.data_folder import DataFolder

@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from emaviz.figures.signals import LEAST_SPACE_PX, value_axis
+from emaviz.figures.runs import LEAST_SPACE_PX, value_axis
 from emaviz.page import docked
-from emaviz.page.chart_heights import ChartHeights, spaced
+from emaviz.page.charts import ChartHeights, spaced
 from emaviz.page.docked import TWO_COLUMNS_PX
 
 

@@ -13,32 +13,21 @@ from support.comparison_by_hand import comparison as by_hand
 
 from ema_model.quantities.numbers import amount, number
 from ema_model.quantities.variables import MODULATORS, variable_title
-from emaviz.figures import (
-    calibration_scores,
-    explained,
-    order_spectrum,
-    overlay,
-    quantity,
-    residual_against,
-    residual_polar,
-    residual_time,
-    theme,
-)
-from emaviz.figures.binned import binned
-from emaviz.figures.lines import band, line, scattered
-from emaviz.figures.region_blocks import time_ranges
-from emaviz.figures.theme import why_missing
+from emaviz.figures import campaign, theme
+from emaviz.figures import comparison as comparison_figures
+from emaviz.figures.comparison import time_ranges
+from emaviz.figures.theme import band, binned, line, scattered, why_missing
 
 FIGURES = {
-    "overlay": overlay.figure,
-    "residual_time": residual_time.figure,
-    "against_speed": lambda c, **k: residual_against.figure(c, "motor_speed", **k),
-    "against_angle": lambda c, **k: residual_against.figure(c, "motor_angle", **k),
-    "against_current": lambda c, **k: residual_against.figure(c, "current", **k),
-    "polar": residual_polar.figure,
-    "orders": order_spectrum.figure,
-    "explained": explained.figure,
-    "calibration": calibration_scores.figure,
+    "overlay": comparison_figures.overlay,
+    "residual_time": comparison_figures.residual_time,
+    "against_speed": lambda c, **k: comparison_figures.residual_against(c, "motor_speed", **k),
+    "against_angle": lambda c, **k: comparison_figures.residual_against(c, "motor_angle", **k),
+    "against_current": lambda c, **k: comparison_figures.residual_against(c, "current", **k),
+    "polar": comparison_figures.residual_polar,
+    "orders": comparison_figures.order_spectrum,
+    "explained": comparison_figures.explained,
+    "calibration": campaign.calibration_scores,
 }
 
 
@@ -75,7 +64,7 @@ def test_a_highlighted_region_is_marked(comparison, name):
 def test_shaded_times_are_those_of_the_region(comparison):
     speed = next(region for region in comparison.worst_regions if region.variable == "motor_speed")
     for recording in (0, 1):
-        figure = overlay.figure(comparison, recording=recording, highlight=speed)
+        figure = comparison_figures.overlay(comparison, recording=recording, highlight=speed)
         time = comparison.recordings[recording].time_s
         shaded = np.zeros(len(time), dtype=bool)
         for shape in figure.layout.shapes:
@@ -129,33 +118,33 @@ def test_a_spike_of_one_block_reaches_the_figure(comparison):
     measured = one.measured["current_A"].copy()
     measured[1234] += 77.0
     spiked = replace(one, measured={**one.measured, "current_A": measured})
-    figure = residual_time.figure(replace(comparison, recordings=[spiked]), "current_A")
+    figure = comparison_figures.residual_time(replace(comparison, recordings=[spiked]), "current_A")
     (residual,) = (trace for trace in figure.data if trace.name == "residual")
     assert np.nanmax(residual.y) == pytest.approx(measured[1234] - one.model["current_A"][1234], rel=1e-6)
 
 
 def test_current_is_told_as_torque(comparison):
-    amperes = residual_against.figure(comparison, "motor_speed", as_torque=False)
-    torques = residual_against.figure(comparison, "motor_speed")
+    amperes = comparison_figures.residual_against(comparison, "motor_speed", as_torque=False)
+    torques = comparison_figures.residual_against(comparison, "motor_speed")
     (a,), (t,) = ([d for d in f.data if d.name == "mean ± error"] for f in (amperes, torques))
     factor = {"A": 1.0, "mA": 1e3}[amperes.layout.yaxis.title.text.split("[")[1].rstrip("]")]
     assert torques.layout.yaxis.title.text == "Residual torque [mN·m]"
     assert t.y / 1e3 == pytest.approx(a.y / factor * comparison.residuals.torque_constant)
-    orders = order_spectrum.figure(comparison).data[0]
+    orders = comparison_figures.order_spectrum(comparison).data[0]
     strongest = comparison.orders[0]
     height = 1e3 * comparison.residuals.torque_constant * strongest.amplitude
     assert strongest.order == 12 and orders.y[list(orders.x).index(12)] == pytest.approx(height)
 
 
 def test_a_mean_for_each_direction_where_direction_explains(comparison):
-    names = [trace.name for trace in residual_against.figure(comparison, "current").data]
+    names = [trace.name for trace in comparison_figures.residual_against(comparison, "current").data]
     assert {"mean, forward", "mean, backward"} <= set(names)
-    names = [trace.name for trace in residual_against.figure(comparison, "motor_speed").data]
+    names = [trace.name for trace in comparison_figures.residual_against(comparison, "motor_speed").data]
     assert "mean ± error" in names
 
 
 def test_what_noise_could_have_made_is_pale(comparison):
-    for trace in explained.figure(comparison).data:
+    for trace in comparison_figures.explained(comparison).data:
         for name, opacity in zip(trace.y, trace.marker.opacity):
             modulator = next(m for m, one in MODULATORS.items() if one.title == trace.name)
             (found,) = (
@@ -167,11 +156,11 @@ def test_what_noise_could_have_made_is_pale(comparison):
 def test_what_is_not_there_is_said(comparison):
     bare = replace(comparison, orders=(), explained_by=(), calibration=None)
     texts = [
-        residual_against.figure(bare, "temperature").layout.annotations[0].text,
-        overlay.figure(bare, "motor_torque_Nm").layout.annotations[0].text,
+        comparison_figures.residual_against(bare, "temperature").layout.annotations[0].text,
+        comparison_figures.overlay(bare, "motor_torque_Nm").layout.annotations[0].text,
         *(
             f(bare).layout.annotations[0].text
-            for f in (order_spectrum.figure, explained.figure, calibration_scores.figure)
+            for f in (comparison_figures.order_spectrum, comparison_figures.explained, campaign.calibration_scores)
         ),
     ]
     assert all(texts)
@@ -201,7 +190,7 @@ def test_errors_of_binned_means_are_truthful(correlated):
     ],
 )
 def test_ranges_over_the_end_of_a_turn(low, high, parts):
-    assert residual_against.turn_ranges(low, high) == parts
+    assert comparison_figures.turn_ranges(low, high) == parts
 
 
 @pytest.mark.parametrize(
@@ -213,11 +202,14 @@ def test_numbers_are_short(value, text):
 
 
 def test_units_suit_the_size():
-    torque = quantity.Quantity("Torque", "N·m")
+    torque = comparison_figures.Quantity("Torque", "N·m")
     assert torque.scaled([0.035, -0.01]).text(0.035) == "35.0 mN·m"
     assert torque.scaled([2.0]).unit == "N·m" and torque.scaled([3e-6]).unit == "µN·m"
-    assert quantity.Quantity("Temperature", "°C").scaled([0.01]).unit == "°C"
-    inertia, stiffness = quantity.Quantity("Inertia", "kg·m²"), quantity.Quantity("Stiffness", "N·m/rad")
+    assert comparison_figures.Quantity("Temperature", "°C").scaled([0.01]).unit == "°C"
+    inertia, stiffness = (
+        comparison_figures.Quantity("Inertia", "kg·m²"),
+        comparison_figures.Quantity("Stiffness", "N·m/rad"),
+    )
     assert inertia.powered([1.38e-5, 1.2e-5]).text(1.38e-5) == "13.8 10⁻⁶ kg·m²"
     assert stiffness.powered([100_750.0]).label == "Stiffness [kN·m/rad]"
     assert torque.powered([0.035]).unit == "mN·m" and torque.powered([0.0]).unit == "N·m"
@@ -248,7 +240,11 @@ def test_a_figure_with_its_legend_fits_a_panel_that_is_narrow_for_a_moment(brows
 
 def test_a_figure_with_nothing_in_it_is_a_line_in_words(comparison):
     bare = replace(comparison, orders=(), explained_by=())
-    assert why_missing(order_spectrum.figure(bare)).endswith(
+    assert why_missing(comparison_figures.order_spectrum(bare)).endswith(
         "orders of the motor's turn: nothing repeats with the motor's turn."
     )
-    assert why_missing(order_spectrum.figure(comparison)) == why_missing(overlay.figure(comparison)) == ""
+    assert (
+        why_missing(comparison_figures.order_spectrum(comparison))
+        == why_missing(comparison_figures.overlay(comparison))
+        == ""
+    )

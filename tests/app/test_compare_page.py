@@ -17,14 +17,13 @@ from support.two_clocks import write_two_clocks
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
 from ema_model.recordings import write_measurement
-from ema_model.simulation.run import Run, simulate_reference
-from ema_model.simulation.sensors import Sensors
+from ema_model.simulation.run import Run, Sensors, simulate_reference
 from emaviz.page.app import App
-from emaviz.page.compare.plots import View
+from emaviz.page.compare.result import View
 from emaviz.page.compare.tab import CompareTab
 from emaviz.page.explore.tab import ExploreTab
 from emaviz.page.identify.tab import IdentifyTab
-from emaviz.page.track.tab import TrackTab
+from emaviz.page.track import TrackTab
 
 pytestmark = pytest.mark.browser
 

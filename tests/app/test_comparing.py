@@ -13,15 +13,14 @@ import pytest
 from ema_model.actuator import load_actuator, shipped
 from ema_model.commands import command
 from ema_model.errors import InputError
-from ema_model.files.limits import FILE_BYTES, PAGE_BYTES
+from ema_model.files.sandbox import FILE_BYTES, PAGE_BYTES
 from ema_model.recordings import ColumnMapping, MappedColumn, Measurement, read_side_file, side_path, write_measurement
 from ema_model.recordings.formats.text_layout import Hints
-from ema_model.simulation.run import Run, simulate_reference
-from ema_model.simulation.sensors import Sensors
+from ema_model.simulation.run import Run, Sensors, simulate_reference
 from emaviz.recording import read
-from emaviz.session.actuators import UPLOADED, shipped_actuators
-from emaviz.session.compare.comparing import Comparing
+from emaviz.session.compare import Comparing
 from emaviz.session.data_folder import DataFolder
+from emaviz.session.files import UPLOADED, shipped_actuators
 from emaviz.session.session import Session
 
 
@@ -126,7 +125,7 @@ def test_foreign_columns_wait_for_the_user_and_are_remembered(comparing, heard, 
 def test_the_page_takes_less_than_the_command_line(comparing, heard, recording, monkeypatch):
     assert PAGE_BYTES < FILE_BYTES
     foreign_csv(recording, comparing.folder.uploads / "rig.csv")
-    monkeypatch.setattr("emaviz.session.opened.PAGE_BYTES", 1000)
+    monkeypatch.setattr("emaviz.session.files.PAGE_BYTES", 1000)
     comparing.add("uploads/rig.csv")
     assert re.search(r"rig\.csv: is [0-9.]+ MB large, over the limit of 0\.001 MB", heard.wait(heard.told))
 

@@ -10,9 +10,8 @@ import viser
 from support.on_page import wait_until
 from support.raw_page import RawPage
 
-from emaviz.server.messages import MOST_INT
+from emaviz.server.messages import LONGEST_TEXT, MOST_INT
 from emaviz.server.safe_server import open_server
-from emaviz.server.values import LONGEST_TEXT
 
 # Refused by every control.  3000 digits come as text or as an extension: msgpack's own integers end at 2⁶⁴.
 NEVER = [
@@ -148,7 +147,7 @@ def test_what_is_refused_is_sent_back(controls, raw):
 
 
 def test_a_number_on_its_way_into_its_bounds_is_left_to_be_typed(controls, raw, monkeypatch):
-    monkeypatch.setattr("emaviz.server.gate.TYPING_S", 0.3)
+    monkeypatch.setattr("emaviz.server.door.TYPING_S", 0.3)
     number = controls["number"]
     for typed in (-2e9, -2e10, 60, 6.5):
         raw.update(uuid(number), typed)

@@ -8,7 +8,7 @@ import numpy as np
 import plotly.graph_objects as go
 import pytest
 
-from emaviz.figures.cut import cut, end_of, told
+from emaviz.figures.theme import cut, cut_note, end_of
 
 NOISE = 0.1 * np.random.default_rng(1).standard_normal(1000)
 START = np.concatenate([np.full(5, -3.0), NOISE[5:]])
@@ -17,7 +17,7 @@ START = np.concatenate([np.full(5, -3.0), NOISE[5:]])
 def test_a_start_does_not_set_the_axis():
     end = end_of(START)
     assert end == pytest.approx(0.5) and np.count_nonzero(np.abs(START) > end) == 5
-    assert told(end, START, "A") == "cut at ±0.5 A, largest 3.00 A"
+    assert cut_note(end, START, "A") == "cut at ±0.5 A, largest 3.00 A"
     figure: Any = go.Figure(go.Scatter(y=START))
     cut(figure, START, "A")
     assert tuple(figure.layout.yaxis.range) == (-end, end) and "cut at" in figure.layout.annotations[0].text

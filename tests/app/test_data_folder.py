@@ -10,9 +10,9 @@ from support.robot_datasets import write_robot_dataset
 
 from ema_model.actuator import load_actuator
 from ema_model.errors import InputError
-from ema_model.recordings.side_file.read import SideFile
+from ema_model.recordings.side_file import SideFile
 from emaviz.session.data_folder import DataFolder, sanitised
-from emaviz.session.opened import read_opened
+from emaviz.session.files import read_opened
 
 ROWS = "time_s,current_A\n" + "\n".join(f"{i * 1e-3},{i % 3}" for i in range(200)) + "\n"
 

@@ -10,20 +10,19 @@ from support.on_page import wait_until
 from support.rig import Rig
 
 from ema_model.actuator import load_actuator
-from ema_model.challenges.truth import Truth
+from ema_model.challenges.challenge import Truth
 from ema_model.comparison.criteria import BAND
 from ema_model.discovery.criteria import LEAST_BIC
 from ema_model.discovery.result import Change
-from ema_model.discovery.words import faults, headline, sentences
+from ema_model.discovery.words import faults, headline, words_sentences
 from ema_model.errors import InputError
-from emaviz.figures import signature
-from emaviz.figures.model_equation import equation
-from emaviz.page.discover import cards
-from emaviz.page.discover.effect import about_fault
+from emaviz.figures import discovery
+from emaviz.figures.discovery import equation
+from emaviz.page.discover import candidate
+from emaviz.page.discover.candidate import about_fault
 from emaviz.page.discover.result import answer
-from emaviz.session.discover.beside_truth import agrees, document_of
-from emaviz.session.discover.saved_story import story_of
-from emaviz.text.verdict import MEANINGS
+from emaviz.session.discover.source import agrees, document_of, story_of
+from emaviz.text.results import MEANINGS
 
 pytestmark = pytest.mark.long
 
@@ -58,11 +57,11 @@ def test_start_offers_the_fault_beside_the_effects(rig):
     assert not look.found.faults and look.steps == 1, "a person decides"
     best = look.promising[0]
     assert best.name == "k2" and look.share(best) > 0.5
-    text = cards.label(look, best)
+    text = candidate.label(look, best)
     assert text.startswith("Backlash (fault k2)\nerror ") and "backlash " in text and "µrad, k2 ≈ 0." in text
     assert "strong evidence" in text
     assert "Physics is missing, or the actuator has a fault." in answer(look)
-    shown = signature.figure(look, best)
+    shown = discovery.signature(look, best)
     assert len(shown.data) == 2 and "backlash (fault k2) would change" in shown.data[1].name
     about = about_fault("k2", look.found.actuator)
     assert "99" in about and "Mistaken for" in about and "k2 0.25 to 0.75" in about
@@ -85,7 +84,7 @@ def test_it_is_added_by_its_name(worn):
     assert look.rmse < BAND < look.found.ladder[0].rmse
     assert headline(look.found) == "No physics is missing: the actuator has the fault k2 backlash."
     assert "k2 backlash" in faults(look.found)["k2"] and "µrad" in faults(look.found)["k2"]
-    assert any("k2 backlash" in text for text in sentences(look.found))
+    assert any("k2 backlash" in text for text in words_sentences(look.found))
     assert MEANINGS["found"] in answer(look), "at the floor, and not as it should be"
     assert "Backlash (fault k2):" in equation(look.found, look.added) and look.removable == ["k2"]
     assert worn.entries.current.result.startswith("1 added")

@@ -11,17 +11,16 @@ from support.on_page import wait_until
 from support.rig import Rig
 
 from ema_model.actuator import load_actuator
-from ema_model.discovery.shown.tracks import tracks
+from ema_model.discovery.words import tracks
 from ema_model.effects.user import user_torque
 from ema_model.errors import InputError
 from ema_model.faults import HEALTHY
-from emaviz.page.discover import cards as discover_cards
-from emaviz.page.discover.actuator import _SHOWN, run_of
-from emaviz.page.discover.guide import STEPS, step
-from emaviz.page.discover.next_experiment import as_csv
+from emaviz.page.discover import candidate
+from emaviz.page.discover.result import _SHOWN, as_csv, run_of
+from emaviz.page.discover.tab import STEPS, step
 from emaviz.recording.read import read
 from emaviz.scene.motion import motion
-from emaviz.session.discover.beside_truth import agrees, document_of
+from emaviz.session.discover.source import agrees, document_of
 
 EASY = "first_bench_run"
 
@@ -53,7 +52,7 @@ def test_the_first_card_is_what_is_hidden(fresh):
     look = fresh.look
     best = look.promising[0]
     assert best.name == "cogging_torque" and best.settings["order"] == 14
-    text = discover_cards.label(look, best)
+    text = candidate.label(look, best)
     assert "order 14" in text and "mN·m" in text and f"{100.0 * look.share(best):.0f} %" in text
     amplitude, half = best.settings["amplitude_Nm"], look.uncertainty(best)
     assert abs(amplitude - 0.02) < 2.0 * half < 0.005

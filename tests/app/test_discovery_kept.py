@@ -14,8 +14,7 @@ from ema_model.actuator import load_actuator
 from ema_model.discovery.result import Experiment
 from ema_model.effects.user import user_torque
 from ema_model.errors import InputError
-from emaviz.session.discover.beside_truth import agrees, document_of
-from emaviz.session.discover.sealing import sensors_of, truth_of
+from emaviz.session.discover.source import agrees, document_of, sensors_of, truth_of
 from emaviz.session.settings import Settings
 
 EASY = "first_bench_run"

@@ -15,13 +15,11 @@ from ema_model.effects import CATALOGUE
 from ema_model.errors import InputError
 from ema_model.faults import HEALTHY
 from ema_model.recordings import Measurement
-from ema_model.recordings.file import read_measurement
+from ema_model.recordings.read import read_measurement
 from ema_model.simulation.run import Run, simulate_monitor, simulate_reference
-from emaviz.figures import run_signals
-from emaviz.figures.run_metrics import differences, metrics, rise_time_s, table
-from emaviz.figures.signals import _within, at, beneath
-from emaviz.page.explore.presets import CUSTOM, PRESETS, name_of
-from emaviz.page.explore.tab import ExploreTab
+from emaviz.figures import runs as runs_figures
+from emaviz.figures.runs import _within, at, beneath, differences, metrics, rise_time_s, run_metrics_table
+from emaviz.page.explore.tab import CUSTOM, PRESETS, ExploreTab, name_of
 from emaviz.page.identify.tab import IdentifyTab
 from emaviz.session.session import Session
 from emaviz.session.settings import Settings
@@ -92,9 +90,11 @@ def test_a_number_that_is_missing_has_its_reason(runs):
     reference, _ = runs
     stuck = Measurement({**reference.signals, "user_position_rad": 0.0 * reference.time_s}, name="stuck")
     errors = {"frozen run's": {"Current": (math.nan, "A")}}
-    found = table({"plant": metrics(stuck, "step"), "frozen": metrics(reference, "chirp")}, errors, ["red", "blue"])
+    found = run_metrics_table(
+        {"plant": metrics(stuck, "step"), "frozen": metrics(reference, "chirp")}, errors, ["red", "blue"]
+    )
     assert [found.count(f">{why}<") for why in ("not reached", "no step", "diverged")] == [1, 1, 1]
-    assert "rise time" not in table({"plant": metrics(reference, "chirp")}, errors, ["red"])
+    assert "rise time" not in run_metrics_table({"plant": metrics(reference, "chirp")}, errors, ["red"])
 
 
 def test_a_run_that_diverged_has_its_numbers(runs):
@@ -125,7 +125,7 @@ def test_a_window_keeps_two_samples_or_more(window):
 
 
 def test_the_large_plot_has_units_and_every_line(runs):
-    figure = run_signals.figure(*runs, runs[0], (0.1, 0.2))
+    figure = runs_figures.run_signals(*runs, runs[0], (0.1, 0.2))
     assert len(figure.data) == 4 * 3 + 1
     titles = [figure.layout[f"yaxis{i}"].title.text for i in ("", "2", "3", "4")]
     assert all("[" in title for title in titles) and figure.layout.xaxis4.title.text == "Time [s]"

@@ -12,8 +12,8 @@ from support.on_page import choose, field, wait_until
 from ema_model.actuator import load_actuator
 from ema_model.faults import vector
 from ema_model.simulation.run import simulate_monitor
+from emaviz.page.charts import png
 from emaviz.page.explore.tab import ExploreTab
-from emaviz.page.picture import png
 from emaviz.session.fan import SEVERITIES, fan_of
 from emaviz.session.settings import Settings
 from emaviz.session.undo import Undo

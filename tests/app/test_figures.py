@@ -11,9 +11,9 @@ import pytest
 from ema_model.actuator import load_actuator
 from ema_model.effects import find
 from emaviz import figures
-from emaviz.figures.decimate import envelope
-from emaviz.figures.fault_bars import fault_bars
-from emaviz.figures.model_equation import _symbol
+from emaviz.figures.discovery import _symbol
+from emaviz.figures.identification import fault_bars
+from emaviz.figures.theme import envelope
 
 
 @pytest.mark.parametrize("n", [10, 999, 1000, 1001, 5001, 123_457])

@@ -16,7 +16,7 @@ from ema_model.errors import InputError
 from emaviz.recording import read
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.session import Session
-from emaviz.session.track.following import Following
+from emaviz.session.track import Following
 from emaviz.session.worker import Worker
 
 COUNT = 20

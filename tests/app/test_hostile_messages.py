@@ -14,10 +14,9 @@ from support.on_page import field, wait_until
 from support.raw_page import CAMERA, RawPage
 
 from ema_model.recordings import write_measurement
-from emaviz.server import gate
-from emaviz.server.gate import TYPING_S
-from emaviz.server.messages import MOST_INT
-from emaviz.server.values import checked
+from emaviz.server import door
+from emaviz.server.door import TYPING_S
+from emaviz.server.messages import MOST_INT, checked
 from emaviz.server.viser_private import Inside
 
 NUMBERS = (viser.GuiNumberHandle, viser.GuiSliderHandle)
@@ -195,7 +194,7 @@ def test_no_press_of_any_button_beside_results_costs_a_traceback(app, controls, 
 
 
 def test_a_picture_that_a_page_does_not_draw_is_no_traceback(app, raw, capfd, monkeypatch):
-    monkeypatch.setattr("emaviz.page.picture._LONGEST_S", 0.3)
+    monkeypatch.setattr("emaviz.page.charts._LONGEST_S", 0.3)
     for answer in (b"no picture", None):
         raw.update(app.strip._picture._impl.uuid, True)
         wait_until(lambda: raw.asked_for_a_picture, 20.0)
@@ -241,7 +240,7 @@ def test_a_choice_that_is_taken_away_while_a_page_makes_it_is_not_kept(app, raw,
             choice.options = ("c", "d")
         return taken
 
-    monkeypatch.setattr(gate, "checked", late)
+    monkeypatch.setattr(door, "checked", late)
     raw.update(choice._impl.uuid, "b")
     heard(raw, marker)
     wait_until(lambda: choice.value == "c", 20.0)

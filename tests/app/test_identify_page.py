@@ -14,20 +14,18 @@ from ema_model.actuator import load_actuator
 from ema_model.commands import command
 from ema_model.errors import InputError
 from ema_model.faults import performance_coefficient, vector
-from ema_model.identification.landscape import slices, ways
 from ema_model.identification.run import ALGORITHMS, Progress
+from ema_model.identification.search import slices, ways
 from ema_model.identification.words import facts, way_sentences, why_best
 from ema_model.quantities.numbers import amount
 from ema_model.recordings import write_measurement
-from ema_model.recordings.file import read_measurement
-from ema_model.simulation.run import Run, simulate_reference
-from ema_model.simulation.sensors import Sensors
-from emaviz.figures import swarm
-from emaviz.figures.identified_table import Row, table
-from emaviz.page.identify.swarm import at_iteration, telling
+from ema_model.recordings.read import read_measurement
+from ema_model.simulation.run import Run, Sensors, simulate_reference
+from emaviz.figures import identification
+from emaviz.figures.identification import Row, table
+from emaviz.page.identify.result import at_iteration, telling
 from emaviz.recording.read import read
-from emaviz.session.identify.landscape import ends
-from emaviz.session.identify.race import MOST_FRAMES, Track
+from emaviz.session.identify import MOST_FRAMES, Track, ends
 from emaviz.session.session import Session
 from emaviz.session.settings import Settings
 
@@ -220,10 +218,10 @@ def test_the_axes_are_those_on_which_the_faults_stand():
 
 
 def test_a_swarm_is_drawn_where_it_is():
-    one = swarm.Swarm("do", "#1098ad", np.array([[0.0] * 8, [1.0] * 8]), np.full(8, 0.5))
-    plane = swarm.plane([one], 0, 1, np.full(8, 0.25), [np.array([[0.0] * 8, [0.5] * 8])])
+    one = identification.Swarm("do", "#1098ad", np.array([[0.0] * 8, [1.0] * 8]), np.full(8, 0.5))
+    plane = identification.plane([one], 0, 1, np.full(8, 0.25), [np.array([[0.0] * 8, [0.5] * 8])])
     assert "M44.0 536.0h0M446.0 10.0h0" in plane and 'cx="245.0" cy="273.0"' in plane and "<polyline" in plane
-    lines = swarm.lines([one], np.full(8, 0.25))
+    lines = identification.lines([one], np.full(8, 0.25))
     assert lines.count("<path") == 8 + 3 and "M44 528.0" in lines
 
 

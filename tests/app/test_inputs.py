@@ -19,17 +19,17 @@ from ema_model.recordings import write_measurement
 from ema_model.simulation.run import Run, simulate_reference
 from emaviz.session import saved as session_file
 from emaviz.session.campaigns import Campaigns
-from emaviz.session.compare.comparing import Comparing
+from emaviz.session.compare import Comparing
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.discover.discovering import Discovering
-from emaviz.session.discover.entries import Entry
+from emaviz.session.discover.stories import Entry
 from emaviz.session.inputs import Inputs, Provenance, results_part
 from emaviz.session.job import Job
 from emaviz.session.job import Run as JobRun
 from emaviz.session.saved import Part
 from emaviz.session.session import Session
-from emaviz.session.track.following import Following
-from emaviz.session.units.comparing_units import ComparingUnits
+from emaviz.session.track import Following
+from emaviz.session.units import ComparingUnits
 from emaviz.session.worker import Worker
 
 FILES = {"bench": ("chirp.csv", "step.csv"), "fleet/a": ("sine.csv",), "fleet/b": ("sine.csv",)}
@@ -188,9 +188,9 @@ def test_flights_that_were_removed_or_replaced_are_not_followed_on(app, monkeypa
         asked.append(name)
         return SimpleNamespace(name=name, excluded="", common=np.zeros((8, 3)))
 
-    monkeypatch.setattr("emaviz.session.track.following.identified", identified)
+    monkeypatch.setattr("emaviz.session.track.identified", identified)
     monkeypatch.setattr(track, "_follow", lambda *_: None)
-    monkeypatch.setattr("emaviz.session.track.following.check_enough", lambda *_: None)
+    monkeypatch.setattr("emaviz.session.track.check_enough", lambda *_: None)
     folder = app.data.folder / "flights"
     folder.mkdir()
     for number in range(3):
@@ -283,12 +283,12 @@ def test_a_session_of_today_and_one_without_results_are_both_read(app, tmp_path)
     path = session_file.free_path(app.data, "kept")
     session_file.write(path, parts, app.data, [])
     app.units.provenance.clear()
-    session_file.read(path, parts, app.data)
+    session_file.saved_read(path, parts, app.data)
     assert app.units.provenance.line().startswith("To be computed again: the comparison of fleet")
     app.units.provenance.clear()
     with zipfile.ZipFile(tmp_path / "old.emaviz", "w") as archive:
         archive.writestr("session.json", json.dumps({"schema": 1, "files": []}))
-    session_file.read(tmp_path / "old.emaviz", parts, app.data)
+    session_file.saved_read(tmp_path / "old.emaviz", parts, app.data)
     assert not app.units.provenance.line()
 
 

@@ -10,12 +10,12 @@ import pytest
 
 from ema_model.errors import InputError
 from ema_model.faults import HEALTHY, vector
-from ema_model.identification.landscape import Landscape, Way, extent, slices, ways
 from ema_model.identification.next_experiment import Suggestion
+from ema_model.identification.search import Landscape, Way, extent, slices, ways
 from ema_model.identification.words import landscape_words, way_sentences
-from ema_model.simulation.words import run_in_words
-from emaviz.figures import landscape as figures
-from emaviz.text.identification import sure_words
+from ema_model.simulation.run import run_in_words
+from emaviz.figures import identification
+from emaviz.text.results import sure_words
 
 TRUTH = vector({"k1": 0.3, "k6": 0.4})
 
@@ -96,7 +96,7 @@ def test_a_way_goes_the_short_way_round_the_angle():
 def test_the_map_has_units_marks_and_a_box():
     found = whole(TRUTH, 0, 5, points=9)[-1]
     interval = np.stack([TRUTH - 0.05, TRUTH + 0.05], axis=1)
-    drawn = figures.figure(found, figures.Marks(TRUTH, interval, TRUTH, {"do": HEALTHY}))
+    drawn = identification.figure(found, identification.Marks(TRUTH, interval, TRUTH, {"do": HEALTHY}))
     assert "k1" in drawn.layout.xaxis.title.text and "[–]" in drawn.layout.yaxis.title.text
     assert drawn.data[0].colorbar.title.text == "corrected error [A]"
     assert [trace.name for trace in drawn.data[1:]] == ["Dandelion ended", "truth", "answer, 90 %"]
@@ -108,12 +108,12 @@ def test_the_map_has_units_marks_and_a_box():
     half = whole(TRUTH, 0, 5, points=9)[1]
     assert landscape_words(half).startswith("Stopped at 44 %. Held: k2")
     empty = Landscape(0, 5, TRUTH, np.linspace(0, 1, 3), np.linspace(0, 1, 3), np.full((3, 3), np.nan), 0)
-    figures.figure(empty, figures.Marks(TRUTH))
+    identification.figure(empty, identification.Marks(TRUTH))
 
 
 @pytest.mark.parametrize("low, high", [(0.1, 3.0), (1e-9, 1e6), (0.31, 0.33), (5.0, 5.0)])
 def test_a_scale_of_logarithms_has_a_few_round_values(low, high):
-    ticks = figures.round_values(low, high)
+    ticks = identification.round_values(low, high)
     assert 2 <= len(ticks) <= 8 and all(a <= b for a, b in itertools.pairwise(ticks))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from support.on_page import wait_until
 
-from emaviz.page.library.tab import LibraryTab
+from emaviz.page.library import LibraryTab
 
 pytestmark = pytest.mark.browser
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from ema_model.recordings import ColumnMapping, MappedColumn
-from emaviz.page.compare.cards import mapping_table
+from emaviz.page.compare.files import mapping_table
 
 
 @pytest.mark.parametrize(

@@ -11,9 +11,8 @@ from ema_model.actuator.reference import kinds_of_actuators, parameter_rows
 from ema_model.errors import InputError
 from ema_model.quantities.axes import Axes
 from emaviz.cli import main
-from emaviz.session.actuators import UPLOADED
 from emaviz.session.data_folder import DataFolder
-from emaviz.session.new_actuator import Description
+from emaviz.session.files import UPLOADED, Description
 
 ANSWERS = {
     "transmission.gear_ratio": "500:1",

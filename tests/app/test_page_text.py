@@ -13,13 +13,13 @@ from support import hostile
 from support.on_page import wait_until
 
 import emaviz
-from emaviz.figures import signature, theme, two_recordings
+from emaviz.figures import discovery, runs, theme
 from emaviz.page.app import App
 from emaviz.page.discover.tab import DiscoverTab
 from emaviz.page.explore.tab import ExploreTab
-from emaviz.page.runs.controls import _card
-from emaviz.session.archive import Recorded, recovered
-from emaviz.text.html import Html, escape, html, joined, said
+from emaviz.page.runs import _card
+from emaviz.session.saved import Recorded, recovered
+from emaviz.text.html import Html, html, html_escape, joined, said
 
 RAW = ("<iframe srcdoc", "<img", "<script", 'href="javascript')
 
@@ -32,7 +32,7 @@ def test_values_are_escaped_and_templates_are_not(name):
     )
     assert joined([name, Html("<i>a</i>"), name], "<br>") == f"{safe}<br><i>a</i><br>{safe}"
     assert Html("<b>") + name == f"<b>{safe}" and name + Html("<b>") == f"{safe}<b>"
-    assert isinstance(name + Html("<b>"), Html) and escape(escape(name)) == safe, "once"
+    assert isinstance(name + Html("<b>"), Html) and html_escape(html_escape(name)) == safe, "once"
     assert markup.unescape(said(name)).count(name) == 1
     assert html("{0!r} {named}", name, named=name) == f"{markup.escape(repr(name))} {safe}"
     assert html("{:>60}", Html("<b>")) == markup.escape(f"{'<b>':>60}"), "what is formatted is text again"
@@ -60,7 +60,7 @@ def test_the_page_gets_html_and_markdown_in_no_other_way():
 def test_figures_take_no_name_for_a_tag(name):
     figure, empty = theme.new(name, name, name).layout, theme.missing(name, name).layout
     texts = [figure.title.text, figure.xaxis.title.text, figure.yaxis.title.text, empty.annotations[0].text]
-    texts.append(signature._legend(SimpleNamespace(name=name)))
+    texts.append(discovery._legend(SimpleNamespace(name=name)))
     assert all(markup.escape(name, quote=False) in text for text in texts)
 
 
@@ -140,5 +140,5 @@ def test_recordings_and_what_they_say_of_themselves(app):
     recorded = Recorded(app.comparing.folder.recordings)
     first, second = (recorded.entry(f"{name}.rrd") for name in hostile.NAMES[:2])
     assert first.settings[hostile.FRAME] == hostile.FRAME and first.best == hostile.FRAME
-    for text in (two_recordings.table(first, second), _card(first), _card(second)):
+    for text in (runs.two_recordings_table(first, second), _card(first), _card(second)):
         assert isinstance(text, Html) and not any(sign in text for sign in RAW)

@@ -17,7 +17,7 @@ from ema_model.simulation.one_stack import library_stack, own_stack, stack_at_ha
 from ema_model.simulation.run import Run, simulate_monitor, simulate_reference
 from emaviz.page.app import App
 from emaviz.page.explore.tab import ExploreTab
-from emaviz.session.actuators import shipped_actuators
+from emaviz.session.files import shipped_actuators
 from emaviz.session.session import Session
 
 SERVO, DRIVE = "XL330 on a pendulum", "ODrive motor"

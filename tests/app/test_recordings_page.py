@@ -14,11 +14,11 @@ from support.on_page import field, wait_until
 from ema_model.actuator import load_actuator
 from ema_model.errors import InputError
 from ema_model.text import COLOURS
-from emaviz.figures import two_recordings
+from emaviz.figures import runs
 from emaviz.recording import RecordingWriter, read
-from emaviz.recording.entry import setting
+from emaviz.recording.file import setting
 from emaviz.recording.viewer import ViewerHost
-from emaviz.session.archive import Recorded
+from emaviz.session.saved import Recorded
 from emaviz.session.session import Session
 
 
@@ -137,15 +137,15 @@ def test_delete_removes_one(recorded, races):
 def test_two_recordings_share_their_axes(recorded, races):
     names = [race.path.name for race in races]
     first, second = (recorded.read(name) for name in names)
-    assert "current_A" in two_recordings.signals(first, second)
-    figure = two_recordings.figure(first, second, "current_A")
+    assert "current_A" in runs.signals(first, second)
+    figure = runs.two_recordings(first, second, "current_A")
     drawn = {trace.name: trace for trace in figure.data}
     assert {"A fitted", "B fitted", "A recorded", "B recorded", "A residual", "B residual"} <= set(drawn)
     assert {"A Dandelion", "A Honey Badger", "B Dandelion"} <= set(drawn)
     assert np.allclose(drawn["B Dandelion"].y, second.identification["do"].corrected)
     assert figure.layout.yaxis3.title.text == "Corrected<br>error [A]"
     assert drawn["A fitted"].yaxis == drawn["B fitted"].yaxis
-    text = two_recordings.table(*(recorded.entry(name) for name in names))
+    text = runs.two_recordings_table(*(recorded.entry(name) for name in names))
     assert "0.2 0 0" in text and "0.6 0 0" in text and "population" not in text, "only what differs"
     k1, k7 = (text[text.index(f"<td>{name}") :].split("</tr>")[0] for name in ("k1 friction", "k7"))
     assert COLOURS["warning"] in k1 and COLOURS["warning"] not in k7, (

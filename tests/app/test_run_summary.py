@@ -10,9 +10,9 @@ import pytest
 from support.on_page import wait_until
 
 from ema_model.quantities.numbers import with_uncertainty
-from emaviz.page.discover.guide import step
-from emaviz.session.archive import Recorded
+from emaviz.page.discover.tab import step
 from emaviz.session.run_summary import summary
+from emaviz.session.saved import Recorded
 
 
 @pytest.mark.parametrize(

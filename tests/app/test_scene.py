@@ -21,14 +21,14 @@ from ema_model.simulation.run import Run, simulate_reference
 from emaviz.page.docked import LEFT_PX, _width_px
 from emaviz.page.members import tabs
 from emaviz.page.style import STRIP_HEIGHT_PX
-from emaviz.scene import drive_box, drivetrain, motor, solids
-from emaviz.scene.actuator import _NAMES, ActuatorScene
-from emaviz.scene.drive_box import NAMED_AT
+from emaviz.scene import actuator as actuator_scene
+from emaviz.scene import solids
+from emaviz.scene.actuator import _NAMES, NAMED_AT, ActuatorScene
 from emaviz.scene.framing import BOXES, frame
 from emaviz.scene.labels import Label, lay_out
 from emaviz.scene.motion import enlargement, motion
-from emaviz.scene.palette import FAULT, RESIDUAL
 from emaviz.scene.playback import Playback
+from emaviz.scene.solids import FAULT, RESIDUAL
 from emaviz.server.safe_server import open_server
 from emaviz.session.session import Simulation
 
@@ -39,9 +39,9 @@ SOLIDS = {
     "ball": solids.ball(0.5),
     "wheel": solids.gear_wheel(14, 0.1, 0.0, 0.1),
     "thread": solids.thread(0.0, 1.0, 0.05, 0.05, 0.01),
-    "housing": motor._housing(),
-    "stator": motor._stator(),
-    "flap": drivetrain._flap(),
+    "housing": actuator_scene._housing(),
+    "stator": actuator_scene._stator(),
+    "flap": actuator_scene._flap(),
 }
 
 
@@ -81,7 +81,13 @@ def test_a_solid_is_made_of_real_triangles(name):
 
 
 def test_the_whole_actuator_has_few_triangles():
-    parts = (motor._housing(), motor._stator(), motor._rotor_core(), drivetrain._flap(), drivetrain._rails())
+    parts = (
+        actuator_scene._housing(),
+        actuator_scene._stator(),
+        actuator_scene._rotor_core(),
+        actuator_scene._flap(),
+        actuator_scene._rails(),
+    )
     assert sum(len(part.faces) for part in parts) < 6000
 
 
@@ -116,11 +122,11 @@ def test_positive_azimuths_and_turns_agree():
 
 @pytest.mark.parametrize("turn", [-0.6, -0.2, 0.0, 0.3, 0.6])
 def test_the_rod_keeps_its_length(turn):
-    _, at_rest = drivetrain._rod_of(0.0)
-    pin, rod = drivetrain._rod_of(turn)
+    _, at_rest = actuator_scene._rod_of(0.0)
+    pin, rod = actuator_scene._rod_of(turn)
     assert np.hypot(*rod) == pytest.approx(np.hypot(*at_rest), rel=1e-9)
-    assert pin[1] == pytest.approx(drivetrain._SCREW_Z + drivetrain._PIN_Z)
-    assert (pin[0] > drivetrain._NUT_X) == (turn > 0.0) or turn == 0.0
+    assert pin[1] == pytest.approx(actuator_scene._SCREW_Z + actuator_scene._PIN_Z)
+    assert (pin[0] > actuator_scene._NUT_X) == (turn > 0.0) or turn == 0.0
 
 
 @pytest.mark.parametrize("largest, factor", [(0.005, 100.0), (0.03, 20.0), (0.2, 3.0), (2.0, 1.0), (0.0, 1.0)])
@@ -233,9 +239,9 @@ def test_the_load_is_an_arrow_on_the_surface(scene, actuator):
 
 
 def test_the_drive_says_its_bus_and_its_delay(actuator):
-    assert drive_box.said(actuator) == "controller and inverter\n48 V bus"
+    assert actuator_scene.said(actuator) == "controller and inverter\n48 V bus"
     late = replace(actuator, effects={"computation_delay": {"delay_s": 1e-4}})
-    assert drive_box.said(late) == "controller and inverter\n48 V bus, delay 0.100 ms"
+    assert actuator_scene.said(late) == "controller and inverter\n48 V bus, delay 0.100 ms"
 
 
 def test_labels_leave_the_motor_to_be_seen(actuator):
@@ -351,8 +357,8 @@ class Meshes:
 
 def test_coils_burn_from_the_first_shorted_turn_on():
     scene = Meshes()
-    one = motor.Motor(scene, "/m", 2)
-    loop = len(motor._loop(1.0).faces)
+    one = actuator_scene.Motor(scene, "/m", 2)
+    loop = len(actuator_scene._loop(1.0).faces)
     for turns, burnt in (((1.0, 1.0, 1.0), 0), ((0.97, 1.0, 1.0), 2), ((0.5, 1.0, 0.25), 8 + 12), ((0.02, 1, 1), 16)):
         one.damage(turns, 0.0, 0.0)
         one.glow((0.0, 1.0, 0.5))

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from emaviz.text.sentence import begun
-from emaviz.text.told import warned
+from emaviz.text.results import begun, warned
 
 
 @pytest.mark.parametrize(

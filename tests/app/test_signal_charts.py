@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from emaviz.figures.signal_charts import charts, fitted
+from emaviz.figures.runs import charts, fitted
 
 POSITION = next(chart for chart in charts() if chart.signal == "user_position_rad")
 

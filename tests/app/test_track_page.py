@@ -10,7 +10,7 @@ from support.flights import flights
 from support.known_flights import FOLLOWING, known, write_flights
 from support.on_page import choose, fill, wait_until
 
-from emaviz.page.track.tab import TrackTab
+from emaviz.page.track import TrackTab
 
 pytestmark = pytest.mark.browser
 COUNT = 40

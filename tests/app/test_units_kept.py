@@ -10,9 +10,8 @@ import pytest
 
 from ema_model.actuator import load_actuator
 from ema_model.errors import InputError
-from ema_model.units.result import Alone, Difference, Need, OfRecording, OfType, Transfer, UnitsCompared
-from ema_model.units.summary import as_dict
-from emaviz.session.units.kept import read, saved
+from ema_model.units.result import Alone, Difference, Need, OfRecording, OfType, Transfer, UnitsCompared, as_dict
+from emaviz.session.units import read_saved, saved
 
 ACTUATOR = load_actuator()
 PLAY, GAIN = "transmission.backlash_rad", "controller.speed_gain_Nms_rad"
@@ -40,11 +39,11 @@ def kept(found: UnitsCompared | None = FOUND):
 
 
 def test_the_answer_comes_back_whole():
-    told, again = read(kept())
+    told, again = read_saved(kept())
     assert (told.folder, told.rule, told.actuator) == ("fleet", "*unseen*", ACTUATOR.name)
     assert again is not None and as_dict(again) == as_dict(FOUND) and str(again) == str(FOUND)
     assert again.type_actuator.value(PLAY) == 1.1e-5 and again.actuator.tolerances == ACTUATOR.tolerances
-    assert read(kept(None))[1] is None
+    assert read_saved(kept(None))[1] is None
 
 
 @pytest.mark.parametrize(
@@ -65,5 +64,5 @@ def test_what_makes_no_sense_is_refused_in_one_line(damage):
     given = kept()
     given["answer"] |= damage
     with pytest.raises(InputError, match="the session's") as told:
-        read(given)
+        read_saved(given)
     assert "\n" not in str(told.value)

@@ -10,7 +10,7 @@ from ema_model.actuator import load_actuator
 from emaviz.cli import main
 from emaviz.colours import LIMIT
 from emaviz.page.style import STRIP_HEIGHT_PX
-from emaviz.page.units.tab import UnitsTab
+from emaviz.page.units import UnitsTab
 
 pytestmark = pytest.mark.browser
 

@@ -12,10 +12,10 @@ from support.discovered import with_cogging
 
 from emaviz.page.compare.result import headline
 from emaviz.page.discover.result import answer
-from emaviz.report.comparison.answer import Answer
-from emaviz.report.discovery.verdict import Verdict
-from emaviz.report.section import Figures
-from emaviz.text.verdict import MEANINGS, of_discovery, of_units
+from emaviz.report.comparison import Answer
+from emaviz.report.discovery import Verdict
+from emaviz.report.page import Figures
+from emaviz.text.results import MEANINGS, of_discovery, of_units
 
 GREEN = MEANINGS["good"]
 

@@ -24,10 +24,10 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from support.foreign_files import FILES
 
 import emaviz.formats
-from ema_model.files import apart
+from ema_model.files import sandbox
 from ema_model.recordings import Measurement, write_measurement
-from ema_model.recordings.file import read_measurement
 from ema_model.recordings.formats import WRITTEN
+from ema_model.recordings.read import read_measurement
 
 assert emaviz.formats  # which join the others
 NAMES = "command_rad user_position_rad motor_position_rad motor_speed_rad_s current_A bus_voltage_V temperature_C"
@@ -47,7 +47,7 @@ def signals(samples: int) -> dict[str, np.ndarray]:
 
 def _computing() -> float:
     """Seconds that this process has computed, and those that read logs, the one that lives and those before it."""
-    alive = apart.process_id()
+    alive = sandbox.process_id()
     return sum(os.times()[:4]) + (sum(psutil.Process(alive).cpu_times()[:2]) if alive else 0.0)
 
 

@@ -17,7 +17,7 @@ from support.documents import result_of
 from ema_model.campaign import Store, load_plan, run_plan
 from ema_model.campaign import store as storing
 from ema_model.campaign.execute import execute
-from ema_model.campaign.version import version
+from ema_model.campaign.store import version
 from ema_model.errors import InputError
 from emaviz.cli import main
 

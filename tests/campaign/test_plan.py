@@ -13,7 +13,7 @@ from support.hidden_effects import ACTUATOR, plant
 from support.hidden_effects import recorded as by_hand
 
 from ema_model.campaign import load_plan, shipped_plans
-from ema_model.campaign.given import effects_of, given
+from ema_model.campaign.axes import effects_of, given
 from ema_model.campaign.kinds import KINDS
 from ema_model.campaign.task import from_json, text_hash
 from ema_model.effects import CATALOGUE

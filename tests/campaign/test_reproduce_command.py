@@ -12,17 +12,16 @@ from support.documents import result_of
 from test_campaign_command import Here
 
 from ema_model.actuator import load_actuator
-from ema_model.campaign import Store
-from ema_model.campaign.thesis import responses
-from ema_model.campaign.thesis.cases import BY_NAME
-from ema_model.campaign.thesis.deviations import DEVIATIONS
+from ema_model.campaign import Store, thesis
+from ema_model.campaign.thesis import BY_NAME, DEVIATIONS
 from ema_model.commands import command
 from ema_model.faults import NAMES, error_percent
 from ema_model.simulation.run import Run
 from emaviz.cli import main
 from emaviz.recording import reproduce as recording
 from emaviz.recording.read import read
-from emaviz.report.reproduce import SECTIONS, severities
+from emaviz.report import reproduce as report
+from emaviz.report.reproduce import SECTIONS
 
 PLAN = """
 [runs.short]
@@ -63,10 +62,10 @@ def made(plan, tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("ema_model.campaign.scheduler", lambda address, workers: Here())
         for name, settings in (("chirp", {}), ("step", {"time_s": 0.002})):
-            patch.setitem(responses.RUNS, name, Run(command(name, settings), 0.01))
+            patch.setitem(thesis.RUNS, name, Run(command(name, settings), 0.01))
         arguments = ["reproduce", "--plan", str(plan), "--out", str(folder), "--json", str(folder.parent / "r.json")]
         with pytest.MonkeyPatch.context() as without:  # severities, which take the longest to draw
-            for module in (responses, severities, recording):
+            for module in (thesis, report, recording):
                 without.setattr(module, "FAMILIES", ())
             assert main(arguments) == 0
         sizes = [(folder / name).stat().st_size for name in ("reproduce.html", "reproduce.rrd")]
@@ -135,10 +134,10 @@ def test_the_recording_holds_what_the_report_draws(made):
 def test_responses_are_those_of_the_models(made):
     """Both models on one time base; a fault that is not there changes nothing, a greater one more."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(responses.RUNS, "chirp", Run(command("chirp"), 0.02))
-        family = next(one for one in responses.FAMILIES if one.name == "friction")
-        runs = list(responses.responses(family, "chirp", load_actuator()).values())
-        healthy, faulty = responses.pairs(load_actuator())
+        patch.setitem(thesis.RUNS, "chirp", Run(command("chirp"), 0.02))
+        family = next(one for one in thesis.FAMILIES if one.name == "friction")
+        runs = list(thesis.responses(family, "chirp", load_actuator()).values())
+        healthy, faulty = thesis.pairs(load_actuator())
     peaks = [float(np.max(np.abs(one["current_A"]))) for one in runs]
     assert peaks == sorted(peaks) and peaks[-1] > 1.5 * peaks[0]
     np.testing.assert_array_equal(runs[0]["current_A"], healthy.reference["current_A"])

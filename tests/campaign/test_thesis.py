@@ -8,11 +8,26 @@ import numpy as np
 import pytest
 
 from ema_model.campaign import load_plan
-from ema_model.campaign.thesis import printed
-from ema_model.campaign.thesis.cases import ALGORITHMS, BY_NAME, CASES, EVERY, FAULTS, MULTIPLE, case_of
-from ema_model.campaign.thesis.responses import FAMILIES
-from ema_model.campaign.thesis.scores import SINGLE, Spread, coefficients, missed, scores
-from ema_model.campaign.thesis.trade_off import points, settled_at, stops
+from ema_model.campaign.thesis import (
+    ALGORITHMS,
+    BY_NAME,
+    CASES,
+    EVERY,
+    FAMILIES,
+    FAULTS,
+    MULTIPLE,
+    SINGLE,
+    Spread,
+    case_of,
+    missed,
+    points,
+    printed_means,
+    printed_rows,
+    scores,
+    scores_coefficients,
+    settled_at,
+    stops,
+)
 from ema_model.faults import NAMES, error_percent, physical, vector
 from ema_model.identification.run import ROBUST
 
@@ -36,25 +51,25 @@ def row(case, algorithm, k=None, error=None, time=1.0, **more):
 def as_the_thesis_printed():
     """Its 330 rows as if a campaign had made them, with the means of its times."""
     return [
-        row(one.case, one.algorithm, one.k, one.error_percent, printed.means()[one.case, one.algorithm].time_s)
-        for one in printed.rows()
+        row(one.case, one.algorithm, one.k, one.error_percent, printed_means()[one.case, one.algorithm].time_s)
+        for one in printed_rows()
     ]
 
 
 def test_the_eleven_cases_are_the_thesis_s():
     assert len(CASES) == 11
-    assert len(printed.rows()) == 330
-    assert len(printed.means()) == 33 == len({(one.case, one.algorithm) for one in printed.rows()})
+    assert len(printed_rows()) == 330
+    assert len(printed_means()) == 33 == len({(one.case, one.algorithm) for one in printed_rows()})
     assert case_of(vector({"k1": 0.3})) is None
     assert case_of([0.0133, 0.05, 0.003, 0, 0, 0.012, 0.5, 0.35]) is BY_NAME[MULTIPLE]
 
 
 def test_printed_errors_follow_from_printed_k_and_printed_means_from_printed_errors():
     rounding = 0.005 + 100.0 / math.sqrt(6.5) * 0.5e-4
-    for one in printed.rows():
+    for one in printed_rows():
         assert error_percent(one.k, one.truth) == pytest.approx(one.error_percent, abs=rounding + 1e-9), one
     for one in scores(as_the_thesis_printed(), tuple(ALGORITHMS)):
-        mean = printed.means()[one.case.name, one.algorithm].error_percent
+        mean = printed_means()[one.case.name, one.algorithm].error_percent
         assert one.error.mean == pytest.approx(mean, abs=0.0101), (one.case.name, one.algorithm)  # it cuts some off
         assert one.error == one.printed and one.difference == 0.0 and one.k == one.printed_k
         assert one.time_s.mean == one.printed_time_s and one.error.count == 10
@@ -62,7 +77,7 @@ def test_printed_errors_follow_from_printed_k_and_printed_means_from_printed_err
 
 def test_the_thesis_s_rows_give_its_coefficients():
     """T 5.39–5.43, as far as errors with two digits tell: half a unit of Err moves the smallest by some per cent."""
-    made = coefficients(scores(as_the_thesis_printed(), tuple(ALGORITHMS)))
+    made = scores_coefficients(scores(as_the_thesis_printed(), tuple(ALGORITHMS)))
     assert {one.fault for one in made} == {*FAULTS, MULTIPLE, SINGLE} and len(made) == 21
     for one in made:
         assert one.printed is not None
@@ -97,7 +112,7 @@ def test_runs_that_missed_are_told_apart():
     assert (one.count, one.missed) == (4, 1) and one.error_of_others == pytest.approx(8.0 / 3.0)
     assert (one.printed_count, one.printed_missed) == (110, 1)  # of table 5.17
     (ssa,) = missed([row("gain_low", "ssa")])
-    assert ssa.printed_missed == sum(one.error_percent > 5.0 for one in printed.rows() if one.algorithm == "ssa") >= 4
+    assert ssa.printed_missed == sum(one.error_percent > 5.0 for one in printed_rows() if one.algorithm == "ssa") >= 4
 
 
 def test_a_coefficient_needs_every_algorithm_on_low_and_high():
@@ -106,10 +121,10 @@ def test_a_coefficient_needs_every_algorithm_on_low_and_high():
         for name, error, time in (("ssa", 2.0, 3.0), ("hba", 1.0, 2.0), ("do", 4.0, 1.0))
         for size in ("low", "high")
     ]
-    found = coefficients(scores(made))
+    found = scores_coefficients(scores(made))
     assert [(one.fault, one.algorithm) for one in found] == [("friction", name) for name in ALGORITHMS]
     assert [one.percent for one in found] == pytest.approx([50.0, 100.0 * (1 - 2 / 12), 100.0 * (1 - 4 / 12)])
-    assert coefficients(scores(made[:-1])) == []
+    assert scores_coefficients(scores(made[:-1])) == []
     assert EVERY == (*ALGORITHMS, ROBUST)
 
 

@@ -11,8 +11,7 @@ from ema_model.campaign import Store, load_plan
 from ema_model.campaign.execute import common
 from ema_model.campaign.kinds.discover import tally
 from ema_model.campaign.kinds.identify import covered
-from ema_model.campaign.store import header_of
-from ema_model.campaign.summary import summaries
+from ema_model.campaign.store import header_of, summaries
 from ema_model.faults import HEALTHY, NAMES
 from emaviz.report.campaign import write_campaign_report
 from emaviz.text.campaign import progress_table, report_text

@@ -12,8 +12,8 @@ from support.cheap_plans import cheap
 from ema_model.campaign import load_plan
 from ema_model.campaign.execute import OtherVersion, execute
 from ema_model.campaign.one_compiler import Turns
-from ema_model.campaign.schedulers.processes import Processes
-from ema_model.campaign.version import version
+from ema_model.campaign.schedulers import Processes
+from ema_model.campaign.store import version
 from ema_model.simulation import one_stack
 
 COMPILES = """

@@ -19,7 +19,7 @@ from ema_model.commands import COMMANDS as MODEL_COMMANDS
 from ema_model.effects import CATALOGUE
 from ema_model.effects.user.entries import KINDS
 from ema_model.identification.run import ALGORITHMS
-from ema_model.recordings.file import read_measurement
+from ema_model.recordings.read import read_measurement
 from ema_model.simulation.plant import FITNESSES
 from emaviz.cli import main, options
 

@@ -12,7 +12,7 @@ from ema_model.effects import CATALOGUE
 from ema_model.effects.user.entries import KEYS
 from emaviz.cli import main
 from emaviz.report import effects as reference
-from emaviz.text.mathml import mathml
+from emaviz.text.html import mathml
 
 
 def test_the_users_own_are_listed_and_explained(tmp_path, capsys):

@@ -11,18 +11,18 @@ import numpy as np
 import pytest
 
 from ema_model.actuator import load_actuator
-from ema_model.challenges.sealed_file import sealed_challenge
+from ema_model.challenges.challenge import sealed_challenge
 from ema_model.commands import command
 from ema_model.effects import find
 from ema_model.effects.user import user_torque
 from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.recordings import ColumnMapping, MappedColumn
-from ema_model.recordings.columns.mapping import parse_mapping
-from ema_model.recordings.file import read_measurement
+from ema_model.recordings.columns import parse_mapping
+from ema_model.recordings.read import read_measurement
 from emaviz.cli import main
 from emaviz.session import saved as session_file
-from emaviz.session.archive import Recorded
 from emaviz.session.data_folder import DataFolder
+from emaviz.session.saved import Recorded
 from emaviz.session.settings import Settings
 
 LONG = "A" * 50_000
@@ -173,7 +173,7 @@ def test_what_a_browser_and_a_session_send(tmp_path, text):
         with zipfile.ZipFile(path, "w") as archive:
             archive.writestr(session_file._DOCUMENT, json.dumps(document))
         with pytest.raises(InputError) as told:
-            session_file.read(path, {}, folder)
+            session_file.saved_read(path, {}, folder)
         one_line(told.value)
 
 

@@ -7,7 +7,7 @@ from options_of import needed, options_with_values
 
 from ema_model.simulation import plant, run
 from emaviz.cli import main
-from emaviz.cli.numbers import Number
+from emaviz.cli.options import Number
 
 NUMBERS = [one for one in options_with_values() if isinstance(one[2].type, Number)]
 HOSTILE = ("nan", "inf", "-inf", "9" * 5000, "-" + "9" * 5000, "", "many", "1e999")

@@ -20,7 +20,7 @@ from ema_model.recordings import Measurement, read, write_measurement
 from ema_model.simulation import run as simulating
 from ema_model.simulation.run import Run, simulate_reference
 from emaviz.cli import main
-from emaviz.session.compare.comparing import Comparing
+from emaviz.session.compare import Comparing
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.discover.source import DiscoverySource
 from emaviz.session.session import Session

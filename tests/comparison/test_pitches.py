@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ema_model.comparison import pitches as of_pitches
-from ema_model.comparison.pitches import HIGHEST, pitches
+from ema_model.comparison import explain
+from ema_model.comparison.explain import HIGHEST, pitches
 
 X = 0.1 * np.sin(np.linspace(0.0, 20.0, 3000)) + 0.02  # m, not evenly
 NOISE = 0.2 * np.random.default_rng(3).standard_normal(X.size)
@@ -37,7 +37,7 @@ def test_as_many_at_once_as_memory_lets_tell_the_same(monkeypatch):
     values = np.sin(2.0 * np.pi * 40.0 * x) + NOISE[::10]
     at_once = pitches(x, values)
     for size in (x.size, 7 * x.size):
-        monkeypatch.setattr(of_pitches, "_AT_ONCE", size)
+        monkeypatch.setattr(explain, "_AT_ONCE", size)
         assert [one.order for one in pitches(x, values)] == pytest.approx([one.order for one in at_once])
 
 

@@ -19,13 +19,12 @@ import ema_model
 from ema_model.actuator import load_actuator
 from ema_model.challenges import challenges, folder
 from ema_model.challenges.__main__ import main
-from ema_model.challenges.make import COLUMNS, RUNS, make, plant_of
-from ema_model.challenges.truth import read_truth, truths
+from ema_model.challenges.challenge import COLUMNS, RUNS, make, plant_of, read_truth, truths
 from ema_model.discovery import discover
 from ema_model.effects import CATALOGUE
 from ema_model.errors import InputError
 from ema_model.estimation import default_free
-from ema_model.recordings.file import read_measurement
+from ema_model.recordings.read import read_measurement
 
 # A few that a test has time for.
 NAMES = ("cogging_torque", "stribeck_friction", "hinge_moment", "dead_time")

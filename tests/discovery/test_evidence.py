@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from ema_model.comparison.orders import colour as around_orders
+from ema_model.comparison.explain import colour as around_orders
 from ema_model.discovery.candidates.harmonics import _stands_out
 from ema_model.discovery.candidates.paid_for import _lasts
 from ema_model.discovery.criteria import LEAST_BIC

@@ -11,14 +11,11 @@ from ema_model.comparison.criteria import BAND
 from ema_model.discovery import as_dict, begun, discover, result_of
 from ema_model.discovery.candidates.next_experiment import next_experiment
 from ema_model.discovery.result import Candidate, Change
-from ema_model.discovery.shown.fault_pages import PAGES, size, typical
-from ema_model.discovery.shown.labels import effect_title, rung_label, rung_title
-from ema_model.discovery.shown.tables import candidates
 from ema_model.discovery.steps.snapshot import assessed
+from ema_model.discovery.words import PAGES, candidates, effect_title, rung_label, rung_title, size, typical
 from ema_model.faults import BY_NAME, CAUSES, vector
 from ema_model.quantities.axes import ROTARY
-from ema_model.simulation.run import Run, simulate_reference
-from ema_model.simulation.sensors import Sensors
+from ema_model.simulation.run import Run, Sensors, simulate_reference
 
 ACTUATOR = load_actuator()
 RIG = Sensors(current_noise_A=0.45, encoder_bits=12)

@@ -13,11 +13,10 @@ from ema_model.discovery.candidates.faults import scored_faults, tried_faults
 from ema_model.discovery.discover import result_of
 from ema_model.discovery.model_fit import holdout_error
 from ema_model.discovery.result import Change
-from ema_model.discovery.shown.summary import as_dict
 from ema_model.discovery.steps.begin import begun
+from ema_model.discovery.words import as_dict
 from ema_model.faults import vector
-from ema_model.simulation.run import Run, simulate_reference
-from ema_model.simulation.sensors import Sensors
+from ema_model.simulation.run import Run, Sensors, simulate_reference
 
 ACTUATOR = load_actuator()
 RIG = Sensors(current_noise_A=0.45, encoder_bits=12)

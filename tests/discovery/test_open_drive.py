@@ -10,7 +10,7 @@ from support.unknown_drive import drive_of
 from ema_model.comparison import compare
 from ema_model.comparison.sentences import OPEN_LOOP
 from ema_model.discovery import Discovery, discover
-from ema_model.discovery.shown.sentences import OPEN_LOOP_LEFT
+from ema_model.discovery.words import OPEN_LOOP_LEFT
 
 
 def found_of(folder, hidden=None, noise_A: float = 0.05, seed: int = 0) -> Discovery:

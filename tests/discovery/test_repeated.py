@@ -9,12 +9,10 @@ import pytest
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
 from ema_model.discovery.discover import result_of
-from ema_model.discovery.shown.summary import as_dict
 from ema_model.discovery.steps.begin import begun
-from ema_model.discovery.words import document_of
+from ema_model.discovery.words import as_dict, document_of
 from ema_model.faults import vector
-from ema_model.simulation.run import Run, simulate_reference
-from ema_model.simulation.sensors import Sensors
+from ema_model.simulation.run import Run, Sensors, simulate_reference
 
 ACTUATOR = load_actuator()
 

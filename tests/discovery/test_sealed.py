@@ -12,16 +12,12 @@ import numpy as np
 import pytest
 
 from ema_model.actuator import load_actuator
-from ema_model.challenges import opened, sealed_challenge
-from ema_model.challenges import sealed_file as layout
-from ema_model.challenges.make import RUNS
-from ema_model.challenges.sealing import seal, unseal
-from ema_model.challenges.truth import Truth
+from ema_model.challenges import challenge, opened, sealed_challenge
+from ema_model.challenges.challenge import RUNS, Truth, seal, unseal
 from ema_model.effects import CATALOGUE
 from ema_model.errors import InputError
 from ema_model.recordings import read
-from ema_model.simulation.run import simulate_reference
-from ema_model.simulation.sensors import Sensors
+from ema_model.simulation.run import Sensors, simulate_reference
 
 HIDDEN = {"cogging_torque": {"amplitude_Nm": 0.02, "order": 12.0, "phase_rad": 0.5}}
 TRUTH = Truth("", 7, "Hidden: cogging torque.", HIDDEN, faults={"k1": 0.4})
@@ -75,11 +71,13 @@ def test_the_answer_cannot_be_seen_by_a_glance(sealed):
 
 
 def test_sealing_the_same_twice_tells_nothing(sealed, tmp_path):
-    parts = layout.read_parts(sealed)
+    parts = challenge.read_parts(sealed)
     head = {"title": "x", "grade": 0, "story": "y", "training": ["chirp.parquet"], "holdout": []}
     seals = []
     for name in ("a", "b"):
-        layout.write_sealed(tmp_path / f"{name}.challenge", head, {k: v for k, v in parts.items() if "json" not in k})
+        challenge.write_sealed(
+            tmp_path / f"{name}.challenge", head, {k: v for k, v in parts.items() if "json" not in k}
+        )
         with zipfile.ZipFile(tmp_path / f"{name}.challenge") as archive:
             seals.append(json.loads(archive.read("seal.json"))["sha256"])
     assert seals[0] != seals[1]
@@ -145,9 +143,9 @@ def test_no_zip_at_all(tmp_path, content):
 
 def resealed(sealed, path, head=None, **parts):
     """With other parts under a good seal: whoever seals may be hostile, too."""
-    known = {name: content for name, content in layout.read_parts(sealed).items() if name != "challenge.json"}
-    told = json.loads(layout.read_parts(sealed)["challenge.json"])
-    layout.write_sealed(path, {**told, **(head or {})}, {**known, **parts})
+    known = {name: content for name, content in challenge.read_parts(sealed).items() if name != "challenge.json"}
+    told = json.loads(challenge.read_parts(sealed)["challenge.json"])
+    challenge.write_sealed(path, {**told, **(head or {})}, {**known, **parts})
     return path
 
 
@@ -165,7 +163,7 @@ def test_a_hostile_sealer_is_told_in_one_line(sealed, tmp_path):
         with pytest.raises(InputError, match=re.escape(says)):
             sealed_challenge(resealed(sealed, path, head))
     long = sealed_challenge(resealed(sealed, path, {"title": "x\x00\n" * 999}))
-    assert len(long.title) <= layout.MOST_CHARACTERS["title"] and "\x00" not in long.title
+    assert len(long.title) <= challenge.MOST_CHARACTERS["title"] and "\x00" not in long.title
     bomb = zlib.compress(b" " * 50_000_000)
     for hidden in (b"", b"!!", b"aGVsbG8=", zlib.compress(b"{}"), base64.b64encode(bomb)):
         with pytest.raises(InputError, match=r"x\.challenge: "):

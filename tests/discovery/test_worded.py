@@ -8,12 +8,18 @@ from dataclasses import replace
 import pytest
 from support.discovered import with_cogging
 
+from ema_model.discovery import words
 from ema_model.discovery.result import Change, StoodIn
-from ema_model.discovery.shown import tables
-from ema_model.discovery.shown.labels import effect_title, rung_label
-from ema_model.discovery.shown.sentences import NOT_REPEATABLE, masked, untold
-from ema_model.discovery.shown.summary import as_dict
-from ema_model.discovery.words import moved, sentences
+from ema_model.discovery.words import (
+    NOT_REPEATABLE,
+    as_dict,
+    effect_title,
+    masked,
+    moved,
+    rung_label,
+    untold,
+    words_sentences,
+)
 from ema_model.estimation import Calibrated
 from ema_model.quantities.axes import ROTARY, Axes
 from emaviz.report import write_discovery_report
@@ -37,7 +43,7 @@ def test_parameters_that_masked_an_effect_are_named_as_on_the_page(tmp_path):
         effects=[replace(one, stood_in=moved), later],
         warnings=[untold("cogging_torque", "torque_ripple"), NOT_REPEATABLE],
     )
-    assert lines[0] in as_dict(told)["warnings"] and lines[0] in sentences(told)
+    assert lines[0] in as_dict(told)["warnings"] and lines[0] in words_sentences(told)
     assert not any(RAW.search(line) for line in as_dict(told)["warnings"])
     write_discovery_report(told, tmp_path / "report.html")
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
@@ -72,8 +78,8 @@ def test_a_parameter_that_an_effect_takes_beyond_its_tolerance_is_told_by_the_ef
         calibration=calibration,
         parameters_outside_tolerance=[path],
     )
-    assert "Outside its tolerance: motor viscous friction." in sentences(told)
-    assert [facts.title for facts in tables.added(told)] == [facts.title for facts in tables.added(found)]
+    assert "Outside its tolerance: motor viscous friction." in words_sentences(told)
+    assert [facts.title for facts in words.added(told)] == [facts.title for facts in words.added(found)]
 
 
 def test_orders_along_a_linear_motor_are_pitches():
@@ -86,7 +92,7 @@ def test_a_refit_that_diverged_is_called_so_and_a_poor_one_has_its_number():
     found = with_cogging()
     one, other, *rest = found.candidates
     told = replace(found, candidates=[replace(one, refitted_drop=-1.4e16), replace(other, refitted_drop=-3.0), *rest])
-    table = tables.candidates(told)
+    table = words.candidates(told)
     assert table is not None
     refitted = {row[0]: row[2] for row in table.rows}
     assert refitted[effect_title(one.name)] == "refit diverged" and refitted[effect_title(other.name)] == "−3"

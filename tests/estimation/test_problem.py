@@ -12,7 +12,7 @@ from ema_model.commands import command
 from ema_model.effects import find
 from ema_model.estimation import calibrate, floor
 from ema_model.estimation.calibrate import calibrated, problem_of
-from ema_model.estimation.descent import Descent
+from ema_model.estimation.least_squares import Descent
 from ema_model.estimation.problem import TOGETHER
 from ema_model.estimation.unknowns import K_SIGMA, to_vector, unknowns_of
 from ema_model.faults import HEALTHY, NAMES, vector
@@ -20,8 +20,7 @@ from ema_model.identification.fit import setting
 from ema_model.identification.objective import Objective
 from ema_model.models import model_for
 from ema_model.simulation.plant import simulated
-from ema_model.simulation.run import Run, simulate_reference
-from ema_model.simulation.sensors import Sensors
+from ema_model.simulation.run import Run, Sensors, simulate_reference
 
 ACTUATOR = load_actuator()
 BLIND = replace(ACTUATOR, controller=replace(ACTUATOR.controller, kind="unknown"))

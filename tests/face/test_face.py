@@ -14,8 +14,8 @@ import pytest
 import ema_model as em
 from ema_model.recordings import write_measurement
 from ema_model.text import Document, Facts, Lines, Note, Remark, Remarks, Table
-from emaviz.recording.markdown import written
-from emaviz.text.told import shown
+from emaviz.recording.writer import written
+from emaviz.text.results import shown
 
 PROJECT = Path(__file__).parents[2]
 NOTEBOOKS = sorted((PROJECT / "assets" / "notebooks").glob("*.ipynb"))

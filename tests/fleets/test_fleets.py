@@ -11,8 +11,7 @@ import pytest
 from ema_model.actuator import load_actuator
 from ema_model.errors import InputError
 from ema_model.fleets import RUNS, draw, recorded
-from ema_model.fleets.files import TRUTH, read_truth, told, write
-from ema_model.fleets.own import own
+from ema_model.fleets.fleet import TRUTH, own, read_truth, told, write
 from ema_model.recordings import read
 
 ACTUATOR = load_actuator()

@@ -14,8 +14,8 @@ from ema_model.actuator import load_actuator
 from ema_model.commands import command
 from ema_model.discovery.model_fit import with_effect
 from ema_model.errors import InputError
-from ema_model.estimation.descent import Descent
 from ema_model.estimation.feldman_cousins import above_zero, length_of_vector
+from ema_model.estimation.least_squares import Descent
 from ema_model.estimation.unknowns import to_k, to_vector
 from ema_model.identification.base_spreads import most_likely_spreads
 from ema_model.identification.fit import refine, setting
@@ -23,8 +23,7 @@ from ema_model.identification.model_bias import TWINS, _spread, twins
 from ema_model.identification.objective import Objective
 from ema_model.identification.run import identify
 from ema_model.simulation.plant import simulated
-from ema_model.simulation.run import Run, simulate_reference
-from ema_model.simulation.sensors import Sensors
+from ema_model.simulation.run import Run, Sensors, simulate_reference
 
 ACTUATOR = load_actuator()
 MULTI = {"k1": 0.0133, "k2": 0.05, "k3": 0.003, "k6": 0.012, "k8": 0.35}

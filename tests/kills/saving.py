@@ -17,7 +17,7 @@ import numpy as np
 
 from ema_model.actuator import load_actuator, save_actuator
 from ema_model.recordings import Measurement, write_measurement
-from ema_model.recordings.file import read_measurement
+from ema_model.recordings.read import read_measurement
 from emaviz.cli.output import write_json
 from emaviz.recording import RecordingWriter, read
 from emaviz.session import saved as session_file
@@ -39,7 +39,7 @@ def _save_session(path: Path, number: int) -> None:
 def _read_session(path: Path) -> list[int]:
     found: list[int] = []
     part = session_file.Part(list, lambda saved, names: found.extend(saved))
-    session_file.read(path, {"numbers": part}, DataFolder(path.parent / "data"))
+    session_file.saved_read(path, {"numbers": part}, DataFolder(path.parent / "data"))
     return found
 
 

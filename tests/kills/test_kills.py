@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from saving import KINDS, SIZE
 
-from ema_model.files.whole_file import remove_abandoned
-from emaviz.recording.recover import recover
+from ema_model.files.written import remove_abandoned
+from emaviz.recording.read import recover
 
 LONGEST_S = 0.25  # until the kill; several savings of each kind
 

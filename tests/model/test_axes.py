@@ -21,13 +21,11 @@ from ema_model.models.inverse_dynamics import InverseDynamics
 from ema_model.models.loop_window import cut
 from ema_model.quantities.axes import Axes
 from ema_model.recordings import Measurement
-from ema_model.recordings.checks import check_needed
 from ema_model.recordings.health.card import health
-from ema_model.recordings.prepared import prepared
-from ema_model.simulation.run import Run, finite
-from ema_model.simulation.words import run_in_words
+from ema_model.recordings.read import check_needed, prepared
+from ema_model.simulation.run import Run, finite, run_in_words
 from emaviz.cli.given import effects_of
-from emaviz.figures.signal_charts import charts
+from emaviz.figures.runs import charts
 
 PROJECT = Path(__file__).parents[2]
 ROTARY, LINEAR = Axes(), Axes("linear", "linear")

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from ema_model import stacks
-from ema_model.kernel_cache.folder import cache_folder
+from ema_model.kernel_cache import cache_folder
 
 pytestmark = pytest.mark.skipif(
     "fork" not in multiprocessing.get_all_start_methods(), reason="this system does not fork processes"

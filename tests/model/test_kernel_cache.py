@@ -17,10 +17,8 @@ import numpy as np
 import pytest
 
 import ema_model.stacks
-from ema_model.kernel_cache import folder as kernel_cache
-from ema_model.kernel_cache import kept as kept_kernels
-from ema_model.kernel_cache.folder import cache_folder
-from ema_model.kernel_cache.kept import kept
+from ema_model import kernel_cache
+from ema_model.kernel_cache import cache_folder, kept
 from ema_model.stacks import find_stack
 
 PARENT = Path(ema_model.stacks.__file__).parents[1]
@@ -35,7 +33,7 @@ def root(tmp_path, monkeypatch):
     """An empty cache's root, which this process uses during the test."""
     path = tmp_path / "cache"
     monkeypatch.setenv("EMAVIZ_CACHE_DIR", str(path))
-    monkeypatch.setattr(kept_kernels, "_told", [])
+    monkeypatch.setattr(kernel_cache, "_told", [])
     kernel_cache._find.cache_clear()
     yield path
     kernel_cache._find.cache_clear()
@@ -157,7 +155,7 @@ def test_a_planted_kernel_is_executed_only_where_none_but_the_user_can_plant_it(
     assert tiny()(3.0) == 9.0
     marker, [file] = tmp_path / "executed", cache_folder().iterdir()
     content = pickle.dumps(Planted(marker))
-    file.write_bytes(kept_kernels._checksum(file, content) + content)
+    file.write_bytes(kernel_cache._checksum(file, content) + content)
     with pytest.raises(TypeError):  # it is no kernel
         tiny()(3.0)
     assert marker.exists(), "the trap works"
@@ -242,7 +240,7 @@ def test_a_kernel_that_cannot_be_kept_runs(root, monkeypatch):
     def full(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(kept_kernels.os, "replace", full)
+    monkeypatch.setattr(kernel_cache.os, "replace", full)
     assert tiny()(3.0) == 9.0
     assert not list(cache_folder().iterdir()), "no draft is left"
 
@@ -250,7 +248,7 @@ def test_a_kernel_that_cannot_be_kept_runs(root, monkeypatch):
 PROCESS = """
 import sys
 import numba
-from ema_model.kernel_cache.kept import kept
+from ema_model.kernel_cache import kept
 
 @kept(numba.njit)
 def sum_of_thrice(x):
@@ -278,7 +276,7 @@ def test_two_processes_may_heal_the_same_kernel_at_once(root):
             out, error = process.communicate(timeout=60)
             assert out == "9.0\n" and len(error.splitlines()) <= 1, error
         [file] = folder.iterdir()
-        assert kept_kernels._read(file), "whole"
+        assert kernel_cache._read(file), "whole"
         os.truncate(file, file.stat().st_size - 100)
 
 

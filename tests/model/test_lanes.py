@@ -20,8 +20,7 @@ from ema_model.simulation import run as simulation
 from ema_model.simulation.one_stack import stack_at_hand
 from ema_model.simulation.pack import initial_state, monitor_rows
 from ema_model.simulation.plant import simulated
-from ema_model.simulation.run import Run, simulate_monitor
-from ema_model.simulation.traced import traced
+from ema_model.simulation.run import Run, simulate_monitor, traced
 from ema_model.stacks import CIRCUITS, exclusive, find_stack
 
 ACTUATOR = load_actuator()

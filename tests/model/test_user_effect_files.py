@@ -14,7 +14,7 @@ from ema_model.commands import command
 from ema_model.effects import find
 from ema_model.effects.user import UserEffect, torque_curve, user_torque
 from ema_model.errors import InputError
-from ema_model.recordings.file import read_measurement
+from ema_model.recordings.read import read_measurement
 from ema_model.simulation.run import Run, simulate_monitor
 from emaviz.cli import main
 from emaviz.cli.given import split_at_commas

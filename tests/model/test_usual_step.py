@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ema_model.actuator import load_actuator
-from ema_model.models.stretches import evaluation_stretches, fit_stretches
+from ema_model.models.measured_motion import evaluation_stretches, fit_stretches
 from ema_model.recordings import Measurement
 
 DRIVE = """

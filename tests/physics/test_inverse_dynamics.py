@@ -10,7 +10,7 @@ from ema_model.actuator import Actuator, load_actuator
 from ema_model.effects import CATALOGUE
 from ema_model.errors import InputError
 from ema_model.models import InverseDynamics
-from ema_model.models.motion import motion_of
+from ema_model.models.measured_motion import motion_of
 from ema_model.physics.rows import LANES
 from ema_model.recordings import Measurement, SideFile
 from ema_model.simulation.one_stack import stack_at_hand

@@ -12,7 +12,7 @@ from ema_model.commands import command
 from ema_model.comparison import compare
 from ema_model.comparison.sentences import OPEN_LOOP
 from ema_model.discovery import begun
-from ema_model.discovery.shown.sentences import OPEN_LOOP_LEFT
+from ema_model.discovery.words import OPEN_LOOP_LEFT
 from ema_model.errors import InputError
 from ema_model.models.open_loop import simulate_open_loop
 from ema_model.recordings import Measurement

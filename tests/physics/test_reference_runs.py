@@ -7,7 +7,7 @@ import pytest
 
 from ema_model.actuator import load_actuator
 from ema_model.commands import Recorded
-from ema_model.simulation.reference_runs import SHOWN, simulate_references
+from ema_model.simulation.plant import SHOWN, simulate_references
 from ema_model.simulation.run import Run, simulate_reference
 
 ACTUATOR = load_actuator()

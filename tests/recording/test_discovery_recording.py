@@ -11,7 +11,7 @@ from support.discovered import with_cogging, with_unknown
 from ema_model.errors import InputError
 from ema_model.quantities.numbers import number
 from emaviz.recording import read
-from emaviz.recording.discovery.write import write_discovery
+from emaviz.recording.discovery import write_discovery
 
 
 @pytest.fixture(scope="module")

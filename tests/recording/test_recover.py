@@ -17,8 +17,7 @@ from support.on_page import wait_until
 
 from emaviz.cli import main
 from emaviz.recording import RecordingError, RecordingWriter, writer
-from emaviz.recording.read import read
-from emaviz.recording.recover import recover
+from emaviz.recording.read import read, recover
 
 RUN = """
 import sys, time, numpy as np

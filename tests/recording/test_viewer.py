@@ -10,8 +10,7 @@ import sys
 
 import pytest
 
-from ema_model.files.lock import FileLock
-from ema_model.files.whole_file import lock_path
+from ema_model.files.written import FileLock, lock_path
 from emaviz.recording import RecordingError, RecordingWriter
 from emaviz.recording.viewer import ViewerHost, view
 

@@ -18,7 +18,7 @@ from scipy.sparse import csc_matrix
 
 from ema_model.errors import InputError
 from ema_model.recordings import read_columns
-from ema_model.recordings.file import read_measurement
+from ema_model.recordings.read import read_measurement
 
 N = 120
 LIMIT = 10_000_000  # bytes

@@ -10,7 +10,7 @@ from unittest.mock import Mock
 
 import pytest
 
-from ema_model.files.whole_file import new_draft, remove_abandoned, whole_file
+from ema_model.files.written import new_draft, remove_abandoned, whole_file
 from emaviz.session.data_folder import DataFolder
 
 WRITING = """

@@ -13,8 +13,8 @@ from scipy.io import savemat
 
 from ema_model.errors import InputError
 from ema_model.recordings import SIGNALS, Measurement, read_columns, write_measurement
-from ema_model.recordings.file import read_measurement
 from ema_model.recordings.formats import FORMATS, WRITTEN
+from ema_model.recordings.read import read_measurement
 
 N = 150
 k = np.arange(float(N))

@@ -17,8 +17,7 @@ from ema_model.recordings import (
     with_equivalent_current,
 )
 from ema_model.recordings.health.card import health
-from ema_model.simulation.run import Run, simulate_reference
-from ema_model.simulation.sensors import Sensors
+from ema_model.simulation.run import Run, Sensors, simulate_reference
 
 ACTUATOR = load_actuator()
 PERIOD = 1e-3

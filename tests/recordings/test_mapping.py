@@ -19,8 +19,8 @@ from ema_model.recordings import (
     guess_mapping,
     parse_mapping,
 )
-from ema_model.recordings.columns.guess import doubt
-from ema_model.recordings.file import read_measurement
+from ema_model.recordings.columns import doubt
+from ema_model.recordings.read import read_measurement
 
 # header: the signal of each column in its order, with the unit where it is not the signal's own; - is left aside
 HEADERS = {

@@ -11,8 +11,8 @@ from support.foreign_files import mat73, tdms
 
 from ema_model.errors import InputError
 from ema_model.recordings import read_columns
-from ema_model.recordings.file import read_measurement
 from ema_model.recordings.formats import mdf
+from ema_model.recordings.read import read_measurement
 
 N = 120
 TIME = np.arange(N) / 1e3

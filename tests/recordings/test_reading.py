@@ -12,8 +12,8 @@ import pytest
 from ema_model.errors import InputError
 from ema_model.quantities.signals import lookalikes
 from ema_model.recordings import SIGNALS, Measurement, check_needed, write_measurement
-from ema_model.recordings.file import read_measurement
 from ema_model.recordings.formats import WRITTEN
+from ema_model.recordings.read import read_measurement
 
 N = 120
 

@@ -10,7 +10,7 @@ from scipy.io import savemat
 from support.mat_structs import row_of_structs
 
 from ema_model.recordings import read_columns
-from ema_model.recordings.file import read_header, read_measurement
+from ema_model.recordings.read import read_header, read_measurement
 from ema_model.recordings.recording_set import runs_of
 
 

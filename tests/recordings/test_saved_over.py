@@ -15,9 +15,8 @@ from hypothesis import strategies as st
 from ema_model.actuator import load_actuator, save_actuator
 from ema_model.actuator.parameters import Tolerance
 from ema_model.errors import InputError
-from ema_model.files import whole_file
-from ema_model.files.lock import FileLock
-from ema_model.files.toml_write import inline, toml_text
+from ema_model.files import written
+from ema_model.files.written import FileLock, inline, toml_text
 from ema_model.recordings import ColumnMapping, MappedColumn, SideFile, change_side_file, read_side_file
 from ema_model.recordings.formats.text_layout import Hints
 
@@ -179,12 +178,12 @@ def test_a_killed_holders_lock_does_not_block(tmp_path, monkeypatch):
     path = tmp_path / "a.toml"
     holder = started(HOLDING, str(path))
     try:
-        lock = whole_file.lock_path(path)
+        lock = written.lock_path(path)
         assert FileLock.acquire(lock) is None and FileLock.is_held(lock)
     finally:
         holder.kill()
         holder.communicate()
     assert lock.exists() and not FileLock.is_held(lock)
-    monkeypatch.setattr(whole_file, "_LONGEST_S", 0.0)  # without any wait
+    monkeypatch.setattr(written, "_LONGEST_S", 0.0)  # without any wait
     change_side_file(path, SideFile(), sampling="mean")
     assert read_side_file(path).sampling == "mean" and [one.name for one in tmp_path.iterdir()] == ["a.toml"]

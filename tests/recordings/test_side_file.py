@@ -25,9 +25,9 @@ from ema_model.recordings import (
     side_path,
     write_side_file,
 )
-from ema_model.recordings.file import read_measurement
 from ema_model.recordings.formats.text_layout import ENCODINGS, Hints
-from ema_model.recordings.side_file.read import SENSOR_KEYS
+from ema_model.recordings.read import read_measurement
+from ema_model.recordings.side_file import SENSOR_KEYS
 
 N = 600
 TEXT = """

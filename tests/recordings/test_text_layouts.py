@@ -9,8 +9,8 @@ import pytest
 
 from ema_model.errors import InputError
 from ema_model.recordings import read_columns, read_head
-from ema_model.recordings.file import read_header, read_measurement
 from ema_model.recordings.formats.text_layout import Hints
+from ema_model.recordings.read import read_header, read_measurement
 
 N = 240
 k = np.arange(N)

@@ -11,13 +11,12 @@ import pytest
 from ema_model.actuator import load_actuator
 from ema_model.challenges import sealed_challenge
 from ema_model.errors import InputError
-from ema_model.files.user_file import open_user_file
+from ema_model.files.opened import open_user_file
 from ema_model.recordings import read, read_columns, read_side_file
-from ema_model.recordings.file import read_measurement
+from ema_model.recordings.read import read_measurement
 from emaviz.cli import main
 from emaviz.recording import RecordingError
-from emaviz.recording.read import check
-from emaviz.recording.recover import recover, recover_part
+from emaviz.recording.read import check, recover, recover_part
 from emaviz.session import saved as session_file
 from emaviz.session.data_folder import DataFolder
 
@@ -30,7 +29,7 @@ DOORS = {
     "columns": (read_columns, "a.csv"),
     "recording": (lambda path: read(path, load_actuator()), "a.csv"),
     "challenge": (sealed_challenge, "a.challenge"),
-    "session": (lambda path: session_file.read(path, {}, DataFolder(path.parent)), "a.emaviz"),
+    "session": (lambda path: session_file.saved_read(path, {}, DataFolder(path.parent)), "a.emaviz"),
     "taken in": (lambda path: DataFolder(path.parent / "data").take_in(path), "a.csv"),
     "rrd": (check, "a.rrd"),
     "part": (lambda path: recover_part(path, path.with_name("b.rrd")), "a.rrd.part"),

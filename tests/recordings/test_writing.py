@@ -13,9 +13,8 @@ from hypothesis import strategies as st
 
 from ema_model.errors import InputError
 from ema_model.recordings import SIGNALS, Measurement, write_measurement
-from ema_model.recordings.checks import LARGEST
-from ema_model.recordings.file import read_measurement
 from ema_model.recordings.formats import WRITTEN
+from ema_model.recordings.read import LARGEST, read_measurement
 
 N = 120
 each_format = pytest.mark.parametrize("suffix", sorted(WRITTEN))

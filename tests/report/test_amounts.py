@@ -11,8 +11,8 @@ from ema_model.comparison.result import SignalError
 from ema_model.comparison.verdict import judge
 from ema_model.comparison.words import held_out
 from emaviz.page.compare.result import numbers
-from emaviz.recording.markdown import written
-from emaviz.report.comparison.errors_per_signal import ErrorsPerSignal
+from emaviz.recording.writer import written
+from emaviz.report.comparison import ErrorsPerSignal
 
 SIZES = {  # of the error and its floor, A: as both are to be read
     (0.2, 0.12): ("0.200", "0.120", "A"),

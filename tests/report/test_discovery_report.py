@@ -15,9 +15,9 @@ from ema_model.discovery import Discovery
 from ema_model.discovery.result import Experiment
 from ema_model.errors import InputError
 from ema_model.quantities.numbers import number
-from emaviz.figures import error_ladder
+from emaviz.figures import discovery
 from emaviz.report import write_discovery_report
-from emaviz.text.mathml import mathml
+from emaviz.text.html import mathml
 
 HOSTILE = '</script><script>window.bad = 1</script><img src="x" onerror="window.bad = 2">&amp;'
 
@@ -76,7 +76,7 @@ def test_each_effect_has_equation_cause_parameters_and_rivals(report, found):
 def test_no_number_of_the_ladder_lies_on_the_floor(found):
     steps = ((3.0, 2.0), (0.7, 0.3), (1.05, 1.02))
     rungs = [replace(found.ladder[0], rmse=rmse, holdout_rmse=held) for rmse, held in steps]
-    fitted, held_out, *_ = error_ladder.figure(replace(found, ladder=rungs)).data
+    fitted, held_out, *_ = discovery.error_ladder(replace(found, ladder=rungs)).data
     assert fitted.textposition == ("top center", "middle right", "top center"), "above 0.7 it would reach over 1"
     assert held_out.textposition == ("bottom center",) * 3, "the floor runs through the marker of 1.02"
 

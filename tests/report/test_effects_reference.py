@@ -15,7 +15,7 @@ from ema_model.effects.user.entries import KEYS
 from ema_model.quantities.variables import variable_title
 from ema_model.simulation.run import simulate_monitor
 from ema_model.simulation.with_effect import RUNS, EffectRuns, WithEffect, few_periods
-from emaviz.figures.effect_residual import SEVERITIES, picture, pictures
+from emaviz.figures.discovery import SEVERITIES, picture, pictures
 from emaviz.report.effects import write_effects_reference
 
 ACTUATOR = load_actuator()

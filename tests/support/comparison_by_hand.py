@@ -11,15 +11,13 @@ from scipy.ndimage import uniform_filter1d
 
 from ema_model.actuator import Actuator, load_actuator
 from ema_model.commands import command
-from ema_model.comparison.explain import Explanation
-from ema_model.comparison.orders import Order
+from ema_model.comparison.explain import Explanation, Order
 from ema_model.comparison.residuals import Residuals, join
 from ema_model.comparison.result import Compared, Comparison, Region, SignalError
 from ema_model.estimation.calibrate import Calibrated, Calibration
 from ema_model.quantities.titles import unit_of
 from ema_model.recordings.health.card import health
-from ema_model.simulation.run import Run, simulate_monitor, simulate_reference
-from ema_model.simulation.sensors import Sensors
+from ema_model.simulation.run import Run, Sensors, simulate_monitor, simulate_reference
 
 SIGNALS = ("current_A", "motor_position_rad", "user_position_rad")
 PER_BLOCK = 5

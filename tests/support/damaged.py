@@ -20,9 +20,8 @@ from scipy.io import savemat
 
 from ema_model.actuator import load_actuator
 from ema_model.actuator.file import shipped
-from ema_model.challenges import sealed_file
-from ema_model.challenges.sealing import seal
-from ema_model.challenges.truth import Truth
+from ema_model.challenges import challenge as challenge_challenges
+from ema_model.challenges.challenge import Truth, seal
 from emaviz.recording import RecordingWriter
 from emaviz.session.settings import Settings
 from support.foreign_files import FILES
@@ -267,15 +266,15 @@ def _resealed(content: bytes, rng: random.Random, folder: Path) -> bytes:
     """Under a good seal, since whoever seals may be hostile."""
     path = folder / "resealed.challenge"
     path.write_bytes(content)
-    parts = sealed_file.read_parts(path)
+    parts = challenge_challenges.read_parts(path)
     head = parts.pop("challenge.json")
     name = rng.choice([*parts, "challenge.json"])
     if name != "challenge.json":
         parts[name] = changed(parts[name], rng)
-        sealed_file.write_sealed(path, json.loads(head), parts)
+        challenge_challenges.write_sealed(path, json.loads(head), parts)
         return path.read_bytes()
     try:
-        sealed_file.write_sealed(path, json.loads(changed(head, rng)), parts)
+        challenge_challenges.write_sealed(path, json.loads(changed(head, rng)), parts)
     except (ValueError, TypeError):  # no longer JSON, or no table
         return changed(content, rng)
     return path.read_bytes()

@@ -12,7 +12,7 @@ import numpy as np
 from ema_model.recordings import Measurement, write_measurement
 from ema_model.tracking.flight import Flight
 
-FOLLOWING = "emaviz.session.track.following"
+FOLLOWING = "emaviz.session.track"
 
 
 def recording(path: Path) -> None:

@@ -75,10 +75,10 @@ class ReadingProcess:
 def _measurement(path: Path, most_bytes: int) -> None:
     import emaviz  # noqa: F401  which adds formats
     from ema_model.errors import InputError
-    from ema_model.files.limits import PAGE_BYTES
+    from ema_model.files.sandbox import PAGE_BYTES
     from ema_model.recordings import read_columns
-    from ema_model.recordings.file import read_measurement
     from ema_model.recordings.health.card import health
+    from ema_model.recordings.read import read_measurement
 
     refused = None
     try:
@@ -106,7 +106,7 @@ def _servo_log(path: Path, most_bytes: int) -> None:
 
 def _robot_dataset(path: Path, most_bytes: int) -> None:
     """path: a dataset's description, put into one that is whole otherwise."""
-    from ema_model.recordings.file import read_header, read_measurement
+    from ema_model.recordings.read import read_header, read_measurement
     from ema_model.recordings.recording_set import episodes_of, files_of
 
     root = path.parent / "dataset"
@@ -145,8 +145,8 @@ def _session(path: Path, _: int) -> None:
 def _challenge(path: Path, _: int) -> None:
     from ema_model.actuator import load_actuator
     from ema_model.challenges import opened, sealed_challenge
-    from ema_model.challenges.sealing import unseal
-    from ema_model.files.limits import CHALLENGE_RECORDING_BYTES
+    from ema_model.challenges.challenge import unseal
+    from ema_model.files.sandbox import CHALLENGE_RECORDING_BYTES
     from ema_model.recordings import read
 
     with opened(sealed_challenge(path)) as one:
@@ -190,11 +190,11 @@ def _checked(line: str) -> str:
 
 def _outcome(reader: str, path: Path, most_bytes: int) -> Outcome:
     from ema_model.errors import InputError
-    from ema_model.files import apart
-    from emaviz.recording.errors import RecordingError
+    from ema_model.files import sandbox
+    from emaviz.recording.file import RecordingError
 
     before = _memory("VmRSS", reset=True)
-    reader_apart = apart.process_id()
+    reader_apart = sandbox.process_id()
     before_apart = _memory("VmRSS", reset=True, process=reader_apart) if reader_apart else 0.0
     began = time.process_time()
     try:
@@ -207,7 +207,7 @@ def _outcome(reader: str, path: Path, most_bytes: int) -> Outcome:
         kind, line = "uncaught", f"{type(error).__name__}: {error}"[:300]
     seconds = time.process_time() - began
     grown = max(_memory("VmHWM") - before, 0.0)
-    if reader_apart and reader_apart == apart.process_id():
+    if reader_apart and reader_apart == sandbox.process_id():
         grown += max(_memory("VmHWM", process=reader_apart) - before_apart, 0.0)
     return Outcome(kind, line, seconds, grown)
 
@@ -226,7 +226,7 @@ def _memory(which: str, reset: bool = False, process: int | str = "self") -> flo
 if __name__ == "__main__":
     resource.setrlimit(resource.RLIMIT_AS, (_MOST_MEMORY, _MOST_MEMORY))
     for module in (
-        "ema_model.challenges.sealing",
+        "ema_model.challenges.challenge",
         "ema_model.effects",
         "emaviz.session.saved",
         "emaviz.session.settings",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ema_model.actuator import load_actuator
 from emaviz.session import saved as session_file
-from emaviz.session.compare.comparing import Comparing
+from emaviz.session.compare import Comparing
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.discover.discovering import Discovering
 from emaviz.session.saved import Part
@@ -41,4 +41,4 @@ class Rig:
         return path
 
     def load(self, path):
-        session_file.read(path, {"discovery": self.part}, self.folder)
+        session_file.saved_read(path, {"discovery": self.part}, self.folder)

@@ -9,11 +9,11 @@ import pytest
 from support.flights import flights
 
 from ema_model.errors import InputError
-from ema_model.tracking.criteria import LEAST_FLIGHTS
+from ema_model.tracking.evidence import LEAST_FLIGHTS
 from ema_model.tracking.history import Came, History
 from ema_model.tracking.track import track
 from ema_model.tracking.words import headline, hindsight
-from emaviz.figures import predicted_life
+from emaviz.figures import tracking
 
 ALL = flights(0.004 * np.arange(120))
 AT = 0.4  # k1, which is there after flight 100 or so
@@ -75,7 +75,7 @@ def test_the_band_of_the_predicted_life_stays_within_its_axis(history, far):
     odd = History(history.thresholds)
     odd.looks = history.looks | {first: replace(look, faults={**look.faults, "k1": replace(one, remaining=left)})}
     odd.flights = history.flights
-    figure = predicted_life.figure(odd, "k1", 100)
+    figure = tracking.predicted_life(odd, "k1", 100)
     low, high = figure.layout.yaxis.range
     assert all(low <= value <= high for trace in figure.data for value in trace.y if value is not None)
     cut = any("are cut" in one.text for one in figure.layout.annotations)

@@ -9,7 +9,7 @@ from typing import Any
 
 import pyarrow as pa
 
-from ema_model.campaign.given import Given
+from ema_model.campaign.axes import Given
 from ema_model.campaign.kinds.kind import FLAG, NUMBER, NUMBERS, TEXT, TEXTS, Kind
 from ema_model.campaign.showable import showable
 from ema_model.comparison.criteria import BAND

@@ -15,7 +15,7 @@ import numpy as np
 import pyarrow as pa
 
 from ema_model.actuator import Actuator
-from ema_model.campaign.given import Given
+from ema_model.campaign.axes import Given
 from ema_model.campaign.kinds.kind import FLAG, NUMBER, TEXTS, Kind
 from ema_model.errors import InputError
 from ema_model.fleets import RUNS, UNSEEN, Fleet, draw, recorded

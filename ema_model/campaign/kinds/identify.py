@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow as pa
 
 from ema_model import faults
-from ema_model.campaign.given import Given
+from ema_model.campaign.axes import Given
 from ema_model.campaign.kinds.kind import FLAG, NUMBER, NUMBERS, TEXT, TEXTS, Kind
 from ema_model.errors import InputError, quoted
 from ema_model.identification.objective import Objective

@@ -8,7 +8,7 @@ from typing import Any
 
 import pyarrow as pa
 
-from ema_model.campaign.given import Given
+from ema_model.campaign.axes import Given
 
 TEXT, NUMBER, FLAG = pa.string(), pa.float64(), pa.bool_()
 TEXTS, NUMBERS = pa.list_(pa.string()), pa.list_(pa.float64())

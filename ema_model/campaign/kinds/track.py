@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from ema_model.campaign.given import Given
+from ema_model.campaign.axes import Given
 from ema_model.campaign.kinds.kind import NUMBER, NUMBERS, TEXT, TEXTS, Kind
 from ema_model.errors import InputError, quoted
 from ema_model.faults import NAMES

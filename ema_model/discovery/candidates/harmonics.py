@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ema_model.comparison.orders import Order, colour
+from ema_model.comparison.explain import Order, colour
 from ema_model.discovery.candidates.fingerprints import fingerprints
 from ema_model.discovery.candidates.paid_for import pays
 from ema_model.discovery.candidates.refit import Trial, tried

@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator, Tolerance
-from ema_model.comparison.curves import HIGHEST_ORDER
-from ema_model.comparison.explain import Explanation, modulator_of, used_blocks
+from ema_model.comparison.explain import HIGHEST_ORDER, Explanation, modulator_of, used_blocks
 from ema_model.comparison.residuals import Residuals
 from ema_model.comparison.verdict import ORDER_OF_PRIMARY
 from ema_model.discovery.evidence.remaining import residuals_left

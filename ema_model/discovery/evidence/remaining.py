@@ -11,12 +11,18 @@ from numpy.typing import NDArray
 from ema_model.actuator import Actuator
 from ema_model.comparison.assemble import residuals_of
 from ema_model.comparison.criteria import BAND
-from ema_model.comparison.curves import orders_in
 from ema_model.comparison.events import Event, events
-from ema_model.comparison.explain import Explanation, advance_of, explain, used_blocks, without_spikes
-from ema_model.comparison.orders import Order
-from ema_model.comparison.orders import orders as orders_of
-from ema_model.comparison.pitches import pitches
+from ema_model.comparison.explain import (
+    Explanation,
+    Order,
+    advance_of,
+    explain,
+    orders_in,
+    pitches,
+    used_blocks,
+    without_spikes,
+)
+from ema_model.comparison.explain import orders as orders_of
 from ema_model.comparison.residuals import Residuals
 from ema_model.comparison.verdict import ORDER_OF_PRIMARY, lasting, most_of_floor
 from ema_model.discovery.model_fit import Data, Fit, floor_ratio, twins_of

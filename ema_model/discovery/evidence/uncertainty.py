@@ -13,7 +13,7 @@ from ema_model.discovery.evidence.counted import colour_of, signals_of
 from ema_model.discovery.model_fit import Data, Fit, fit
 from ema_model.estimation import Calibration
 from ema_model.estimation.calibrate import calibrated, problem_of
-from ema_model.quantities.interval import HALF_90
+from ema_model.quantities.numbers import HALF_90
 
 Array = NDArray[np.float64]
 

@@ -15,9 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
-from ema_model.comparison.orders import Order, orders
-from ema_model.comparison.pitches import pitches
-from ema_model.models.motion import motion_of
+from ema_model.comparison.explain import Order, orders, pitches
+from ema_model.models.measured_motion import motion_of
 from ema_model.quantities.numbers import amount, number
 from ema_model.quantities.shown import of_signal
 from ema_model.recordings import Measurement

@@ -20,9 +20,9 @@ from ema_model.discovery.evidence.uncertainty import with_intervals
 from ema_model.discovery.observed.controller import ControllerSeen, controller_seen
 from ema_model.discovery.observed.repeatability import by_inverse_dynamics
 from ema_model.discovery.result import Added, Candidate, Change
-from ema_model.discovery.shown.sentences import LOOP_UNTOLD
 from ema_model.discovery.steps.begin import calibrated_story
 from ema_model.discovery.steps.path import Story
+from ema_model.discovery.words import LOOP_UNTOLD
 from ema_model.effects import CATALOGUE, find
 from ema_model.errors import InputError
 from ema_model.estimation import Calibrated

@@ -16,13 +16,13 @@ from ema_model.discovery.candidates.alike import alike
 from ema_model.discovery.criteria import LEAST_BIC
 from ema_model.discovery.evidence.remaining import Left
 from ema_model.discovery.result import Added, Candidate, Discovery
-from ema_model.discovery.shown.tracks import primary
 from ema_model.discovery.steps.path import Story
 from ema_model.discovery.steps.ranking import signatures, with_faults
 from ema_model.discovery.steps.step import Step
+from ema_model.discovery.words import primary
 from ema_model.effects import find
 from ema_model.faults import BY_NAME, causes
-from ema_model.quantities.interval import HALF_90
+from ema_model.quantities.numbers import HALF_90
 
 Array = NDArray[np.float64]
 

@@ -5,7 +5,7 @@ To add a format, add a file with a `FORMAT`: reading, writing and their messages
 
 from __future__ import annotations
 
-from ema_model.files.refusal import refusal, shown
+from ema_model.files.opened import refusal, shown
 from ema_model.members import members
 from ema_model.recordings.formats.format import Columns, Format
 

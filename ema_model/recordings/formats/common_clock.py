@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ema_model.files.refusal import listed, refusal, shown
+from ema_model.files.opened import listed, refusal, shown
 from ema_model.recordings.formats.channels import Channel, Log, NoLog, named
 from ema_model.recordings.formats.clocks import Clocks, between, covered, is_state, main_clock, rule, usable
 from ema_model.recordings.formats.format import Array, check_size

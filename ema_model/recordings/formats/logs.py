@@ -12,13 +12,13 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from typing import Any
 
-from ema_model.files import apart
-from ema_model.files.refusal import listed, refusal, shown
+from ema_model.files import sandbox
+from ema_model.files.opened import listed, refusal, shown
 from ema_model.recordings.formats import common_clock
-from ema_model.recordings.formats.arrays import check_lengths
 from ema_model.recordings.formats.channels import Log, NoLog, told
 from ema_model.recordings.formats.clocks import Clocks
 from ema_model.recordings.formats.format import Array, Columns, Format
+from ema_model.recordings.formats.npz import check_lengths
 from ema_model.recordings.formats.own_clocks import with_own_clocks
 from ema_model.recordings.formats.run_groups import with_runs
 
@@ -29,15 +29,17 @@ INSTALL = "pip install 'emaviz[rigs]'"
 def log_format(module: str, title: str, *suffixes: str, needs: str = "", doubtful: tuple[str, ...] = ()) -> Format:
     """A format whose file is `module`; `needs` is the library that reads it, if it is not always installed."""
 
-    def ask(function: str, path: str, max_bytes: int, *more: Any) -> apart.Answer:
+    def ask(function: str, path: str, max_bytes: int, *more: Any) -> sandbox.Answer:
         if needs and importlib.util.find_spec(needs) is None:
             raise refusal(path, f"{title} files are read with {needs}, which is not installed: {INSTALL}")
         with open(path, "rb"):
             pass  # what the system does not let us read, is told as for any file
         question = f"{__name__}:{function}"
         try:
-            return apart.ask(question, module, path, max_bytes, *more, most_bytes=3 * max_bytes, patience_s=_PATIENCE_S)
-        except apart.Broken as error:
+            return sandbox.ask(
+                question, module, path, max_bytes, *more, most_bytes=3 * max_bytes, patience_s=_PATIENCE_S
+            )
+        except sandbox.Broken as error:
             raise refusal(path, f"is not a whole {title} file ({error}); save it again, or in parts") from None
 
     def header(path: str, max_bytes: int) -> list[str]:

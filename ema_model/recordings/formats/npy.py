@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ema_model.files.refusal import refusal, shown
+from ema_model.files.opened import refusal, shown
 from ema_model.recordings.formats.channels import Channel, Log, NoLog, broken_file, is_table, table
 from ema_model.recordings.formats.format import check_size
 from ema_model.recordings.formats.logs import log_format

@@ -13,10 +13,10 @@ from functools import partial
 import numpy as np
 
 from ema_model.quantities.units import Unit, find_unit
-from ema_model.recordings.columns.words import QUANTITIES, readings
+from ema_model.recordings.column_names import QUANTITIES, readings
 from ema_model.recordings.formats.channels import Array, Channel, Log, with_unit
 from ema_model.recordings.formats.clocks import usable
-from ema_model.recordings.formats.text_clocks import is_time
+from ema_model.recordings.formats.csv import is_time
 
 _TIME = QUANTITIES["time"]
 _RISING = 0.9  # of a clock's steps

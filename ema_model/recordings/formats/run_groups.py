@@ -13,7 +13,7 @@ from functools import partial
 
 import numpy as np
 
-from ema_model.recordings.columns.words import QUANTITIES
+from ema_model.recordings.column_names import QUANTITIES
 from ema_model.recordings.formats.channels import Array, Channel, Log
 from ema_model.recordings.formats.own_clocks import is_clock
 

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
-from ema_model.files.refusal import refusal, shown
+from ema_model.files.opened import refusal, shown
 from ema_model.quantities.units import dimensions_of
 from ema_model.recordings.formats.stamps import is_stamp
 

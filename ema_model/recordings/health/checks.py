@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 from ema_model.quantities.numbers import amount
 from ema_model.quantities.signals import SIGNALS
 from ema_model.quantities.titles import in_sentence
-from ema_model.recordings.equivalent_current import PHASES
 from ema_model.recordings.health import estimates
 from ema_model.recordings.health.finding import Finding
-from ema_model.recordings.measurement import Measurement
+from ema_model.recordings.measurement import PHASES, Measurement
 
 Array = NDArray[np.float64]
 

@@ -11,10 +11,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from ema_model.files.refusal import listed, shown
+from ema_model.files.opened import listed, shown
 from ema_model.quantities.signals import SIGNALS
 from ema_model.quantities.titles import in_sentence
-from ema_model.recordings.columns.mapping import MappedColumn
+from ema_model.recordings.columns import MappedColumn
 from ema_model.recordings.health.finding import Finding
 from ema_model.recordings.health.speed_lag import clock_drift, speed_lag
 from ema_model.recordings.measurement import Measurement

@@ -10,12 +10,12 @@ from ema_model.actuator.naming import on_axes
 from ema_model.comparison.summary import ParameterJson, parameter_dict
 from ema_model.discovery import Added
 from ema_model.discovery import as_dict as of_discovery
-from ema_model.discovery.shown.summary import DiscoveryJson
+from ema_model.discovery.words import DiscoveryJson
 from ema_model.quantities.axes import Axes
 from ema_model.units.discovery.result import UnitsDiscovered
 from ema_model.units.discovery.words import sentences
-from ema_model.units.summary import UnitsComparedJson
-from ema_model.units.summary import as_dict as of_compared
+from ema_model.units.result import UnitsComparedJson
+from ema_model.units.result import as_dict as of_compared
 
 
 class LackOfUnitJson(TypedDict):

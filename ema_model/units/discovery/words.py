@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from ema_model.discovery.shown.labels import effect_title
+from ema_model.discovery.words import effect_title
 from ema_model.quantities.numbers import number
 from ema_model.quantities.titles import in_sentence
-from ema_model.text import Document, Lines, Note, Table
-from ema_model.text.document import Block
+from ema_model.text import Block, Document, Lines, Note, Table
 from ema_model.units.discovery.result import Lack, UnitsDiscovered
-from ema_model.units.words import and_so_on, notes, rests_on
-from ema_model.units.words import document_of as of_compared
-from ema_model.units.words import sentences as of_differences
+from ema_model.units.result import and_so_on, notes, rests_on
+from ema_model.units.result import document_of as of_compared
+from ema_model.units.result import sentences as of_differences
 
 
 def sentences(result: UnitsDiscovered) -> list[str]:

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ema_model.errors import InputError
-from ema_model.files.refusal import shown
+from ema_model.files.opened import shown
 from emaviz.cli import files, options
 from emaviz.cli.interrupt import PartialAnswer
-from emaviz.cli.numbers import whole
+from emaviz.cli.options import whole
 
 if TYPE_CHECKING:
     from ema_model.campaign import Status, Store

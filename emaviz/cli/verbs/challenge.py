@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ema_model.errors import InputError, did_you_mean, quoted
-from ema_model.files.refusal import shown
+from ema_model.files.opened import shown
 from emaviz.cli import files
 
 if TYPE_CHECKING:
@@ -87,6 +87,6 @@ def _answer(one: Challenge) -> list[str]:
         from ema_model.practice import made
 
         return list(made.reveal(one).lines)
-    from ema_model.challenges.truth import read_truth
+    from ema_model.challenges.challenge import read_truth
 
     return [read_truth(folder() / "truth" / f"{one.name}.toml").answer]

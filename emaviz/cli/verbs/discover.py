@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from emaviz.cli import files, options
 from emaviz.cli.exit_code import ExitCode
 from emaviz.cli.interrupt import PartialAnswer
-from emaviz.cli.numbers import whole
+from emaviz.cli.options import whole
 
 if TYPE_CHECKING:
     from ema_model.discovery import Discovery
@@ -31,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def documents() -> tuple[type, ...]:
     """What --json holds: of recordings, and of units beside each other."""
-    from ema_model.discovery.shown.summary import DiscoveryJson
+    from ema_model.discovery.words import DiscoveryJson
     from ema_model.units.discovery.summary import UnitsDiscoveredJson
 
     return (DiscoveryJson, UnitsDiscoveredJson)
@@ -93,7 +93,7 @@ def _write(found: Discovery, arguments: argparse.Namespace) -> None:
     from emaviz.cli import output
 
     if arguments.record:
-        from emaviz.recording.discovery.write import write_discovery  # rerun takes a second to import
+        from emaviz.recording.discovery import write_discovery  # rerun takes a second to import
 
         write_discovery(found, arguments.record, output.configuration(arguments))
     if arguments.report:

@@ -6,8 +6,7 @@ import argparse
 from pathlib import Path
 
 from emaviz.cli.files import RECORDING, Folder
-from emaviz.cli.numbers import whole
-from emaviz.cli.options import add_actuator
+from emaviz.cli.options import add_actuator, whole
 
 HELP = "the app in the browser (also without a command)"
 PLACE = 1

@@ -10,7 +10,7 @@ from ema_model.errors import InputError
 from ema_model.members import stated, stated_in
 from emaviz.cli import files, options
 from emaviz.cli.interrupt import PartialAnswer
-from emaviz.cli.numbers import whole
+from emaviz.cli.options import whole
 
 if TYPE_CHECKING:
     import numpy as np
@@ -173,7 +173,7 @@ def _recordings(
         return fitted, held
     assert truth is not None
     from ema_model.simulation.plant import simulated
-    from ema_model.simulation.sensors import Sensors
+    from ema_model.simulation.run import Sensors
 
     sensors = Sensors(arguments.noise_current, arguments.encoder_bits)
     try:

@@ -35,7 +35,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Recovers it; the part goes once its recording was read."""
     from emaviz.cli import output
     from emaviz.recording import RecordingError
-    from emaviz.recording.recover import recover_part
+    from emaviz.recording.read import recover_part
 
     part = Path(arguments.file)
     if part.suffix != ".part":

@@ -9,7 +9,7 @@ from pathlib import Path
 from ema_model.errors import InputError
 from emaviz.cli import files, options
 from emaviz.cli.interrupt import PartialAnswer
-from emaviz.cli.numbers import whole
+from emaviz.cli.options import whole
 
 HELP = "compute the thesis's evaluation anew, and set its numbers beside ours"
 PLACE = 12
@@ -31,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def documents() -> tuple[type, ...]:
     """What --json holds."""
-    from ema_model.campaign.thesis.result import EvaluationJson
+    from ema_model.campaign.thesis import EvaluationJson
 
     return (EvaluationJson,)
 
@@ -41,8 +41,7 @@ def run(arguments: argparse.Namespace) -> int:
     from ema_model.actuator import load_actuator
     from ema_model.campaign import Store, load_plan, run_plan, scheduler
     from ema_model.campaign.plan import plan_path
-    from ema_model.campaign.thesis import Evaluation
-    from ema_model.campaign.thesis.responses import drawn
+    from ema_model.campaign.thesis import Evaluation, drawn
     from emaviz.cli import output
     from emaviz.text.campaign import interrupted
     from emaviz.text.reproduce import aligned, answer, short_table

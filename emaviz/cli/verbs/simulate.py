@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from ema_model.errors import InputError
 from emaviz.cli import files, options
-from emaviz.cli.numbers import FINITE
+from emaviz.cli.options import FINITE
 
 if TYPE_CHECKING:
     import numpy as np
@@ -58,7 +58,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     from ema_model.actuator.readings import readings
     from ema_model.recordings import write_measurement
-    from ema_model.simulation.sensors import Sensors
+    from ema_model.simulation.run import Sensors
     from emaviz.cli import given, output
 
     actuator = given.actuator_of(arguments)

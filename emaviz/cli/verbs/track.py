@@ -80,7 +80,7 @@ def run(arguments: argparse.Namespace) -> int:
                         flights.append(flight)
                         answer.grows()
             except KeyboardInterrupt:
-                from ema_model.tracking.criteria import LEAST_FLIGHTS
+                from ema_model.tracking.evidence import LEAST_FLIGHTS
 
                 progress.done()
                 print(f"Interrupted: {len(flights)} of {len(paths)} flights are identified.", flush=True)
@@ -148,7 +148,7 @@ def _watch(
     """Until it is interrupted; a file that cannot be used is told once and left out, and may be replaced."""
     from ema_model.files.arriving import LOOK_S, Watched
     from ema_model.recordings.recording_set import recordings_in
-    from ema_model.tracking.criteria import LEAST_FLIGHTS
+    from ema_model.tracking.evidence import LEAST_FLIGHTS
     from ema_model.tracking.order import check_order, in_order
     from emaviz.cli import given
 

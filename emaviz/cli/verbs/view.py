@@ -6,7 +6,7 @@ import argparse
 
 from ema_model.errors import InputError
 from emaviz.cli.files import Input
-from emaviz.cli.numbers import whole
+from emaviz.cli.options import whole
 
 HELP = "open a .rrd recording in the Rerun viewer (in the browser, no network needed)"
 PLACE = 9

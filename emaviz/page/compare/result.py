@@ -1,33 +1,224 @@
-"""The comparison on the right: the answer in words, where the model fails, and the plots."""
+"""What a comparison has found: its sentences, charts, and the moment that is looked at."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+import plotly.graph_objects as go
 import viser
 
+from ema_model.actuator import Actuator
 from ema_model.comparison.regions import worst_moment
-from ema_model.comparison.result import Comparison, Region
+from ema_model.comparison.result import Compared, Comparison, Region
 from ema_model.comparison.words import details, errors, errors_by_recording, of_floor
 from ema_model.errors import InputError
-from emaviz.figures import mapped_columns
+from ema_model.estimation.calibrate import calibration_table
+from ema_model.faults import HEALTHY
+from ema_model.quantities.variables import VARIABLES
+from ema_model.recordings import Measurement
+from emaviz.figures import campaign
+from emaviz.figures import comparison as comparison_figures
+from emaviz.figures.theme import why_missing
 from emaviz.page.compare import WORKSPACE
-from emaviz.page.compare.moment import motion_of
-from emaviz.page.compare.plots import ComparePlots, View
-from emaviz.page.compare.raw_lines import RawLines
+from emaviz.page.compare.files import RawLines
 from emaviz.page.inset import ALL_COLUMNS, COLUMNS, NEXT_COLUMN, PLOTS_EARLY, ROOM
-from emaviz.page.kept import Cleared
 from emaviz.page.page import Page
+from emaviz.page.panel import Cleared
 from emaviz.page.playback import PlaybackStrip
 from emaviz.page.style import IN_PAIRS
+from emaviz.scene.motion import Motion, motion
 from emaviz.server.viser_private import selector_of
-from emaviz.session.opened import Opened
-from emaviz.text.html import Html, add_html, html, joined, unescaped
-from emaviz.text.notes import begin
-from emaviz.text.told import folded, large, shown, warned
-from emaviz.text.verdict import of_comparison
+from emaviz.session.files import Opened
+from emaviz.text.html import Html, add_html, begin, html, joined, note, unescaped
+from emaviz.text.results import folded, large, of_comparison, shown, warned
+
+_FULL = 4.0  # times its floor, at which a residual glows fully
+
+
+def motion_of(comparison: Comparison, compared: Compared, actuator: Actuator) -> Motion | None:
+    """What was measured of it, and of the model what was not; None without a motor position, as of a static map."""
+    signals = {**compared.model, **compared.measured}
+    motor = signals.get("motor_position_rad")
+    if motor is None or comparison.residuals.is_map or len(compared.time_s) < 2:
+        return None
+    still = np.zeros_like(motor)
+    time_s = compared.time_s
+    run = Measurement(
+        {
+            "time_s": time_s,
+            "current_A": signals.get("current_A", still),
+            "motor_position_rad": motor,
+            "motor_speed_rad_s": np.gradient(motor, time_s),
+            "user_position_rad": signals.get("user_position_rad", actuator.transmission.gear_ratio * motor),
+        },
+        compared.name,
+    )
+    shown = motion(run, HEALTHY, actuator)
+    name = comparison.primary
+    if name not in compared.measured:
+        return shown
+    error = np.abs(compared.measured[name] - compared.model[name]) / compared.sigma[name]
+    glow = np.clip((error - 1.0) / (_FULL - 1.0), 0.0, 1.0)
+    return replace(shown, heat=glow, says=f"Screw red where the model fails (full from {_FULL:g} × floor).")
+
+
+# --- the plots of a comparison, in tabs; a chosen region and moment are marked in every one of them -------------------
+
+_PLOTS_CONFIG = {"displayModeBar": False}
+_FIRST = next(iter(VARIABLES))
+_EMPTY = "–"
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """What the plots show."""
+
+    comparison: Comparison
+    recording: int = 0
+    region: Region | None = None
+    moment_s: float | None = None
+
+
+@dataclass
+class _Plot:
+    """A place of a figure on the page, and of the line that says why there is none; aspect is height over width."""
+
+    draw: Callable[[View], go.Figure]
+    aspect: float
+    handle: Any
+    why: Any
+
+
+class ComparePlots:
+    """Tabs over time, against a variable, over the motor's turn, what explains it, and the calibration.
+
+    Everything is drawn on the screen's thread.
+    """
+
+    def __init__(self, page: Page) -> None:
+        self._page = page
+        self._view: View | None = None
+        gui = page.server.gui
+        self._signal = gui.add_dropdown("Signal", [_EMPTY])
+        self._titles: dict[str, str] = {}
+        self._variables: dict[str, str] = {}
+        tabs = gui.add_tab_group()
+        with tabs.add_tab("Time", viser.Icon.CHART_LINE):
+            self._time = [
+                self._add(
+                    lambda v: comparison_figures.overlay(v.comparison, self._chosen(), v.recording, **_marks(v)), 0.42
+                ),
+                self._add(
+                    lambda v: comparison_figures.residual_time(v.comparison, self._chosen(), v.recording, **_marks(v)),
+                    0.42,
+                ),
+            ]
+        with tabs.add_tab("Against", viser.Icon.CHART_DOTS):
+            self._variable = gui.add_dropdown("Variable", [_EMPTY])
+            self._against = [self._add(self._draw_against, 0.66)]
+        with tabs.add_tab("Orders", viser.Icon.ROTATE_CLOCKWISE):
+            self._turn = [
+                self._add(lambda v: comparison_figures.order_spectrum(v.comparison, highlight=v.region), 0.42),
+                self._add(
+                    lambda v: comparison_figures.residual_polar(v.comparison, self._chosen(), highlight=v.region), 0.8
+                ),
+            ]
+        with tabs.add_tab("Explained by", viser.Icon.QUESTION_MARK):
+            self._why = [self._add(lambda v: comparison_figures.explained(v.comparison, highlight=v.region), 0.7)]
+        with tabs.add_tab("Calibration", viser.Icon.TARGET):
+            self._fit = [self._add(lambda v: campaign.calibration_scores(v.comparison), 0.8)]
+            self._numbers = add_html(gui)
+        self._signal.on_update(lambda event: event.client and self._post([*self._time, *self._against, *self._turn]))
+        self._variable.on_update(lambda event: event.client and self._post(self._against))
+
+    def add_against(self) -> None:
+        """The figure of `Against` a second time, at this place of the page."""
+        self._against.append(self._add(self._draw_against, 0.36))
+
+    def begin(self, view: View) -> None:
+        """A new comparison: its signals and variables to choose from, the telling ones first."""
+        self._view = view
+        comparison = view.comparison
+        self._titles = {
+            comparison_figures.quantity_of_signal(comparison, name).title: name
+            for name in comparison.recordings[0].measured
+        }
+        self._signal.options = tuple(self._titles)
+        known = [name for name in VARIABLES if name in comparison.residuals.variables]
+        self._variables = {comparison_figures.of_variable(comparison, name).title: name for name in known}
+        self._variable.options = tuple(self._variables) or (_EMPTY,)
+        first = comparison.explained_by[0].variable if comparison.explained_by else ""
+        self._choose(comparison.primary, first)
+        fit = comparison.calibration
+        table = shown(calibration_table(fit, comparison.actuator.axes) if fit is not None else None)
+        self._numbers.content = html('<div style="overflow-x:auto;font-size:11px;padding:0 2px">{}</div>', table)
+        self._draw(list(self._all()))
+
+    def show(self, view: View) -> None:
+        """Another region, moment or recording of the same comparison."""
+        self._view = view
+        if view.region is not None:
+            self._choose(view.region.signal, view.region.variable)
+        self._draw(list(self._all()))
+
+    def move(self, view: View) -> None:
+        """Only the play-head has moved."""
+        self._view = view
+        self._draw(self._time)
+
+    def _choose(self, signal: str, variable: str) -> None:
+        for dropdown, names, wanted in (
+            (self._signal, self._titles, signal),
+            (self._variable, self._variables, variable),
+        ):
+            title = next((title for title, name in names.items() if name == wanted), None)
+            if title is not None and dropdown.value != title:
+                dropdown.value = title
+
+    def _chosen(self) -> str | None:
+        return self._titles.get(str(self._signal.value))
+
+    def _draw_against(self, view: View) -> go.Figure:
+        variable = self._variables.get(str(self._variable.value), _FIRST)
+        return comparison_figures.residual_against(view.comparison, variable, self._chosen(), highlight=view.region)
+
+    def _add(self, draw: Callable[[View], go.Figure], aspect: float) -> _Plot:
+        """A plot at this place of the page; it is drawn when there is something to draw."""
+        gui = self._page.server.gui
+        handle = gui.add_plotly(go.Figure(), config=_PLOTS_CONFIG, aspect=aspect, visible=False)
+        return _Plot(draw, aspect, handle, add_html(gui, visible=False))
+
+    def _all(self) -> Iterator[_Plot]:
+        for group in (self._time, self._against, self._turn, self._why, self._fit):
+            yield from group
+
+    def _post(self, plots: list[_Plot]) -> None:
+        self._page.screen.post(f"plots {len(plots)}", lambda: self._draw(plots))
+
+    def _draw(self, plots: list[_Plot]) -> None:
+        if self._view is None:
+            return
+        for plot in plots:
+            figure = plot.draw(self._view)
+            why = why_missing(figure)
+            if why:
+                plot.why.content = note(why)
+            else:
+                plot.handle.figure = figure
+            for one, seen in ((plot.handle, not why), (plot.why, bool(why))):
+                if one.visible != seen:
+                    one.visible = seen
+
+
+def _marks(view: View) -> dict[str, Any]:
+    return {"highlight": view.region, "moment_s": view.moment_s}
+
+
+# --- the comparison on the right: the answer in words, where the model fails, and the plots ---------------------------
 
 _BOX = Html('style="padding:2px 12px 6px;font-size:13px;line-height:1.45"')
 _CARD = "height:auto!important;min-height:2em;padding:4px 8px;font-weight:400;font-size:13px;"
@@ -108,7 +299,7 @@ class ResultPanel:
         said = "as its columns are read"
         self._lines.show(opened)
         try:
-            figure, aspect = mapped_columns.figure(opened.columns, opened.mapping)
+            figure, aspect = comparison_figures.mapped_columns(opened.columns, opened.mapping)
         except InputError as error:
             said = "no table is found in it" if opened.problem else str(error)
             if self._preview is not None:

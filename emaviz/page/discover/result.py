@@ -1,35 +1,163 @@
-"""Discover's panel on the right: the answer so far, the ladder, the opened candidate, the equation, what is left."""
+"""What a discovery has found: the ladder, the residuals, the actuator, the next experiment."""
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
+import numpy as np
 import plotly.graph_objects as go
 import viser
 
-from ema_model.discovery.shown.tables import per_recording
-from ema_model.discovery.shown.tracks import Track, tracks
+from ema_model.commands import command
+from ema_model.discovery.result import Experiment
 from ema_model.discovery.steps.snapshot import Look
-from ema_model.discovery.words import FLOOR_NOTE, headline, sentences, so_far
+from ema_model.discovery.words import (
+    FLOOR_NOTE,
+    Track,
+    headline,
+    next_experiment,
+    per_recording,
+    so_far,
+    tracks,
+    words_sentences,
+)
 from ema_model.effects import CATALOGUE
-from ema_model.faults import BY_NAME
-from ema_model.recordings import SIGNALS
-from emaviz.figures import error_ladder, explained_steps, missing_curve, residual_steps
-from emaviz.figures.model_equation import equation
-from emaviz.page.discover.actuator import ActuatorSwitch
-from emaviz.page.discover.effect import CONFIG, EffectView
-from emaviz.page.discover.next_experiment import NextTest
+from ema_model.errors import InputError
+from ema_model.faults import BY_NAME, HEALTHY
+from ema_model.recordings import SIGNALS, Measurement
+from emaviz.figures import discovery
+from emaviz.figures.discovery import equation
+from emaviz.page.discover import WORKSPACE
+from emaviz.page.discover.candidate import CONFIG, EffectView
 from emaviz.page.inset import COLUMNS, NEXT_COLUMN
-from emaviz.page.kept import Cleared
 from emaviz.page.page import Page
+from emaviz.page.panel import Cleared
 from emaviz.page.playback import PlaybackStrip
-from emaviz.session.discover import beside_truth
+from emaviz.scene.motion import motion
+from emaviz.session.discover import source
 from emaviz.session.discover.discovering import Discovering
-from emaviz.text.html import Html, add_html, html, joined
-from emaviz.text.notes import BOX, begin, boxed
-from emaviz.text.told import folded, large, shown, warned
-from emaviz.text.verdict import of_discovery
+from emaviz.text.html import BOX, Html, add_html, begin, boxed, html, joined, note
+from emaviz.text.results import folded, large, of_discovery, shown, warned
+
+_RATE_HZ = 10_000.0
+_ASK = "Of all tests that the actuator can follow, the one that would tell the two best candidates apart."
+
+
+class NextTest:
+    """A folder of the panel on the right.  load(experiment, client) takes a test, and the window, to Explore."""
+
+    def __init__(
+        self, page: Page, discovering: Discovering, load: Callable[[Experiment, viser.ClientHandle | None], None]
+    ) -> None:
+        self._page, self._discovering = page, discovering
+        gui = page.server.gui
+        self._folder = gui.add_folder("Suggested next test", visible=False)
+        with self._folder:
+            self._text = add_html(gui, note(_ASK))
+            self._find = gui.add_button("Find the best test", icon=viser.Icon.FLASK)
+            self._load = gui.add_button("Load it into Explore", icon=viser.Icon.ADJUSTMENTS, visible=False)
+            self._csv = gui.add_button(
+                "Command as CSV", icon=viser.Icon.FILE_SPREADSHEET, color="gray", visible=False, hint="For a test rig"
+            )
+        self._load.on_click(
+            lambda event: page.screen.post(
+                "load test", lambda: self._with(lambda one: load(one, event.client), self._load)
+            )
+        )
+        self._csv.on_click(self._send)
+        discovering.events.unsuggested.connect(lambda: page.screen.post("unsuggested", self._nothing))
+
+    def connect(self, ask: Callable[[Callable[[], bool], Any], None]) -> None:
+        """ask(begin, button) starts a step."""
+        self._find.on_click(lambda _: ask(self._discovering.suggest, self._find))
+
+    def busy(self, busy: bool) -> None:
+        """Whether a step runs."""
+        self._find.disabled = busy
+
+    def show(self, look: Look | None) -> None:
+        """A story as it stands."""
+        self._folder.visible = look is not None and look.assessment is not None
+        told = next_experiment(look.found) if look is not None else []
+        self._load.visible = self._csv.visible = bool(told)
+        self._find.color = "gray" if told else None
+        if told:
+            more = joined(html("<div>{}</div>", text) for text in told[1:])
+            self._text.content = html("<div {}><b>{}</b>{}</div>", BOX, told[0], more)
+        else:
+            self._text.content = note(_ASK)
+
+    def _nothing(self) -> None:
+        self._text.content = note("No test that the actuator can follow would tell the two apart.")
+
+    def _with(self, act: Callable[[Experiment], Any], button: Any) -> None:
+        one = self._discovering.experiment
+        if one is not None:
+            self._page.checked(lambda: act(one), button)
+
+    def _send(self, event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
+        client = event.client
+        if client is not None:
+            self._with(
+                lambda one: client.send_file_download("next-test.csv", as_csv(one), save_immediately=True), self._csv
+            )
+
+
+def as_csv(one: Experiment) -> bytes:
+    """time_s, command_rad and load_torque_Nm, as a measurement has them."""
+    time_s = np.arange(round(one.duration_s * _RATE_HZ)) / _RATE_HZ
+    demand = command(one.command, one.settings).at(time_s)
+    table = np.column_stack([time_s, demand, np.full_like(time_s, one.load_torque_Nm)])
+    text = io.StringIO()
+    np.savetxt(text, table, delimiter=",", header="time_s,command_rad,load_torque_Nm", comments="", fmt="%.9g")
+    return text.getvalue().encode()
+
+
+# --- the 3D actuator with a recording that was fitted: as measured, or as the model has it before and after -----------
+
+_SHOWN = ("as measured", "calibrated model", "improved model")
+
+
+class ActuatorSwitch:
+    """A dropdown; track() is the recording that is looked at, which plays on Discover's own clock."""
+
+    def __init__(
+        self, page: Page, discovering: Discovering, track: Callable[[], Track | None], strip: PlaybackStrip
+    ) -> None:
+        self._page, self._discovering, self._track, self._strip = page, discovering, track, strip
+        self._shown: tuple[object, ...] = ()
+        self._choice = page.server.gui.add_dropdown("3D actuator", _SHOWN, hint="What it plays")
+        self._choice.on_update(lambda event: event.client and page.screen.post("3D actuator", self.refresh))
+
+    def refresh(self) -> None:
+        """Plays what is chosen of the present recording; on the screen's thread."""
+        track, chosen = self._track(), str(self._choice.value)
+        if (track, chosen) == self._shown:
+            return
+        self._shown = (track, chosen)
+        shown = None
+        look = self._discovering.look
+        if track is not None and look is not None:
+            with suppress(InputError):  # without a position, the actuator cannot be shown with it
+                shown = motion(run_of(track, chosen), HEALTHY, look.found.actuator)
+        self._strip.put(shown, WORKSPACE.name)
+
+
+def run_of(track: Track, shown: str) -> Measurement:
+    """A recording's blocks as a run; what was not measured is the last model's.  InputError without a position."""
+    of = {_SHOWN[0]: track.measured, _SHOWN[1]: track.models[0], _SHOWN[2]: track.models[-1]}[shown]
+    signals = {**track.models[-1], **track.measured, **of}
+    missing = {"current_A", "motor_position_rad", "user_position_rad"} - signals.keys()
+    if missing:
+        raise InputError(f"{track.name}: {min(missing)} was not fitted, so that the actuator cannot be shown with it")
+    time_s, motor = track.time_s, signals["motor_position_rad"]
+    return Measurement({"time_s": time_s, "motor_speed_rad_s": np.gradient(motor, time_s), **signals}, track.name)
+
+
+# --- discover's panel on the right: the answer so far, the ladder, the opened candidate, the equation, what i---
 
 _STEPS = (
     "Choose measurements on the left: those of Compare, or one of the challenges.",
@@ -125,12 +253,12 @@ class DiscoveryPanel:
             return
         found = look.found
         self._headline.content = answer(look)
-        self._ladder.figure = error_ladder.figure(found)
+        self._ladder.figure = discovery.error_ladder(found)
         self._equation.content = boxed(equation(found, look.added))
         named = all(one.name in CATALOGUE for one in look.added)
         self._left_folder.label = "Remaining residual" if named else "Unexplained residual"
         if self._left_folder.visible:
-            self._left.figure, self._left.visible = missing_curve.figure(found), True
+            self._left.figure, self._left.visible = discovery.missing_curve(found), True
         self._titles = {SIGNALS[name].title: name for name in found.ladder[0].signals}
         names = [f"{i + 1}. {name}" for i, name in enumerate(look.reach)]
         for dropdown, options in ((self._recording, names), (self._signal, list(self._titles))):
@@ -147,7 +275,7 @@ class DiscoveryPanel:
         signal = self._titles.get(str(self._signal.value)) or self._look.primary
         track = self._track()
         if track is not None:
-            self._residual.figure = residual_steps.figure(track, signal)
+            self._residual.figure = discovery.residual_steps(track, signal)
             self._residual.visible = True
         self._actuator.refresh()
 
@@ -162,14 +290,14 @@ class DiscoveryPanel:
     def _draw_explained(self, look: Look) -> None:
         self._explained.visible = look.assessment is not None and bool(look.explained_before)
         if look.assessment is not None and self._explained.visible:
-            self._explained.figure = explained_steps.figure(look.explained_before, look.assessment.left.explained)
+            self._explained.figure = discovery.explained_steps(look.explained_before, look.assessment.left.explained)
 
     def _revealed(self) -> None:
         self._page.checked(self._show_truth, self._reveal)
 
     def _show_truth(self) -> None:
         if self._look is not None:
-            told = beside_truth.document_of(self._discovering.source.reveal(), self._look.found, self._look.added)
+            told = source.document_of(self._discovering.source.reveal(), self._look.found, self._look.added)
             self._truth.content = boxed(joined(map(shown, told.blocks)))
             self._discovering.events.revealed()
 
@@ -186,9 +314,9 @@ def answer(look: Look) -> Html:
         best, meaning = look.promising[0].name, "warning"
         may_be_worn = any(name in BY_NAME for name in (best, *look.assessment.alike.get(best, ())))
         first = "Physics is missing, or the actuator has a fault." if may_be_worn else "Physics is missing."
-        others = [sentences(found)[0], *([left.sentence] if left is not None else [])]
+        others = [words_sentences(found)[0], *([left.sentence] if left is not None else [])]
     else:
-        first, others = headline(found), sentences(found)
+        first, others = headline(found), words_sentences(found)
     return html(
         '<div {}>{}{}{}<div style="opacity:.65;font-size:12px" title="{}">The floor is what noise and the model\'s own '
         "limits leave: 1 on the ladder.</div>{}</div>",

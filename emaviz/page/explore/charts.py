@@ -1,24 +1,32 @@
-"""Explore's tabs on the right: the signals, the phases, the run in numbers, and what can be taken away."""
+"""Explore's charts, the fan of severities, and what can be taken away."""
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import viser
 
+from ema_model.faults import FAULTS, HEALTHY
+from ema_model.recordings import write_measurement
 from emaviz.colours import GHOST, MONITOR, REFERENCE
-from emaviz.figures.run_metrics import differences, metrics, table
-from emaviz.figures.signals import PHASE_SIGNALS, LivePhases, LiveSignals
-from emaviz.page.explore import METRICS, PHASES
-from emaviz.page.explore.fan import FanView
+from emaviz.figures import runs
+from emaviz.figures.identification import LiveFan
+from emaviz.figures.runs import PHASE_SIGNALS, LivePhases, LiveSignals, differences, metrics, run_metrics_table
+from emaviz.page.explore import METRICS, PHASES, WORKSPACE
 from emaviz.page.page import Page
 from emaviz.page.playback import PlaybackStrip
-from emaviz.page.style import TIME_CHARTS, play_head
+from emaviz.page.style import TIME_CHARTS, WIDE_MODAL, play_head
 from emaviz.scene.playback import FIRST
+from emaviz.server.safe_server import SCENES
+from emaviz.session.data_folder import DataFolder
+from emaviz.session.fan import Fan
 from emaviz.session.session import Simulation
 from emaviz.session.worker import Worker
-from emaviz.text.html import add_html
+from emaviz.text.html import add_html, html, said
 
 
 class ChartsPanel:
@@ -119,7 +127,7 @@ class ChartsPanel:
         if ghost is not None:
             runs["frozen plant"] = metrics(ghost.reference, ghost.command)
             errors["frozen run's"] = differences(ghost.reference, ghost.monitor, axes)
-        self._table.content = table(runs, errors, [REFERENCE, MONITOR, GHOST], axes)
+        self._table.content = run_metrics_table(runs, errors, [REFERENCE, MONITOR, GHOST], axes)
 
     def _zoom(self) -> None:
         low, high = (min(max(float(value), 0.0), 100.0) / 100.0 for value in self._range.value)
@@ -134,3 +142,139 @@ class ChartsPanel:
     def _redraw(self) -> None:
         if self._simulation is not None:
             self.show(self._simulation)
+
+
+# --- explore's fan: five severities of one fault beside each other, at one click --------------------------------------
+
+TITLE = "Fan"
+_LABELS = tuple(fault.label for fault in FAULTS)
+_ABOUT = (
+    "The monitor model's response to the command under five severities of one fault, the other sliders as they stand."
+)
+
+
+class FanView:
+    """In a tab on the right; follows the fault that was moved last until one is chosen there."""
+
+    def __init__(self, page: Page, panel: viser.PanelHandle) -> None:
+        self._page = page
+        gui = page.server.gui
+        with panel.add_tab(TITLE, viser.Icon.CHART_AREA_LINE):
+            self._fault: Any = gui.add_dropdown("Fault", _LABELS)
+            show = gui.add_button("Show five severities", icon=viser.Icon.CHART_AREA_LINE)
+            self._note = add_html(gui, said(_ABOUT))
+            self._charts = LiveFan(gui, page.session.actuator.axes)
+            page.workspaces.heights.add(self._charts.handles, spare_px=-36)
+        show.on_click(lambda _: self._ask())
+        self._fault.on_update(lambda event: event.client and self._ask())
+        page.session.events.fanned.connect(lambda fan: page.screen.post("fan", lambda: self._draw(fan)))
+
+    def ask_for(self, fault: int) -> None:
+        """Simulates and draws the fan of one fault, and brings it to the front of windows at Explore."""
+        self._fault.value = _LABELS[fault]
+        self._ask()
+        self._page.workspaces.bring_forward(WORKSPACE.name, "", TITLE)
+
+    def _ask(self) -> None:
+        if self._fault.value in _LABELS:
+            self._page.session.show_fan(_LABELS.index(self._fault.value))
+
+    def _draw(self, fan: Fan) -> None:
+        healthy = FAULTS[fan.fault].name, HEALTHY[fan.fault]
+        with self._page.server.atomic():
+            self._note.content = said(f"Monitor model; {healthy[0]} is healthy at {healthy[1]:g}. {fan.note}".strip())
+            self._charts.show(fan.labels, fan.runs)
+
+
+# --- what can be taken away from Explore: the run's data, a picture of the plot, the moving scene ---------------------
+
+_FRAMES, _FRAME_S = 120, 0.04  # of an exported scene
+_NAME = "emaviz-run"
+
+
+class ExportControls:
+    """Buttons; what each makes is sent to the browser that has asked."""
+
+    def __init__(self, page: Page, strip: PlaybackStrip, charts: ChartsPanel, folder: DataFolder) -> None:
+        self._folder = folder
+        self._page, self._playback, self._charts = page, strip.playback, charts
+        gui = page.server.gui
+        gui.add_markdown("The run as it stands, in the format that *Compare* reads.")
+        self._whose = gui.add_dropdown("Signals of", ("plant", "monitor"), initial_value="plant")
+        self._button("Data as CSV", viser.Icon.FILE_SPREADSHEET, lambda client: self._send_data(client, ".csv"))
+        self._button("Data as Parquet", viser.Icon.TABLE, lambda client: self._send_data(client, ".parquet"))
+        gui.add_markdown("Any chart saves itself: **PNG** at its corner. All four as one figure:")
+        self._button("Plot (PNG)…", viser.Icon.PHOTO, self._show_plot)
+        gui.add_markdown(
+            "The actuator with its motion, in one **HTML** file that opens offline, and a link to it here."
+        )
+        self._scene = self._button("Scene as HTML", viser.Icon.CUBE, self._send_scene)
+        self._link = add_html(gui)
+
+    def _button(self, label: str, icon: viser.IconName, act: Callable[[viser.ClientHandle], None]) -> Any:
+        button = self._page.server.gui.add_button(label, icon=icon, color="gray")
+
+        @button.on_click
+        def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
+            client = event.client
+            if client is None:
+                return
+            if self._page.session.simulation is None:
+                self._page.say_beside(button, "Nothing has been simulated yet.")
+                return
+            self._page.say_beside(button, "")
+            self._page.screen.post(f"export {label}", lambda: act(client))
+
+        return button
+
+    def _run(self) -> Simulation:
+        simulation = self._page.session.simulation
+        assert simulation is not None, "the buttons act once there is a run"
+        return simulation
+
+    def _send_data(self, client: viser.ClientHandle, suffix: str) -> None:
+        whose = "monitor" if self._whose.value == "monitor" else "plant"
+        run = self._run()
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / f"{_NAME}-{whose}{suffix}"
+            write_measurement(run.monitor if whose == "monitor" else run.reference, path)
+            client.send_file_download(path.name, path.read_bytes(), save_immediately=True)
+
+    def _show_plot(self, client: viser.ClientHandle) -> None:
+        run, ghost = self._run(), self._charts.ghost
+        figure = runs.run_signals(
+            run.reference,
+            run.monitor,
+            ghost.reference if ghost is not None else None,
+            self._charts.window_s,
+            axes=self._page.session.actuator.axes,
+        )
+        saved = {"format": "png", "filename": _NAME, "width": 1200, "height": 1000, "scale": 2}
+        modal = client.gui.add_modal("Plot")
+        with modal:
+            add_html(client.gui, WIDE_MODAL)
+            client.gui.add_plotly(
+                figure,
+                config={"displayModeBar": True, "displaylogo": False, "toImageButtonOptions": saved},
+                aspect=0.75,
+            )
+            client.gui.add_button("Close", color="gray").on_click(lambda _: modal.close())
+
+    def _send_scene(self, client: viser.ClientHandle) -> None:
+        with self._playback.still() as motion:
+            if motion is None:
+                return
+            serializer = self._page.server.get_scene_serializer()
+            for time_s in np.linspace(0.0, motion.duration_s, _FRAMES, endpoint=False):
+                motion.pose(self._playback.scene, float(time_s))
+                serializer.insert_sleep(_FRAME_S)
+            page = serializer.as_html().replace("<title>Viser</title>", "<title>Actuator – emaviz</title>", 1)
+        client.send_file_download("emaviz-actuator.html", page.encode(), save_immediately=True)
+        path = self._folder.fresh(self._folder.scenes, "actuator", ".html")
+        try:
+            path.write_bytes(page.encode())
+        except OSError as error:
+            text = f"No link to the scene: {path.name} cannot be written ({error.strerror})"
+            self._page.say_beside(self._scene, text)
+            return
+        self._link.content = said(html('<a href="{}{}" target="_blank">Open {} ↗</a>', SCENES, path.name, path.name))

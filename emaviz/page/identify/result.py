@@ -1,34 +1,259 @@
-"""Identify's panel on the right: convergence and swarm, the answer, and the table of all runs."""
+"""What an identification has found: faults, the swarm, the landscape."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 import viser
 
-from ema_model.faults import HEALTHY, NAMES
+from ema_model.faults import FAULTS, HEALTHY, NAMES
 from ema_model.identification.next_experiment import Suggestion
-from ema_model.identification.run import ALGORITHMS
-from emaviz.figures.convergence import LiveConvergence
-from emaviz.figures.fault_bars import fault_bars
-from emaviz.figures.fitted_current import LiveFit
-from emaviz.figures.identified_table import Row, table
+from ema_model.identification.run import ALGORITHMS, algorithm_title
+from ema_model.identification.search import POINTS, Landscape, Way
+from ema_model.identification.words import CORRECTED, way_sentences
+from emaviz.figures import identification
+from emaviz.figures.identification import LiveConvergence, LiveFit, Row, colour, fault_bars, table
 from emaviz.page.identify import WORKSPACE
-from emaviz.page.identify.landscape import LandscapeView
-from emaviz.page.identify.swarm import SwarmView
-from emaviz.page.inset import COLUMNS
+from emaviz.page.inset import COLUMNS, NEXT_COLUMN
 from emaviz.page.page import Page
+from emaviz.page.panel import JobLine
 from emaviz.page.playback import PlaybackStrip
 from emaviz.page.standing import Standing
 from emaviz.scene.motion import PLAYED, motion
-from emaviz.session.identify.race import Race, Track
+from emaviz.session.identify import Frame, Landscapes, Race, Track, ends
 from emaviz.session.worker import Worker
-from emaviz.text.html import Html, add_html
-from emaviz.text.identification import sure_words
-from emaviz.text.notes import begin
+from emaviz.text.html import Html, add_html, begin, joined, note
+from emaviz.text.results import sure_words
+
+_PLANE, _LINES = "points over two k", "lines across all k"
+_NAMES = tuple(fault.label for fault in FAULTS)
+
+
+class SwarmView:
+    """The picture and its controls, which `appear` with the first race."""
+
+    def __init__(self, page: Page) -> None:
+        self._page = page
+        self._race: Race | None = None
+        self._chosen = False  # by hand, which two k
+        gui = page.server.gui
+        self._folder = gui.add_folder("Population", visible=False)
+        with self._folder:
+            add_html(gui, NEXT_COLUMN)
+            self._picture = add_html(gui, identification.plane([], 0, 5))
+        self._kind = gui.add_dropdown("Population view", (_PLANE, _LINES), visible=False)
+        self._x = gui.add_dropdown("Horizontal axis", _NAMES, initial_value=_NAMES[0], visible=False)
+        self._y = gui.add_dropdown("Vertical axis", _NAMES, initial_value=_NAMES[5], visible=False)
+        self._iteration = gui.add_slider(
+            "Iteration", 0, 150, 1, 150, disabled=True, visible=False, hint="Looks back once it is over"
+        )
+        for entry in (self._kind, self._iteration):
+            entry.on_update(lambda event: event.client and page.screen.post("swarm view", self._changed))
+        for entry in (self._x, self._y):
+            entry.on_update(lambda event: event.client and page.screen.post("swarm axes", self._choose))
+
+    def appear(self) -> None:
+        """There is something to look at."""
+        for one in (self._folder, self._kind, self._iteration):
+            one.visible = True
+        self._show_axes()
+
+    def show(self, race: Race, begun: bool) -> None:
+        """Draws a race as it stands; on the screen's thread."""
+        self._race = race
+        over = all(track.answer is not None for track in race.tracks.values())
+        last = max((len(track.rmse) - 1 for track in race.tracks.values()), default=1)
+        last = max(last, 1)
+        if begun and race.truth is not None and not self._chosen:
+            x, y = telling(race.truth)
+            self._x.value, self._y.value = _NAMES[x], _NAMES[y]
+        reach = last if over else max(track.iterations for track in race.tracks.values())
+        if self._iteration.max != reach:
+            self._iteration.value = min(self._iteration.value, reach)
+            self._iteration.max = reach
+        if over:
+            self._iteration.value = last
+        self._iteration.disabled = not over
+        self._draw(last)
+
+    def _choose(self) -> None:
+        self._chosen = True
+        self._changed()
+
+    def _changed(self) -> None:
+        self._show_axes()
+        self._draw(int(self._iteration.value) if not self._iteration.disabled else 10**9)
+
+    def _show_axes(self) -> None:
+        self._x.visible = self._y.visible = self._kind.value != _LINES
+
+    def _draw(self, iteration: int) -> None:
+        race = self._race
+        if race is None:
+            self._picture.content = (
+                identification.lines([]) if self._kind.value == _LINES else identification.plane([], *self._axes())
+            )
+            return
+        swarms, trails = [], []
+        for track in list(race.tracks.values()):
+            frame = at_iteration(track, iteration)
+            if frame is None:
+                continue
+            swarms.append(identification.Swarm(track.algorithm, colour(track.algorithm), frame.population, frame.k))
+            trails.append(np.array([one.k for one in list(track.frames) if one.iteration <= frame.iteration]))
+        if self._kind.value == _LINES:
+            self._picture.content = identification.lines(swarms, race.truth)
+        else:
+            self._picture.content = identification.plane(swarms, *self._axes(), race.truth, trails)
+
+    def _axes(self) -> tuple[int, int]:
+        return _place(self._x.value, 0), _place(self._y.value, 5)
+
+
+def at_iteration(track: Track, iteration: int) -> Frame | None:
+    """The swarm then, or the last one that is kept from before; the newest while the race runs."""
+    frames = [frame for frame in list(track.frames) if frame.iteration <= iteration]
+    if track.last is not None and track.last.iteration <= iteration:
+        last = track.last
+        return Frame(last.iteration, last.population.astype(np.float32), last.k, last.rmse)
+    return frames[-1] if frames else None
+
+
+def telling(truth: np.ndarray) -> tuple[int, int]:
+    """The two k that are farthest from healthy: there one sees most."""
+    away = np.abs(truth - HEALTHY)
+    away[6] *= truth[5]  # a phase of no eccentricity means nothing
+    first, second = np.argsort(-away, kind="stable")[:2]
+    return (int(first), int(second)) if away[second] > 0.0 else (int(first), 5 if first != 5 else 0)
+
+
+def _place(name: str, default: int) -> int:
+    return _NAMES.index(name) if name in _NAMES else default
+
+
+# --- identify's Landscape tab: the cost over two chosen k around an answer, simulated on demand -----------------------
+
+_LANDSCAPE_BEST = "the answer"
+_WHOLE, _CLOSE = "all of 0 … 1", "close to it"
+_LANDSCAPE_STEPS = (
+    Html("Press <b>Identify</b> on the left, and wait for the answer."),
+    Html("Choose two of k1 … k8 here, and press <b>Draw the landscape</b>: the search's cost is simulated over both."),
+    "You see whether the answer lies in a narrow valley, in a long one, or beside another that fits as well.",
+)
+_CONFIG = {"displayModeBar": False, "responsive": False}
+
+
+class LandscapeView:
+    """Its controls, the map and what it says.  Figures are drawn on the slow screen's thread."""
+
+    def __init__(self, page: Page, slow: Worker) -> None:
+        self._page, self._landscapes = page, Landscapes(page.session.worker)
+        self._race: Race | None = None
+        self._by_hand = False  # which two k
+        self._plot: Any = None
+        gui = page.server.gui
+        add_html(gui, COLUMNS)
+        self._x: Any = gui.add_dropdown("Horizontal k", _NAMES, initial_value=_NAMES[0])
+        self._y: Any = gui.add_dropdown("Vertical k", _NAMES, initial_value=_NAMES[5])
+        self._through: Any = gui.add_dropdown(
+            "Through", (_LANDSCAPE_BEST,), hint="The other six k are held at this place's"
+        )
+        self._extent: Any = gui.add_dropdown("Shown", (_WHOLE, _CLOSE))
+        self._draw = gui.add_button("Draw the landscape", icon=viser.Icon.MAP_2, disabled=True)
+        self._line = JobLine(page, self._landscapes.job, stop="Stop drawing")
+        self._first = add_html(gui, begin("No landscape yet", _LANDSCAPE_STEPS))
+        self._show_controls(False)
+        self._place = gui.add_folder("Map", visible=False)
+        with self._place:
+            add_html(gui, NEXT_COLUMN)
+        self._words = add_html(gui)
+        for entry in (self._x, self._y):
+            entry.on_update(lambda event: event.client and self._chosen())
+        self._draw.on_click(lambda _: page.screen.post("landscape", self._begin))
+        landscapes, post = self._landscapes, page.screen.post
+        landscapes.job.began.connect(lambda _: post("landscape runs", lambda: self._busy(True)))
+        landscapes.job.ended.connect(lambda _: post("landscape runs", lambda: self._busy(False)))
+        landscapes.grown.connect(lambda *found: slow.post("landscape", lambda: self._draw_map(*found)))
+        landscapes.drawn.connect(lambda *found: post("landscape ways", lambda: self._say_ways(*found)))
+
+    def answered(self, race: Race) -> None:
+        """A race is over; on the screen's thread."""
+        self._race = race
+        self._place.visible = False
+        self._words.content = ""
+        best = race.best
+        self._show_controls(best is not None and best.k is not None)
+        if best is None or best.k is None:
+            return
+        others = [algorithm_title(name) for name in race.tracks if race.tracks[name] is not best]
+        self._through.options = (_LANDSCAPE_BEST, *(f"where {title} ended" for title in others))
+        self._through.value = _LANDSCAPE_BEST
+        if not self._by_hand:
+            x, y = telling(best.k if race.truth is None else race.truth)
+            self._x.value, self._y.value = _NAMES[x], _NAMES[y]
+        self._line.say(f"{POINTS} × {POINTS} simulations, the other six k held.")
+
+    def _show_controls(self, shown: bool) -> None:
+        """Of the landscape of an answer; before there is one, how to get there."""
+        self._draw.disabled, self._first.visible = not shown, not shown
+        for control in (self._x, self._y, self._through, self._extent, self._draw):
+            control.visible = shown
+        if not shown:
+            self._line.say("")
+
+    def _chosen(self) -> None:
+        self._by_hand = True
+
+    # --- the simulations --------------------------------------------------------------------------------------------
+
+    def _begin(self) -> None:
+        """Starts what the controls ask for, or says why not."""
+        race = self._race
+        if race is None or race.best is None:
+            return
+        x, y = (_NAMES.index(str(entry.value)) for entry in (self._x, self._y))
+        through, close = self._place_held(race), self._extent.value == _CLOSE
+        self._page.begins(lambda: self._landscapes.draw(race, x, y, through, close), self._draw)
+
+    def _place_held(self, race: Race) -> np.ndarray:
+        """(8,): where the chosen search ended, or the answer."""
+        best = race.best
+        assert best is not None and best.k is not None
+        for name, k in ends(race).items():
+            if self._through.value == f"where {algorithm_title(name)} ended":
+                return k
+        return best.k
+
+    # --- what is shown ----------------------------------------------------------------------------------------------
+
+    def _draw_map(self, race: Race, found: Landscape) -> None:
+        best = race.best
+        if race is not self._race or best is None or best.k is None:
+            return
+        sure = best.answer.uncertainty.interval90 if best.answer is not None and best.answer.polished else None
+        figure = identification.figure(found, identification.Marks(best.k, sure, race.truth, ends(race)))
+        with self._page.server.atomic():
+            if self._plot is None:
+                with self._place:
+                    self._plot = self._page.server.gui.add_plotly(figure, config=_CONFIG, aspect=1.0)
+            else:
+                self._plot.figure = figure
+            self._place.visible = True
+
+    def _say_ways(self, race: Race, found: Mapping[str, Way]) -> None:
+        if race is self._race:
+            best = race.best
+            fitted = best.algorithm if best is not None and best.answer is not None and best.answer.polished else ""
+            self._words.content = joined(note(line) for line in (*way_sentences(found, fitted), CORRECTED))
+
+    def _busy(self, busy: bool) -> None:
+        self._draw.visible = not busy
+
+
+# --- identify's panel on the right: convergence and swarm, the answer, and the table of all runs ----------------------
 
 _BEST = "the best"
 _STEPS = (

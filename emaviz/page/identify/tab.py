@@ -1,25 +1,262 @@
-"""The Identify tab: the search for the faults, watched, and its answer."""
+"""The Identify tab: what is searched, how, and where one goes on."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
 import msgspec
 import viser
 
-from emaviz.figures.identified_table import Row
-from emaviz.page.explore.suggested_run import take_separating
-from emaviz.page.explore.tab import ExploreTab
+from ema_model.errors import InputError
+from ema_model.identification.run import ALGORITHMS
+from ema_model.identification.words import facts, verdict, why_best
+from ema_model.recordings import write_measurement
+from ema_model.simulation.plant import FITNESSES
+from emaviz.figures.identification import Row, named
+from emaviz.page.explore.tab import ExploreTab, take_separating
 from emaviz.page.identify import WORKSPACE
-from emaviz.page.identify.controls import IdentifyPanel
 from emaviz.page.identify.result import IdentifyResult
-from emaviz.page.identify.to_discover import take_to_discover
-from emaviz.page.runs.tab import RunsTab
+from emaviz.page.page import Page
+from emaviz.page.panel import JobLine
+from emaviz.page.runs import RunsTab
+from emaviz.page.standing import Standing
+from emaviz.page.style import IN_PAIRS
 from emaviz.page.tab import Shared, Tab
-from emaviz.session.described import taken
+from emaviz.page.viewer_links import recording_link
+from emaviz.recording.viewer import ViewerHost
+from emaviz.session.compare import Comparing
+from emaviz.session.described import limits, taken
+from emaviz.session.discover.discovering import Discovering
+from emaviz.session.identify import Race
 from emaviz.session.saved import Part
+from emaviz.session.settings import SLIDERS, Settings
+from emaviz.text.html import Html, add_html, html, joined
+
+PLANT = "The plant of Explore's sliders"
+_WHY = '<details style="opacity:.75"><summary style="cursor:pointer">★ why it is the best</summary>{}</details>'
+
+
+class IdentifyPanel:
+    """The tab's controls.  `result` is the panel on the right."""
+
+    def __init__(
+        self,
+        page: Page,
+        comparing: Comparing,
+        viewer: ViewerHost | None,
+        result: IdentifyResult,
+        standing: Standing,
+        *,
+        open_viewer: Callable[[str, str], None],
+        to_discover: Callable[[Race], None],
+    ) -> None:
+        """open_viewer(url, name): on the right of Recordings; to_discover(race): takes its recording there."""
+        self._page, self._comparing, self._viewer, self._result = page, comparing, viewer, result
+        self._race: Race | None = None
+        self._open_viewer, self._to_discover = open_viewer, to_discover
+        gui, settings, of = page.server.gui, page.session.settings, partial(limits, Settings)
+        self._source: Any = gui.add_dropdown(
+            "Identify", (PLANT,), hint="The sliders' plant, whose faults are known, or a measurement of the data folder"
+        )
+        with gui.add_folder("Algorithms, one or several at once"):
+            add_html(gui, IN_PAIRS)
+            self._ticks = {
+                name: gui.add_checkbox(title, name in settings.algorithms) for name, title in ALGORITHMS.items()
+            }
+            self._population = gui.add_number("Population", settings.population, **of("population"), step=1)
+            self._iterations = gui.add_number("Iterations", settings.iterations, **of("iterations"), step=1)
+            self._fitness: Any = gui.add_dropdown("Fitness", FITNESSES, initial_value=settings.fitness)
+            self._seed = gui.add_number("Seed", settings.seed, min=0, step=1)  # a maximum would be put in silently
+        for entry, name in (
+            (self._population, "population"),
+            (self._iterations, "iterations"),
+            (self._fitness, "fitness"),
+            (self._seed, "seed"),
+        ):
+            self._listen(entry, partial(settings.set, name))
+        self._start = gui.add_button("Identify", icon=viser.Icon.SEARCH)
+        self._line = JobLine(page, page.session.identifying.job, pauses="the search")
+        self._line.say("Finds the faults from the current alone.")
+        self._text = add_html(gui)
+        self._link = add_html(gui)
+        self._watch = gui.add_button(
+            "Watch it in Rerun, here",
+            icon=viser.Icon.EYE,
+            color="gray",
+            visible=False,
+            hint="The run while it is written, on the right",
+        )
+        self._missing = gui.add_button(
+            "Look for the missing physics",
+            icon=viser.Icon.BULB,
+            color="orange",
+            visible=False,
+            hint="The model does not fit: takes the same measurement to Discover",
+        )
+        self._source.on_update(lambda event: event.client and page.screen.post("identify source", self._take_source))
+        for tick in self._ticks.values():
+            tick.on_update(lambda event: event.client and page.screen.post("algorithms", self._take_algorithms))
+        self._start.on_click(lambda _: self._begin())
+        standing.connect(self._start, self._forget_errors)
+        self._watch.on_click(lambda event: page.screen.post("watch", lambda: self._watch_growing(event.client)))
+        self._missing.on_click(
+            lambda event: page.screen.post("to discover", lambda: self._look_for_missing(event.client))
+        )
+        identifying, post = page.session.identifying, page.screen.post
+        identifying.progressed.connect(self._progressed)
+        identifying.identified.connect(lambda race: post("identification", lambda: self._draw_answer(race)))
+        identifying.job.began.connect(lambda _: post("search began", self._began))
+        identifying.job.rests.connect(lambda _: post("search rests", result.draw))
+        identifying.job.ended.connect(lambda _: post("search ended", self._ended))
+        comparing.events.opened.connect(lambda _: page.screen.post("sources", self.refresh_sources))
+        self.refresh_sources()
+
+    # --- what is asked ----------------------------------------------------------------------------------------------
+
+    def refresh_sources(self) -> None:
+        """Reads the data folder's list again; the chosen one stays as long as it exists."""
+        names = (PLANT, *self._comparing.folder.measurements())
+        if tuple(self._source.options) != names:
+            self._source.options = names
+        self._source.value = self._page.session.settings.source or PLANT
+
+    def show_settings(self) -> None:
+        """Sets the controls to what the session holds; on the screen's thread."""
+        settings = self._page.session.settings
+        self.refresh_sources()
+        for name, tick in self._ticks.items():
+            tick.value = name in settings.algorithms
+        self._population.value, self._iterations.value = settings.population, settings.iterations
+        self._fitness.value, self._seed.value = settings.fitness, settings.seed
+
+    def _take_source(self) -> None:
+        name = str(self._source.value)
+        settings = self._page.session.settings
+        if not self._page.checked(lambda: settings.set("source", SLIDERS if name == PLANT else name), self._source):
+            self.refresh_sources()
+
+    def _take_algorithms(self) -> None:
+        settings = self._page.session.settings
+        chosen, last = [name for name, tick in self._ticks.items() if tick.value], [*self._ticks.values()][-1]
+        if not self._page.checked(lambda: settings.set("algorithms", chosen), last):
+            for name, tick in self._ticks.items():
+                tick.value = name in settings.algorithms
+
+    def _listen(self, entry: Any, setter: Callable[[Any], None]) -> None:
+        def changed(_: Any) -> None:
+            self._page.checked(lambda: setter(entry.value), entry)
+
+        entry.on_update(changed)
+
+    # --- the race ---------------------------------------------------------------------------------------------------
+
+    def _begin(self) -> None:
+        if not self._page.begins(self._page.session.identify, self._start):
+            self._page.session.identifying.provenance.refused()
+
+    def _forget_errors(self) -> None:
+        """What was said of what is not identified any more."""
+        self._page.say_beside(self._start, "")
+        if not self._page.session.identifying.job.running:
+            self._line.say("")
+
+    def _began(self) -> None:
+        self._start.disabled = True
+        self._text.content = self._link.content = ""
+        self._missing.visible = False
+
+    def _ended(self) -> None:
+        self._start.disabled = self._watch.visible = False
+
+    def _watch_growing(self, client: viser.ClientHandle | None) -> None:
+        race = self._race
+        if self._viewer is not None and race is not None and race.growing is not None:
+            self._open_viewer(self._viewer.url_of(race.growing.name), race.growing.name)
+            self._page.workspaces.go("runs", client)
+
+    def _look_for_missing(self, client: viser.ClientHandle | None) -> None:
+        race = self._race
+        if race is not None and self._page.checked(lambda: self._to_discover(race)):
+            self._page.workspaces.go("discover", client)
+
+    def _progressed(self, race: Race) -> None:
+        self._result.progressed(race)
+        self._page.screen.post("identification", lambda: self._draw(race))
+
+    def _draw(self, race: Race) -> None:
+        lines = []
+        for name, track in race.tracks.items():
+            if not track.rmse or len(race.tracks) == 1:  # of one alone the job's own line tells as much
+                continue
+            at = f"iteration {len(track.rmse) - 1} of {track.iterations}"
+            if track.answer is not None:
+                at = "done"
+            elif track.fitting is not None:
+                at = f"searched; {track.fitting[0]}"
+            lines.append(_line(html("{} · {} · uncorrected error {:.4f} A", named(name), at, track.rmse[-1])))
+        if race.growing is not None and race is not self._race:
+            self._link.content = recording_link(self._viewer, race.growing, "Watch it live ↗")
+            self._watch.visible = self._viewer is not None
+        self._race = race
+        self._text.content = joined(lines)
+
+    def _draw_answer(self, race: Race) -> None:
+        best = race.best
+        lines = []
+        for answer in race.answers:
+            star = "★ " if best is not None and len(race.tracks) > 1 and answer is best.answer else ""
+            told = [*facts(answer), *([verdict(answer)] if len(race.tracks) > 1 else [])]
+            lines.append(_line(html("{}{} · {}", star, named(answer.algorithm), " · ".join(told))))
+        if best is not None and best.answer is not None and len(race.answers) > 1:
+            others = [answer for answer in race.answers if answer is not best.answer]
+            lines.append(_line(html(_WHY, why_best(best.answer, others))))
+        self._text.content = joined(lines)
+        self._race = race
+        self._missing.visible = best is not None and best.answer is not None and not best.answer.uncertainty.adequate
+        self._result.finished(race)
+        if race.path is not None:
+            self._link.content = recording_link(self._viewer, race.path, "Open this run in Rerun ↗")
+
+
+def _line(inner: str) -> Html:
+    return html('<div style="padding:1px 10px;font-size:13px;line-height:1.4">{}</div>', inner)
+
+
+# --- from an identification that does not fit to Discover: the same recording, opened there ---------------------------
+
+_NAME = "identified plant.csv"  # of the sliders' plant, which has no file yet
+
+
+def take_to_discover(page: Page, discovering: Discovering, race: Race) -> None:
+    """Opens the race's recording on Compare, alone, and chooses Compare's recordings on Discover.
+
+    The sliders' plant is written into the data folder first.
+    Raises InputError if that cannot be done; on the screen's thread.
+    """
+    comparing = discovering.comparing
+    if discovering.running:
+        raise InputError("Discover is busy with a step; stop it there first")
+    name = race.settings.source
+    if not name:
+        path = comparing.folder.place(_NAME)
+        try:
+            write_measurement(race.measurement, path)
+        except OSError as error:
+            raise InputError(f"{path.name}: cannot be written ({error.strerror}); check the disk") from None
+        name = comparing.folder.name_of(path)
+    actuator = comparing.session.actuator.name
+    if comparing.actuator_name != actuator:
+        comparing.choose_actuator(actuator)
+    for other in [other for other in comparing.opened if other != name]:
+        comparing.remove(other)
+    comparing.add(name)
+    discovering.choose("")
+    page.notify("Discover has the measurement", f"{name}: press Start.", "green")
+
+
+# --- the Identify tab: the search for the faults, watched, and its answer ---------------------------------------------
 
 
 class IdentifyTab(Tab):

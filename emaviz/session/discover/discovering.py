@@ -1,38 +1,140 @@
-"""The session's part of Discover: which recordings, the story so far, and its steps on the compute thread."""
+"""Discovering without a screen."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
-from ema_model.discovery import Candidate, verified, walk
+import numpy as np
+
+from ema_model.actuator import save_actuator
+from ema_model.discovery import Candidate, Story, verified, walk
 from ema_model.discovery.candidates.next_experiment import next_experiment
+from ema_model.discovery.candidates.preview import Preview as Room
+from ema_model.discovery.candidates.preview import preview as room_for
 from ema_model.discovery.candidates.refit import Trial
 from ema_model.discovery.candidates.unknown import curve_for
 from ema_model.discovery.result import Experiment
-from ema_model.discovery.shown.labels import effect_title
 from ema_model.discovery.steps.snapshot import Look
-from ema_model.discovery.words import verification
+from ema_model.discovery.steps.step import Step
+from ema_model.discovery.words import effect_title, verification
 from ema_model.effects import CATALOGUE
-from ema_model.effects.user import UserEffect
+from ema_model.effects.user import Expression, UserEffect, parse
 from ema_model.errors import InputError, quoted
 from ema_model.faults import NAMES
 from ema_model.quantities.titles import in_sentence
-from emaviz.session.compare.comparing import Comparing
-from emaviz.session.discover.entries import Entries, Entry
-from emaviz.session.discover.events import DiscoverEvents
-from emaviz.session.discover.keep import keep
-from emaviz.session.discover.own_effect import OwnPreview
-from emaviz.session.discover.progress import Telling
-from emaviz.session.discover.refits import undecided
-from emaviz.session.discover.saved_stories import SavedStories
-from emaviz.session.discover.sealing import Sealing
-from emaviz.session.discover.shown import Shown
-from emaviz.session.discover.source import NOTHING, DiscoverySource
+from emaviz.session.compare import Comparing
+from emaviz.session.data_folder import DataFolder
+from emaviz.session.discover.source import NOTHING, DiscoverySource, Sealing
+from emaviz.session.discover.stories import Entries, Entry, SavedStories, Shown, Telling, undecided
 from emaviz.session.inputs import Provenance
 from emaviz.session.job import Job, Tell
 from emaviz.session.session import Session
+from emaviz.session.signal import Signal
 from emaviz.session.worker import Worker
+
+
+@dataclass
+class DiscoverEvents:
+    """What the screen listens to; called on the threads that work, so listeners only hand over."""
+
+    looked: Signal[[Look | None]] = field(default_factory=Signal)  # the story has changed
+    unsuggested: Signal[[]] = field(default_factory=Signal)  # no test tells the candidates apart
+    revealed: Signal[[]] = field(default_factory=Signal)
+    previewed: Signal[[Any]] = field(default_factory=Signal)  # `discovery_own.Preview`
+    unpreviewed: Signal[[str]] = field(default_factory=Signal)  # why a torque has no preview
+    kept: Signal[[Path]] = field(default_factory=Signal)  # a report, a recording, a model
+    verified: Signal[[Path, str]] = field(default_factory=Signal)  # a kept model, and how good it is
+
+
+# --- a user's own torque before it is in the model: the text as it is typed, and what its values would change---------
+
+
+@dataclass(frozen=True)
+class Typed:
+    """A text as it stands: the expression, if it is one, and what is to be said of it."""
+
+    expression: Expression | None
+    line: str
+
+
+@dataclass(frozen=True, eq=False)
+class Preview:
+    """What a torque with these values would change, as a candidate of a picture of the story."""
+
+    look: Look
+    candidate: Candidate
+    rmse: float  # with it, in floors
+
+
+def typed(text: str) -> Typed:
+    """Reads what stands in the field; never raises, and never runs any of it."""
+    if not text.strip():
+        return Typed(None, "")
+    try:
+        found = parse(text)
+    except InputError as error:
+        return Typed(None, f"✗ {error}")
+    used = ", ".join(found.variables) or "no variable"
+    free = ", ".join(found.parameters) or "none"
+    return Typed(found, f"✓ uses {used}; parameters to fit: {free}")
+
+
+class OwnPreview:
+    """Holds a torque against what a story's last model leaves; the first time, a torque is compiled."""
+
+    def __init__(self) -> None:
+        self._room: tuple[Step, Room] | None = None
+
+    def of(self, story: Story, look: Look, effect: UserEffect, settings: Mapping[str, float]) -> Preview:
+        """What a torque with these settings would change; `look` is a picture of that story as it stands.
+
+        Raises InputError where the torque has no value somewhere in these recordings, or settings out of range.
+        """
+        if look.assessment is None:
+            raise InputError("one moment: the residual is still being analysed")
+        full, step = effect.settings(dict(settings)), story.steps[-1]
+        if self._room is None or self._room[0] is not step or self._room[1].name != effect.name:
+            self._room = (step, room_for(story.data, story.current, effect.name, full))
+        change = self._room[1].change(full)
+        if not np.all(np.isfinite(change)):
+            raise InputError("with these values the torque has no value somewhere, as in a division by zero")
+        signatures = {**look.assessment.signatures, effect.name: change}
+        shown = replace(look, assessment=replace(look.assessment, signatures=signatures))
+        candidate = Candidate(effect.name, 0.0, full)
+        return Preview(shown, candidate, shown.error_with(candidate))
+
+
+# --- what stays of a discovery in the data folder: the report, the recording for Rerun, the improved model ------------
+
+
+def keep(look: Look, folder: DataFolder, suffix: str) -> Path:
+    """Writes a report (.html), a recording (.rrd) or an actuator (.toml) under a new name; returns where it is."""
+    found = look.found
+    where = folder.actuators if suffix == ".toml" else folder.recordings
+    path = folder.fresh(where, "discover", suffix)
+    configuration = {
+        "fitted": ", ".join(look.reach),
+        "held out": ", ".join(look.held) or "–",
+        "actuator": found.actuator.name,
+    }
+    # Imported when wanted: rerun and the report's figures take half a second of the app's start.
+    if suffix == ".html":
+        from emaviz.report import write_discovery_report
+
+        write_discovery_report(found, path, configuration)
+    elif suffix == ".rrd":
+        from emaviz.recording.discovery import write_discovery
+
+        write_discovery(found, path, configuration)
+    else:
+        save_actuator(found.actuator, path)
+    return path
+
+
+# --- the session's part of Discover: which recordings, the story so far, and its steps on the compute thread ----------
 
 
 class Discovering:

@@ -1,23 +1,270 @@
-"""What a discovery is made from: a challenge, or the recordings and the actuator of Compare, some of them held out."""
+"""What a discovery is made of: recordings, a challenge, a sealed plant, and its truth."""
 
 from __future__ import annotations
 
+import math
+import secrets
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Annotated, Any
+
+import msgspec
+import numpy as np
+from numpy.typing import ArrayLike
 
 from ema_model.actuator import Actuator, load_actuator
+from ema_model.actuator.readings import sentences
 from ema_model.actuator.write import as_toml
 from ema_model.challenges import Challenge, challenges, folder, opened, sealed_challenge
-from ema_model.challenges.sealing import unseal
-from ema_model.challenges.truth import Truth, read_truth
+from ema_model.challenges.challenge import SENSORS, SUFFIX, Truth, read_truth, seal, unseal
+from ema_model.commands import command
+from ema_model.discovery import Discovery
+from ema_model.discovery.result import Added, Experiment
+from ema_model.discovery.words import effect_title, fitted_of, value
+from ema_model.effects import CATALOGUE, find
 from ema_model.errors import InputError
-from ema_model.files.limits import CHALLENGE_RECORDING_BYTES
+from ema_model.faults import BY_NAME, NAMES, named
+from ema_model.files.sandbox import CHALLENGE_RECORDING_BYTES
+from ema_model.quantities.numbers import amount
+from ema_model.quantities.titles import in_sentence
 from ema_model.recordings import Measurement, read
-from emaviz.session.compare.comparing import USUAL, Comparing
-from emaviz.session.discover.saved_story import Recipe
+from ema_model.simulation.run import Sensors
+from ema_model.text import Document, Lines, Remark, Remarks, Severity
+from emaviz.session.compare import USUAL, Comparing
+from emaviz.session.data_folder import DataFolder, sanitised
+from emaviz.session.described import taken
 from emaviz.session.inputs import Inputs, digest, listed, version_of
+from emaviz.session.job import Job, Tell
+from emaviz.session.session import Session
+from emaviz.session.settings import Settings
+from emaviz.session.signal import Signal
+
+MOST_STEPS = 100
+_FARTHEST = 1e3  # σ that a fitted value may be off
+
+
+class Recipe(msgspec.Struct, frozen=True):
+    """From which the same story can be begun again: a challenge, else recordings of Compare as they were asked then."""
+
+    challenge: str = ""  # its name, or its sealed file's in the data folder
+    fitted: tuple[str, ...] = ()  # names in the data folder
+    held: tuple[str, ...] = ()
+    window_s: tuple[float, float] | None = None
+    signals: tuple[str, ...] | None = None
+    actuator: str = ""  # its file's text
+
+    def __post_init__(self) -> None:
+        if self.window_s is not None and not all(map(math.isfinite, self.window_s)):
+            raise InputError("a window has finite edges")
+
+    @property
+    def files(self) -> list[str]:
+        """Names in the data folder; a challenge that comes with the app has none there, which does no harm."""
+        return [name for name in (self.challenge, *self.fitted, *self.held) if name]
+
+    def renamed(self, names: Mapping[str, str]) -> Recipe:
+        """With the files' names of now, by those of then."""
+        fitted, held = (tuple(names.get(name, name) for name in part) for part in (self.fitted, self.held))
+        challenge = names.get(self.challenge, self.challenge)
+        return msgspec.structs.replace(self, challenge=challenge, fitted=fitted, held=held)
+
+
+class SavedStep(msgspec.Struct, frozen=True):
+    """A step after the calibration: its model, where its fit ended, the faults in it, and its rivals."""
+
+    model: str  # as an actuator's file
+    starts: dict[str, Annotated[float, msgspec.Meta(gt=-_FARTHEST, lt=_FARTHEST)]]  # σ, by path
+    faults: tuple[str, ...] = ()
+    same_as: tuple[str, ...] = ()  # effects and faults that cannot be told from the new one
+
+    def __post_init__(self) -> None:
+        if len(set(self.faults)) != len(self.faults) or not set(self.faults) <= set(NAMES):
+            raise InputError("faults are k1 … k8, each once")
+
+
+class SavedStory(msgspec.Struct, frozen=True):
+    """One discovery; with the first of a session, the others."""
+
+    recipe: Recipe
+    steps: Annotated[tuple[SavedStep, ...], msgspec.Meta(max_length=MOST_STEPS)]
+    experiment: Experiment | None = None
+    revealed: bool = False  # the challenge's truth
+    says: str = "not opened yet"
+    others: tuple[SavedStory, ...] = ()
+
+    def __post_init__(self) -> None:
+        if (one := self.experiment) is not None:
+            command(one.command, one.settings)
+            for name in one.separates:
+                if name not in NAMES:
+                    find(name)
+            if not all(map(math.isfinite, (one.duration_s, one.load_torque_Nm, one.expected_chi2))):
+                raise InputError("a suggested test has finite numbers")
+
+    def saved(self) -> dict[str, Any]:
+        """In what JSON can hold."""
+        return msgspec.to_builtins(self)
+
+
+def story_of(saved: Any) -> SavedStory:
+    """What `SavedStory.saved` gave; InputError if it makes no sense."""
+    return taken(SavedStory, saved, "part of Discover")
+
+
+# --- seals what Explore hides in its plant as a challenge for somebody else, on the compute thread --------------------
+
+_MOST_SEED = 1_000_000
+
+
+class Sealing:
+    """Takes the plant as the session's settings have it when it is asked."""
+
+    def __init__(self, session: Session, folder: DataFolder) -> None:
+        self.session, self.folder = session, folder
+        self.job = Job(session.worker)
+        self.sealed: Signal[[Path]] = Signal()  # a challenge is in the data folder
+
+    def seal(self, title: str, story: str) -> bool:
+        """Makes and writes the challenge soon; False, and nothing is begun, while another long run goes on.
+
+        Raises InputError for a title or a story that is missing.
+        """
+        for what, text in (("title", title), ("story", story)):
+            if not text.strip():
+                raise InputError(f"the challenge has no {what} yet; write one")
+        settings, actuator = self.session.settings, self.session.actuator
+        truth = truth_of(settings, actuator, secrets.randbelow(_MOST_SEED))
+        path = self.folder.place(sanitised(title.strip() + SUFFIX))
+        sensors, load = sensors_of(settings), settings.load_torque_Nm
+
+        def work(tell: Tell) -> None:
+            tell("simulating; a combination of effects is compiled on its first use")
+            seal(truth, path, title, story, actuator, sensors=sensors, load_torque_Nm=load, on_progress=tell)
+
+        def done() -> str:
+            self.sealed(path)
+            return f"Kept in the data folder: {self.folder.name_of(path)}"
+
+        return self.job.begin("Sealing", work, done)
+
+
+def truth_of(settings: Settings, actuator: Actuator, seed: int) -> Truth:
+    """What the settings hide in the plant: its effects, and the faults that are not healthy."""
+    k, told = settings.k, []
+    faults = named(k)
+    for name, given in settings.effects.items():
+        order = f" of order {given['order']:g}" if "order" in given else ""
+        told.append(f"{in_sentence(find(name).title)}{order}")
+    told += [sentences(k, actuator)[NAMES.index(name)] for name in faults]
+    answer = (
+        f"Hidden: {'; '.join(told)}." if told else "Nothing is hidden: the plant is the model's, within tolerances."
+    )
+    effects = {name: dict(given) for name, given in settings.effects.items()}
+    return Truth("", seed, answer, effects, faults=faults)
+
+
+def sensors_of(settings: Settings) -> Sensors:
+    """Those that are set; where they are perfect, those of the shipped challenges, since no rig has such."""
+    given = settings.sensors
+    return Sensors(given.current_noise_A or SENSORS.current_noise_A, given.encoder_bits or SENSORS.encoder_bits)
+
+
+# --- a discovery beside the truth that a challenge hides, in words ----------------------------------------------------
+
+_NEAR = 0.25  # of the true value, within which a strength counts as found where its interval misses it
+
+
+# What of the model's parameters tells a fault that is slight enough to pass for it.
+_OF_FAULT = {"k1": "friction", "k2": "backlash", "k8": "position_gain"}
+
+
+def agrees(truth: Truth, found: Discovery, added: tuple[Added, ...]) -> bool:
+    """Whether the answer names exactly what is hidden: the effects, or a torque of its own for an unknown one."""
+    named = {one.name for one in added if one.name in CATALOGUE and not one.stands_for}
+    own = any(one.name not in CATALOGUE for one in added)
+    seen = all(_sees(found, fault) for fault in truth.faults)
+    return named == set(truth.effects) and own == bool(truth.torque) and seen and not _invented(truth, found)
+
+
+def _sees(found: Discovery, fault: str) -> bool:
+    told = _OF_FAULT.get(fault)
+    return fault in found.faults or (told is not None and any(told in p for p in found.parameters_outside_tolerance))
+
+
+def _invented(truth: Truth, found: Discovery) -> list[str]:
+    """Faults that were named and are not there; a phase belongs to its modulus."""
+    return [name for name in found.faults if name not in truth.faults and name != "k7"]
+
+
+def _fault(fault: str, k: ArrayLike, found: Discovery) -> Remark:
+    index = NAMES.index(fault)
+    what = f"{in_sentence(BY_NAME[fault].title)} fault: {sentences(k, found.plant.actuator)[index]}"
+    if fault in found.faults:
+        own, true = found.faults[fault], float(np.asarray(k)[index])
+        low, high = own.interval90
+        near = low <= true <= high or abs(own.value - true) <= _NEAR * abs(true - BY_NAME[fault].healthy)
+        return _row(near, what, f"{fault} {true:g} in truth, {value(own)} found")
+    good = _sees(found, fault)
+    return _row(good, what, "its parameter is outside its tolerance" if good else "not found; try Identify")
+
+
+def document_of(truth: Truth, found: Discovery, added: tuple[Added, ...]) -> Document:
+    """Whether they agree, the truth in words, then effect by effect."""
+    good = agrees(truth, found, added)
+    verdict = Remark(f"Your answer {'agrees' if good else 'differs'}", "this is what was hidden", _severity(good))
+    rows = [_effect(name, given, found, added) for name, given in truth.effects.items()]
+    rows += [_fault(fault, truth.k, found) for fault in truth.faults]
+    for name in _invented(truth, found):
+        rows.append(_row(False, f"the fault {BY_NAME[name].label}", "is not hidden here"))
+    if truth.torque:
+        own = next((one for one in added if one.name not in CATALOGUE), None)
+        what = f"an effect outside the library: T = {truth.torque}"
+        how = f"found as {in_sentence(effect_title(own.name))}" if own else "not found: add the residual's curve"
+        rows.append(_row(own is not None, what, how))
+    for one in added:
+        if one.name in CATALOGUE and one.name not in truth.effects:
+            tied = [name for name in one.same_as if name in truth.effects or name in truth.faults]
+            if one.stands_for:
+                why = "a parameter outside its tolerance; nothing of the kind is hidden"
+            elif tied:
+                why = f"cannot be told from {in_sentence(effect_title(tied[0]))} by these recordings"
+            else:
+                why = "is not hidden here"
+            rows.append(_row(False, in_sentence(effect_title(one.name)), why))
+    if not rows:
+        rows.append(_row(True, "nothing is hidden", "and you added nothing"))
+    return Document([Remarks([verdict]), Lines([truth.answer]), Remarks(rows)])
+
+
+def _effect(name: str, given: dict[str, float], found: Discovery, added: tuple[Added, ...]) -> Remark:
+    title = in_sentence(effect_title(name))
+    order = given.get("order")
+    own = [one for one in added if one.name == name]
+    one = next((one for one in own if order is None or one.chosen.get("order") == order), own[0] if own else None)
+    if one is None:
+        return _row(False, title, "not found")
+    first = find(name, found.actuator.axes).parameters[0]
+    fitted = fitted_of(found, one, first.name)
+    low, high = fitted.interval90
+    inside = low <= given[first.name] <= high
+    near = inside or abs(fitted.value - given[first.name]) <= _NEAR * abs(given[first.name])
+    told = f"{in_sentence(first.title)} {amount(given[first.name], first.unit)} in truth, {value(fitted)} found"
+    if order is not None:
+        told += f"; order {order:g} in truth, {one.chosen.get('order', 0.0):g} found"
+    return _row(near and (order is None or one.chosen.get("order") == order), title, told)
+
+
+def _row(good: bool, what: str, how: str) -> Remark:
+    return Remark(what[:1].upper() + what[1:], how, _severity(good))
+
+
+def _severity(good: bool) -> Severity:
+    return "good" if good else "bad"
+
+
+# --- what a discovery is made from: a challenge, or the recordings and the actuator of Compare, some of them ---
 
 COMPARED = "The measurements of Compare"
 NOTHING = "no measurement to fit is chosen; open one on Compare, or choose a challenge"

@@ -36,7 +36,7 @@ def documents() -> tuple[type, ...]:
 def run(arguments: argparse.Namespace) -> int:
     """Loads, checks, and calibrates where there is a recording."""
     from ema_model.actuator import load_actuator
-    from ema_model.actuator.plausible import implausible, missing
+    from ema_model.actuator.describe import implausible, missing
     from emaviz.cli import output
 
     actuator = load_actuator(arguments.file)
@@ -90,7 +90,7 @@ def _beside(actuator: Actuator, arguments: argparse.Namespace) -> dict[str, list
         one = calibration.parameters[path]
         shown = on_axes(path, actuator.axes).path
         strange.append(f"{shown} ends at the edge of its tolerance, at {one.value:g} {one.unit}".rstrip())
-    from ema_model.estimation.identifiable import told
+    from ema_model.estimation.calibrate import told
 
     for one in told(calibration):
         shown = on_axes(one.name, actuator.axes).path

@@ -12,7 +12,7 @@ from ema_model.errors import InputError, quoted
 from ema_model.members import stated_in
 from ema_model.quantities.axes import KINDS as AXES
 from emaviz.cli import files, options
-from emaviz.cli.numbers import FINITE, SAMPLE_RATE
+from emaviz.cli.options import FINITE, SAMPLE_RATE
 
 if TYPE_CHECKING:
     from emaviz.cli.documents import NewActuatorJson
@@ -74,8 +74,7 @@ def documents() -> tuple[type, ...]:
 def run(arguments: argparse.Namespace) -> int:
     """Asks for what no option says where a terminal is there, guesses the rest, and writes the file."""
     from ema_model.actuator import save_actuator
-    from ema_model.actuator.describe import described
-    from ema_model.actuator.plausible import implausible, missing
+    from ema_model.actuator.describe import described, implausible, missing
     from emaviz.cli import output
     from emaviz.cli.verbs.actuator.questions import ask
 

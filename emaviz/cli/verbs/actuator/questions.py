@@ -11,7 +11,7 @@ from ema_model.actuator.naming import on_axes
 from ema_model.actuator.parameters import facts_of
 from ema_model.errors import InputError
 from ema_model.quantities.axes import KINDS as AXES
-from emaviz.cli.numbers import SAMPLE_RATE
+from emaviz.cli.options import SAMPLE_RATE
 
 _GEAR = "transmission.gear_ratio"
 

@@ -1,0 +1,218 @@
+"""Files opened with care: refusals, links, archives."""
+
+from __future__ import annotations
+
+import io
+import math
+import os
+import stat
+import zipfile
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from contextlib import ExitStack, contextmanager
+from typing import IO, BinaryIO
+
+from ema_model.errors import InputError, quoted
+from ema_model.files.sandbox import megabytes
+
+_NAMES_SHOWN = 12
+
+
+def shown(value: object, limit: int = 40) -> str:
+    """Foreign text on one line, cut to `limit` characters; see `quoted`."""
+    return quoted(value, limit)
+
+
+def listed(names: Iterable[str]) -> str:
+    """Foreign names joined by commas, the first dozen of them."""
+    names = list(names)
+    more = [f"… ({len(names)} in all)"] if len(names) > _NAMES_SHOWN else []
+    return ", ".join([shown(name.strip()) or "(unnamed)" for name in names[:_NAMES_SHOWN]] + more) or "none"
+
+
+def refusal(path: str | os.PathLike[str], problem: str) -> InputError:
+    """The error to raise: the file's name as given, then what is wrong, where, and what to do."""
+    return InputError(f"{shown(os.fspath(path), 300)}: {problem}")
+
+
+def reason(error: Exception) -> str:
+    """What the system says about an error, on one line."""
+    return shown(" ".join(str(getattr(error, "strerror", None) or error).split()), 80)
+
+
+# --- the door for files that a user names: a regular file of a bearable size, or one clear line -----------------------
+
+
+def check_user_file(
+    path: str | os.PathLike[str], expected: str, most_bytes: float = math.inf, *, name: str | None = None
+) -> os.stat_result:
+    """The status of a regular file of at most so many bytes; raises InputError for anything else.
+
+    expected: what the file should be, as in "an actuator file (.toml)"; name: what the error calls it, its path
+    unless given.  Nothing is opened.
+    """
+    told = path if name is None else name
+    try:
+        status = os.stat(path)
+    except (FileNotFoundError, NotADirectoryError):
+        raise refusal(told, "no such file; check the name and the folder") from None
+    except (OSError, ValueError) as error:
+        raise _unreadable(told, error) from None
+    _check(told, status, expected, most_bytes)
+    return status
+
+
+def open_user_file(path: str | os.PathLike[str], expected: str, most_bytes: float = math.inf) -> BinaryIO:
+    """The file, opened to read bytes; raises as `check_user_file`."""
+    check_user_file(path, expected, most_bytes)
+    try:
+        file = open(path, "rb", opener=_without_waiting)
+    except OSError as error:
+        raise _unreadable(path, error) from None
+    try:  # what is open now may be another than what was there before
+        _check(path, os.fstat(file.fileno()), expected, most_bytes)
+    except InputError:
+        file.close()
+        raise
+    return file
+
+
+def _check(path: str | os.PathLike[str], status: os.stat_result, expected: str, most_bytes: float) -> None:
+    if stat.S_ISDIR(status.st_mode):
+        raise refusal(path, f"is a folder; {expected} is expected")
+    if not stat.S_ISREG(status.st_mode):
+        raise refusal(path, f"is not a regular file; {expected} is expected")
+    if status.st_size > most_bytes:
+        size = f"is {status.st_size / 1e6:.6g} MB large, over the limit of {most_bytes / 1e6:g} MB"
+        raise refusal(path, f"{size}; {expected} is expected")
+
+
+def _without_waiting(path: str, flags: int) -> int:
+    """Opens a pipe at once as well, so that it can be refused."""
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
+
+
+def _unreadable(path: str | os.PathLike[str], error: Exception) -> InputError:
+    return refusal(path, f"cannot be read ({reason(error)}); check the name and the permissions")
+
+
+# --- takes a zip apart that may mean harm: .npz files, sessions and sealed challenges are zips, and come from---
+
+_PIECE = 1 << 20
+_DIRECTORY_BYTES = 4 << 20  # the list of members, which zipfile reads at once: each takes 46 and its name
+_ENCRYPTED = 0x1  # of a member's flags
+_OTHER_WAYS = {9: "deflate64", 12: "bzip2", 14: "LZMA", 93: "Zstandard"}
+
+
+class Damaged(Exception):
+    """No zip, or a broken one; the text says why, for a person."""
+
+
+class Refused(Exception):
+    """A zip that is not taken; the text says what it does, for a person; the reader adds what to do."""
+
+
+class SafeZip:
+    """The members of a zip by name; all that is read of them, together, stays below `most_bytes`.
+
+    A name stands here as it does in the zip, and is good for nothing but to ask for the member.
+    """
+
+    def __init__(self, archive: zipfile.ZipFile, most_members: int, most_bytes: int) -> None:
+        members = [info for info in archive.infolist() if not info.is_dir()]
+        if len(members) > most_members:
+            raise Refused(f"holds {len(members)} files, over the limit of {most_members}")
+        for info in members:
+            if info.flag_bits & _ENCRYPTED:
+                raise Refused("is encrypted")
+            if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+                way = _OTHER_WAYS.get(info.compress_type, f"method {info.compress_type}")
+                raise Refused(f"holds {shown(info.filename)!r} packed by {way}, where only deflate is taken")
+        twice = [name for name, count in Counter(info.filename for info in members).items() if count > 1]
+        if twice:
+            raise Refused(f"holds {shown(twice[0])!r} twice")
+        self._archive, self._members = archive, {info.filename: info for info in members}
+        self._most_bytes, self._read = most_bytes, 0
+
+    @property
+    def names(self) -> list[str]:
+        """All members' names, in the zip's order."""
+        return list(self._members)
+
+    @contextmanager
+    def open(self, name: str) -> Iterator[Member]:
+        """A member to read from; Damaged if there is none of that name."""
+        if name not in self._members:
+            raise Damaged(f"{shown(name)} is missing")
+        with _told():
+            file = self._archive.open(self._members[name])
+        with file:
+            yield Member(self, file)
+
+    def read(self, name: str, most_bytes: int | None = None) -> bytes:
+        """A whole member, which may have a limit of its own."""
+        whole = io.BytesIO()
+        with self.open(name) as member:
+            while piece := member.read(_PIECE):
+                whole.write(piece)
+                if most_bytes is not None and whole.tell() > most_bytes:
+                    raise Refused(f"holds {shown(name)!r} of over {megabytes(most_bytes)}, which is the limit")
+        return whole.getvalue()
+
+    def copy(self, name: str, target: IO[bytes]) -> None:
+        """Writes a whole member to a file."""
+        with self.open(name) as member:
+            while piece := member.read(_PIECE):
+                target.write(piece)
+
+    def count(self, size: int) -> None:
+        """Adds to what was read."""
+        self._read += size
+        if self._read > self._most_bytes:
+            raise Refused(f"unpacks to over {megabytes(self._most_bytes)}, which is the limit")
+
+
+class Member:
+    """A member of a zip, opened."""
+
+    def __init__(self, archive: SafeZip, file: IO[bytes]) -> None:
+        self._archive, self._file = archive, file
+
+    def read(self, size: int) -> bytes:
+        """Up to `size` bytes, unpacked, and never more than a megabyte; none at the end."""
+        with _told():
+            piece = self._file.read(min(size, _PIECE))
+        self._archive.count(len(piece))
+        return piece
+
+
+@contextmanager
+def opened_zip(file: BinaryIO, most_members: int, most_bytes: int) -> Iterator[SafeZip]:
+    """The members of a zip, which raise Damaged and Refused as this does."""
+    with ExitStack() as closing:
+        with _told():
+            archive = closing.enter_context(zipfile.ZipFile(_Sparing(file)))  # type: ignore
+            # Members that share their bytes could each be read from end to end, over and over.
+            if sum(info.compress_size for info in archive.infolist()) > os.fstat(file.fileno()).st_size:
+                raise Damaged("its members overlap")
+        yield SafeZip(archive, most_members, most_bytes)
+
+
+class _Sparing(io.BufferedReader):
+    """A file that gives no more at once than a zip's directory may have, since zipfile reads that in one piece."""
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        if size is not None and size > _DIRECTORY_BYTES:
+            raise Damaged("its directory is too large")
+        return super().read(size)
+
+
+@contextmanager
+def _told() -> Iterator[None]:
+    """Around zipfile: a damaged zip fails in as many ways as there are layers below it."""
+    try:
+        yield
+    except (Damaged, MemoryError):
+        raise
+    except Exception as error:
+        raise Damaged(f"{type(error).__name__}: {shown(error, 80)}" if str(error) else type(error).__name__) from None

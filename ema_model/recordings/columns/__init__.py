@@ -1,1 +1,0 @@
-"""Which column of a file is which signal: names, units, guesses and mappings."""

@@ -1,1 +1,0 @@
-"""The side file NAME.toml beside a recording, read and written."""

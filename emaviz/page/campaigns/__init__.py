@@ -1,1 +1,0 @@
-"""Campaigns: their progress and tables, and a row as a run."""

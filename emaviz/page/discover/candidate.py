@@ -1,0 +1,449 @@
+"""A candidate: its card, its effect with sliders, and a law of one's own."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import plotly.graph_objects as go
+import viser
+
+from ema_model.actuator import Actuator
+from ema_model.discovery import Candidate
+from ema_model.discovery.steps.snapshot import Look
+from ema_model.discovery.words import effect_title, page_of, size
+from ema_model.discovery.words import typical as typical_fault
+from ema_model.effects import Effect, find
+from ema_model.effects.effect import FAMILIES
+from ema_model.effects.user import UserEffect, user_torque
+from ema_model.effects.user.expression import FUNCTIONS, VARIABLES
+from ema_model.effects.user.torque import RANGE
+from ema_model.errors import InputError
+from ema_model.faults import BY_NAME
+from ema_model.quantities.numbers import Quantity, amount, number, with_uncertainty
+from ema_model.quantities.numbers import number as shown
+from ema_model.quantities.titles import in_sentence
+from ema_model.text import COLOURS
+from emaviz.figures import discovery
+from emaviz.page.page import Page
+from emaviz.session.described import number as setting_number
+from emaviz.session.discover.discovering import Discovering, Preview, Typed, typed
+from emaviz.text.html import BOX, Html, add_html, boxed, html, joined, mathml, note, unescaped
+
+_CARD = (
+    "height:auto!important;min-height:2em;padding:5px 9px;font-weight:400;font-size:12.5px;"
+    "background-color:rgba(134,142,150,.10)!important;color:inherit!important;"
+)
+_LABEL = "display:block;height:auto;overflow:visible;white-space:pre-line;text-align:left;line-height:1.35;width:100%"
+_LITTLE = 0.005  # of the error
+_BAR = "rgba(240,140,0,.28)"
+
+
+def label(look: Look, one: Candidate) -> str:
+    """The lines of a card; its first is the effect's or fault's name."""
+    title = effect_title(one.name)
+    if one.untestable_reason:
+        return title
+    lines = [title]
+    if look.is_worth(one):
+        before, after = number(look.rmse), number(look.predicted_rmse(one))
+        if look.share(one) < _LITTLE:
+            lines.append("explains a part, but hardly reduces the error by itself")
+        else:
+            lines.append(f"error {before} → ≈ {after} × floor (−{100.0 * look.share(one):.0f} %)")
+        lines += [strength(look, one), confidence(one)]
+        same = look.assessment.alike.get(one.name, ()) if look.assessment else ()
+        if same:
+            lines.append("≈ same as " + ", ".join(in_sentence(effect_title(name)) for name in same))
+    return "\n".join(lines)
+
+
+def strength(look: Look, one: Candidate) -> str:
+    """'amplitude 20.4 ± 0.8 mN·m, order 14', as the residual suggests it; of a fault its size."""
+    if one.name in BY_NAME:
+        return size(one, look.found.actuator)
+    first = find(one.name, look.found.actuator.axes).parameters[0]
+    value, half = one.settings[first.name], look.uncertainty(one)
+    shown = amount(value, first.unit) if half is None else with_uncertainty(value, half, first.unit)
+    told = f"{in_sentence(first.title)} {shown}"
+    order = one.settings.get("order")
+    return told if order is None else f"{told}, order {order:g}"
+
+
+def confidence(one: Candidate) -> str:
+    """How strong the evidence is that something like this is missing: 'strong evidence (Δχ² −405)'."""
+    drop = one.predicted_drop
+    word = "strong" if drop > 200.0 else "moderate" if drop > 50.0 else "weak"
+    return f"{word} evidence (Δχ² −{drop:.0f})"
+
+
+def style(look: Look | None, shown: Sequence[tuple[str, Candidate | None]], opened: str | None) -> Html:
+    """viser's buttons have one line and one colour; these become cards.  shown: (the button's id, its candidate)."""
+    rules = []
+    for uuid, one in shown:
+        if one is None or look is None:
+            continue
+        button = f'[id="{uuid}"]'
+        share = 100.0 * look.share(one) if look.is_worth(one) else 0.0
+        bar = f"background-image:linear-gradient(to right,{_BAR} {share:.1f}%,transparent {share:.1f}%)!important;"
+        edge = "#f08c00" if one.name == opened else "rgba(134,142,150,.5)" if share else "rgba(134,142,150,.25)"
+        grey = "opacity:.55;" if one.untestable_reason else ""
+        rules.append(f"{button}{{{_CARD}{bar}{grey}border-left:3px solid {edge}}}")
+        rules.append(f"{button} .mantine-Button-inner{{justify-content:flex-start}}")
+        rules.append(f"{button} .mantine-Button-label{{{_LABEL}}}{button} .mantine-Button-label::first-line")
+        rules.append("{font-weight:600;font-size:13.5px}")
+    return unescaped(f"<style>{''.join(rules)}</style>")
+
+
+# --- sliders for the parameters of a user's torque, and the ranges that they move in ----------------------------------
+
+_START = 1e-3  # N·m and the like: a torque at the motor is some thousandths
+_USUAL = 0.05  # a slider's reach, as long as nobody has set another
+_STEPS = 500
+
+
+class ParameterSliders:
+    """A folder with a slider for each name, and a folded one with the ranges.  moved() follows each change."""
+
+    def __init__(self, page: Page, moved: Callable[[], None]) -> None:
+        self._page, self._moved = page, moved
+        self._sliders: dict[str, Any] = {}
+        self._ranges: dict[str, Any] = {}
+        gui = page.server.gui
+        self._folder = gui.add_folder("Its parameters", visible=False)
+        self._wide = gui.add_folder("Ranges of the parameters", visible=False, expand_by_default=False)
+
+    def list(self, names: tuple[str, ...]) -> None:
+        """These parameters; those that stay keep their values and ranges."""
+        if tuple(self._sliders) == names:
+            return
+        values = {name: slider.value for name, slider in self._sliders.items()}
+        ranges = {name: entry.value for name, entry in self._ranges.items()}
+        for control in (*self._sliders.values(), *self._ranges.values()):
+            control.remove()
+        self._sliders, self._ranges = {}, {}
+        self._folder.visible = self._wide.visible = bool(names)
+        for name in names:
+            low, high = ranges.get(name, (-_USUAL, _USUAL))
+            with self._folder:
+                self._sliders[name] = self._slider(name, float(low), float(high), float(values.get(name, _START)))
+            with self._wide:
+                entry = self._page.server.gui.add_vector2(
+                    f"{name} from, to", (float(low), float(high)), step=1e-4, hint="Of the slider, and of the fit"
+                )
+            entry.on_update(lambda event, name=name: event.client and self._post_range(name))
+            self._ranges[name] = entry
+
+    @property
+    def values(self) -> dict[str, float]:
+        """As the sliders stand; a fit begins there."""
+        return {name: setting_number(slider.value, name) for name, slider in self._sliders.items()}
+
+    @property
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        """Those that somebody has set: a fit keeps to them."""
+        found = {name: _range(name, entry.value) for name, entry in self._ranges.items()}
+        return {name: limits for name, limits in found.items() if limits != (-_USUAL, _USUAL)}
+
+    def _slider(self, name: str, low: float, high: float, value: float) -> Any:
+        step = float(f"{(high - low) / _STEPS:.0e}")
+        value = min(max(value, low), high)
+        slider = self._page.server.gui.add_slider(
+            name, low, high, step, value, hint="What it does is drawn below; the fit begins here"
+        )
+        slider.on_update(lambda event: event.client and self._moved())
+        return slider
+
+    def _post_range(self, name: str) -> None:
+        def take() -> None:
+            self._page.checked(lambda: self._take_range(name), self._ranges[name])
+
+        self._page.screen.post(f"range of {name}", take)
+
+    def _take_range(self, name: str) -> None:
+        low, high = _range(name, self._ranges[name].value)
+        slider = self._sliders[name]
+        with self._page.server.atomic():
+            slider.min, slider.max = low, high
+            slider.step = float(f"{(high - low) / _STEPS:.0e}")
+            slider.precision = 7
+            slider.value = min(max(float(slider.value), low), high)
+        self._moved()
+
+
+def _range(name: str, limits: Any) -> tuple[float, float]:
+    low, high = (setting_number(limit, f"the range of {name}") for limit in limits)
+    if not RANGE[0] <= low < high <= RANGE[1]:
+        raise InputError(f"the range of {name} must go from a number to a larger one within ±{RANGE[1]:g}")
+    return low, high
+
+
+# --- one candidate opened: its signature beside what is left, its equation, cause, size, and what it is mista---
+
+CONFIG = {"displayModeBar": False, "responsive": False}
+
+
+class EffectView:
+    """A folder of the panel on the right, there while a card is open."""
+
+    def __init__(self, page: Page, discovering: Discovering) -> None:
+        self._discovering = discovering
+        self._name: str | None = None
+        self._busy = self._untestable = False
+        self._drawn: tuple[Any, str | None] = (None, None)
+        gui = page.server.gui
+        self._folder = gui.add_folder("Candidate", visible=False)
+        with self._folder:
+            self._head = add_html(gui)
+            self._add = gui.add_button("Add it to the model", icon=viser.Icon.PLUS)
+            self._plot: Any = gui.add_plotly(go.Figure(), config=CONFIG, aspect=0.52, visible=False)
+            self._text = add_html(gui)
+            self._close = gui.add_button("Close", icon=viser.Icon.X, color="gray")
+
+    def connect(self, ask: Callable[[Callable[[], bool], Any], None], close: Callable[[], None]) -> None:
+        """ask(begin, button) starts a step; close() closes the card."""
+        self._close.on_click(lambda _: close())
+
+        def add(_: Any) -> None:
+            name = self._name
+            if name is not None:
+                ask(lambda: self._discovering.add(name), self._add)
+
+        self._add.on_click(add)
+
+    def busy(self, busy: bool) -> None:
+        """Whether a step runs."""
+        self._busy = busy
+        self._enable()
+
+    def _enable(self) -> None:
+        self._add.disabled = self._busy or self._untestable
+
+    def open(self, look: Look | None, name: str | None) -> None:
+        """Shows a candidate, or none."""
+        one = look.candidate(name) if look is not None and name is not None else None
+        self._name = one.name if one is not None else None
+        self._folder.visible = one is not None
+        if look is None or one is None or self._drawn == (look, one.name):
+            return
+        self._drawn = (look, one.name)
+        self._folder.label = effect_title(one.name)
+        self._head.content = head(look, one)
+        actuator = look.found.actuator
+        is_fault = one.name in BY_NAME
+        self._text.content = about_fault(one.name, actuator) if is_fault else about(find(one.name, actuator.axes))
+        self._untestable = bool(one.untestable_reason)
+        self._enable()
+        self._plot.visible = not self._untestable
+        if not self._untestable:
+            self._plot.figure = discovery.signature(look, one)
+
+
+def head(look: Look, one: Candidate) -> Html:
+    """What adding it is expected to do."""
+    if one.untestable_reason:
+        why = one.untestable_reason[:1].upper() + one.untestable_reason[1:]
+        return html('<div {}><span style="color:{}">▲ {}.</span></div>', BOX, COLOURS["warning"], why)
+    if not look.is_worth(one):
+        return html("<div {}>No evidence for it: adding it would not reduce the error significantly.</div>", BOX)
+    lines: list[str] = [
+        html(
+            "The error would fall from <b>{}</b> to about <b>{} times the floor</b> ({:.0f} % of it).",
+            number(look.rmse),
+            number(look.predicted_rmse(one)),
+            100.0 * look.share(one),
+        ),
+        f"Suggested: {strength(look, one)} (estimated; adding it fits it).",
+    ]
+    same = look.assessment.alike.get(one.name, ()) if look.assessment else ()
+    if same:
+        names = ", ".join(in_sentence(effect_title(name)) for name in same)
+        lines.append(
+            html('<span style="color:{}">▲ These recordings cannot tell it from {}.</span>', COLOURS["warning"], names)
+        )
+    return boxed(joined(lines, "<br>"))
+
+
+def about(effect: Effect, equation: bool = True) -> Html:
+    """Equation (unless it stands elsewhere), cause, typical size, where it shows, what it is mistaken for."""
+    rows = [
+        ("Belongs to", FAMILIES[effect.family]),
+        ("Why", effect.explanation),
+        ("Typical", typical(effect)),
+        ("Shows", effect.shows),
+        ("Mistaken for", effect.mistaken_for),
+        ("Source", effect.source),
+    ]
+    return _written(effect.equation if equation else "", rows)
+
+
+def about_fault(name: str, actuator: Actuator) -> Html:
+    """The same of a fault of the actuator."""
+    page = page_of(name)
+    rows = [
+        ("Belongs to", "the actuator itself: a fault, and no missing physics"),
+        ("Why", page.explanation),
+        ("Typical", typical_fault(name, actuator)),
+        ("Shows", page.shows),
+        ("Mistaken for", page.mistaken_for),
+    ]
+    return _written(page.equation, rows)
+
+
+def _written(equation: str, rows: list[tuple[str, str]]) -> Html:
+    table = joined(
+        html(
+            '<tr><td style="opacity:.65;vertical-align:top;padding-right:8px;white-space:nowrap">{}</td>'
+            "<td>{}</td></tr>",
+            title,
+            text,
+        )
+        for title, text in rows
+        if text
+    )
+    shown = html('<div style="font-size:17px;padding:4px 0 6px">{}</div>', mathml(equation, "inline"))
+    return html("<div {}>{}<table>{}</table></div>", BOX, shown if equation else "", table)
+
+
+def typical(effect: Effect) -> str:
+    """'Amplitude 6, 12, 24 mN·m: low, medium, high.'"""
+    first = effect.parameters[0]
+    shown = Quantity("", first.unit).scaled(effect.severities)
+    values = ", ".join(number(shown.factor * one, 2) for one in effect.severities)
+    return f"{first.title} {values} {shown.unit}".rstrip() + ": low, medium, high"
+
+
+# --- your own effect: an expression checked as it is typed, a slider for each parameter, and the curve of wha---
+
+_EXAMPLE = "-c*sign(omega)*sqrt(abs(omega))"
+_TYPED_S = 0.7  # after the last key, from which a text is taken for whole: its torque is compiled then
+_CONFIG = {"displayModeBar": False, "responsive": False}
+
+
+class OwnEffect:
+    """A folder of the Discover tab."""
+
+    def __init__(self, page: Page, discovering: Discovering) -> None:
+        self._page, self._discovering = page, discovering
+        self._typed = Typed(None, "")
+        self._running = False
+        self._look: Look | None = None
+        self._timer: threading.Timer | None = None
+        gui = page.server.gui
+        self._folder = gui.add_folder("Your own effect", visible=False, expand_by_default=False)
+        with self._folder:
+            add_html(gui, _help())
+            self._text = gui.add_text("T [N·m] =", "", hint=f"For example {_EXAMPLE}")
+            self._checked = add_html(gui)
+            self._sliders = ParameterSliders(page, self._preview)
+            self._said = add_html(gui)
+            self._plot: Any = gui.add_plotly(go.Figure(), config=_CONFIG, aspect=0.7, visible=False)
+            self._add = gui.add_button("Fit it in the model", icon=viser.Icon.PLUS, disabled=True)
+            self._curve = gui.add_button(
+                "From the curve",
+                icon=viser.Icon.CHART_LINE,
+                color="gray",
+                disabled=True,
+                hint="What is left, as a table of torque over the variable that explains it best",
+            )
+        self._text.on_update(lambda event: event.client and page.screen.post("own effect", self._check))
+        events = discovering.events
+        events.previewed.connect(lambda found: page.screen.post("own preview", lambda: self._draw(found)))
+        events.unpreviewed.connect(lambda why: page.screen.post("own preview", lambda: self._hide(why)))
+
+    def connect(self, ask: Callable[[Callable[[], bool], Any], None]) -> None:
+        """ask(begin, button) starts a step."""
+        self._add.on_click(lambda _: ask(self._begin, self._add))
+        self._curve.on_click(lambda _: ask(self._discovering.add_curve, self._curve))
+
+    def busy(self, busy: bool) -> None:
+        """Whether a step runs."""
+        self._running = busy
+        self._enable()
+
+    def show(self, look: Look | None) -> None:
+        """A story as it stands."""
+        changed = look is None or self._look is None or look.steps != self._look.steps or self._look.assessment is None
+        self._look = look
+        self._folder.visible = look is not None
+        self._enable()
+        if changed:
+            self._hide("")
+            if look is not None and look.assessment is not None and not self._is_in(look):
+                self._preview()
+
+    def _is_in(self, look: Look) -> bool:
+        found = self._typed.expression
+        return found is not None and any(one.key == user_torque(found.text).name for one in look.added)
+
+    def _enable(self) -> None:
+        left = self._look.assessment.left.explanation if self._look and self._look.assessment else None
+        self._add.disabled = self._running or self._typed.expression is None
+        self._curve.disabled = self._running or left is None
+
+    def _check(self) -> None:
+        """Reads the text as it stands; on the screen's thread."""
+        self._typed = typed(str(self._text.value))
+        colour = COLOURS["good" if self._typed.expression else "bad"]
+        self._checked.content = html('<div {}><span style="color:{}">{}</span></div>', BOX, colour, self._typed.line)
+        self._sliders.list(self._typed.expression.parameters if self._typed.expression else ())
+        self._hide("")
+        self._enable()
+        if self._timer is not None:
+            self._timer.cancel()
+        if self._typed.expression is not None:
+            self._timer = threading.Timer(_TYPED_S, lambda: self._page.screen.post("own effect typed", self._preview))
+            self._timer.daemon = True
+            self._timer.start()
+
+    def _effect(self) -> UserEffect:
+        if self._typed.expression is None:
+            raise InputError("there is no expression that can be used yet; write one, for example " + _EXAMPLE)
+        return user_torque(self._typed.expression.text, self._sliders.ranges)
+
+    # --- what it would change ---------------------------------------------------------------------------------------
+
+    def _preview(self) -> None:
+        """Asks for what the torque would change with the sliders' values."""
+        if self._typed.expression is None or self._look is None or self._is_in(self._look):
+            return
+        if not self._plot.visible:
+            self._said.content = note("Simulating; a new expression is compiled first, for some seconds …")
+        try:
+            self._discovering.preview_own(self._effect(), self._sliders.values)
+        except InputError as error:
+            self._hide(str(error))
+
+    def _draw(self, found: Preview) -> None:
+        if self._look is None or found.look.steps != self._look.steps or self._typed.expression is None:
+            return
+        if found.candidate.name != self._effect().name:
+            return  # of a text that was typed before
+        with self._page.server.atomic():
+            self._plot.figure = discovery.signature(found.look, found.candidate)
+            self._plot.visible = True
+            change = f"{shown(found.look.rmse)} → ≈ {shown(found.rmse)} × floor"
+            self._said.content = html("<div {}>With these values, before any fit: error {}.</div>", BOX, change)
+
+    def _hide(self, why: str) -> None:
+        self._plot.visible = False
+        self._said.content = (
+            html('<div {}><span style="color:{}">{}</span></div>', BOX, COLOURS["warning"], why) if why else ""
+        )
+
+    def _begin(self) -> bool:
+        return self._discovering.add_own(self._effect(), self._sliders.values)
+
+
+def _help() -> Html:
+    rows = joined(html("<div><code>{}</code> {}</div>", name, meaning) for name, meaning in VARIABLES.items())
+    functions = ", ".join(FUNCTIONS)
+    return html(
+        "<div {}>A torque at the motor's shaft, in N·m; positive drives it on. Every other name is a "
+        'parameter, and is fitted.<details><summary style="cursor:pointer">What can be used</summary>{}'
+        "<div><code>pi</code>, + − * / ** and {}</div></details></div>",
+        BOX,
+        rows,
+        functions,
+    )

@@ -1,0 +1,344 @@
+"""What tabs share: a job's line, files that stay, ways on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+import viser
+
+from ema_model.text import InWords
+from emaviz.page.page import Page
+from emaviz.page.style import IN_ROW
+from emaviz.page.viewer_links import recording_link
+from emaviz.recording.viewer import ViewerHost
+from emaviz.session.data_folder import DataFolder
+from emaviz.session.files import Practice
+from emaviz.session.inputs import Provenance
+from emaviz.session.job import Job
+from emaviz.session.signal import Signal
+from emaviz.text.html import BOX, Html, add_html, boxed, html, joined
+from emaviz.text.results import begun, going_on, large, warned
+
+
+class JobLine:
+    """A line of text; while the job runs, a bar, what goes on, and how long it still takes where that is known."""
+
+    def __init__(self, page: Page, job: Job, *, stop: str = "Stop", pauses: str = "") -> None:
+        """stop: the button's label; pauses: what its other button pauses, as in 'the search', or none."""
+        self._page, self._job, self._pauses = page, job, pauses
+        self._title = self._waited = ""
+        self._stopping = False
+        gui = page.server.gui
+        self._pause = gui.add_button(
+            f"Pause {pauses}", icon=viser.Icon.PLAYER_PAUSE, color="gray", visible=False, disabled=not pauses
+        )
+        self._stop = gui.add_button(stop, icon=viser.Icon.PLAYER_STOP, color="red", visible=False)
+        self._bar = gui.add_progress_bar(100.0, animated=True, visible=False)
+        self._text = add_html(gui)
+        self._name = f"job {id(self)}"
+        post = page.screen.post
+        self._pause.on_click(lambda _: post(f"{self._name} rests", lambda: job.pause(not job.paused)))
+        self._stop.on_click(lambda _: post(f"{self._name} stops", self._ask_to_stop))
+        job.began.connect(lambda title: post(self._name, lambda: self._began(title)))
+        job.waits.connect(lambda text: post(f"{self._name} waits", lambda: self._waits(text)))
+        job.progressed.connect(lambda *said: post(f"{self._name} goes on", lambda: self._goes_on(*said)))
+        job.rests.connect(lambda rests: post(f"{self._name} is paused", lambda: self._show_paused(rests)))
+        job.ended.connect(lambda text: post(self._name, lambda: self._ended(text)))
+
+    def say(self, text: str) -> None:
+        """On the screen's thread."""
+        self._text.content = boxed(text if isinstance(text, Html) else begun(self._page.local(text))) if text else ""
+
+    def _waits(self, text: str) -> None:
+        """For its turn, and can be stopped before that has come; or, with no text, does not wait any more."""
+        if self._job.running:
+            return
+        if self._job.waiting and text:
+            self._stop.visible, self._stop.disabled, self._waited = True, False, text
+            self.say(text)
+        elif not self._job.waiting:
+            self._stop.visible = False
+            if self._waited and self._text.content == boxed(begun(self._waited)):  # nothing was said since
+                self.say("")
+
+    def _began(self, title: str) -> None:
+        self._title, self._stopping = title, False
+        with self._page.server.atomic():
+            self._show_paused(False)
+            self._stop.visible, self._stop.disabled = self._job.running, False
+            self._bar.visible, self._pause.visible = self._job.running, self._job.running and bool(self._pauses)
+            self._bar.value, self._bar.animated = 100.0, True
+            ready = self._page.session.ready.is_set()
+            self.say(f"{title} …" if ready else f"{title}: waiting until the models are compiled …")
+
+    def _goes_on(self, text: str, seconds: float, share: float | None) -> None:
+        if not self._job.running or self._stopping:
+            return
+        said = self._title if text == self._title else f"{self._title}: {text}"
+        with self._page.server.atomic():
+            self._bar.value, self._bar.animated = (100.0, True) if share is None else (100.0 * share, False)
+            self.say(f"{said} … {going_on(seconds, share)}")
+
+    def _show_paused(self, paused: bool) -> None:
+        self._pause.label = f"{'Resume' if paused else 'Pause'} {self._pauses}"
+        self._pause.icon = viser.Icon.PLAYER_PLAY if paused else viser.Icon.PLAYER_PAUSE
+
+    def _ask_to_stop(self) -> None:
+        self._job.stop()
+        if self._job.running:
+            self._stopping = self._stop.disabled = True
+            self.say("Stopping after the present simulation …")
+        else:  # it waited for its turn
+            self._stop.visible = False
+            self.say("Stopped.")
+
+    def _ended(self, text: str) -> None:
+        with self._page.server.atomic():
+            self._stop.visible = self._pause.visible = self._bar.visible = False
+            self.say(warned([self._job.error]) if self._job.error and not text else text)
+
+
+# --- a dropdown of the data folder's folders, read anew whenever its tab is entered -----------------------------------
+
+_NONE = "–"
+
+
+class FolderChoice:
+    """The chosen folder stays as long as it is there; else the first one is taken."""
+
+    def __init__(
+        self,
+        page: Page,
+        label: str,
+        hint: str,
+        listed: Callable[[], dict[str, str]],
+        chosen: Callable[[], str],
+        take: Callable[[str], None],
+    ) -> None:
+        """listed(): names by title; chosen(): the one taken; take(name): another one, on the screen's thread."""
+        self._page, self._listed, self._chosen, self._take_name = page, listed, chosen, take
+        self._names: dict[str, str] = {}
+        self._what = label
+        self.control: Any = page.server.gui.add_dropdown(label, (_NONE,), hint=hint)
+        self.control.on_update(lambda event: event.client and self._ask())
+
+    @property
+    def empty(self) -> bool:
+        """Whether there is none to choose."""
+        return not self._names
+
+    def refresh(self) -> None:
+        """Reads the list again."""
+        self._names = self._listed()
+        options = tuple(self._names) or (_NONE,)
+        if tuple(self.control.options) != options:
+            self.control.options = options
+        title = next((title for title, name in self._names.items() if name == self._chosen()), None)
+        if title is not None:
+            self.control.value = title
+        elif self._names:
+            self._take(options[0])
+
+    def choose(self, name: str) -> None:
+        """A folder by its name; on the screen's thread."""
+        self.refresh()
+        self._take(next(title for title, one in self._names.items() if one == name))
+
+    def _ask(self) -> None:
+        """As it is chosen now: the list may be about to be read again."""
+        title = str(self.control.value)
+        self._page.screen.post(f"folder of {self._what}", lambda: self._take(title))
+
+    def _take(self, title: str) -> None:
+        name = self._names.get(title)
+        if name is not None and self.control.value != title:
+            self.control.value = title
+        if name is not None and name != self._chosen():
+            self._take_name(name)
+
+
+# --- buttons that take what is shown to the workspace where one goes on with it ---------------------------------------
+
+
+@dataclass(frozen=True)
+class Lead:
+    """take(): hands over what is shown, on the screen's thread; InputError says why that cannot be."""
+
+    label: str
+    icon: viser.IconName
+    hint: str
+    to: str  # the workspace's name
+    take: Callable[[], Any]
+
+
+class Leads:
+    """A button for each; the window that has asked goes along."""
+
+    def __init__(self, page: Page, leads: Sequence[Lead]) -> None:
+        self._page = page
+        for one in leads:
+            self._add(one)
+
+    def _add(self, lead: Lead) -> None:
+        button = self._page.server.gui.add_button(lead.label, icon=lead.icon, hint=lead.hint)
+
+        def follow(event: viser.GuiEvent[Any]) -> None:
+            def taken() -> None:
+                if self._page.checked(lead.take, button):
+                    self._page.workspaces.go(lead.to, event.client)
+
+            self._page.screen.post(f"lead {lead.label}", taken)
+
+        button.on_click(follow)
+
+
+# --- buttons that keep what is shown in the data folder, and what they have written; the browser saves it as -----
+
+
+class Cleared(Protocol):
+    """Forgets what it has said of files that were kept of what was shown before."""
+
+    def clear(self) -> None:
+        """To be called on the screen's thread."""
+
+
+@dataclass(frozen=True)
+class Keeps:
+    """A button, and the file that it asks for."""
+
+    label: str
+    suffix: str
+    icon: viser.IconName
+    hint: str
+
+
+REPORT = Keeps("Save report", ".html", viser.Icon.FILE_TEXT, "One HTML file that opens offline")
+RECORD = Keeps("Record", ".rrd", viser.Icon.DEVICE_FLOPPY, "An .rrd file for the Rerun viewer")
+
+
+class KeepButtons:
+    """The buttons, and a line of the last file; a recording's line leads to the viewer."""
+
+    def __init__(
+        self,
+        page: Page,
+        what: str,
+        folder: DataFolder,
+        viewer: ViewerHost | None,
+        kept: Signal[[Path]],
+        save: Callable[[str, Any], object],
+        provenance: Provenance,
+        *buttons: Keeps,
+    ) -> None:
+        """what: is kept, a word that no other tab has; save(suffix, button): asks for the file; kept: it is written.
+
+        provenance: of the result, which is written as it was computed.
+        """
+        self._provenance = provenance
+        self._folder, self._viewer, self._save = folder, viewer, save
+        self._asked: viser.ClientHandle | None = None  # who is sent the file
+        gui = page.server.gui
+        add_html(gui, IN_ROW)
+        for one in buttons:
+            button = gui.add_button(one.label, icon=one.icon, hint=one.hint)
+            button.on_click(lambda event, suffix=one.suffix, button=button: self._ask(event.client, suffix, button))
+        self._links = add_html(gui)
+        kept.connect(lambda path: page.screen.post(f"{what} kept {path.suffix}", lambda: self._kept(path)))
+
+    def clear(self) -> None:
+        """Something else is shown: what was kept before is told no more."""
+        self._links.content = ""
+
+    def name(self, path: Path, text: str = "") -> None:
+        """Where a file is kept, and what is to be said of it."""
+        name = ", ".join(filter(None, (self._folder.name_of(path), self._provenance.note(), text)))
+        self._links.content = html(
+            '<div style="padding:2px 10px;font-size:13px">Also kept in the data folder: {}</div>', name
+        )
+
+    def said_at_once(self, path: Path) -> str:
+        """What is to be said of a file that has just been written."""
+        return ""
+
+    def _ask(self, client: viser.ClientHandle | None, suffix: str, button: Any) -> None:
+        self._asked = client
+        self._save(suffix, button)
+
+    def _kept(self, path: Path) -> None:
+        if path.suffix == RECORD.suffix:
+            self._links.content = recording_link(self._viewer, path)
+            return
+        self.name(path, self.said_at_once(path))
+        if self._asked is not None:
+            self._asked.send_file_download(path.name, path.read_bytes(), save_immediately=True)
+
+
+# --- challenges on a tab: a button for each, the story of the one that is chosen, and its seal ------------------------
+
+
+class PracticeButtons:
+    """On the left.  chosen(name): called with the folder's name once its recordings are there, on the screen."""
+
+    def __init__(self, page: Page, practice: Practice, chosen: Callable[[str], None]) -> None:
+        self._practice = practice
+        self._folder = ""
+        gui = page.server.gui
+        self._story = add_html(gui)
+        with gui.add_folder("Challenges to practise on", expand_by_default=False):
+            for one in practice.shipped:
+                button = gui.add_button(
+                    f"{one.title} {'●' * one.grade}{'○' * (5 - one.grade)}",
+                    icon=viser.Icon.LOCK,
+                    color="gray",
+                    hint="Its recordings are made in the data folder, in some seconds",
+                )
+                button.on_click(
+                    lambda _, one=one, button=button: page.ask(
+                        "challenge", lambda: page.begins(lambda: practice.open(one), button)
+                    )
+                )
+        practice.made.connect(lambda name: page.screen.post("challenge made", lambda: chosen(name)))
+
+    def show(self, folder: str) -> None:
+        """The story of the challenge in a folder, if it holds one."""
+        self._folder = folder
+        one = self._practice.held(folder)
+        self._story.content = "" if one is None else boxed(html("<b>{}.</b> {}", one.title, one.story))
+
+    def fold(self) -> None:
+        """The story gives way to a run and its result; a click on its title opens it."""
+        one = self._practice.held(self._folder)
+        if one is not None:
+            told = '<details><summary style="cursor:pointer"><b>{}</b>: the story</summary>{}</details>'
+            self._story.content = boxed(html(told, one.title, one.story))
+
+
+class Seal:
+    """On the right.  found(): what was found, of what the challenge is about."""
+
+    def __init__(
+        self, page: Page, practice: Practice, folder: Callable[[], str], found: Callable[[], InWords | None]
+    ) -> None:
+        self._practice, self._folder, self._found = practice, folder, found
+        gui = page.server.gui
+        self._place = gui.add_folder("The sealed truth", visible=False)
+        with self._place:
+            button = gui.add_button("Open the seal", icon=viser.Icon.LOCK_OPEN, color="gray")
+            self._told = add_html(gui)
+        button.on_click(lambda _: page.ask("seal", self._open, button))
+
+    def show(self) -> None:
+        """Something else is shown: the seal is closed again."""
+        self._place.visible = self._practice.held(self._folder()) is not None
+        self._told.content = ""
+
+    def _open(self) -> None:
+        told = self._practice.reveal(self._folder(), self._found())
+        lines = joined(html("<div>{}</div>", line) for line in told.lines)
+        verdict = html("")
+        if told.agrees is not None:
+            verdict = large("The answer agrees.", "good") if told.agrees else large("The answer differs.", "bad")
+        self._told.content = html("<div {}>{}{}</div>", BOX, verdict, lines)

@@ -1,0 +1,520 @@
+"""The Runs tab: recordings, two beside each other, sessions."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterable, Mapping
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import plotly.graph_objects as go
+import viser
+
+from ema_model.errors import InputError
+from ema_model.faults import HEALTHY
+from ema_model.recordings import SIGNALS, Measurement
+from emaviz.figures import comparison, runs
+from emaviz.figures.identification import named
+from emaviz.page.campaigns import CampaignControls
+from emaviz.page.inset import COLUMNS
+from emaviz.page.page import Page
+from emaviz.page.tab import Shared, Tab
+from emaviz.page.viewer_links import recording_link
+from emaviz.page.workspaces import Workspace
+from emaviz.recording.file import Entry, error_said, setting
+from emaviz.recording.read import Recording
+from emaviz.recording.viewer import ViewerHost
+from emaviz.scene.motion import motion
+from emaviz.session import saved as session_file
+from emaviz.session.compare import Comparing
+from emaviz.session.data_folder import SESSION_SUFFIX
+from emaviz.session.files import UPLOADED
+from emaviz.session.saved import Part, Recorded
+from emaviz.session.worker import Worker
+from emaviz.text.html import Html, add_html, begin, boxed, html, joined, said
+
+WORKSPACE = Workspace("runs", "Runs", viser.Icon.LIST, 8, share=0.66)  # for the Rerun viewer
+
+_NONE = "–"
+
+
+class SessionControls:
+    """Save, and load; files are packed on the worker `files`, controls are set on the screen's thread."""
+
+    def __init__(
+        self,
+        page: Page,
+        comparing: Comparing,
+        files: Worker,
+        kept: Callable[[], Mapping[str, Part]],
+        lacking: Callable[[], Mapping[str, str]],
+    ) -> None:
+        """kept(): the parts of the page; lacking(): what each tab has to compute again, by its title."""
+        self._page, self._comparing, self._files, self._kept = page, comparing, files, kept
+        self._lacking = lacking
+        gui = page.server.gui
+        with gui.add_folder("Session: everything on the page"):
+            self._name = gui.add_text("Session name", f"session-{datetime.now():%Y%m%d}")
+            self._save_it = gui.add_button(
+                "Save session", icon=viser.Icon.DEVICE_FLOPPY, hint="To the data folder, and here"
+            )
+            self._choice: Any = gui.add_dropdown("Saved", (_NONE,))
+            self._load = gui.add_button("Load session", icon=viser.Icon.FOLDER_OPEN, color="gray", disabled=True)
+            self._loaded = add_html(gui)
+            add_html(
+                gui,
+                html(
+                    '<div style="font-size:12px;opacity:.75;padding:0 10px">A {} file from elsewhere: drop '
+                    "it anywhere on the page.</div>",
+                    SESSION_SUFFIX,
+                ),
+            )
+        self._save_it.on_click(lambda event: self._post("save session", lambda: self._save(event.client)))
+        self._load.on_click(lambda _: self._load_named(str(self._choice.value)))
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Reads the folder's list again."""
+        names = self._comparing.folder.session_files()
+        self._choice.options = names or [_NONE]
+        self._choice.value = (names or [_NONE])[0]
+        self._load.disabled = not names
+
+    def uploaded(self, path: Path) -> None:
+        """A session came from the browser; on any thread."""
+        self._page.ask("load session", lambda: self._read(path), self._load)
+
+    def _load_named(self, name: str) -> None:
+        self._page.ask("load session", lambda: self._read(self._comparing.folder.session(name)), self._load)
+
+    def _save(self, client: viser.ClientHandle | None) -> None:
+        folder = self._comparing.folder
+        path = session_file.free_path(folder, self._name.value)
+        session_file.write(path, self._kept(), folder, self._needed())
+        self.refresh()
+        self._page.notify("Session saved", folder.name_of(path), "green")
+        if client is not None:
+            client.send_file_download(path.name, path.read_bytes(), save_immediately=True)
+
+    def _needed(self) -> list[str]:
+        """Names of the files that the page shows or uses."""
+        names = [*self._comparing.opened, self._page.session.settings.source]
+        if self._comparing.actuator_name.startswith(UPLOADED):
+            names.append(self._comparing.actuator_name.removeprefix(UPLOADED))
+        names += [name for part in self._kept().values() for name in part.files()]
+        return [name for name in names if name]
+
+    def _read(self, path: Path) -> None:
+        try:
+            session_file.saved_read(path, self._kept(), self._comparing.folder)
+        finally:
+            self.refresh()
+        lines = self._lacking()
+        told = [html("<div><b>{}.</b> {}</div>", title, line) for title, line in lines.items()]
+        begun = html("<div>{} is loaded{}</div>", path.name, ":" if told else ", with all its results.")
+        self._loaded.content = boxed(joined([begun, *told]))
+        said = "; ".join(f"{title}: {line[:1].lower()}{line[1:].rstrip('.')}" for title, line in lines.items())
+        self._page.notify("Session loaded", f"{path.name}. {said}" if said else path.name, "green")
+
+    def _post(self, kind: str, job: Callable[[], None]) -> None:
+        def checked() -> None:
+            self._page.checked(job, self._save_it)
+
+        self._files.post(kind, checked)
+
+
+# --- the Runs tab's panel on the right: the Rerun viewer in the page, and two recordings on the same axes -------------
+
+_CONFIG = {"displayModeBar": False}
+_STEPS = (
+    Html("Identify something, or press <b>Record</b> below a comparison or a discovery."),
+    "Choose the run on the left: you see what it found, and its current.",
+    "Open it in Rerun, on this page or in a tab of its own, or lay two runs over each other.",
+)
+_NOTHING = begin("Nothing is recorded yet", _STEPS)
+
+
+class RunsResult:
+    """Called on the files' thread."""
+
+    def __init__(self, page: Page, panel: viser.PanelHandle) -> None:
+        self._page = page
+        self._pair: tuple[tuple[Entry, Any], tuple[Entry, Any]] | None = None
+        self._plot: Any = None
+        self._told, self._drawn = _NOTHING, False  # of the chosen run
+        self._opened, self._dark = ("", ""), False  # the viewer's address and recording; whether the page is dark
+        self._tab = panel.add_tab("Rerun", viser.Icon.PLAYER_PLAY)
+        gui = page.server.gui
+        with self._tab:
+            self._frame = add_html(gui, _NOTHING)
+            self._glance: Any = gui.add_plotly(go.Figure(), config=_CONFIG, aspect=0.5, visible=False)
+            self._close = gui.add_button("Close the viewer", icon=viser.Icon.X, color="gray", visible=False)
+        with panel.add_tab("Two runs", viser.Icon.ARROWS_DIFF):
+            add_html(gui, COLUMNS)
+            self._names = add_html(gui, _hint("Choose two on the left."))
+            self._signals: dict[str, str] = {}
+            self._signal: Any = gui.add_dropdown("Signal", ("–",), visible=False)
+            self._place = gui.add_folder("Signals and search", visible=False)
+            self._table = add_html(gui)
+        self._close.on_click(lambda _: page.screen.post("viewer", self.close_viewer))
+        self._signal.on_update(lambda event: event.client and page.screen.post("two", self._draw))
+
+    def set_dark(self, dark: bool) -> None:
+        """The page is dark from now on, or light; a viewer that is open is loaded anew."""
+        self._dark = dark
+        if self._close.visible:
+            self.open(*self._opened)
+
+    def open(self, url: str, name: str) -> None:
+        """The viewer with a recording, in the page, as light or dark as that is."""
+        self._opened = url, name
+        url += f"&theme={'dark' if self._dark else 'light'}"
+        self._frame.content = html(
+            '<div style="padding:0 10px 4px;font-size:12px;overflow-wrap:anywhere"><b>{}</b> · '
+            '<a href="{}" target="_blank" rel="noopener">in a tab of its own ↗</a></div>'
+            '<iframe class="emaviz-rerun" src="{}" title="Rerun viewer" '
+            'style="width:100%;height:calc(100vh - 240px);border:0"></iframe>',
+            name,
+            url,
+            url,
+        )
+        self._close.visible, self._glance.visible = True, False
+
+    def show(self, told: Html, recording: Recording | None) -> None:
+        """The chosen run, where the viewer is not open: what is said of it, and its current; None for none."""
+        figure = comparison.one_recording(recording) if recording is not None else None
+        self._told, self._drawn = told or _NOTHING, figure is not None
+        if figure is not None:
+            self._glance.figure = figure
+        if not self._close.visible:
+            self._frame.content, self._glance.visible = self._told, self._drawn
+
+    def close_viewer(self) -> None:
+        """Takes the viewer off the page, which frees its memory."""
+        self._close.visible = False
+        self._frame.content, self._glance.visible = self._told, self._drawn
+
+    def compare(self, first: tuple[Entry, Any], second: tuple[Entry, Any]) -> None:
+        """Two recordings, each as an entry and what was read of it."""
+        self._pair = first, second
+        names = runs.signals(first[1], second[1]) or ["current_A"]
+        self._signals = {SIGNALS[name].title: name for name in names}
+        titles = {name: title for title, name in self._signals.items()}
+        self._signal.options = tuple(self._signals)
+        self._signal.value = titles.get("current_A") or next(iter(self._signals))
+        self._signal.visible = self._place.visible = True
+        self._names.content = _hint(
+            html(
+                '<b style="color:{}">A</b> {}<br><b style="color:{}">B</b> {}',
+                runs.FIRST,
+                first[0].name,
+                runs.SECOND,
+                second[0].name,
+            )
+        )
+        self._draw()
+        self._table.content = runs.two_recordings_table(first[0], second[0])
+
+    def _draw(self) -> None:
+        if self._pair is None:
+            return
+        (_, first), (_, second) = self._pair
+        figure = runs.two_recordings(first, second, self._signals.get(str(self._signal.value), "current_A"))
+        if self._plot is None:
+            with self._place:
+                self._plot = self._page.server.gui.add_plotly(figure, config=_CONFIG, aspect=1.1)
+        else:
+            self._plot.figure = figure
+
+
+def _hint(text: str) -> Html:
+    return html('<div style="padding:8px 12px;font-size:13px;opacity:.8">{}</div>', text)
+
+
+# --- the Runs tab: past runs (.rrd) with what they were and what they found; reopen, rename, delete, compare ----------
+
+NONE = "–"
+_SHOWN = 25
+_LOOK_S = 2.0  # between two looks at the folder
+_UNSET = ("", "none", None, "0", "0.0", 0)  # settings that say that there is nothing of the kind, are not listed
+_BOX = Html('style="padding:2px 10px;font-size:12.5px;line-height:1.45"')
+
+
+class RunsPanel:
+    """The tab's controls.  `result` is the panel on the right; files are read on the worker `files`."""
+
+    def __init__(
+        self, page: Page, viewer: ViewerHost | None, recorded: Recorded, files: Worker, result: RunsResult
+    ) -> None:
+        self._page, self._viewer, self._recorded = page, viewer, recorded
+        self._files, self._result = files, result
+        self._by_hand = False  # chosen; else the newest is shown
+        self._seen: tuple[str, datetime] | None = None  # which is shown at a glance
+        gui = page.server.gui
+        self._choice: Any = gui.add_dropdown("Run", (NONE,))
+        self._card = add_html(gui, _empty("None yet: identify something, or record a comparison or a discovery."))
+        self._open = gui.add_button("Open in Rerun, here", icon=viser.Icon.PLAYER_PLAY, disabled=True)
+        self._link = add_html(gui)
+        with gui.add_folder("Compare two"):
+            self._other: Any = gui.add_dropdown("With", (NONE,))
+            self._compare = gui.add_button("Overlay both runs", icon=viser.Icon.ARROWS_DIFF, disabled=True)
+        with gui.add_folder("Rename or delete", expand_by_default=False):
+            self._name = gui.add_text("New name", "")
+            self._rename = gui.add_button("Rename", icon=viser.Icon.PENCIL, color="gray", disabled=True)
+            self._delete = gui.add_button("Delete…", icon=viser.Icon.TRASH, color="red", disabled=True)
+        with gui.add_folder("All, newest first"):
+            self._list = add_html(gui)
+            again = gui.add_button("Refresh the list", icon=viser.Icon.REFRESH, color="gray")
+        self._choice.on_update(lambda event: event.client and self._post(self._take_choice))
+        self._open.on_click(lambda _: self._post(self._open_chosen, self._open))
+        self._compare.on_click(lambda _: self._post(self._compare_two, self._compare))
+        self._rename.on_click(lambda _: self._post(self._rename_chosen, self._rename))
+        self._delete.on_click(lambda event: event.client and self._ask(event.client))
+        again.on_click(lambda _: self._post(self.refresh))
+        page.session.identifying.identified.connect(lambda _: self.refresh_soon())
+        page.workspaces.entered.connect(lambda name: name == WORKSPACE.name and self.refresh_soon())
+        threading.Thread(target=self._watch, name="emaviz-runs", daemon=True).start()
+        self.refresh_soon()
+
+    def _watch(self) -> None:
+        """Another program's runs are seen, too, while somebody looks."""
+        known: list[str] = []
+        while not self._files.closing:
+            time.sleep(_LOOK_S)
+            if self._page.workspaces.anyone(WORKSPACE.name) and (names := self._recorded.names()) != known:
+                known = names
+                self.refresh_soon()
+
+    def refresh_soon(self) -> None:
+        """Reads the folder again; from any thread."""
+        self._post(self.refresh)
+
+    # --- on the files' thread ---------------------------------------------------------------------------------------
+
+    def choose(self, name: str) -> None:
+        """Shows a recording, and opens it."""
+        self._choice.options = self._recorded.names()
+        self._choice.value, self._by_hand = name, True
+        self.refresh()
+        self._open_chosen()
+
+    def refresh(self) -> None:
+        """Reads the folder again."""
+        names = self._recorded.names()
+        if not self._by_hand or self._choice.value not in names:
+            self._by_hand, chosen = False, (names or [NONE])[0]
+        else:
+            chosen = self._choice.value
+        if list(self._choice.options) != (names or [NONE]):
+            self._choice.options = names or [NONE]
+        self._choice.value = chosen
+        entries = self._entries(names[:_SHOWN])
+        more = html("<div {}>… and {} more</div>", _BOX, len(names) - _SHOWN) if len(names) > _SHOWN else ""
+        self._list.content = _listed(entries) + more
+        self._show_chosen()
+
+    def _take_choice(self) -> None:
+        self._by_hand = True
+        self._show_chosen()
+
+    def _offer_others(self) -> None:
+        """A run is compared with another one, which stays chosen as long as it is one."""
+        others = [name for name in self._choice.options if name != self._choice.value] or [NONE]
+        if list(self._other.options) != others:
+            other = self._other.value
+            self._other.options = others
+            self._other.value = other if other in others else others[0]
+        self._compare.disabled = others == [NONE]
+
+    def _entries(self, names: list[str]) -> list[Entry]:
+        entries = []
+        for name in names:
+            try:
+                entries.append(self._recorded.entry(name))
+            except InputError:  # gone since it was listed
+                continue
+        return entries
+
+    def _show_chosen(self) -> None:
+        name = str(self._choice.value)
+        exists = name != NONE
+        self._open.disabled = not exists or self._viewer is None
+        self._rename.disabled = self._delete.disabled = not exists
+        self._offer_others()
+        if not exists:
+            self._card.content, self._link.content = _empty("None yet."), ""
+            self._result.show(Html(), None)
+            return
+        entry = self._recorded.entry(name)
+        self._card.content = html("<div {}>{}</div>", _BOX, _size(entry))  # what it says stands on the right
+        self._glance(entry)
+        self._link.content = recording_link(self._viewer, self._recorded.path(name))
+        self._name.value = name.removesuffix(".rrd")
+
+    def _glance(self, entry: Entry) -> None:
+        """The chosen run on the right, once somebody looks."""
+        if (entry.name, entry.at) == self._seen or not self._page.workspaces.anyone(WORKSPACE.name):
+            return
+        self._seen = entry.name, entry.at
+        told = html('<div style="padding:8px 10px 2px;font-size:14px"><b>{}</b></div>{}', entry.name, _card(entry))
+        try:
+            self._result.show(told, self._recorded.read(entry.name))
+        except InputError:  # it is not whole
+            self._result.show(told, None)
+
+    def _open_chosen(self) -> None:
+        if self._viewer is not None:
+            name = self._recorded.path(str(self._choice.value)).name
+            try:
+                self._viewer.check()
+            except OSError as error:
+                raise InputError(str(error)) from None
+            self._result.open(self._viewer.url_of(name), name)
+
+    def _compare_two(self) -> None:
+        names = [str(entry.value) for entry in (self._choice, self._other)]
+        self._result.compare(*((self._recorded.entry(name), self._recorded.read(name)) for name in names))
+
+    def _rename_chosen(self) -> None:
+        new = self._recorded.rename(str(self._choice.value), self._name.value)
+        self._choice.options = self._recorded.names()
+        self._choice.value, self._by_hand = new, True
+        self.refresh()
+
+    def _ask(self, client: viser.ClientHandle) -> None:
+        name = str(self._choice.value)
+        modal = client.gui.add_modal("Delete this run?")
+        with modal:
+            add_html(client.gui, said(html("<b>{}</b> is removed from the disk.", name)))
+            yes = client.gui.add_button("Delete it", icon=viser.Icon.TRASH, color="red")
+            no = client.gui.add_button("Keep it", color="gray")
+
+        @yes.on_click
+        def _(_: Any) -> None:
+            modal.close()
+            self._post(lambda: self._delete_named(name), self._delete)
+
+        no.on_click(lambda _: modal.close())
+
+    def _delete_named(self, name: str) -> None:
+        self._recorded.delete(name)
+        self.refresh()
+
+    def _post(self, job: Callable[[], None], control: Any = None) -> None:
+        """On the files' thread; what is refused stands beside the control."""
+
+        def checked() -> None:
+            self._page.checked(job, control or self._choice)
+
+        self._files.post(job.__qualname__, checked)
+
+
+def _card(entry: Entry) -> Html:
+    """Settings and results of one recording."""
+    size = _size(entry)
+    if not entry.found:
+        said = f"{entry.says}" if entry.says else "Signals without a result."
+        return html("<div {}>{}<br><b>{}</b> {}</div>", _BOX, size, entry.kind.capitalize(), said)
+    results = joined(
+        html(
+            "<div>{} {}{}</div>",
+            named(name),
+            _result(answer, entry.found.values()),
+            " ★" if name == entry.best and len(entry.found) > 1 else "",
+        )
+        for name, answer in entry.found.items()
+    )
+    settings = [
+        html("{} <b>{}</b>", *setting(name, value))
+        for name, value in entry.settings.items()
+        if name == "seed" or value not in _UNSET
+    ]
+    return html(
+        '<div {}>{}{}<div style="opacity:.8;font-size:12.5px">{}</div></div>',
+        _BOX,
+        size,
+        results,
+        joined(settings, " · "),
+    )
+
+
+def _size(entry: Entry) -> str:
+    return f"{entry.at:%Y-%m-%d %H:%M:%S} · {entry.size_bytes / 1e6:.1f} MB"
+
+
+def _result(answer: dict[str, Any], all_answers: Iterable[dict[str, Any]]) -> str:
+    error = "" if answer.get("error_percent") is None else f"Err {answer['error_percent']:.2f} % · "
+    alarms = ", ".join(answer.get("alarms", ())) or "no single k stands out"
+    verdict = "healthy" if answer.get("healthy") else f"not healthy: {alarms}"
+    stopped = " · stopped" if answer.get("stopped") else ""
+    return f"{error}{error_said(answer, *all_answers)} · {answer['elapsed_s']:.1f} s · {verdict}{stopped}"
+
+
+def _listed(entries: list[Entry]) -> Html:
+    if not entries:
+        return _empty("None yet.")
+    rows = []
+    for entry in entries:
+        answer = entry.answer
+        facts = [] if not answer else [error_said(answer, *entry.found.values())]
+        if answer and answer.get("error_percent") is not None:
+            facts.append(f"Err {answer['error_percent']:.2f} %")
+        says = " · ".join(filter(None, (entry.kind, entry.says, *facts)))
+        rows.append(
+            html(
+                '<div style="padding:2px 0;overflow-wrap:anywhere">{}<div style="opacity:.75;font-size:11.5px">{}</div>'
+                "</div>",
+                entry.name,
+                says,
+            )
+        )
+    return html("<div {}>{}</div>", _BOX, joined(rows))
+
+
+def _empty(text: str) -> Html:
+    return html("<div {}>{}</div>", _BOX, text)
+
+
+# --- the Runs tab: past runs, campaigns, and everything on the page as one file ---------------------------------------
+
+
+class RunsTab(Tab):
+    """Takes sessions from the browser."""
+
+    workspace = WORKSPACE
+
+    def __init__(self, shared: Shared, right: viser.PanelHandle) -> None:
+        super().__init__(shared, right)
+        self.result = RunsResult(self.page, right)
+        shared.strip.themed.connect(lambda dark: self.page.screen.post("viewer", lambda: self.result.set_dark(dark)))
+
+    def build(self) -> None:
+        """The recordings, sessions and campaigns."""
+        shared, page = self.shared, self.page
+        recorded = Recorded(shared.comparing.folder.recordings)
+        self.panel = RunsPanel(page, shared.viewer, recorded, shared.files, self.result)
+        self.sessions = SessionControls(page, shared.comparing, shared.files, shared.kept, shared.standings.lines)
+        CampaignControls(
+            page,
+            shared.campaigns,
+            shared.files,
+            self.right,
+            self._show,
+            lambda provenance: self.standing(provenance, saved=False),
+        )
+        for events in (shared.comparing.events, shared.discovering.events):
+            events.kept.connect(lambda _: self.panel.refresh_soon())
+
+    def takes(self) -> dict[str, Callable[[Path], None]]:
+        """Sessions."""
+        return {SESSION_SUFFIX: self.sessions.uploaded}
+
+    def _show(self, path: Path, run: Measurement) -> None:
+        """A campaign's row was simulated again, and recorded there."""
+        self.panel.choose(path.name)
+        self.shared.strip.put(motion(run, HEALTHY, self.page.session.actuator), WORKSPACE.name)
+
+
+# --- the Runs tab and its panels --------------------------------------------------------------------------------------

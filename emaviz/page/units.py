@@ -1,0 +1,265 @@
+"""The Units tab."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import plotly.graph_objects as go
+import viser
+
+from ema_model.units.result import UnitsCompared, document_of, lacking, notes, rests_on, sentences
+from emaviz.figures import units
+from emaviz.page.inset import COLUMNS, NEXT_COLUMN, PLOTS_EARLY
+from emaviz.page.page import Page
+from emaviz.page.panel import REPORT, FolderChoice, JobLine, KeepButtons, Keeps, PracticeButtons, Seal
+from emaviz.page.standing import Standing
+from emaviz.page.tab import Shared, Tab
+from emaviz.page.workspaces import Workspace
+from emaviz.session.saved import Part
+from emaviz.session.units import TYPE, ComparingUnits
+from emaviz.text.html import BOX, DIM, Html, add_html, begin, html, joined, note
+from emaviz.text.results import MEANINGS, begun, of_units, warned, whole
+
+WORKSPACE = Workspace("units", "Units", viser.Icon.LAYOUT_GRID, 5, share=0.66, lower=True)
+
+_TYPE = Keeps(
+    "Save the type as an actuator",
+    TYPE,
+    viser.Icon.DEVICE_FLOPPY,
+    "Means as values, and how far a further unit may be from them as tolerances",
+)
+
+
+class UnitsKeep(KeepButtons):
+    """Two buttons, and what they have written."""
+
+    def __init__(self, page: Page, comparing: ComparingUnits) -> None:
+        def save(suffix: str, button: Any) -> None:
+            page.ask(f"units {suffix}", lambda: comparing.save(suffix), button)
+
+        super().__init__(
+            page, "units", comparing.folder, None, comparing.events.kept, save, comparing.provenance, REPORT, _TYPE
+        )
+
+
+# --- units' panel on the right: what differs in words, each unit's parameters, which model suits which, what ----
+
+_CONFIG = {"displayModeBar": False}
+_STEPS = (
+    "Choose a folder of units on the left, or a challenge to practise on.",
+    Html("Press <b>Compare units</b>: one model is fitted to all units; where a unit differs, a parameter is its own."),
+    "You see which unit differs from the rest, in which parameter and by how much, checked on held-out recordings.",
+)
+_BESIDE_PX = 200  # of a window, what stands above and below the parameters
+_WIDTH_PX = 540  # of a figure on a usual panel, by which its share of height is made
+_HEAD_PX, _ROW_PX, _FEWEST_ROWS = 110, 34, 4  # of the matrix
+
+
+class UnitsResult:
+    """Everything here is built and changed on the screen's thread."""
+
+    def __init__(self, page: Page, comparing: ComparingUnits) -> None:
+        self._page, self._comparing = page, comparing
+        gui = page.server.gui
+        add_html(gui, COLUMNS)
+        self._told = add_html(gui, begin("No units are compared yet", _STEPS))
+        add_html(gui, PLOTS_EARLY)
+        self._matrix = gui.add_folder("The model of one unit on another", visible=False)
+        with self._matrix:
+            self._transfer: Any = gui.add_plotly(go.Figure(), config=_CONFIG, aspect=0.6)
+        self._seal = Seal(page, comparing.practice, lambda: comparing.chosen, lambda: comparing.found)
+        self._words = gui.add_folder("All results in numbers", visible=False, expand_by_default=False)
+        with self._words:
+            self._document = add_html(gui)
+        self._save = gui.add_folder("Keep it", visible=False)
+        with self._save:
+            self._keep = UnitsKeep(page, comparing)
+        self._figures = gui.add_folder("Parameters of each unit", visible=False)
+        with self._figures:
+            add_html(gui, NEXT_COLUMN)
+            self._parameters: Any = gui.add_plotly(go.Figure(), config=_CONFIG, aspect=1.0)
+
+    def show(self, found: UnitsCompared | None) -> None:
+        """An answer; None for none."""
+        with self._page.server.atomic():
+            for folder in (self._figures, self._matrix, self._words, self._save):
+                folder.visible = found is not None
+            self._keep.clear()
+            self._seal.show()
+            if found is None:
+                self._told.content = begin("No units are compared yet", _STEPS)
+                return
+            self._told.content = said(found)
+            self._parameters.figure = units.unit_parameters(found)
+            least, usual, most = (one(found) for one in units.HEIGHTS_PX)
+            self._page.workspaces.heights.set_figure(self._parameters, least, usual, most, _BESIDE_PX)
+            self._transfer.figure = units.transfer_matrix(found)
+            rows = max(len(found.units), _FEWEST_ROWS)
+            self._transfer.aspect = (_HEAD_PX + _ROW_PX * rows) / _WIDTH_PX
+            self._document.content = whole(document_of(found))
+
+
+def said(found: UnitsCompared) -> Html:
+    """The sentences, what the answer rests on, warnings, and which recordings lack."""
+    return html(
+        '<div {}><div style="font-size:16px;font-weight:600;color:{};padding:4px 0">{}</div><div {}>{}</div>{}{}</div>',
+        BOX,
+        MEANINGS[of_units(found)],
+        joined(html("<div>{}</div>", begun(line, found.units)) for line in sentences(found)),
+        DIM,
+        rests_on(found),
+        warned(notes(found), found.units),
+        _listed([begun(line, found.units) for line in lacking(found)]),
+    )
+
+
+def _listed(lines: list[str]) -> Html:
+    if not lines:
+        return Html()
+    items = joined(html("<div>{}</div>", line) for line in lines)
+    return html('<details style="padding-top:4px"><summary style="cursor:pointer">{}</summary>{}</details>',
+                "What the recordings do not tell", items)  # fmt: skip
+
+
+# --- the Units tab: a folder of units, the recordings to hold out, the actuator, and the run --------------------------
+
+_ABOUT = (
+    "A folder inside the data folder with a folder for each unit of one type, each with recordings of the same "
+    "commands. One model is fitted to all; where a unit differs, and held-out recordings agree, a parameter is its own."
+)
+
+
+class UnitsPanel:
+    """The tab's controls.  `result` is the panel on the right."""
+
+    def __init__(self, page: Page, comparing: ComparingUnits, result: UnitsResult, standing: Standing) -> None:
+        self._page, self._comparing, self._result = page, comparing, result
+        gui, post = page.server.gui, page.screen.post
+        add_html(gui, note(_ABOUT))
+        hint = "Folders of the data folder that hold units"
+        self._folder = FolderChoice(page, "Units", hint, self._listed, lambda: comparing.chosen, self._take_folder)
+        self._practice = PracticeButtons(page, comparing.practice, self.choose)
+        self._rule = gui.add_text(
+            "Hold out",
+            comparing.rule,
+            hint="Recordings of such a name are not fitted, but check the result: *unseen*; empty for none",
+        )
+        self._actuator: Any = gui.add_dropdown("Actuator", (comparing.actuator_name,), hint="The units' type")
+        self._start = gui.add_button("Compare units", icon=WORKSPACE.icon, disabled=True)
+        self._line = JobLine(page, comparing.job, pauses="it")
+        self._rule.on_update(lambda event: event.client and post("units rule", self._take_rule))
+        self._actuator.on_update(lambda event: event.client and post("units actuator", self._take_actuator))
+        self._start.on_click(lambda _: post("compare units", self._begin))
+        standing.connect(self._start, self._forget_errors)
+        comparing.job.began.connect(lambda _: post("units began", lambda: self._busy(True)))
+        comparing.job.ended.connect(lambda _: post("units ended", lambda: self._busy(False)))
+        comparing.events.compared.connect(lambda found: post("units compared", lambda: result.show(found)))
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Reads the data folder's lists again; what is chosen stays as long as it exists."""
+        comparing = self._comparing
+        self._folder.refresh()
+        actuators = tuple(comparing.actuators())
+        if tuple(self._actuator.options) != actuators:
+            self._actuator.options = actuators
+            self._actuator.value = comparing.actuator_name
+        self._start.disabled = comparing.job.running or self._folder.empty
+
+    def choose(self, name: str) -> None:
+        """A folder by its name; on the screen's thread."""
+        self._folder.choose(name)
+
+    def show(self) -> None:
+        """What is chosen and its answer, as a session's file says."""
+        comparing = self._comparing
+        self._rule.value = comparing.rule
+        self.refresh()
+        self._actuator.value = comparing.actuator_name
+        self._practice.show(comparing.chosen)
+        if comparing.found is not None:
+            self._practice.fold()
+        self._result.show(comparing.found)
+
+    def _listed(self) -> dict[str, str]:
+        comparing = self._comparing
+        listed = {
+            f"{'the data folder' if name == '.' else name} ({count} unit{'s' if count > 1 else ''})": name
+            for name, count in comparing.fleets().items()
+        }
+        if comparing.found is not None and comparing.chosen not in listed.values():
+            listed[f"{comparing.chosen} (not in the data folder)"] = comparing.chosen  # of a session
+        return listed
+
+    def _take_folder(self, name: str) -> None:
+        self._page.checked(lambda: self._comparing.choose(name), self._folder.control)
+        self._practice.show(self._comparing.chosen)
+        self._result.show(None)
+        self._line.say("")
+
+    def _take_rule(self) -> None:
+        self._comparing.rule = str(self._rule.value)
+
+    def _take_actuator(self) -> None:
+        comparing = self._comparing
+        if not self._page.checked(lambda: comparing.choose_actuator(str(self._actuator.value)), self._actuator):
+            self._actuator.value = comparing.actuator_name
+
+    def _begin(self) -> None:
+        if not self._page.begins(self._comparing.begin, self._start):
+            self._comparing.provenance.refused()
+
+    def _forget_errors(self) -> None:
+        """What was said of units that are not chosen any more."""
+        self._page.say_beside(self._start, "")
+        if not self._comparing.job.running:
+            self._line.say("")
+
+    def _busy(self, busy: bool) -> None:
+        if busy:
+            self._practice.fold()
+        with self._page.server.atomic():
+            for control in (self._start, self._folder.control, self._rule, self._actuator):
+                control.disabled = busy
+        self.refresh()
+
+
+# --- the Units tab: what units of one type differ in ------------------------------------------------------------------
+
+
+class UnitsTab(Tab):
+    """A folder of units, a folder of recordings each."""
+
+    workspace = WORKSPACE
+
+    def __init__(self, shared: Shared, right: viser.PanelHandle) -> None:
+        super().__init__(shared, right)
+        self.comparing = ComparingUnits(self.page.session, shared.comparing.folder, shared.files)
+        self._standing = self.standing(self.comparing.provenance)
+        with right.add_tab("Units", WORKSPACE.icon):
+            self._standing.add(self.page.server.gui)
+            self.result = UnitsResult(self.page, self.comparing)
+
+    def build(self) -> None:
+        """Which units, what is held out, and the run."""
+        self.panel = UnitsPanel(self.page, self.comparing, self.result, self._standing)
+
+    def refresh_files(self) -> None:
+        """What may be compared."""
+        self.panel.refresh()
+
+    def kept(self) -> dict[str, Part]:
+        """What is chosen, and the answer."""
+        return {"units": Part(self.comparing.saved, self._restore, self.comparing.files)}
+
+    def _restore(self, saved: Any, names: Mapping[str, str]) -> None:
+        self.comparing.restore(saved, names)
+        self.panel.show()
+
+    def close(self) -> None:
+        """Ends the run."""
+        self.comparing.job.stop()
+
+
+# --- the Units tab ----------------------------------------------------------------------------------------------------

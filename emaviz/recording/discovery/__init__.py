@@ -1,1 +1,0 @@
-"""A discovery told as a recording."""

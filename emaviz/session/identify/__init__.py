@@ -1,1 +1,0 @@
-"""The session's part of Identify: the race of searches, its answer, and the cost around it."""

@@ -1,0 +1,446 @@
+"""Tracking without a screen: flights that are followed, and what is saved of them."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import threading
+from collections.abc import Collection, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from ema_model import faults
+from ema_model.actuator.write import as_toml
+from ema_model.errors import InputError, quoted
+from ema_model.files.arriving import LOOK_S, Watched
+from ema_model.identification.run import Progress
+from ema_model.recordings import read
+from ema_model.recordings.recording_set import recordings_in
+from ema_model.recordings.side_file import SideFile
+from ema_model.tracking.evidence import LEAST_FLIGHTS
+from ema_model.tracking.flight import Flight
+from ema_model.tracking.history import History
+from ema_model.tracking.identify import identified
+from ema_model.tracking.order import check_enough, check_order, flights_in, in_order
+from ema_model.tracking.result import Tracked
+from ema_model.tracking.track import check_thresholds
+from emaviz.session.data_folder import DataFolder
+from emaviz.session.described import number, taken
+from emaviz.session.files import Practice, side_file_of
+from emaviz.session.inputs import Inputs, Provenance, version_with_side
+from emaviz.session.job import RESTED, Job, Run, Stopped
+from emaviz.session.session import Session
+from emaviz.session.signal import Signal
+from emaviz.session.worker import Worker
+
+MOST = 2000  # flights, two kilobytes each; a unit with more is identified anew
+_PART = "part of Track"
+_K = len(faults.NAMES)
+
+
+class SavedFlight(msgspec.Struct, frozen=True):
+    """A flight, and the file that it was identified from, as it was then."""
+
+    name: str
+    numbers: str  # k, own and common, one after another, as base 64 of doubles
+    excluded: str = ""
+    file: str = ""  # its name in the folder
+    changed: tuple[int, int] = (0, 0)  # its size and the time of its last change
+
+    def is_of(self, path: Path) -> bool:
+        """Whether a file is still the one."""
+        try:
+            return self.changed == as_it_is(path)
+        except OSError:
+            return False
+
+    @property
+    def flight(self) -> Flight:
+        """InputError for numbers that are no flight's."""
+        try:
+            numbers = np.frombuffer(base64.b64decode(self.numbers, validate=True))
+            k, own, common = np.split(numbers, [_K, _K + _K * _K])
+            own, common = own.reshape(_K, _K), common.reshape(_K, -1)
+            good = len(k) == _K and bool(np.all(np.isfinite(numbers)))
+            good = good and np.allclose(own, own.T) and bool(np.all(np.linalg.eigvalsh(own) >= 0.0))
+        except (binascii.Error, ValueError):
+            good = False
+        if not good:
+            raise InputError(f"the session's {_PART} is damaged (a flight's numbers make no sense); save it anew")
+        return Flight(self.name, k, own, common, self.excluded)
+
+
+class SavedTrack(msgspec.Struct, frozen=True):
+    """What is chosen, and the flights in order of time."""
+
+    folder: str
+    thresholds: dict[str, float]
+    actuator: str = ""  # as a file, by which they were identified
+    flights: tuple[SavedFlight, ...] = ()
+
+    def __post_init__(self) -> None:
+        check_thresholds(self.thresholds)
+
+
+def as_it_is(path: Path) -> tuple[int, int]:
+    """By which a file is known again; OSError where it is not there."""
+    now = path.stat()
+    return now.st_size, now.st_mtime_ns
+
+
+def saved(
+    folder: str, thresholds: Mapping[str, float], actuator: str, flights: Sequence[Flight], files: Mapping[Path, Flight]
+) -> dict[str, Any]:
+    """In what JSON can hold; files: what each flight was identified from."""
+    by_flight = {id(one): path for path, one in files.items()}
+    kept = tuple(_saved(one, by_flight.get(id(one))) for one in flights) if len(flights) <= MOST else ()
+    return msgspec.to_builtins(SavedTrack(folder, dict(thresholds), actuator, kept))
+
+
+def read_saved(given: Any) -> SavedTrack:
+    """What `saved` gave; InputError for what makes no sense."""
+    return taken(SavedTrack, given, _PART)
+
+
+def _saved(one: Flight, path: Path | None) -> SavedFlight:
+    numbers = np.concatenate([one.k, one.own.ravel(), one.common.ravel()]).astype("<f8")
+    told = SavedFlight(one.name, base64.b64encode(numbers.tobytes()).decode(), one.excluded)
+    try:
+        return told if path is None else msgspec.structs.replace(told, file=path.name, changed=as_it_is(path))
+    except OSError:  # it is gone since
+        return told
+
+
+# --- what stays of followed flights in the data folder: the report, and the recording for Rerun -----------------------
+
+
+def keep(found: Tracked, actuator: str, folder: DataFolder, suffix: str) -> Path:
+    """Writes a report (.html) or a recording (.rrd) under a new name; returns where it is."""
+    path = folder.fresh(folder.recordings, "track", suffix)
+    if suffix == ".html":
+        from emaviz.report import write_tracking_report  # plotly takes a second to import
+
+        write_tracking_report(found, actuator, path)
+    else:
+        from emaviz.recording.tracking import write_tracking  # as does rerun
+
+        write_tracking(found, path)
+    return path
+
+
+# --- the flights of a folder: identified one after another, followed, and taken up as they arrive ---------------------
+
+_FOLLOWING = 0.02  # share of the bar that following takes, after flights were identified
+
+
+@dataclass
+class TrackEvents:
+    """What the screen listens to, besides the job; called on the threads that work, so listeners only hand over."""
+
+    followed: Signal[[History]] = field(default_factory=Signal)
+    left_out: Signal[[]] = field(default_factory=Signal)  # what cannot be used has changed
+    kept: Signal[[Path]] = field(default_factory=Signal)  # a report or a recording is written
+
+
+class Following:
+    """The chosen folder, the thresholds, the flights that are identified, and what was known after each."""
+
+    def __init__(self, session: Session, folder: DataFolder, files: Worker) -> None:
+        """files: writes what stays."""
+        self.session, self.folder, self._files = session, folder, files
+        self.events = TrackEvents()
+        self.job = Job(session.worker, on_divergence="check the recordings' units")
+        self.practice = Practice(self.job, folder, "life")
+        self.chosen = ""  # the folder's name in the data folder
+        self.watching = True
+        self.thresholds: dict[str, float] = {}
+        self._brought: dict[str, float] = {}  # by a challenge
+        self.left_out: dict[str, str] = {}  # why a file is, by its name
+        self.history: History | None = None  # as it was followed last
+        self._growing: History | None = None
+        self._path: Path | None = folder.folder  # None: a session's, which is not there
+        self._flights: dict[Path, Flight] = {}
+        self._versions: dict[Path, str] = {}  # of the recordings that were read
+        self._looks_on = False  # at what arrives, since flights of this folder were asked for
+        self._brought_flights: list[Flight] = []  # by a session, until they are followed
+        self._watched = Watched()
+        self._closed = threading.Event()
+        self._looks: threading.Thread | None = None
+        self.provenance = Provenance("the life", "Track", self.inputs, self.job)
+
+    def close(self) -> None:
+        """Ends the threads."""
+        self._closed.set()
+        self.job.stop()
+
+    # --- what is asked ----------------------------------------------------------------------------------------------
+
+    def choose(self, name: Any) -> None:
+        """A folder by its name; what was known of another one is forgotten.  InputError where there is none."""
+        path = self.folder.inner(str(name))
+        if self.job.running:
+            raise InputError("flights are being identified; stop that first")
+        if name != self.chosen or self._path != path:
+            self.chosen, self.history, self._growing, self.left_out = str(name), None, None, {}
+            self._path, self._flights, self._brought_flights, self._watched = path, {}, [], Watched()
+            self._versions, self._looks_on = {}, False
+            self.provenance.clear()
+            challenge = self.practice.held(self.chosen)
+            own = dict(self.thresholds.items() - self._brought.items())
+            self._brought = {} if challenge is None else challenge.thresholds
+            self.thresholds = own | self._brought
+
+    def inputs(self) -> Inputs:
+        """What would be followed now; of a folder that is watched, what arrives is taken up by itself."""
+        files, path = None, self._path
+        if path is not None:
+            with suppress(OSError):
+                files = {one: version_with_side(one) for one in recordings_in(path)}
+                if self.watching and self._looks_on:
+                    files = {one: self._versions[one] for one in files if one in self._versions}
+        return self._inputs(files)
+
+    def _inputs(self, files: Mapping[Path, str] | None) -> Inputs:
+        named = None if files is None else {f"{self.chosen}/{path.name}": version for path, version in files.items()}
+        options = {f"the threshold of {name}": str(at) for name, at in self.thresholds.items()}
+        return Inputs(self.chosen, self.chosen, named, options)
+
+    def set_threshold(self, name: str, value: Any) -> None:
+        """Where the life ends by a k; None for nowhere.  InputError for a value that is no threshold."""
+        others = {other: at for other, at in self.thresholds.items() if other != name}
+        if value is not None:
+            others[name] = number(value, f"the threshold of {name}")
+            check_thresholds(others)
+        self.thresholds = others
+
+    @property
+    def is_elsewhere(self) -> bool:
+        """Whether the folder is one of a session, and not here."""
+        return self._path is None
+
+    @property
+    def last(self) -> Tracked | None:
+        """What is known after the last flight."""
+        return None if self.history is None else self.history.last
+
+    def file_of(self, flight: Flight) -> str:
+        """The name in the data folder of a flight's recording; InputError where it is not there any more."""
+        path = next((path for path, one in self._flights.items() if one is flight), None)
+        if path is None:
+            raise InputError(f"{quoted(flight.name)}: its recording is not in the data folder, or is another by now")
+        return self.folder.name_of(path)
+
+    # --- the run ----------------------------------------------------------------------------------------------------
+
+    def begin(self) -> bool:
+        """Identifies the flights that are not yet, and follows all; False while another long run goes on.
+
+        InputError for a folder without flights, out of which no order can be made, or of several units; and for too
+        few of them, unless more are waited for.
+        """
+        if not self.chosen:
+            raise InputError("no folder of flights is chosen; put one into the data folder, and choose it")
+        self._path = self._path or self.folder.inner(self.chosen)  # it may have come since
+        paths = self._paths(self._path)
+        self.left_out = {}  # it may have been mended
+        self._forget_all_but([path for path in paths if self._versions.get(path) == version_with_side(path)])
+        self._watched.arrived(paths)
+        started = self.provenance.begin(lambda: self._start(paths, "Identifying flights"))
+        if started:
+            self._watched.take(paths)
+            self._watch()
+        return started
+
+    def _paths(self, folder: Path) -> list[Path]:
+        """In order of time; the data folder itself has folders of the app beside its flights."""
+        try:
+            paths = in_order(recordings_in(folder)) if self.chosen == "." else flights_in(folder)
+            check_order(paths)
+        except InputError as error:
+            raise InputError(str(error).replace(f"{self.folder.folder}/", "")) from None
+        if not self.watching:
+            check_enough(paths, self.chosen)
+        return paths
+
+    def _start(self, paths: list[Path], title: str) -> bool:
+        todo = [path for path in paths if path not in self._flights and path.name not in self.left_out]
+        told: list[str] = []
+
+        def work(run: Run) -> None:
+            try:
+                for place, path in enumerate(todo):
+                    self._take(path, place, len(todo), run)
+            except Stopped:
+                told.append(f"Stopped after {len(self._flights)} of {len(paths)} flights; Track goes on from there.")
+            self._follow(run, _FOLLOWING if todo else 1.0)
+
+        def done() -> str | None:
+            if self.history is not None and self.last is not None:
+                self.events.followed(self.history)
+            elif not told:
+                told.append(f"{len(self._flights)} of the {LEAST_FLIGHTS} flights that a trend needs.")
+            return " ".join(told) or None
+
+        return self.job.begin(title if todo else "Following k", work, done)
+
+    def _take(self, path: Path, place: int, count: int, run: Run) -> None:
+        """Identifies one; what cannot be used is left out, and said."""
+        text = f"flight {place + 1} of {count}"
+
+        def told(at: Progress) -> None:
+            done = place + at.iteration / max(at.iterations, 1)
+            run(text, (1.0 - _FOLLOWING) * done / count)
+
+        run(text, (1.0 - _FOLLOWING) * place / count)
+        self._versions[path] = version_with_side(path)
+        try:
+            side = side_file_of(path, self.folder) or SideFile()
+            recording = read(path, self.session.actuator, side=side)
+            if recording.reading.told and not self._flights:
+                self.session.events.told("Columns were guessed", f"{path.name}: {recording.reading.told}")
+            flight = identified(recording, path.stem, self.session.actuator, on_iteration=told)
+        except InputError as error:
+            self.left_out[path.name] = str(error).replace(f"{self.folder.folder}/", "")
+            self.events.left_out()
+            return
+        self._flights[path] = flight
+
+    def _follow(self, run: Run, share: float) -> None:
+        """Looks after each flight, of all that are identified; share: of the bar."""
+        self._grow([self._flights[path] for path in in_order(self._flights)], run, share)
+
+    def _forget_all_but(self, paths: Collection[Path]) -> None:
+        """Flights whose recordings were removed, or are others by now, are followed no more."""
+        self._flights = {path: flight for path, flight in self._flights.items() if path in paths}
+        self._versions = {path: version for path, version in self._versions.items() if path in paths}
+
+    @property
+    def complaints(self) -> list[str]:
+        """Why files are left out, of those that are still there."""
+        path, left_out = self._path, dict(self.left_out)
+        return [why for name, why in left_out.items() if path is None or (path / name).exists()]
+
+    def _grow(self, flights: list[Flight], run: Run, share: float) -> None:
+        if self._growing is None or self._growing.thresholds != self.thresholds:
+            self._growing = History(self.thresholds)
+        for done in self._growing.follow(flights):
+            run.say(f"after flight {done}", 1.0 - share * (1.0 - done / len(flights)))
+        self.history = self._growing.copy()
+        if self.last is not None:
+            self.provenance.take(self._inputs(None if self._path is None else dict(self._versions)))
+
+    # --- what arrives -----------------------------------------------------------------------------------------------
+
+    def _watch(self) -> None:
+        self._looks_on = True
+        if self._looks is None:
+            self._looks = threading.Thread(target=self._look_on, name="emaviz-flights", daemon=True)
+            self._looks.start()
+
+    def _look_on(self) -> None:
+        while not self._closed.wait(LOOK_S):
+            path = self._path
+            if self.watching and self._looks_on and self.chosen and path is not None and not self.session.worker.busy:
+                try:
+                    self.take_up(self._watched.arrived(recordings_in(path)))
+                except (InputError, OSError) as error:
+                    self.session.events.told("The folder cannot be watched", str(error))
+                    self.watching = False
+
+    def take_up(self, new: list[Path]) -> None:
+        """Files that have arrived, or were replaced; each that cannot be put among the others is left out, and said."""
+        if not new:
+            return
+        self._forget_all_but([path for path in {**self._flights, **self._versions} if path.exists()])
+        for path in new:
+            self._flights.pop(path, None)
+            self.left_out.pop(path.name, None)
+        good = list(self._flights)
+        for path in new:
+            try:
+                check_order(in_order([*good, path]))
+                good.append(path)
+            except InputError as error:
+                self.left_out[path.name] = str(error)
+                self.events.left_out()
+        if len(good) > len(self._flights) and not self._start(in_order(good), "Taking up flights"):
+            self._watched.forget(new)  # something else has just begun: at the next look
+
+    # --- what a session's file holds --------------------------------------------------------------------------------
+
+    def saved(self) -> dict[str, Any]:
+        """The flights that are followed, as they were identified, and what is asked of them."""
+        flights = self._known()
+        return saved(self.chosen, self.thresholds, as_toml(self.session.actuator), flights, dict(self._flights))
+
+    def _known(self) -> list[Flight]:
+        """The flights that are identified, in order, also before there are enough of them to be followed."""
+        history = [] if self.history is None else self.history.flights
+        identified = [self._flights[path] for path in in_order(dict(self._flights))]
+        return max(self._brought_flights if self.history is None else [], history, identified, key=len)
+
+    def restore(self, saved: Any) -> None:
+        """Takes what `saved` gave: its flights are followed soon, and none is identified, whether it is there or not.
+
+        InputError, and nothing changes, for what makes no sense or is of another actuator, and while flights are
+        identified.
+        """
+        told = read_saved(saved)
+        flights = [one.flight for one in told.flights]
+        if flights and told.actuator != as_toml(self.session.actuator):
+            raise InputError("the session's flights are of another actuator; start the app with that one")
+        if len({one.common.shape for one in flights if not one.excluded}) > 1:
+            raise InputError("the session's flights are of several actuators; save it anew")
+        if self.job.running:
+            raise InputError("flights are being identified; stop that first")
+        try:
+            self._path = self.folder.inner(told.folder) if told.folder else self.folder.folder
+        except InputError:
+            self._path = None
+        self.chosen, self.thresholds, self._brought = told.folder, told.thresholds, {}
+        self.history, self._growing, self.left_out, self._watched = None, None, {}, Watched()
+        files = [] if self._path is None else [self._path / Path(one.file).name for one in told.flights]
+        self._flights = {
+            path: flight for path, one, flight in zip(files, told.flights, flights) if one.file and one.is_of(path)
+        }
+        self._versions = {path: version_with_side(path) if path in self._flights else "" for path in files}
+        self._watched.arrived(self._flights)
+        self._watched.take(self._flights)
+        self._looks_on = False  # flights that came since are long work, which is asked for
+        self._brought_flights = flights
+        self.provenance.clear()
+        if not flights:
+            return
+
+        def work(run: Run) -> None:
+            if self._brought_flights is flights:  # nothing else was chosen while it waited
+                self._grow(flights, run, 1.0)
+            if self.history is not None and self.last is not None:
+                self.events.followed(self.history)
+
+        title = "Following k"
+
+        def begin() -> bool:
+            return self.provenance.begin(lambda: self.job.begin(title, work))
+
+        self.job.begin_in_turn(title, begin, rests=RESTED)
+
+    # --- what stays -------------------------------------------------------------------------------------------------
+
+    def save(self, suffix: str) -> None:
+        """Writes the last answer as a report (.html) or for Rerun (.rrd), soon; InputError before there is one."""
+        found = self.last
+        if found is None:
+            raise InputError("nothing is followed yet; press Track first")
+        self._files.post(
+            f"track {suffix}",
+            lambda: self.events.kept(keep(found, self.session.actuator.name, self.folder, suffix)),
+        )
+
+
+# --- the session's part of Track: a folder of flights, followed on the compute thread ---------------------------------

@@ -1,1 +1,0 @@
-"""The session's part of Units: a folder of units' folders, compared on the compute thread."""

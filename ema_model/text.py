@@ -184,14 +184,16 @@ class Document:
 class InWords:
     """A result that shows itself: as text when it is printed, as HTML in a notebook.
 
-    What it says stands in the file `words.py` beside it, as `document_of(result)`.
+    What it says is `document_of(result)`, in the result's own file or in `words.py` beside it.
     """
 
     @property
     def document(self) -> Document:
         """What it says."""
-        beside, _, _ = type(self).__module__.rpartition(".")
-        return import_module(f"{beside}.words").document_of(self)
+        own = import_module(type(self).__module__)
+        if not hasattr(own, "document_of"):
+            own = import_module(f"{own.__name__.rpartition('.')[0]}.words")
+        return own.document_of(self)
 
     def __str__(self) -> str:
         return self.document.text

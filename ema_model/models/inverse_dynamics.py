@@ -1,7 +1,7 @@
 """Motion in, current or torque out: for recordings whose controller is not known, and for static maps.
 
 The current that the measured motion needs is held against the measured one after both have passed the filter
-of the motion (`ema_model.models.motion`).  In a static map (the current that holds the rotor, against its
+of the motion (`ema_model.models.measured_motion`).  In a static map (the current that holds the rotor, against its
 angle) nothing moves: what the model has to say there is what effects pull at the shaft.
 """
 

@@ -15,7 +15,7 @@ from emaviz.session.data_folder import DataFolder
 
 WRITING = """
 import sys, time
-from ema_model.files.whole_file import whole_file
+from ema_model.files.written import whole_file
 with whole_file(sys.argv[1]) as draft:
     draft.write_text("half")
     print("ready", flush=True)

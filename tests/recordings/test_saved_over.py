@@ -129,9 +129,7 @@ def test_whatever_stood_there_what_is_said_now_is_written(before, now):
 
 ADDING = """
 import sys
-from ema_model.files.toml_text import toml_of
-from ema_model.files.toml_write import toml_text
-from ema_model.files.whole_file import change_file
+from ema_model.files.written import change_file, toml_of, toml_text
 path, name, count = sys.argv[1], sys.argv[2], int(sys.argv[3])
 print("ready", flush=True)
 sys.stdin.readline()
@@ -166,7 +164,7 @@ def test_two_who_save_at_once_lose_nothing(tmp_path):
 
 HOLDING = """
 import sys, time
-from ema_model.files.whole_file import change_file
+from ema_model.files.written import change_file
 def change(text):
     print("ready", flush=True)
     time.sleep(60)

@@ -473,7 +473,7 @@ class EffectCharts:
                 data=(empty, empty),
                 series=({}, _effect_signature_line("difference", DIFFERENCE, 1.5)),
                 title="",
-                axes=(time_axis(last), value_axis(chart.difference_unit)),
+                axes=(time_axis(last), value_axis(shown.difference_unit)),
                 # its topmost number has no title above it
                 **_layout(height - 10 + (LAST_MORE_PX if last else 0), above=8),
             )

@@ -92,7 +92,7 @@ class SessionControls:
     def _save(self, client: viser.ClientHandle | None) -> None:
         folder = self._comparing.folder
         path = session_file.free_path(folder, self._name.value)
-        session_file.write(path, self._kept(), folder, self._needed())
+        session_file.write_session(path, self._kept(), folder, self._needed())
         self.refresh()
         self._page.notify("Session saved", folder.name_of(path), "green")
         if client is not None:
@@ -108,7 +108,7 @@ class SessionControls:
 
     def _read(self, path: Path) -> None:
         try:
-            session_file.saved_read(path, self._kept(), self._comparing.folder)
+            session_file.read_session(path, self._kept(), self._comparing.folder)
         finally:
             self.refresh()
         lines = self._lacking()

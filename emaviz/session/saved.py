@@ -154,7 +154,7 @@ class Part:
     files: Callable[[], Sequence[str]] = list
 
 
-def write(path: Path, parts: Mapping[str, Part], folder: DataFolder, names: Sequence[str]) -> None:
+def write_session(path: Path, parts: Mapping[str, Part], folder: DataFolder, names: Sequence[str]) -> None:
     """Writes a session; names: measurements and actuator files of the data folder that belong to it.
 
     Raises InputError, and leaves nothing behind, if it cannot be written.
@@ -176,7 +176,7 @@ def write(path: Path, parts: Mapping[str, Part], folder: DataFolder, names: Sequ
         raise InputError(f"{quoted(path.name)}: cannot be written ({error.strerror}); check the disk") from None
 
 
-def saved_read(path: Path, parts: Mapping[str, Part], folder: DataFolder) -> None:
+def read_session(path: Path, parts: Mapping[str, Part], folder: DataFolder) -> None:
     """Takes a session back, its files into the data folder.  InputError: no session, damaged, too large.
 
     The files are taken all or not at all.

@@ -281,14 +281,14 @@ def test_a_session_of_today_and_one_without_results_are_both_read(app, tmp_path)
     parts = {"results": results_part(lambda: members(app)), "other": Part(dict, lambda *_: None)}
     app.units.provenance.take()
     path = session_file.free_path(app.data, "kept")
-    session_file.write(path, parts, app.data, [])
+    session_file.write_session(path, parts, app.data, [])
     app.units.provenance.clear()
-    session_file.saved_read(path, parts, app.data)
+    session_file.read_session(path, parts, app.data)
     assert app.units.provenance.line().startswith("To be computed again: the comparison of fleet")
     app.units.provenance.clear()
     with zipfile.ZipFile(tmp_path / "old.emaviz", "w") as archive:
         archive.writestr("session.json", json.dumps({"schema": 1, "files": []}))
-    session_file.saved_read(tmp_path / "old.emaviz", parts, app.data)
+    session_file.read_session(tmp_path / "old.emaviz", parts, app.data)
     assert not app.units.provenance.line()
 
 

@@ -144,7 +144,7 @@ def test_a_session_carries_its_files_to_another_folder(folder, tmp_path):
     (folder.uploads / "left.csv").write_text("not part of it")
     saved = {"a": Part(lambda: {"x": [1, 2]}, lambda *_: None)}
     path = session_file.free_path(folder, "my session")
-    session_file.write(path, saved, folder, ["uploads/a.csv", "uploads/gone.csv", "../../etc/passwd"])
+    session_file.write_session(path, saved, folder, ["uploads/a.csv", "uploads/gone.csv", "../../etc/passwd"])
     assert path.name == "my session.emaviz"
     with zipfile.ZipFile(path) as archive:
         assert sorted(archive.namelist()) == ["files/uploads/a.csv", "files/uploads/a.toml", "session.json"]
@@ -152,14 +152,14 @@ def test_a_session_carries_its_files_to_another_folder(folder, tmp_path):
     other = DataFolder(tmp_path / "other")
     (other.uploads / "a.csv").write_text("another file of this name")
     taken = []
-    session_file.saved_read(path, {"a": Part(dict, lambda said, names: taken.append((said, dict(names))))}, other)
+    session_file.read_session(path, {"a": Part(dict, lambda said, names: taken.append((said, dict(names))))}, other)
     assert taken == [({"x": [1, 2]}, {"uploads/a.csv": "uploads/a-2.csv"})]
     assert (other.uploads / "a-2.csv").read_text() == (folder.uploads / "a.csv").read_text()
     assert (other.uploads / "a-2.toml").read_text() == "# side\n"
     assert not [path.name for path in other.uploads.iterdir() if path.name.startswith(".")], "no draft, no lock"
     assert (other.uploads / "a.csv").read_text() == "another file of this name"
-    session_file.saved_read(path, {}, other)
-    session_file.saved_read(path, {}, folder)
+    session_file.read_session(path, {}, other)
+    session_file.read_session(path, {}, folder)
     assert len(list(folder.uploads.glob("*.csv"))) == 2, "what is there already is not kept twice"
 
 
@@ -186,7 +186,7 @@ def test_what_is_no_session_is_refused_in_one_line(folder, tmp_path, monkeypatch
     cases.append((cut, "is no session"))
     for file, message in cases:
         with pytest.raises(InputError, match=message) as told:
-            session_file.saved_read(file, {}, folder)
+            session_file.read_session(file, {}, folder)
         assert "\n" not in str(told.value)
     monkeypatch.setattr(session_file, "SESSION_BYTES", 1000)
     listing = json.dumps({"schema": 1, "files": ["uploads/a.csv", "uploads/b.csv"]})
@@ -194,19 +194,19 @@ def test_what_is_no_session_is_refused_in_one_line(folder, tmp_path, monkeypatch
         tmp_path / "e.emaviz", {"session.json": listing, "files/uploads/a.csv": "0", "files/uploads/b.csv": "0" * 5000}
     )
     with pytest.raises(InputError, match=r"unpacks to over 0\.001 MB, which is the limit"):
-        session_file.saved_read(bomb, {}, folder)
+        session_file.read_session(bomb, {}, folder)
     assert not [file for file in folder.folder.rglob("*") if file.is_file()], "no half of a session is left"
 
 
 def test_files_of_a_session_stay_inside_the_data_folder(folder, tmp_path):
     document = json.dumps({"schema": 1, "files": ["../../evil.csv", "/etc/evil.csv", "uploads/evil.exe"]})
     files = {"session.json": document, "files/../../evil.csv": "1", "files//etc/evil.csv": "2"}
-    session_file.saved_read(archive_with(tmp_path / "a.emaviz", files), {}, folder)
+    session_file.read_session(archive_with(tmp_path / "a.emaviz", files), {}, folder)
     outside = [p for p in tmp_path.rglob("*evil*") if not p.is_relative_to(folder.folder)]
     assert not outside and {p.parent.name for p in folder.folder.rglob("*evil*")} == {"uploads"}
     files["files/uploads/evil.exe"] = "3"
     with pytest.raises(InputError, match="evil"):
-        session_file.saved_read(archive_with(tmp_path / "b.emaviz", files), {}, folder)
+        session_file.read_session(archive_with(tmp_path / "b.emaviz", files), {}, folder)
 
 
 # --- in the browser ---------------------------------------------------------------------------------------------------
@@ -270,7 +270,7 @@ def test_what_is_out_of_date_is_marked_and_what_a_session_lacks_is_named_in_its_
 
     identifying = app.session.identifying.provenance
     identifying.take()
-    session_file.write(
+    session_file.write_session(
         comparing.folder.sessions / "lacking.emaviz", app.shared.kept(), comparing.folder, list(comparing.opened)
     )
     identifying.clear()

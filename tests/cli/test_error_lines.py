@@ -173,7 +173,7 @@ def test_what_a_browser_and_a_session_send(tmp_path, text):
         with zipfile.ZipFile(path, "w") as archive:
             archive.writestr(session_file._DOCUMENT, json.dumps(document))
         with pytest.raises(InputError) as told:
-            session_file.saved_read(path, {}, folder)
+            session_file.read_session(path, {}, folder)
         one_line(told.value)
 
 

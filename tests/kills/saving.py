@@ -33,13 +33,13 @@ def _measurement(number: int) -> Measurement:
 
 def _save_session(path: Path, number: int) -> None:
     part = session_file.Part(lambda: [number] * SIZE, lambda saved, names: None)
-    session_file.write(path, {"numbers": part}, DataFolder(path.parent / "data"), [])
+    session_file.write_session(path, {"numbers": part}, DataFolder(path.parent / "data"), [])
 
 
 def _read_session(path: Path) -> list[int]:
     found: list[int] = []
     part = session_file.Part(list, lambda saved, names: found.extend(saved))
-    session_file.saved_read(path, {"numbers": part}, DataFolder(path.parent / "data"))
+    session_file.read_session(path, {"numbers": part}, DataFolder(path.parent / "data"))
     return found
 
 

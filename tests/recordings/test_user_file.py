@@ -29,7 +29,7 @@ DOORS = {
     "columns": (read_columns, "a.csv"),
     "recording": (lambda path: read(path, load_actuator()), "a.csv"),
     "challenge": (sealed_challenge, "a.challenge"),
-    "session": (lambda path: session_file.saved_read(path, {}, DataFolder(path.parent)), "a.emaviz"),
+    "session": (lambda path: session_file.read_session(path, {}, DataFolder(path.parent)), "a.emaviz"),
     "taken in": (lambda path: DataFolder(path.parent / "data").take_in(path), "a.csv"),
     "rrd": (check, "a.rrd"),
     "part": (lambda path: recover_part(path, path.with_name("b.rrd")), "a.rrd.part"),

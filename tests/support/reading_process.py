@@ -139,7 +139,7 @@ def _session(path: Path, _: int) -> None:
 
     with tempfile.TemporaryDirectory() as folder:
         settings = Part(dict, lambda saved, _: Settings().restore(saved))
-        session_file.read(path, {"settings": settings}, DataFolder(Path(folder)))
+        session_file.read_session(path, {"settings": settings}, DataFolder(Path(folder)))
 
 
 def _challenge(path: Path, _: int) -> None:

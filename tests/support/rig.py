@@ -37,8 +37,8 @@ class Rig:
 
     def save(self):
         path = session_file.free_path(self.folder, "kept")
-        session_file.write(path, {"discovery": self.part}, self.folder, self.part.files())
+        session_file.write_session(path, {"discovery": self.part}, self.folder, self.part.files())
         return path
 
     def load(self, path):
-        session_file.saved_read(path, {"discovery": self.part}, self.folder)
+        session_file.read_session(path, {"discovery": self.part}, self.folder)

@@ -10,7 +10,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
-from ema_model.actuator import Actuator, save_actuator
+from ema_model.actuator import Actuator
 from ema_model.comparison.summary import plain
 from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.files.opened import listed
@@ -19,45 +19,44 @@ from ema_model.recordings import Measurement, read_header
 from ema_model.recordings.formats.text_layout import Hints
 from ema_model.recordings.recording_set import RUN, held_out, is_pattern
 from ema_model.units.folders import check_same_type
-from emaviz.cli import given, output
+from emaviz.cli import flow, given, output
 
 _BY_FOLDER = ("unit", "folder")
 _NOT_OF_UNITS = {"record": None, "calibrate": True, "signals": None, "fault": []}  # with their defaults
 _WORD = {"calibrate": "--no-calibrate", "signals": "--signal"}
-_Units = dict[str, list[Measurement]]
+Units = dict[str, list[Measurement]]
 
 
 def run(arguments: argparse.Namespace, actuator: Actuator) -> int:
-    """Reads, compares the units, writes and prints."""
+    """Compares the units."""
     from ema_model.units.compare import compare_units
     from ema_model.units.result import as_dict
 
     _refuse(arguments, _NOT_OF_UNITS)
     actuator = replace(actuator, effects={**actuator.effects, **given.effects_of(arguments, actuator.axes)})
-    progress = output.Progress(arguments)
-    try:
-        fitted, held = read_units(arguments, actuator, progress)
+
+    def compute(fitted: Units, held: Units, progress: output.Progress) -> flow.Answer:
         result = compare_units(
             fitted, actuator, holdout=held, free=arguments.free, seed=arguments.seed, on_progress=progress.show
         )
-        if arguments.report:
-            progress.show("writing the report")
-            from emaviz.report import write_units_report  # plotly takes a second to import
 
-            write_units_report(result, arguments.report)
-    finally:
-        progress.done()
-    return _told(arguments, result, as_dict(result), result.type_actuator)
+        def report(path: str, _: Mapping[str, Any]) -> None:
+            from emaviz.report import write_units_report
+
+            write_units_report(result, path)
+
+        return flow.Answer(result, as_dict(result), result.type_actuator, report=report)
+
+    return flow.run(arguments, actuator, compute, read_units)
 
 
 def run_discovery(arguments: argparse.Namespace, actuator: Actuator, signals: tuple[str, ...] | None) -> int:
-    """Reads, looks for what the units lack, writes and prints."""
+    """Looks for what the units lack."""
     from ema_model.units.discovery import as_dict, discover_units
 
     _refuse(arguments, ["record"])
-    progress = output.Progress(arguments)
-    try:
-        fitted, held = read_units(arguments, actuator, progress)
+
+    def compute(fitted: Units, held: Units, progress: output.Progress) -> flow.Answer:
         result = discover_units(
             fitted,
             actuator,
@@ -67,14 +66,15 @@ def run_discovery(arguments: argparse.Namespace, actuator: Actuator, signals: tu
             seed=arguments.seed,
             on_progress=progress.show,
         )
-        if arguments.report:
-            progress.show("writing the report")
-            from emaviz.report import write_units_discovery_report  # plotly takes a second to import
 
-            write_units_discovery_report(result, arguments.report)
-    finally:
-        progress.done()
-    return _told(arguments, result, plain(as_dict(result)), result.compared.type_actuator)
+        def report(path: str, _: Mapping[str, Any]) -> None:
+            from emaviz.report import write_units_discovery_report
+
+            write_units_discovery_report(result, path)
+
+        return flow.Answer(result, plain(as_dict(result)), result.compared.type_actuator, report=report)
+
+    return flow.run(arguments, actuator, compute, read_units)
 
 
 def _refuse(arguments: argparse.Namespace, options: Iterable[str]) -> None:
@@ -84,16 +84,7 @@ def _refuse(arguments: argparse.Namespace, options: Iterable[str]) -> None:
             raise InputError(f"{_WORD.get(name, f'--{name}')}: has no meaning where units are compared; leave it out")
 
 
-def _told(arguments: argparse.Namespace, result: object, document: Mapping[str, Any], of_type: Actuator) -> int:
-    """Saves the type, writes and prints."""
-    if arguments.save_actuator:
-        save_actuator(of_type, arguments.save_actuator)
-    output.write_json(arguments, document)
-    print(result)
-    return 0
-
-
-def read_units(arguments: argparse.Namespace, actuator: Actuator, progress: output.Progress) -> tuple[_Units, _Units]:
+def read_units(arguments: argparse.Namespace, actuator: Actuator, progress: output.Progress) -> tuple[Units, Units]:
     """The recordings to fit and those held out, by unit; InputError where it is not clear whose one is."""
     given_files, unseen = given.files_to_read(arguments, in_folders=True)
     named = {Path(file).resolve() for file in unseen}
@@ -103,8 +94,8 @@ def read_units(arguments: argparse.Namespace, actuator: Actuator, progress: outp
     if column:
         arguments = copy(arguments)
         arguments.runs = column
-    fitted: _Units = {}
-    held: _Units = {}
+    fitted: Units = {}
+    held: Units = {}
     for file, found in given.read_each(files, arguments, actuator, progress):
         for one in found:
             unit = f"{column} {one.name.rpartition(RUN)[2]}" if column else _unit_of(file, one.name, arguments.unit)

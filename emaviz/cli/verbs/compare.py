@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 from ema_model.errors import InputError
 from emaviz.cli import files, options
 
 if TYPE_CHECKING:
-    from ema_model.comparison import Comparison
-    from emaviz.cli import output
+    from ema_model.recordings import Measurement
+    from emaviz.cli import flow, output
 
 HELP = "show where the model fails beside recordings"
 PLACE = 4
@@ -49,10 +50,10 @@ def documents() -> tuple[type, ...]:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Reads, compares, writes and prints."""
+    """Compares, and of units what they differ in."""
     if arguments.save_actuator and not arguments.calibrate:
         raise InputError("--save-actuator writes what the calibration found; leave --no-calibrate out")
-    from emaviz.cli import given, output
+    from emaviz.cli import flow, given
 
     actuator = given.actuator_of(arguments)
     if arguments.by or arguments.unit:
@@ -61,13 +62,12 @@ def run(arguments: argparse.Namespace) -> int:
         return by_unit.run(arguments, actuator)
     k, weights = given.faults_of(arguments, actuator.faults), given.weights_of(arguments.signals)
     effects = given.effects_of(arguments, actuator.axes)
-    progress = output.Progress(arguments)
-    try:
-        measurements, held = given.read_set(arguments, actuator, progress)
+
+    def compute(fitted: list[Measurement], held: list[Measurement], progress: output.Progress) -> flow.Answer:
         from ema_model.comparison import as_dict, compare  # takes a second: recordings are refused before
 
         result = compare(
-            measurements,
+            fitted,
             actuator,
             k=k,
             effects=effects,
@@ -77,39 +77,18 @@ def run(arguments: argparse.Namespace) -> int:
             holdout=held,
             on_progress=progress.show,
         )
-    finally:
-        progress.done()
-    if result.calibration is not None and arguments.save_actuator:
-        from ema_model.actuator import save_actuator
 
-        save_actuator(result.calibration.actuator, arguments.save_actuator)
-    output.write_json(arguments, as_dict(result))
-    print(result, flush=True)
-    _write(result, arguments, progress)
-    return 0
+        def record(path: str, configuration: Mapping[str, Any]) -> None:
+            from emaviz.recording.comparison import write_comparison
 
+            write_comparison(result, path, configuration)
 
-def _write(result: Comparison, arguments: argparse.Namespace, progress: output.Progress) -> None:
-    """The recording and the report, last: if one fails or is interrupted, the answer is there."""
-    try:
-        if arguments.record:
-            progress.show("recording")
-            _record(result, arguments)
-        if arguments.report:
-            progress.show("writing the report")
-            from emaviz.report import write_report  # plotly takes a second to import
+        def report(path: str, _: Mapping[str, Any]) -> None:
+            from emaviz.report import write_report
 
-            write_report(result, arguments.report)
-    finally:
-        progress.done()
+            write_report(result, path)
 
+        found = result.calibration.actuator if result.calibration is not None else None
+        return flow.Answer(result, as_dict(result), found, record, report)
 
-def _record(result: Comparison, arguments: argparse.Namespace) -> None:
-    from emaviz.cli import output
-    from emaviz.recording import RecordingError
-    from emaviz.recording.comparison import write_comparison
-
-    try:
-        write_comparison(result, arguments.record, output.configuration(arguments))
-    except RecordingError as error:
-        raise InputError(str(error)) from None
+    return flow.run(arguments, actuator, compute)

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 from emaviz.cli import files, options
-from emaviz.cli.exit_code import ExitCode
 from emaviz.cli.interrupt import PartialAnswer
 from emaviz.cli.options import whole
 
 if TYPE_CHECKING:
-    from ema_model.discovery import Discovery
+    from ema_model.recordings import Measurement
+    from emaviz.cli import flow, output
 
 HELP = "find the physical effects that the model lacks, and add them"
 PLACE = 5
@@ -38,8 +39,8 @@ def documents() -> tuple[type, ...]:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Reads, discovers, writes and prints; once interrupted, what was found so far."""
-    from emaviz.cli import given, output
+    """Discovers, and of units what they lack; once interrupted, what was found so far."""
+    from emaviz.cli import flow, given
 
     actuator = given.actuator_of(arguments)
     signals = _CURRENT_ONLY if arguments.signals == "current" else None
@@ -47,11 +48,9 @@ def run(arguments: argparse.Namespace) -> int:
         from emaviz.cli import by_unit
 
         return by_unit.run_discovery(arguments, actuator, signals)
-    progress = output.Progress(arguments)
-    try:
-        fitted, held = given.read_set(arguments, actuator, progress)
+
+    def compute(fitted: list[Measurement], held: list[Measurement], progress: output.Progress) -> flow.Answer:
         # These take a second: recordings are refused before.
-        from ema_model.actuator import save_actuator
         from ema_model.comparison.summary import plain
         from ema_model.discovery import as_dict, discover, verified
         from ema_model.discovery.words import verification
@@ -66,37 +65,28 @@ def run(arguments: argparse.Namespace) -> int:
                 on_progress=progress.show,
                 stop=answer.is_interrupted,
             )
-        told, document = str(found), as_dict(found)
-        is_whole = found.verdict != "interrupted"
-        if arguments.save_actuator and is_whole:
-            save_actuator(found.actuator, arguments.save_actuator)
-            progress.show("simulating the saved model")
-            saved = verified(found, arguments.save_actuator)
-            told += f"\n\nsaved {arguments.save_actuator}, {verification(found, saved)}"
-            document["saved_actuator"] = {
+
+        def saved() -> tuple[str, dict[str, Any]]:
+            """The saved model, simulated again, in words and as JSON."""
+            again = verified(found, arguments.save_actuator)
+            of_saved = {
                 "file": arguments.save_actuator,
-                "verified_rmse": saved.rmse,
-                "verified_holdout_rmse": saved.holdout_rmse,
+                "verified_rmse": again.rmse,
+                "verified_holdout_rmse": again.holdout_rmse,
             }
-    finally:
-        progress.done()
-    output.write_json(arguments, plain(document))
-    print(told)
-    if not is_whole:
-        output.say_not_written(arguments, "save_actuator")
-    _write(found, arguments)
-    return ExitCode.DONE if is_whole else ExitCode.INTERRUPTED
+            return f"saved {arguments.save_actuator}, {verification(found, again)}", {"saved_actuator": plain(of_saved)}
 
+        def record(path: str, configuration: Mapping[str, Any]) -> None:
+            from emaviz.recording.discovery import write_discovery
 
-def _write(found: Discovery, arguments: argparse.Namespace) -> None:
-    """The recording and the report, last: if one fails, the answer is there."""
-    from emaviz.cli import output
+            write_discovery(found, path, configuration)
 
-    if arguments.record:
-        from emaviz.recording.discovery import write_discovery  # rerun takes a second to import
+        def report(path: str, configuration: Mapping[str, Any]) -> None:
+            from emaviz.report import write_discovery_report
 
-        write_discovery(found, arguments.record, output.configuration(arguments))
-    if arguments.report:
-        from emaviz.report import write_discovery_report  # as does plotly
+            write_discovery_report(found, path, configuration)
 
-        write_discovery_report(found, arguments.report, output.configuration(arguments))
+        is_whole = found.verdict != "interrupted"
+        return flow.Answer(found, plain(as_dict(found)), found.actuator, record, report, is_whole, saved)
+
+    return flow.run(arguments, actuator, compute)

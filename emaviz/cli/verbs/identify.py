@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import argparse
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
 
 from ema_model.errors import InputError
 from ema_model.members import stated, stated_in
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from ema_model.identification.objective import Objective
     from ema_model.identification.run import Progress
     from ema_model.recordings import Measurement
-    from emaviz.cli import output
+    from emaviz.cli import flow, output
 
 HELP = "find the faults k1 … k8 of recordings, or of a simulated actuator"
 PLACE = 3
@@ -55,8 +56,8 @@ def documents() -> tuple[type, ...]:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Fits, prints and records; once interrupted, the best so far."""
-    from emaviz.cli import given, output
+    """Identifies; once interrupted, the best so far."""
+    from emaviz.cli import flow, given
 
     actuator = given.actuator_of(arguments)
     if effects := given.effects_of(arguments, actuator.axes):
@@ -65,24 +66,36 @@ def run(arguments: argparse.Namespace) -> int:
         for name, settings in effects.items():
             actuator = with_effect(actuator, name, settings)
     truth = given.faults_of(arguments) if arguments.fault or not arguments.files else None
-    progress = output.Progress(arguments)
-    try:
-        measurements, unseen = _recordings(arguments, actuator, truth, progress)
-    finally:
-        progress.done()
 
+    def read(*of: Any) -> tuple[list[Measurement], list[Measurement]]:
+        fitted, held = given.read_set(*of)
+        return fitted or [_simulated(arguments, actuator, truth)], held
+
+    def compute(fitted: list[Measurement], held: list[Measurement], progress: output.Progress) -> flow.Answer:
+        return _identified(arguments, actuator, truth, fitted, held, progress)
+
+    return flow.run(arguments, actuator, compute, read)
+
+
+def _identified(
+    arguments: argparse.Namespace,
+    actuator: Actuator,
+    truth: np.ndarray | None,
+    fitted: list[Measurement],
+    held: list[Measurement],
+    progress: output.Progress,
+) -> flow.Answer:
     # These take a second: recordings are refused before.
-    from ema_model.actuator import save_actuator
     from ema_model.identification.objective import Objective
     from ema_model.identification.run import SEARCH_SHARE, identify
     from ema_model.identification.summary import as_dict
-    from ema_model.quantities.numbers import amount
+    from emaviz.cli import flow
 
     def fitness(of: list[Measurement]) -> Objective:
         return Objective(of, actuator, circuit=arguments.circuit, fitness=arguments.fitness)
 
-    objective, held = fitness(measurements), fitness(unseen) if unseen else None
-    recorder = _Recorder(arguments, measurements, objective, truth) if arguments.record else None
+    objective, unseen = fitness(fitted), fitness(held) if held else None
+    recorder = _Recorder(arguments, fitted, objective, truth) if arguments.record else None
     partial = PartialAnswer()
     history: list[Progress] = []
 
@@ -118,29 +131,33 @@ def run(arguments: argparse.Namespace) -> int:
         if recorder is not None:
             recorder.close()
         raise
-    finally:
-        progress.done()
-    holdout_rmse = None if held is None else _finite(held(answer.k)[0])
-    if arguments.save_actuator:
-        save_actuator(answer.found_actuator, arguments.save_actuator)
-    output.write_json(arguments, as_dict(answer, actuator, holdout_rmse))
-    print(answer)
-    if unseen and holdout_rmse is None:
-        print("the model diverges on what was not fitted")
-    elif holdout_rmse is not None:
-        beside = f"{amount(answer.rmse, 'A')} on what was"
-        names = ", ".join(one.name for one in unseen)
-        print(f"uncorrected error {amount(holdout_rmse, 'A')} on what was not fitted, {beside}: {names}")
-    if recorder is not None:
-        recorder.finish(answer)
-    if arguments.report:
-        from emaviz.report import write_identification_report  # plotly takes a second to import
+    error = None if unseen is None else _finite(unseen(answer.k)[0])
 
-        configuration = output.configuration(arguments)
-        write_identification_report(answer, objective, arguments.report, holdout_rmse, configuration)
-    if recorder is not None and recorder.failed:
-        raise InputError(recorder.failed)
-    return 0
+    def record(*_: object) -> None:
+        if recorder is not None:
+            recorder.finish(answer)
+            if recorder.failed:
+                raise InputError(recorder.failed)
+
+    def report(path: str, configuration: Mapping[str, Any]) -> None:
+        from emaviz.report import write_identification_report
+
+        write_identification_report(answer, objective, path, error, configuration)
+
+    words = "\n".join([str(answer), *_of_unseen(error, answer.rmse, held)])
+    return flow.Answer(words, as_dict(answer, actuator, error), answer.found_actuator, record, report)
+
+
+def _of_unseen(error: float | None, fitted: float, held: list[Measurement]) -> Iterator[str]:
+    """How far the model is from what was not fitted; error and fitted in A."""
+    from ema_model.quantities.numbers import amount
+
+    if held and error is None:
+        yield "the model diverges on what was not fitted"
+    elif error is not None:
+        names = ", ".join(one.name for one in held)
+        beside = f"{amount(fitted, 'A')} on what was"
+        yield f"uncorrected error {amount(error, 'A')} on what was not fitted, {beside}: {names}"
 
 
 def _say_so_far(history: list[Progress], actuator: Actuator, arguments: argparse.Namespace) -> None:
@@ -162,25 +179,19 @@ def _say_so_far(history: list[Progress], actuator: Actuator, arguments: argparse
     output.say_not_written(arguments, "report", "save_actuator")
 
 
-def _recordings(
-    arguments: argparse.Namespace, actuator: Actuator, truth: np.ndarray | None, progress: output.Progress
-) -> tuple[list[Measurement], list[Measurement]]:
-    """Those to fit, and those held out."""
-    from emaviz.cli import given
-
-    fitted, held = given.read_set(arguments, actuator, progress)
-    if fitted:
-        return fitted, held
+def _simulated(arguments: argparse.Namespace, actuator: Actuator, truth: np.ndarray | None) -> Measurement:
+    """The run that the options ask for, as the sensors have it."""
     assert truth is not None
     from ema_model.simulation.plant import simulated
     from ema_model.simulation.run import Sensors
+    from emaviz.cli import given
 
     sensors = Sensors(arguments.noise_current, arguments.encoder_bits)
     try:
         clean = simulated(given.run_of(arguments, actuator), actuator, truth, arguments.fitness)
     except FloatingPointError as error:
         raise InputError(str(error)) from None
-    return [sensors.record(clean, arguments.seed)], held
+    return sensors.record(clean, arguments.seed)
 
 
 def _finite(value: float) -> float | None:

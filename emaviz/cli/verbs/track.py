@@ -7,7 +7,7 @@ import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ema_model.errors import InputError, quoted
 from emaviz.cli import files, options
@@ -123,23 +123,24 @@ def _tell(
     """Writes and prints what flights say; of: as many as there would have been without an interrupt."""
     from ema_model.tracking.summary import as_dict
     from ema_model.tracking.track import track
-    from emaviz.cli import output
+    from emaviz.cli import flow
 
     result = track(flights, thresholds, arguments.seed)
-    progress.done()
     document = as_dict(result)
     if of is not None:
         document |= {"interrupted": True, "flights_identified": len(flights), "flights_named": of}
-    output.write_json(arguments, document)
-    print(result, flush=True)
-    if arguments.record:
-        from emaviz.recording.tracking import write_tracking  # rerun takes a second to import
 
-        write_tracking(result, arguments.record, output.configuration(arguments))
-    if arguments.report:
-        from emaviz.report import write_tracking_report  # plotly takes a second to import
+    def record(path: str, configuration: Mapping[str, Any]) -> None:
+        from emaviz.recording.tracking import write_tracking
 
-        write_tracking_report(result, actuator.name, arguments.report)
+        write_tracking(result, path, configuration)
+
+    def report(path: str, _: Mapping[str, Any]) -> None:
+        from emaviz.report import write_tracking_report
+
+        write_tracking_report(result, actuator.name, path)
+
+    flow.finish(arguments, flow.Answer(result, document, record=record, report=report), progress)
 
 
 def _watch(

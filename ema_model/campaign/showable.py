@@ -9,8 +9,8 @@ import numpy as np
 
 from ema_model.actuator import Actuator
 from ema_model.comparison.compare import weights_of
-from ema_model.discovery.model_fit import fit, gather
 from ema_model.estimation.calibrate import problem_of
+from ema_model.estimation.model_fit import fit, gather
 from ema_model.recordings import Measurement, prepared
 
 

@@ -122,8 +122,9 @@ def _compare(
     if unseen:
         tell("holding it against what was not fitted")
         known = calibration, taken
-        k, known = calibration.k, (calibration, taken)
-        held = _compare(unseen, calibration.actuator, k, None, False, None, signals, (), tell, known).recordings
+        held = _compare(
+            unseen, calibration.actuator, calibration.k, None, False, None, signals, (), tell, known
+        ).recordings
     return Comparison(
         actuator=actuator,
         calibration=fitted_to,

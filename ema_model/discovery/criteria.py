@@ -105,3 +105,6 @@ MISSED, PUT_RIGHT = 3.0, 0.4
 # Tolerances of the file, by which a parameter must differ before a recording counts as another actuator's; and how much
 # wider than them is looked.
 ANOTHER, WIDER = 3.0, 4.0
+
+# Fall of χ² at the candidate's best size, from which on a card calls its evidence strong, and moderate.
+EVIDENCE = (200.0, 50.0)

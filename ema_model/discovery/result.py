@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from ema_model.actuator import Actuator
 from ema_model.comparison.events import Event
 from ema_model.comparison.explain import Explanation
-from ema_model.discovery.criteria import FAR
-from ema_model.discovery.model_fit import Data
+from ema_model.discovery.criteria import EVIDENCE, FAR
 from ema_model.discovery.observed.controller import ControllerSeen
 from ema_model.discovery.observed.repeated import Repeated
 from ema_model.discovery.observed.transmission import TransmissionSeen
 from ema_model.estimation import Calibrated, Calibration, Floor
+from ema_model.estimation.model_fit import Data
 from ema_model.models import Model
 from ema_model.text import InWords
 
@@ -47,6 +47,12 @@ class Candidate:
     def drop(self) -> float:
         """The fall of χ²: that of the refit, or the predicted one where there was none."""
         return self.predicted_drop if self.refitted_drop is None else self.refitted_drop
+
+    @property
+    def evidence(self) -> str:
+        """How strong it is that something like this is missing: "strong", "moderate" or "weak"."""
+        strong, moderate = EVIDENCE
+        return "strong" if self.predicted_drop > strong else "moderate" if self.predicted_drop > moderate else "weak"
 
 
 @dataclass(frozen=True)

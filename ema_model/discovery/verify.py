@@ -6,8 +6,8 @@ import os
 from dataclasses import dataclass
 
 from ema_model.actuator import load_actuator
-from ema_model.discovery.model_fit import resimulated
 from ema_model.discovery.result import Discovery, Rung
+from ema_model.estimation.model_fit import resimulated
 
 _WORSE = 1.03  # times the last rung's error, up to which a saved model counts as the one that was found
 

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.discovery.evidence.counted import colour
-from ema_model.discovery.model_fit import Data
 from ema_model.estimation import Floor, calibrate, default_free, floor
+from ema_model.estimation.model_fit import Data
 from ema_model.estimation.problem import SIGNALS, Problem
 from ema_model.estimation.unknowns import starts_of, unknowns_of
 from ema_model.identification.model_bias import TWINS, Twins, twins

@@ -14,11 +14,11 @@ from ema_model.comparison.assemble import residuals_of
 from ema_model.comparison.explain import Explanation, explain
 from ema_model.comparison.residuals import Residuals
 from ema_model.discovery.candidates.torque_curve import curve_of, is_torque, with_curve
-from ema_model.discovery.model_fit import Data, Fit, fit, gather, holdout_error
 from ema_model.effects import find
 from ema_model.effects.user import torque_curve, user_torque
 from ema_model.errors import InputError
 from ema_model.estimation.floor import twin_error
+from ema_model.estimation.model_fit import Data, Fit, fit, gather, holdout_error
 from ema_model.recordings import prepared
 
 COMMANDS = [("chirp", {}, 0.5), ("step", {"final_rad": 0.005}, 0.5), SINE]

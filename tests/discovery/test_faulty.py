@@ -11,10 +11,10 @@ from ema_model.comparison.criteria import BAND
 from ema_model.discovery import discover
 from ema_model.discovery.candidates.faults import scored_faults, tried_faults
 from ema_model.discovery.discover import result_of
-from ema_model.discovery.model_fit import holdout_error
 from ema_model.discovery.result import Change
 from ema_model.discovery.steps.begin import begun
 from ema_model.discovery.words import as_dict
+from ema_model.estimation.model_fit import holdout_error
 from ema_model.faults import vector
 from ema_model.simulation.run import Run, Sensors, simulate_reference
 

@@ -10,7 +10,7 @@ import pytest
 from scipy.optimize import lsq_linear
 
 from ema_model.discovery.candidates.let_go import let_go
-from ema_model.discovery.model_fit import Fit
+from ema_model.estimation.model_fit import Fit
 
 
 def found_at_bounds(seed: int) -> tuple[Fit, np.ndarray, np.ndarray]:

@@ -13,8 +13,8 @@ from ema_model.actuator import load_actuator, save_actuator
 from ema_model.commands import command
 from ema_model.comparison import compare
 from ema_model.discovery import as_dict, discover, verified
-from ema_model.discovery.model_fit import with_effect
 from ema_model.discovery.words import verification
+from ema_model.estimation.model_fit import with_effect
 from ema_model.faults import vector
 from ema_model.simulation.run import Run, Sensors, simulate_reference
 

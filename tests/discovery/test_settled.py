@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ema_model.discovery.evidence import uncertainty
-from ema_model.discovery.model_fit import Data
+from ema_model.estimation.model_fit import Data
 
 DRIVEN = ("motor.a", "motor.b", "motor.c", "motor.d")  # one after another, as the one before is held
 

@@ -15,10 +15,10 @@ from ema_model.discovery.candidates.fingerprints import fingerprints
 from ema_model.discovery.candidates.next_experiment import allowed, next_experiment
 from ema_model.discovery.candidates.refit import Trial
 from ema_model.discovery.candidates.score import scored, scored_together
-from ema_model.discovery.model_fit import Fit, fit, gather, with_effect
 from ema_model.discovery.observed.repeatability import is_lost, with_divergence
 from ema_model.discovery.result import Candidate
 from ema_model.estimation.floor import floor
+from ema_model.estimation.model_fit import Fit, fit, gather, with_effect
 from ema_model.models import model_for
 from ema_model.recordings import prepared
 from ema_model.simulation.run import Run, Sensors, simulate_reference

@@ -15,12 +15,12 @@ from ema_model.comparison.residuals import Residuals
 from ema_model.comparison.result import SignalError
 from ema_model.comparison.verdict import judge, most_of_floor
 from ema_model.discovery import as_dict, begun, result_of
-from ema_model.discovery.model_fit import floor_ratio
 from ema_model.discovery.result import VERDICTS, Contradiction
 from ema_model.discovery.steps.snapshot import known_of
 from ema_model.discovery.steps.step import Step, rung_of
 from ema_model.discovery.words import WORDS_VERDICTS as IN_WORDS
 from ema_model.discovery.words import headline, so_far, words_sentences
+from ema_model.estimation.model_fit import floor_ratio
 
 CLEAR = {"load_dependent_friction": {"ratio": 0.25}}
 SURE = ("adequate", "effects_found")

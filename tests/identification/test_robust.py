@@ -12,10 +12,10 @@ from support.representative import first_of
 from ema_model import faults
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
-from ema_model.discovery.model_fit import with_effect
 from ema_model.errors import InputError
 from ema_model.estimation.feldman_cousins import above_zero, length_of_vector
 from ema_model.estimation.least_squares import Descent
+from ema_model.estimation.model_fit import with_effect
 from ema_model.estimation.unknowns import to_k, to_vector
 from ema_model.identification.base_spreads import most_likely_spreads
 from ema_model.identification.fit import refine, setting

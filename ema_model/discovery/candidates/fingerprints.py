@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from ema_model.actuator import Actuator
 from ema_model.actuator.unread import idle
 from ema_model.discovery.evidence.extents import Ranges, moves_both_ways, ranges_of, top_speed
-from ema_model.discovery.model_fit import Data, Fit
 from ema_model.effects import Effect, find
+from ema_model.estimation.model_fit import Data, Fit
 
 Array = NDArray[np.float64]
 Lane = tuple[Effect, dict[str, float]]

@@ -14,9 +14,9 @@ from ema_model.discovery.candidates.refit import Trial, tried
 from ema_model.discovery.candidates.score import scored_beside, scored_together
 from ema_model.discovery.criteria import LEAST_BIC
 from ema_model.discovery.evidence.remaining import left_by
-from ema_model.discovery.model_fit import Data
 from ema_model.discovery.result import Candidate
 from ema_model.effects import catalogue_name, find
+from ema_model.estimation.model_fit import Data
 
 _MOST = 5  # further orders
 _APART = 0.5  # orders, closer than which two are one

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ema_model.discovery.model_fit import Fit
+from ema_model.estimation.model_fit import Fit
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ import numpy as np
 from ema_model.discovery.candidates.refit import LEAST_FALL, Trial, fitted_count
 from ema_model.discovery.criteria import BEYOND_DOUBT, LEAST_BIC, MOMENT, MOMENTS
 from ema_model.discovery.evidence.counted import colour_of, effective_values, evidence
-from ema_model.discovery.model_fit import Data, Fit, holdout_change, holdout_error
+from ema_model.estimation.model_fit import Data, Fit, holdout_change, holdout_error
 
 _FALL = 0.01  # below which a fall is slight, and the data must be twice as sure
 _LEAST_T = 2.4  # of the mean gain over blocks of time: 1 % of chance

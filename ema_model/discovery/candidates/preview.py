@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from ema_model.actuator import Actuator
-from ema_model.discovery.model_fit import Data, Fit
+from ema_model.estimation.model_fit import Data, Fit
 from ema_model.models import Model
 
 Array = NDArray[np.float64]

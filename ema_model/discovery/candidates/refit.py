@@ -9,10 +9,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ema_model.discovery.criteria import HALF, LEAST_BIC
-from ema_model.discovery.model_fit import ANGLES, Data, Fit, fit, with_effect
 from ema_model.discovery.result import Candidate
 from ema_model.effects import Effect, find
 from ema_model.estimation import default_free
+from ema_model.estimation.model_fit import ANGLES, Data, Fit, fit, with_effect
 from ema_model.quantities.axes import Axes
 
 Progress = Callable[[str], None]

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from ema_model.discovery.candidates.fingerprints import Fingerprint
 from ema_model.discovery.candidates.let_go import Freed, at_bounds, let_go
 from ema_model.discovery.evidence.extents import greatest
-from ema_model.discovery.model_fit import Fit
 from ema_model.discovery.result import Candidate
 from ema_model.effects import Effect, find
+from ema_model.estimation.model_fit import Fit
 
 Array = NDArray[np.float64]
 

@@ -16,10 +16,10 @@ from ema_model.comparison.explain import HIGHEST_ORDER, Explanation, modulator_o
 from ema_model.comparison.residuals import Residuals
 from ema_model.comparison.verdict import ORDER_OF_PRIMARY
 from ema_model.discovery.evidence.remaining import residuals_left
-from ema_model.discovery.model_fit import Data, Fit
 from ema_model.effects.user import UserEffect, torque_curve
 from ema_model.effects.user.curve import MOST_KNOTS, OF_VARIABLE
 from ema_model.errors import InputError
+from ema_model.estimation.model_fit import Data, Fit
 
 Array = NDArray[np.float64]
 

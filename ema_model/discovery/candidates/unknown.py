@@ -9,9 +9,9 @@ from ema_model.discovery.candidates.paid_for import pays
 from ema_model.discovery.candidates.refit import Trial, stands_for
 from ema_model.discovery.candidates.torque_curve import is_torque, with_curve
 from ema_model.discovery.criteria import LEAST_BIC
-from ema_model.discovery.model_fit import Data, Fit, fit
 from ema_model.discovery.result import Candidate
 from ema_model.effects import find
+from ema_model.estimation.model_fit import Data, Fit, fit
 
 _HALF = 0.5
 _KNOT = 3.0  # χ² that each knot must be worth beside a parameter: knots lie on one smooth line

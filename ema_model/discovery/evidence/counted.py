@@ -16,7 +16,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ema_model.discovery.model_fit import Data, Fit
+from ema_model.estimation.model_fit import Data, Fit
 from ema_model.models import Model
 
 Array = NDArray[np.float64]

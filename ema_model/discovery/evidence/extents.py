@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from ema_model.discovery.model_fit import Fit
+from ema_model.estimation.model_fit import Fit
 
 Array = NDArray[np.float64]
 Ranges = Mapping[str, tuple[float, float]]  # by variable

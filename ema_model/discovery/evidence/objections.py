@@ -27,8 +27,8 @@ from ema_model.discovery.evidence.extents import greatest, travel
 from ema_model.discovery.evidence.remaining import at_floor, left_by, may_be_true, used_left
 from ema_model.discovery.evidence.stability import disagreement
 from ema_model.discovery.evidence.uncertainty import with_intervals
-from ema_model.discovery.model_fit import ANGLES, Data, Fit, floor_ratio
 from ema_model.effects import catalogue_name, find
+from ema_model.estimation.model_fit import ANGLES, Data, Fit, floor_ratio
 from ema_model.quantities.numbers import number, with_uncertainty
 from ema_model.quantities.titles import in_sentence
 from ema_model.recordings import SIGNALS

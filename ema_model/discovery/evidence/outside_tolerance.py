@@ -6,7 +6,7 @@ import numpy as np
 
 from ema_model.discovery.evidence.counted import colour_of
 from ema_model.discovery.evidence.uncertainty import covariance_of, is_base
-from ema_model.discovery.model_fit import Data, Fit
+from ema_model.estimation.model_fit import Data, Fit
 
 _FAR = 3.0  # σ of a parameter's tolerance, beyond which it lies outside
 _TOGETHER = 0.7  # correlation from which on two are drawn by the same

@@ -25,7 +25,7 @@ from ema_model.comparison.explain import (
 from ema_model.comparison.explain import orders as orders_of
 from ema_model.comparison.residuals import Residuals
 from ema_model.comparison.verdict import ORDER_OF_PRIMARY, lasting, most_of_floor
-from ema_model.discovery.model_fit import Data, Fit, floor_ratio, twins_of
+from ema_model.estimation.model_fit import Data, Fit, floor_ratio, twins_of
 
 Array = NDArray[np.float64]
 

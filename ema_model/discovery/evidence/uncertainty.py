@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.discovery.evidence.counted import colour_of, signals_of
-from ema_model.discovery.model_fit import Data, Fit, fit
 from ema_model.estimation import Calibration
 from ema_model.estimation.calibrate import calibrated, problem_of
+from ema_model.estimation.model_fit import Data, Fit, fit
 from ema_model.quantities.numbers import HALF_90
 
 Array = NDArray[np.float64]

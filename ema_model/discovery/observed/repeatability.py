@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
 from ema_model.actuator import Actuator
-from ema_model.discovery.model_fit import Data, Fit
 from ema_model.estimation.floor import CORRELATED_S
+from ema_model.estimation.model_fit import Data, Fit
 from ema_model.recordings import Measurement
 
 Array = NDArray[np.float64]

@@ -13,8 +13,8 @@ from itertools import combinations
 import numpy as np
 
 from ema_model.actuator import Actuator
-from ema_model.discovery.model_fit import Data
 from ema_model.estimation import Floor
+from ema_model.estimation.model_fit import Data
 from ema_model.models.model import Window
 from ema_model.recordings import Measurement
 

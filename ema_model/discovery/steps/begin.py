@@ -9,13 +9,13 @@ from ema_model.actuator import Actuator
 from ema_model.comparison.compare import weights_of
 from ema_model.comparison.sentences import OPEN_LOOP
 from ema_model.discovery.criteria import FAR
-from ema_model.discovery.model_fit import Data, fit, floor_ratio, gather, in_floors_of
 from ema_model.discovery.observed.repeatability import by_inverse_dynamics, is_lost, with_divergence
 from ema_model.discovery.result import Change
 from ema_model.discovery.steps.path import Story
 from ema_model.discovery.steps.step import Step, rung_of
 from ema_model.discovery.words import NOT_REPEATABLE, OPEN_LOOP_LEFT
 from ema_model.errors import InputError
+from ema_model.estimation.model_fit import Data, fit, floor_ratio, gather, in_floors_of
 from ema_model.models.delay_of_drive import with_delay_of_drive
 from ema_model.models.measured_motion import fit_stretches
 from ema_model.recordings import Measurement

@@ -14,8 +14,8 @@ from ema_model.discovery.candidates.refit import Trial
 from ema_model.discovery.criteria import LEAST_BIC
 from ema_model.discovery.evidence.objections import against
 from ema_model.discovery.evidence.remaining import at_floor
-from ema_model.discovery.model_fit import in_floors_of
 from ema_model.discovery.steps.path import Story
+from ema_model.estimation.model_fit import in_floors_of
 
 Progress = Callable[[str], None]
 

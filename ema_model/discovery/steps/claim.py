@@ -11,9 +11,9 @@ from ema_model.discovery.candidates.refit import Trial, stands_for
 from ema_model.discovery.criteria import ALIKE, FAR, HALF, LARGEST_GROUP, SECOND, TIE
 from ema_model.discovery.evidence.counted import evidence
 from ema_model.discovery.evidence.objections import against, ratio
-from ema_model.discovery.model_fit import holdout_error
 from ema_model.discovery.steps.path import Story
 from ema_model.effects import find
+from ema_model.estimation.model_fit import holdout_error
 from ema_model.quantities.titles import in_sentence
 
 Progress = Callable[[str], None]

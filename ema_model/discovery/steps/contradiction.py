@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from ema_model.actuator.naming import on_axes
 from ema_model.discovery.criteria import ANOTHER, MISSED, PUT_RIGHT, WIDER
 from ema_model.discovery.evidence.objections import ratio
-from ema_model.discovery.model_fit import Data, Fit, fit, floor_ratio, gather, resimulated
 from ema_model.discovery.result import Contradiction
 from ema_model.errors import InputError
 from ema_model.estimation import calibrate
+from ema_model.estimation.model_fit import Data, Fit, fit, floor_ratio, gather, resimulated
 from ema_model.quantities.axes import Axes
 from ema_model.quantities.numbers import amount, number
 from ema_model.quantities.shown import of_signal

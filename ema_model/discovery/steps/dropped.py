@@ -10,8 +10,8 @@ from ema_model.discovery.candidates.refit import fitted_count
 from ema_model.discovery.criteria import HALF, LEAST_BIC
 from ema_model.discovery.evidence.counted import evidence
 from ema_model.discovery.evidence.objections import against, ratio, still_against
-from ema_model.discovery.model_fit import Fit
 from ema_model.discovery.steps.path import Story
+from ema_model.estimation.model_fit import Fit
 
 Progress = Callable[[str], None]
 

@@ -22,12 +22,12 @@ from ema_model.discovery.criteria import LEAST_BIC
 from ema_model.discovery.evidence.counted import predicted_evidence
 from ema_model.discovery.evidence.remaining import Left, at_floor, left_by
 from ema_model.discovery.evidence.uncertainty import settled
-from ema_model.discovery.model_fit import Data, Fit, as_in, fit, in_floors_of, without_effect
 from ema_model.discovery.observed.controller import ControllerSeen
 from ema_model.discovery.observed.transmission import TransmissionSeen
 from ema_model.discovery.result import Added, Candidate, Change, Contradiction, Rung
 from ema_model.discovery.steps.step import Step, change_of, refreshed, rung_of, stood_in
 from ema_model.effects import CATALOGUE, catalogue_name, find
+from ema_model.estimation.model_fit import Data, Fit, as_in, fit, in_floors_of, without_effect
 from ema_model.faults import NAMES as FAULTS
 from ema_model.faults import cause_of
 from ema_model.side_by_side import fits

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from ema_model.discovery.candidates.refit import Trial
-from ema_model.discovery.model_fit import Data, Fit, floor_ratio, holdout_fit, ratio_by_recording, rms_by_signal
 from ema_model.discovery.result import Added, Change, Rung, StoodIn
 from ema_model.estimation import Calibration
+from ema_model.estimation.model_fit import Data, Fit, floor_ratio, holdout_fit, ratio_by_recording, rms_by_signal
 
 _MOVED = 1.5  # σ that a parameter comes back by, when it had been standing in for an effect
 

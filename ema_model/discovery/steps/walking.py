@@ -13,7 +13,6 @@ from ema_model.discovery.candidates.unknown import curve_instead, is_a_shape
 from ema_model.discovery.criteria import FAR, HALF, LOOP_TOLD, TOLD_WELL
 from ema_model.discovery.evidence.objections import ratio
 from ema_model.discovery.evidence.remaining import Left, at_floor
-from ema_model.discovery.model_fit import Fit
 from ema_model.discovery.observed.transmission import transmission_seen
 from ema_model.discovery.result import Candidate
 from ema_model.discovery.steps.beside_a_fault import beside_a_fault
@@ -25,6 +24,7 @@ from ema_model.discovery.steps.ranking import with_faults
 from ema_model.discovery.steps.second_opinion import Opinion, compared, second_opinion, taken_over
 from ema_model.discovery.steps.weighed_again import fault_instead, near, weigh_again
 from ema_model.effects import CATALOGUE, find
+from ema_model.estimation.model_fit import Fit
 
 Progress = Callable[[str], None]
 

@@ -16,9 +16,9 @@ from ema_model.discovery.candidates.refit import Trial, settings_in, tried
 from ema_model.discovery.criteria import NEAR_AS_MUCH, TIE
 from ema_model.discovery.evidence.counted import evidence
 from ema_model.discovery.evidence.objections import against
-from ema_model.discovery.model_fit import Fit
 from ema_model.discovery.steps.path import Story
 from ema_model.effects import catalogue_name
+from ema_model.estimation.model_fit import Fit
 
 Progress = Callable[[str], None]
 

@@ -61,7 +61,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     actuator = given.actuator_of(arguments)
     if effects := given.effects_of(arguments, actuator.axes):
-        from ema_model.discovery.model_fit import with_effect
+        from ema_model.estimation.model_fit import with_effect
 
         for name, settings in effects.items():
             actuator = with_effect(actuator, name, settings)

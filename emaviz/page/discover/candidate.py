@@ -73,9 +73,7 @@ def strength(look: Look, one: Candidate) -> str:
 
 def confidence(one: Candidate) -> str:
     """How strong the evidence is that something like this is missing: 'strong evidence (Δχ² −405)'."""
-    drop = one.predicted_drop
-    word = "strong" if drop > 200.0 else "moderate" if drop > 50.0 else "weak"
-    return f"{word} evidence (Δχ² −{drop:.0f})"
+    return f"{one.evidence} evidence (Δχ² −{one.predicted_drop:.0f})"
 
 
 def style(look: Look | None, shown: Sequence[tuple[str, Candidate | None]], opened: str | None) -> Html:

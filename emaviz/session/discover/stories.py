@@ -17,13 +17,13 @@ from ema_model.challenges import Challenge
 from ema_model.comparison.explain import Explanation
 from ema_model.discovery import Candidate, Story, begun, result_of
 from ema_model.discovery.candidates.refit import Trial, with_drops
-from ema_model.discovery.model_fit import fit
 from ema_model.discovery.result import Experiment
 from ema_model.discovery.steps.snapshot import Assessment, Look, assessed, known_of, look_at
 from ema_model.discovery.steps.step import Step
 from ema_model.discovery.words import effect_title
 from ema_model.effects import CATALOGUE, catalogue_name
 from ema_model.errors import InputError
+from ema_model.estimation.model_fit import fit
 from ema_model.faults import NAMES
 from ema_model.quantities.numbers import number
 from ema_model.quantities.titles import in_sentence

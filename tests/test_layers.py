@@ -32,12 +32,12 @@ FLOORS = {
         ["face"],
     ],
     "ema_model.discovery": [
-        ["criteria", "model_fit"],
+        ["criteria"],
         ["observed"],
         ["result"],
         ["evidence", "verify"],
-        ["candidates", "shown"],
-        ["steps", "words"],
+        ["candidates", "words"],
+        ["steps"],
         ["discover"],
     ],
     "emaviz": [

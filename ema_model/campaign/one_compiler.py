@@ -5,8 +5,8 @@ from __future__ import annotations
 from contextlib import suppress
 from pathlib import Path
 
+from ema_model import kernel_cache
 from ema_model.files.written import FileLock
-from ema_model.kernel_cache import kept
 
 _LONGEST_S = 300.0  # to wait: a compilation takes seconds, and whoever holds the lock may have been stopped
 
@@ -33,5 +33,5 @@ class Turns:
 
 def share_kernels() -> None:
     """Makes this process take turns with the others of its host."""
-    if kept.turns is None:
-        kept.turns = Turns()
+    if kernel_cache.turns is None:
+        kernel_cache.turns = Turns()

@@ -22,7 +22,7 @@ from ema_model.recordings import SIGNALS, Measurement
 from ema_model.text import COLOURS
 from emaviz.colours import COMMAND, DIFFERENCE, GHOST, MONITOR, PHASES, REFERENCE, RUNS
 from emaviz.figures.theme import DARK, LIGHT, envelope, line, plain
-from emaviz.recording.file import Entry, error_key, setting
+from emaviz.recording.entry import Entry, error_key, setting
 from emaviz.recording.read import Recording
 from emaviz.text.html import Html, add_html, html, joined
 

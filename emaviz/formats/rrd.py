@@ -28,7 +28,8 @@ def opened(path: str, most_bytes: int) -> Iterator[Log]:
 
 
 def _sound(path: str) -> Iterator[Any]:
-    from emaviz.recording.file import RecordingError, sound_chunks
+    from emaviz.recording.entry import RecordingError
+    from emaviz.recording.read import sound_chunks
 
     try:
         return sound_chunks(Path(path))

@@ -23,7 +23,7 @@ from emaviz.page.page import Page
 from emaviz.page.tab import Shared, Tab
 from emaviz.page.viewer_links import recording_link
 from emaviz.page.workspaces import Workspace
-from emaviz.recording.file import Entry, error_said, setting
+from emaviz.recording.entry import Entry, error_said, setting
 from emaviz.recording.read import Recording
 from emaviz.recording.viewer import ViewerHost
 from emaviz.scene.motion import motion

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from emaviz.recording.file import RecordingError
+from emaviz.recording.entry import RecordingError
 from emaviz.recording.read import Recording, read
 
 if TYPE_CHECKING:

@@ -17,8 +17,8 @@ from ema_model.errors import InputError
 from ema_model.estimation.calibrate import convergence, warnings
 from ema_model.estimation.floor import BAND_SIGMAS
 from ema_model.text import Lines, Note
-from emaviz.recording.file import RecordingError, configured
-from emaviz.recording.layout import COMPARISON, plain
+from emaviz.recording.entry import RecordingError, configured
+from emaviz.recording.style import COMPARISON, plain
 from emaviz.recording.writer import RecordingWriter, written
 
 Array = NDArray[np.float64]

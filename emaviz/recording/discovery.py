@@ -29,8 +29,9 @@ from ema_model.estimation.floor import BAND_SIGMAS
 from ema_model.text import Block, Lines, Note
 from emaviz import colours
 from emaviz.recording import writer as writer_recording
-from emaviz.recording.file import RecordingError, configured
-from emaviz.recording.layout import GROUP_COLOURS, ITERATION, Contents, arranged, plain, plot, series_title, signal_view
+from emaviz.recording.entry import RecordingError, configured
+from emaviz.recording.layout import Contents, arranged, plot, signal_view
+from emaviz.recording.style import GROUP_COLOURS, ITERATION, plain, series_title
 from emaviz.recording.writer import RecordingWriter, written
 
 LADDER, CANDIDATES, VERDICT = "/discovery/ladder", "/discovery/candidates", "/discovery/verdict"

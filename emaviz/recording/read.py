@@ -2,34 +2,114 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import os
+import subprocess
+import sys
 import tempfile
 from collections import defaultdict
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import IO, Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from ema_model.child_processes import start_program
 from ema_model.errors import InputError
 from ema_model.files.opened import check_user_file, open_user_file
 from ema_model.files.written import FileLock, lock_path, whole_file
-from emaviz.recording import file as file_recording
-from emaviz.recording.file import RecordingError, free_name, sound_chunks
-from emaviz.recording.layout import (
-    APPLICATION,
-    GROUPS,
-    ITERATION,
-    K_NAMES,
-    PROPERTIES,
-    SIM_TIME,
-    Algorithm,
-    Contents,
-    build,
-)
+from emaviz.recording.entry import RecordingError, free_name
+from emaviz.recording.style import APPLICATION, GROUPS, ITERATION, K_NAMES, PROPERTIES, SIM_TIME
+
+_TIMEOUT_S = 120.0
+_NUL, _NUL_IN_A_TYPE = b"\0", b"\\0"  # as the program prints a name, and one within a type
+
+
+def sound_chunks(path: Path, content: str | None = None) -> Iterator[Any]:
+    """The chunks of a file (rerun.chunk.Chunk), of all entities or of one; RecordingError where they are no whole ones.
+
+    Raises, too, whatever the native reader makes of damage that it survives.
+    """
+    try:
+        run("rrd", "verify", str(path), timeout_s=_TIMEOUT_S)
+        with tempfile.TemporaryFile() as described:
+            run("rrd", "print", "-vv", str(path), timeout_s=_TIMEOUT_S, output=described)
+            sound = not _has_nul(described)
+    except RecordingError:  # its last line is about itself, or advice for its makers
+        sound = False
+    if not sound:
+        raise RecordingError("its contents cannot be decoded")
+    from rerun.chunk import RrdReader
+
+    stream = RrdReader(path).stream()
+    return iter(stream if content is None else stream.filter(content=content))
+
+
+def _has_nul(described: IO[bytes]) -> bool:
+    described.seek(0)
+    return any(_NUL in line or (b" type: " in line and _NUL_IN_A_TYPE in line) for line in described)
+
+
+# --- rerun's own command line program, run without its telemetry ------------------------------------------------------
+
+
+def rerun_binary() -> Path:
+    """The program in the installed package.  Its Python wrapper would leave it running when it is stopped itself."""
+    spec = importlib.util.find_spec("rerun_cli")
+    if spec is not None and spec.origin is not None:
+        path = Path(spec.origin).with_name("rerun.exe" if sys.platform == "win32" else "rerun")
+        if path.is_file():
+            return path
+    raise RecordingError("the program of rerun-sdk is missing; install rerun-sdk again")
+
+
+@contextmanager
+def started(*arguments: str, output: IO[bytes] | None = None) -> Iterator[subprocess.Popen[str]]:
+    """The program running, its messages on `stderr`; stopped at the end if it has not ended by itself.
+
+    output: as of `run`.
+    """
+    with tempfile.TemporaryDirectory(prefix="emaviz-") as folder:
+        # Analytics are on unless a configuration says otherwise; this one is ours alone.
+        settings = Path(folder, "rerun", "analytics.json")
+        settings.parent.mkdir()
+        settings.write_text(json.dumps({"analytics_enabled": False, "analytics_id": "none", "metadata": {}}))
+        environment = os.environ | {"XDG_CONFIG_HOME": folder, "NO_COLOR": "1"}
+        process = start_program(
+            [str(rerun_binary()), *arguments],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL if output is None else output,
+            stderr=subprocess.PIPE,
+            text=True,
+            errors="replace",
+            env=environment,
+        )
+        try:
+            yield process
+        finally:
+            process.kill()
+            process.communicate()
+
+
+def run(*arguments: str, timeout_s: float, output: IO[bytes] | None = None) -> None:
+    """Runs it to its end; RecordingError with its last message if it fails or takes longer.
+
+    output: a file for what it prints.
+    """
+    with started(*arguments, output=output) as process:
+        try:
+            _, messages = process.communicate(timeout=timeout_s)
+        except subprocess.TimeoutExpired:
+            raise RecordingError(f"rerun {' '.join(arguments[:2])} took more than {timeout_s:g} s") from None
+    if process.returncode != 0:
+        lines = messages.strip().splitlines() or [f"exit code {process.returncode}"]
+        raise RecordingError(f"rerun {' '.join(arguments[:2])} failed: {lines[-1].strip()}")
+
 
 Array = NDArray[np.float64]
 _MAGIC = b"RRF"
@@ -137,7 +217,7 @@ def repair(source: Path, target: Path, layout: Path | None = None) -> None:
     from rerun.chunk import RrdReader
 
     sources = [str(path) for path in (source, layout) if path is not None]
-    file_recording.run("rrd", "optimize", *sources, "-o", str(target), timeout_s=_REPAIR_TIMEOUT_S)
+    run("rrd", "optimize", *sources, "-o", str(target), timeout_s=_REPAIR_TIMEOUT_S)
     if not target.is_file() or not RrdReader(target).recordings():
         raise RecordingError(f"{source}: nothing in it can be read")
 
@@ -329,7 +409,7 @@ def write_whole(part: Path, copy: Path) -> None:
         # The layout comes last in a file, so a run that was killed has none.
         with tempfile.TemporaryDirectory(prefix="emaviz-") as folder:
             layout = Path(folder, "layout.rbl")
-            build(_contents(read(copy))).save(APPLICATION, layout)
+            _blueprint(read(copy)).save(APPLICATION, layout)
             repair(part, copy, layout)
         read(copy)
     except RecordingError as error:
@@ -363,8 +443,10 @@ def _recover(part: Path) -> Recovered:
     return Recovered(part, path, f"{path.name}: recovered from a run that was interrupted")
 
 
-def _contents(recording: Recording) -> Contents:
-    return Contents(
+def _blueprint(recording: Recording) -> Any:
+    from emaviz.recording.layout import Algorithm, Contents, build  # rerun takes a second to import
+
+    contents = Contents(
         signals={group: list(signals) for group, signals in recording.signals.items()},
         algorithms={
             name: Algorithm(bool(len(trace.iteration)), bool(trace.monitor), trace.result is not None)
@@ -372,6 +454,7 @@ def _contents(recording: Recording) -> Contents:
         },
         config=recording.config is not None,
     )
+    return build(contents)
 
 
 def _publish(copy: Path, target: Path) -> Path:

@@ -24,10 +24,11 @@ from ema_model.campaign.thesis import (
 )
 from ema_model.errors import InputError
 from emaviz import colours
-from emaviz.recording import layout
+from emaviz.recording import layout, style
 from emaviz.recording import writer as writer_recording
-from emaviz.recording.file import RecordingError
-from emaviz.recording.layout import Array, Chart, algorithm_colour, plot, signal_title
+from emaviz.recording.entry import RecordingError
+from emaviz.recording.layout import Array, Chart, plot
+from emaviz.recording.style import algorithm_colour, signal_title
 from emaviz.recording.writer import RecordingWriter, escaped
 from emaviz.text.reproduce import NAMES, answer, coefficient_table, row_table
 
@@ -144,7 +145,7 @@ class ReproductionWriter(RecordingWriter):
             rrb.Tabs(*tabs),
             rrb.BlueprintPanel(state="collapsed"),
             rrb.SelectionPanel(state="collapsed"),
-            rrb.TimePanel(state="collapsed", timeline=layout.SIM_TIME, play_state="Paused"),
+            rrb.TimePanel(state="collapsed", timeline=style.SIM_TIME, play_state="Paused"),
             auto_views=False,
             auto_layout=False,
         )
@@ -174,7 +175,7 @@ def _title(case: str) -> str:
 
 def _time(run: Any) -> list[rr.TimeColumn]:
     nanoseconds = np.rint(np.asarray(run.time_s) * 1e9).astype("timedelta64[ns]")
-    return [rr.TimeColumn(layout.SIM_TIME, duration=nanoseconds)]
+    return [rr.TimeColumn(style.SIM_TIME, duration=nanoseconds)]
 
 
 def _markdown(heads: Sequence[str], lines: Sequence[Sequence[str]]) -> str:

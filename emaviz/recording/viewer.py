@@ -22,9 +22,8 @@ from typing import Any
 from urllib.parse import quote, unquote, urlsplit
 
 from ema_model.files.written import FileLock, lock_path
-from emaviz.recording import file
-from emaviz.recording.file import RecordingError, part_of
-from emaviz.recording.read import check
+from emaviz.recording.entry import RecordingError, part_of
+from emaviz.recording.read import check, started
 
 _TYPES = {
     "index.html": "text/html; charset=utf-8",
@@ -75,7 +74,7 @@ def _fetch() -> dict[str, Asset]:
     Given an address to show, it opens no port for logging; nothing ever asks for that address.
     """
     arguments = ("--serve-web", "--bind", "127.0.0.1", "--web-viewer-port", "0", "http://127.0.0.1:1/none.rrd")
-    with file.started(*arguments) as process:
+    with started(*arguments) as process:
         clock = threading.Timer(_TIMEOUT_S, process.kill)
         clock.daemon = True
         clock.start()

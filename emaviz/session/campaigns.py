@@ -85,7 +85,7 @@ class Campaigns:
         self._recorded = path, it.fitted[0], f"{path.name}: {_named(task)}"
 
     def _path(self, task: Task) -> Path:
-        from emaviz.recording.file import free_name  # rerun takes a second to import
+        from emaviz.recording.entry import free_name  # rerun takes a second to import
 
         return free_name(self._session.folder, f"{datetime.now():%Y%m%d-%H%M%S}-{task.kind}-{task.name[:8]}", ".rrd")
 

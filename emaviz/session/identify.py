@@ -410,7 +410,7 @@ class Identifying:
         stem = f"{datetime.now():%Y%m%d-%H%M%S}-{'-'.join(settings.algorithms)}"
         source = "reference" if race.truth is not None else "measurement"
         try:
-            from emaviz.recording.file import free_name
+            from emaviz.recording.entry import free_name
             from emaviz.recording.story import IdentificationStory
 
             path = free_name(self._folder, stem, ".rrd")

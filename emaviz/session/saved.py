@@ -18,7 +18,7 @@ from ema_model.files.sandbox import SESSION_BYTES, SESSION_FILES, SETTINGS_BYTES
 from ema_model.files.written import whole_file
 from ema_model.recordings import side_path
 from emaviz import __version__
-from emaviz.recording.file import Entry
+from emaviz.recording.entry import Entry
 from emaviz.session.data_folder import SESSION_SUFFIX, DataFolder, sanitised
 from emaviz.session.run_summary import summary
 

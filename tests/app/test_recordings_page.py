@@ -16,7 +16,7 @@ from ema_model.errors import InputError
 from ema_model.text import COLOURS
 from emaviz.figures import runs
 from emaviz.recording import RecordingWriter, read
-from emaviz.recording.file import setting
+from emaviz.recording.entry import setting
 from emaviz.recording.viewer import ViewerHost
 from emaviz.session.saved import Recorded
 from emaviz.session.session import Session

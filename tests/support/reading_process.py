@@ -191,7 +191,7 @@ def _checked(line: str) -> str:
 def _outcome(reader: str, path: Path, most_bytes: int) -> Outcome:
     from ema_model.errors import InputError
     from ema_model.files import sandbox
-    from emaviz.recording.file import RecordingError
+    from emaviz.recording.entry import RecordingError
 
     before = _memory("VmRSS", reset=True)
     reader_apart = sandbox.process_id()

@@ -14,8 +14,6 @@ from ema_model.actuator.layout import CONTROLLER_KINDS, INVERTER_KINDS, KINDS, W
 from ema_model.actuator.naming import on_axes
 from ema_model.actuator.parameters import SECTIONS, Facts, default_of, facts_of, numbers
 from ema_model.actuator.unread import settings_read, unread
-from ema_model.effects import CATALOGUE
-from ema_model.effects.user.entries import KEYS as USERS
 from ema_model.files.written import inline
 from ema_model.quantities.axes import Axes
 from ema_model.quantities.numbers import number
@@ -232,6 +230,10 @@ def markdown() -> str:
         "",
     ]
     lines += ["| effect | key | on a linear axis | means | range | default |", "|---" * 6 + "|"]
+    # The kernels take a while to import.
+    from ema_model.effects import CATALOGUE
+    from ema_model.effects.user.entries import KEYS as USERS
+
     for effect in CATALOGUE.values():
         for parameter in effect.parameters:
             there = parameter.on(_LINES).shown

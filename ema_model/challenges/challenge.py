@@ -32,8 +32,8 @@ from ema_model.effects.user import user_torque
 from ema_model.errors import InputError, quoted
 from ema_model.estimation import default_free
 from ema_model.faults import vector
+from ema_model.files.limits import CHALLENGE_BYTES, megabytes
 from ema_model.files.opened import Damaged, Refused, check_user_file, opened_zip, shown
-from ema_model.files.sandbox import CHALLENGE_BYTES, megabytes
 from ema_model.files.shipped import shipped_folder
 from ema_model.files.written import whole_file
 from ema_model.recordings import Measurement

@@ -10,9 +10,9 @@ from typing import Any
 from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.quantities.axes import ROTARY, Axes
 from ema_model.quantities.numbers import check_number
+from ema_model.quantities.si import linear_unit
 from ema_model.quantities.sides import MOTOR, NEITHER, USER, Side
 from ema_model.quantities.titles import labelled, parameter_title, unit_of
-from ema_model.quantities.units import linear_unit
 from ema_model.quantities.variables import VARIABLES
 
 __all__ = ["ADVANCE", "MOTOR", "NEITHER", "PLACES", "USER", "Effect", "Parameter"]  # what effects' files need

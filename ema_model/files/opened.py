@@ -13,7 +13,7 @@ from contextlib import ExitStack, contextmanager
 from typing import IO, BinaryIO
 
 from ema_model.errors import InputError, quoted
-from ema_model.files.sandbox import megabytes
+from ema_model.files.limits import megabytes
 
 _NAMES_SHOWN = 12
 

@@ -11,9 +11,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from ema_model.quantities.si import linear_name, linear_unit
 from ema_model.quantities.sides import MOTOR, USER, Side
 from ema_model.quantities.signals import SIGNALS
-from ema_model.quantities.units import linear_name, linear_unit
 
 KINDS = ("rotary", "linear")
 

@@ -12,7 +12,7 @@ from msgspec import Meta
 from numpy.typing import ArrayLike
 
 from ema_model.errors import InputError, quoted
-from ema_model.quantities.units import BY_SHOWN
+from ema_model.quantities.si import BY_SHOWN
 
 HALF_90 = 1.645  # σ of a normal distribution, on either side
 IntervalJson = Annotated[list[float], Meta(min_length=2, max_length=2)]  # its lower and its upper end

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ema_model.quantities.units import of_name, without_unit
+from ema_model.quantities.si import of_name, without_unit
 
 _PROPER = frozenset(("Stribeck",))
 _OWNERS = {"sensors": "sensor"}  # of a section with several, of which each has its own

@@ -11,11 +11,11 @@ from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any, Literal, cast
 
 from ema_model.errors import InputError, quoted
+from ema_model.files.limits import TEXT_BYTES
 from ema_model.files.opened import listed, open_user_file, reason, refusal, shown
-from ema_model.files.sandbox import TEXT_BYTES
 from ema_model.files.written import change_file, inline, toml_of, toml_text
+from ema_model.quantities.si import of_name, without_unit
 from ema_model.quantities.signals import SIGNALS
-from ema_model.quantities.units import of_name, without_unit
 from ema_model.recordings.columns import NUMBERS, ColumnMapping, MappedColumn, parse_mapping
 from ema_model.recordings.formats.text_layout import Hints, known_encoding
 

@@ -27,7 +27,7 @@ from ema_model.recordings.recording_set import (
     long_enough,
     runs_of,
 )
-from ema_model.simulation.run import LoadProfile
+from ema_model.simulation.load_profile import LoadProfile
 from emaviz.cli.options import COMMAND_OR_FILE
 from emaviz.cli.output import Progress
 

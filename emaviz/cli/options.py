@@ -73,7 +73,7 @@ class _CommandOrFile(files.Input):
 
 
 _LAST = 9  # the place of a command that states none
-_LOAD = "ema_model.simulation.run"
+_LOAD = "ema_model.simulation.load_profile"
 
 COMMAND_OR_FILE = _CommandOrFile(
     "the file of a measurement",

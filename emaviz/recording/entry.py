@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.files.written import FileLock, lock_path
-from ema_model.identification.run import algorithm_title
 from ema_model.quantities.numbers import amount, number
 from ema_model.quantities.titles import in_sentence, parameter_title, unit_of
 from ema_model.text import Facts
@@ -136,6 +135,8 @@ def setting(name: str, value: Any) -> tuple[str, str]:
     """A setting as a person reads it: ('amplitude', '5.00 mrad') of ('amplitude_rad', '0.005')."""
     told = _told(value, unit_of(name))
     if name == "algorithms":
+        from ema_model.identification.run import algorithm_title  # the kernels take a while to import
+
         told = ", ".join(algorithm_title(one) for one in told.split(", "))
     return in_sentence(parameter_title(name)), told
 

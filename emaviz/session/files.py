@@ -17,8 +17,8 @@ from ema_model.actuator.parameters import facts_of
 from ema_model.actuator.reference import usual_tolerance
 from ema_model.challenges import Challenge
 from ema_model.errors import InputError, quoted
+from ema_model.files.limits import PAGE_BYTES
 from ema_model.files.opened import shown
-from ema_model.files.sandbox import PAGE_BYTES
 from ema_model.files.shipped import shipped_folder
 from ema_model.practice import challenge_in, make, reveal, shipped
 from ema_model.practice.kinds.kind import Revealed

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ema_model.errors import InputError, quoted
+from ema_model.files.limits import SESSION_BYTES, SESSION_FILES, SETTINGS_BYTES
 from ema_model.files.opened import Damaged, Refused, SafeZip, check_user_file, opened_zip, shown
-from ema_model.files.sandbox import SESSION_BYTES, SESSION_FILES, SETTINGS_BYTES
 from ema_model.files.written import whole_file
 from ema_model.recordings import side_path
 from emaviz import __version__

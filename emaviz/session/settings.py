@@ -16,8 +16,9 @@ from ema_model.faults import HEALTHY, physical
 from ema_model.identification.run import ALGORITHMS
 from ema_model.quantities.axes import ROTARY, Axes
 from ema_model.quantities.sides import MOTOR, USER
+from ema_model.simulation.load_profile import SHAPES, LoadProfile
 from ema_model.simulation.plant import FITNESSES
-from ema_model.simulation.run import SHAPES, LoadProfile, Run, Sensors
+from ema_model.simulation.run import Run, Sensors
 from emaviz.session.described import checked, number, setting
 
 SLIDERS = ""

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.errors import InputError
+from ema_model.files.limits import COLUMNS
 from ema_model.files.opened import shown
-from ema_model.files.sandbox import COLUMNS
 from ema_model.quantities.units import dimensions_of
 
 Array = NDArray[np.float64]

@@ -17,8 +17,8 @@ import pyarrow.csv as csv
 import pyarrow.csv as pc
 
 from ema_model.errors import InputError, quoted
+from ema_model.files.limits import LINE_BYTES, megabytes
 from ema_model.files.opened import listed, refusal, shown
-from ema_model.files.sandbox import LINE_BYTES, megabytes
 from ema_model.quantities.signals import SIGNALS
 from ema_model.quantities.units import find_unit
 from ema_model.recordings.column_names import QUANTITIES, readings

@@ -10,7 +10,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from ema_model.files.sandbox import ARRAYS
+from ema_model.files.limits import ARRAYS
 from ema_model.recordings.formats import servo_log
 from ema_model.recordings.formats.channels import Channel, Log, NoLog, is_table, table
 from ema_model.recordings.formats.logs import log_format

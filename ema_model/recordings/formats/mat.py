@@ -15,8 +15,8 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from ema_model.files.limits import ARRAYS, megabytes
 from ema_model.files.opened import listed, refusal, shown
-from ema_model.files.sandbox import ARRAYS, megabytes
 from ema_model.quantities.signals import SIGNALS
 from ema_model.recordings.formats import common_clock, hdf5
 from ema_model.recordings.formats.channels import Channel, Log, is_table, told, with_unit

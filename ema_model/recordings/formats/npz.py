@@ -14,8 +14,8 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from ema_model.errors import InputError
+from ema_model.files.limits import ARRAYS
 from ema_model.files.opened import Damaged, Member, Refused, SafeZip, listed, opened_zip, refusal, shown
-from ema_model.files.sandbox import ARRAYS
 from ema_model.quantities.signals import SIGNALS
 from ema_model.recordings.formats.format import Array, Columns, Format, check_size
 

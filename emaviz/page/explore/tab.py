@@ -25,7 +25,7 @@ from ema_model.quantities.shown import of_signal
 from ema_model.quantities.sides import USER
 from ema_model.quantities.titles import labelled
 from ema_model.simulation import plant
-from ema_model.simulation.run import SHAPES
+from ema_model.simulation.load_profile import SHAPES
 from ema_model.text import COLOURS
 from emaviz.page.explore import WORKSPACE
 from emaviz.page.explore.charts import ChartsPanel, ExportControls

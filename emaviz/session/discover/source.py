@@ -26,7 +26,7 @@ from ema_model.discovery.words import effect_title, fitted_of, value
 from ema_model.effects import CATALOGUE, find
 from ema_model.errors import InputError
 from ema_model.faults import BY_NAME, NAMES, named
-from ema_model.files.sandbox import CHALLENGE_RECORDING_BYTES
+from ema_model.files.limits import CHALLENGE_RECORDING_BYTES
 from ema_model.quantities.numbers import amount
 from ema_model.quantities.titles import in_sentence
 from ema_model.recordings import Measurement, read

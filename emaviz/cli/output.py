@@ -19,7 +19,7 @@ import numpy as np
 from ema_model.errors import InputError
 from ema_model.files.written import whole_file
 from emaviz import __version__
-from emaviz.text.results import time_left
+from emaviz.text.time_left import time_left
 
 if TYPE_CHECKING:
     from emaviz.cli.documents import HeadJson

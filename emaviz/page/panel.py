@@ -20,7 +20,8 @@ from emaviz.session.inputs import Provenance
 from emaviz.session.job import Job
 from emaviz.session.signal import Signal
 from emaviz.text.html import BOX, Html, add_html, boxed, html, joined
-from emaviz.text.results import begun, going_on, large, warned
+from emaviz.text.results import begun, large, warned
+from emaviz.text.time_left import going_on
 
 
 class JobLine:

@@ -11,7 +11,7 @@ from ema_model.errors import InputError
 from emaviz.session.pace import Pace
 from emaviz.session.signal import Signal
 from emaviz.session.worker import Steps, Worker
-from emaviz.text.results import going_on
+from emaviz.text.time_left import going_on
 
 _TICK_S = 0.5
 _PAUSE_S = 0.01  # between two looks whether to go on; sliders are answered in between

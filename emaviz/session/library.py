@@ -14,7 +14,7 @@ from ema_model.simulation.with_effect import RUNS, EffectRuns, WithEffect
 from emaviz.session.job import Job, Tell
 from emaviz.session.session import Session
 from emaviz.session.signal import Signal
-from emaviz.text.results import going_on
+from emaviz.text.time_left import going_on
 
 _USUAL_S, _TICK_S = 30.0, 1.0  # on two idle cores; between two lines
 _COMPILING = "Compiling the library of effects for this computer, once"

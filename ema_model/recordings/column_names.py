@@ -98,11 +98,21 @@ def readings(column: str) -> list[Name]:
         return [Name(_words(spoken[1]), spoken[2], True)]
     parts = [part for part in re.split(r"[\s_.,;:()\[\]{}|-]+", re.sub(r"(?<=[a-z])(?=[A-Z])", "_", column)) if part]
     found = []
+    counted = len(parts) - 1 if len(parts) > 2 and parts[-1].isdecimal() else 0  # one of several: q_rad_7
+    for length in range(min(_MOST_WORDS_OF_A_UNIT, counted - 1), 0, -1):
+        unit = "_".join(parts[counted - length : counted])
+        if _is_unit(unit):
+            found.append(Name(_words("_".join(parts[: counted - length])), unit))
     for length in range(min(_MOST_WORDS_OF_A_UNIT, len(parts) - 1), 0, -1):
         unit = "_".join(parts[-length:])
-        if _is_unit(unit):
+        if _is_unit(unit) and not unit.isdecimal():  # which counts columns
             found.append(Name(_words("_".join(parts[:-length])), unit))
     return [*found, Name(_words(column), "")]
+
+
+def is_time(name: str) -> bool:
+    """Whether a column's name says that it is time."""
+    return any(not QUANTITIES["time"].isdisjoint(one.words) for one in readings(name))
 
 
 def _is_unit(text: str) -> bool:

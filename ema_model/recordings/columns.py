@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -134,23 +134,65 @@ class ColumnMapping:
         return ColumnMapping((*kept, entry), unmapped)
 
 
-def parse_mapping(texts: Iterable[str], columns: Collection[str] = ()) -> ColumnMapping:
+# A column by its place: the seventh of all, or of a matrix as NumPy (from 0) and MATLAB (from 1) write it.
+_BY_NUMBER = re.compile(r"#\s*(\d{1,9})")
+_BY_SLICE = re.compile(r"(.+?)\s*(?:\[\s*(?::\s*,\s*)?(\d{1,9})\s*\]|\(\s*:\s*,\s*(\d{1,9})\s*\))")
+
+
+def column_at(name: str, header: Sequence[str]) -> str:
+    """The column that a name or a place means: `#7`, `q[:,6]`, `q[6]` and `q(:,7)`; the name itself where it is none.
+
+    A matrix's columns are called q_1, q_2, … in a file, or q.0, q.1, … where its rows are lists.
+    """
+    if name in header:
+        return name
+    if number := _BY_NUMBER.fullmatch(name):
+        at = int(number[1])
+        return header[at - 1] if 0 < at <= len(header) else name
+    matrix, at = _of_matrix(name)
+    if not matrix:
+        return name
+    called = f"{matrix}_{at + 1}", f"{matrix}.{at}"
+    return next((one for one in header if one in called or one.partition(" [")[0] in called), name)
+
+
+def _of_matrix(name: str) -> tuple[str, int]:
+    """The matrix and which of its columns, from 0, that a name means; "" where it means none."""
+    if found := _BY_SLICE.fullmatch(name):
+        return found[1], int(found[2]) if found[2] else int(found[3]) - 1
+    counted = re.fullmatch(r"(.+)_(\d{1,9})", name)
+    return (counted[1], int(counted[2]) - 1) if counted else ("", 0)
+
+
+def with_places(mapping: ColumnMapping, header: Sequence[str]) -> ColumnMapping:
+    """The mapping with the names of the file's columns where it says their places."""
+    entries = []
+    for entry in mapping.entries:
+        column = column_at(entry.column, header)
+        unit = entry.unit or (unit_in_name(column, entry.signal) if column != entry.column else "")
+        entries.append(replace(entry, column=column, unit=unit) if column != entry.column else entry)
+    return replace(mapping, entries=tuple(entries))
+
+
+def parse_mapping(texts: Iterable[str], columns: Sequence[str] = ()) -> ColumnMapping:
     """The mapping that `signal=column[unit]` texts give.
 
     With the file's `columns`, one whose own name ends in brackets is found too: `speed [rpm]` is then a
-    column with its unit in the name.  Raises InputError for a text of another form.
+    column with its unit in the name, and a column may be given by its place, see `column_at`.  Raises InputError for a
+    text of another form.
     """
-    return ColumnMapping(tuple(_parsed(text, columns) for text in texts))
+    return with_places(ColumnMapping(tuple(_parsed(text, columns) for text in texts)), columns)
 
 
-def _parsed(text: str, columns: Collection[str]) -> MappedColumn:
+def _parsed(text: str, columns: Sequence[str]) -> MappedColumn:
     signal, equals, right = (part.strip() for part in text.partition("="))
     if not equals or not signal or not right:
         raise InputError(f"mapping {shown(text)!r} is not understood; {_FORM}")
     if signal not in SIGNALS:
         raise InputError(f"mapping {shown(text)!r}: {_no_signal(signal)}")
     inside = re.fullmatch(r"(.+?)\s*\[([^\[\]]*)\]", right)
-    if right in columns or not inside:
+    is_place = _BY_SLICE.fullmatch(right) and not (inside and find_unit(inside[2], SIGNALS[signal].unit))
+    if right in columns or not inside or is_place:
         return MappedColumn(signal, right, unit_in_name(right, signal))
     column = inside[1]
     given: dict[str, str] = {}

@@ -28,6 +28,7 @@ from ema_model.recordings.columns import (
     guess_mapping,
     parse_mapping,
     unit_in_name,
+    with_places,
     without_unit,
 )
 from ema_model.recordings.formats import Format, format_of
@@ -170,8 +171,8 @@ def _merged(
         given = [given]
     if given is not None and not isinstance(given, ColumnMapping):
         given = parse_mapping(given, header)
-    merged = side.mapping or ColumnMapping()
-    for entry in given.entries if given else ():
+    merged = with_places(side.mapping or ColumnMapping(), header)
+    for entry in with_places(given, header).entries if given else ():
         merged = merged.with_entry(entry)
     for entry in merged.entries:
         if entry.column not in header:
@@ -440,9 +441,9 @@ def how_to_read(
     side = _side_file(path, actuator, side, max_bytes)
     hints = hints_of(path, side, hints)
     header = read_header(path, max_bytes, hints)
-    given = mapping if isinstance(mapping, ColumnMapping) else parse_mapping(mapping, header)
+    given = with_places(mapping, header) if isinstance(mapping, ColumnMapping) else parse_mapping(mapping, header)
     by_side = side.mapping is not None and bool(side.mapping.entries)
-    known = side.mapping if by_side and side.mapping else _usual(actuator, header)
+    known = with_places(side.mapping, header) if by_side and side.mapping else _usual(actuator, header)
     of_actuator = bool(known.entries) and not by_side
     for entry in given.entries:
         known = known.with_entry(entry)
@@ -490,7 +491,7 @@ def _side_file(path: str, actuator: Actuator, side: SideFile | None, max_bytes: 
     return replace(side, kind="map") if is_map and not side.path else side
 
 
-def _usual(actuator: Actuator, columns: Collection[str]) -> ColumnMapping:
+def _usual(actuator: Actuator, columns: Sequence[str]) -> ColumnMapping:
     """The part of the actuator's mapping that these columns are in."""
     usual = parse_mapping(actuator.mapping, columns)
     return ColumnMapping(tuple(entry for entry in usual.entries if entry.column in columns))

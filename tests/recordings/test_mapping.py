@@ -149,6 +149,7 @@ UNSURE = {  # header: why, by signal; the others are sure
         "user_position_rad": "'pos_2 [deg]' may be it as well",
         "motor_position_rad": "'pos 2' is a position",
     },
+    "t [s],q_rad_1,q_rad_2,tau_Nm_1": {"motor_position_rad": "'q_rad_2' may be it", "user_position_rad": "a position"},
     "t [s],cmd [deg],output angle [deg],encoder [deg],board temp [degC],coil temp [degC]": {
         "temperature_C": "'coil temp [degC]' may be it as well"
     },

@@ -21,7 +21,7 @@ from ema_model.files.opened import listed, refusal, shown
 from ema_model.files.sandbox import LINE_BYTES, megabytes
 from ema_model.quantities.signals import SIGNALS
 from ema_model.quantities.units import find_unit
-from ema_model.recordings.column_names import QUANTITIES, readings
+from ema_model.recordings.column_names import is_time, readings
 from ema_model.recordings.formats.channels import with_unit
 from ema_model.recordings.formats.clocks import Clocks, between, covered, is_state, main_clock, rule
 from ema_model.recordings.formats.format import Array, Columns, Format, check_size
@@ -257,13 +257,6 @@ def _check_text(table: TextTable, max_bytes: int) -> None:
 
 
 # --- texts in which each channel has a column of its own time, as loggers with a buffer for each export them ----------
-
-_TIME = QUANTITIES["time"]
-
-
-def is_time(name: str) -> bool:
-    """Whether a column's name says that it is time."""
-    return any(not _TIME.isdisjoint(one.words) for one in readings(name))
 
 
 def own_clocks(names: Sequence[str]) -> dict[int, int]:

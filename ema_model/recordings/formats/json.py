@@ -12,7 +12,7 @@ import numpy as np
 
 from ema_model.files.sandbox import ARRAYS
 from ema_model.recordings.formats import servo_log
-from ema_model.recordings.formats.channels import Channel, Log, NoLog, is_table, table
+from ema_model.recordings.formats.channels import Channel, Log, Matrix, NoLog, in_columns
 from ema_model.recordings.formats.logs import log_format
 
 _DEEPEST = 8
@@ -38,14 +38,15 @@ def opened(path: str, most_bytes: int) -> Iterator[Log]:
         title, document = servo_log.title(document), servo_log.with_units(document)
     found = _Found()
     found.walk(document, ())
-    yield Log(found.channels, parameters=found.parameters, left_aside=tuple(found.aside), title=title)
+    channels, aside = in_columns(found.channels)
+    yield Log(channels, parameters=found.parameters, left_aside=(*found.aside, *aside), title=title)
 
 
 def numbers_of_records(records: Sequence[Any]) -> list[tuple[tuple[str, ...], Any]]:
     """What records have numbers under, all of them: the keys' path, and the numbers (n,)."""
     found = _Found()
     found.walk(list(records), ())
-    return [(channel.path, np.asarray(channel.values())) for channel in found.channels]
+    return [(channel.path, np.asarray(channel.values())) for channel in in_columns(found.channels)[0]]
 
 
 def decoded(text: bytes) -> Any:
@@ -76,7 +77,7 @@ class _Found:
     """Collects what is in a document."""
 
     def __init__(self) -> None:
-        self.channels: list[Channel] = []
+        self.channels: list[Channel | Matrix] = []
         self.parameters: dict[str, float] = {}
         self.aside: list[str] = []
         self.begin: Any = None  # the first stamp that there is: all count from it
@@ -141,10 +142,19 @@ class _Found:
             values = np.array(rows, np.float64)
         except (TypeError, ValueError, OverflowError):
             return False
-        if values.ndim != 2 or not (is_table(values.shape) or (names and values.shape[1] == len(names))):
+        if values.size == 0:
             return False
-        self.channels += table(path, values.shape[0], values.shape[1], lambda i: values[:, i], names)
-        return True
+        if names and values.ndim == 2 and values.shape[1] == len(names):
+            self.channels += [
+                Channel((*path, name), values.shape[0], lambda i=i: values[:, i]) for i, name in enumerate(names)
+            ]
+            return True
+        values = np.squeeze(values)
+        if values.ndim == 1 and values.size > 1:
+            self.channels.append(Channel(path, values.size, lambda: values))
+        elif values.ndim == 2:
+            self.channels.append(Matrix(path, values.shape, lambda: values))
+        return values.ndim in (1, 2)
 
     def _numbers(self, items: Sequence[Any]) -> Any:
         """The numbers, truth being 0 and 1, stamps of date and time seconds; None for anything else, and for blanks."""

@@ -13,10 +13,9 @@ from functools import partial
 import numpy as np
 
 from ema_model.quantities.units import Unit, find_unit
-from ema_model.recordings.column_names import QUANTITIES, readings
+from ema_model.recordings.column_names import QUANTITIES, is_time, readings
 from ema_model.recordings.formats.channels import Array, Channel, Log, with_unit
 from ema_model.recordings.formats.clocks import usable
-from ema_model.recordings.formats.csv import is_time
 
 _TIME = QUANTITIES["time"]
 _RISING = 0.9  # of a clock's steps
@@ -25,7 +24,7 @@ _LOOKED_AT = 1_000_000  # of its samples
 
 def with_own_clocks(log: Log) -> Log:
     """The log with its channels of time as clocks, where the others have two or more of them; else as it is."""
-    if log.clocks:
+    if log.clocks or sum(is_time(one.path[-1]) for one in log.channels) < 2:
         return log
     times = {i: one for i, one in enumerate(log.channels) if is_clock(one)}
     if len(times) < 2:

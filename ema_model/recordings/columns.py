@@ -300,6 +300,7 @@ class Reading:
     made: tuple[str, ...] = ()  # signals made from others
     clocks: Clocks | None = None  # of the signals, by their names in files, where they had several
     layout: str = ""  # what was found out of how the file is laid out: "header in line 4, units in line 5"
+    remarks: tuple[str, ...] = ()  # what was done to the signals beyond what was asked for, a line each
 
     @property
     def is_guess(self) -> bool:
@@ -315,8 +316,8 @@ class Reading:
 
     @property
     def told(self) -> str:
-        """What was found out by itself, of the layout and the columns, in one line; "" where there was no question."""
-        return "; ".join(filter(None, (self.layout, self.assumed)))
+        """What was found out and done unasked, in one line; "" where there was no question."""
+        return "; ".join(filter(None, (self.layout, self.assumed, *self.remarks)))
 
     def proposed(self, columns: Iterable[str]) -> ColumnMapping:
         """Everything that somebody should look at: what is used, canonical names too, and what is in doubt."""

@@ -6,6 +6,7 @@ import os
 import shlex
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -34,7 +35,14 @@ from ema_model.recordings.columns import (
 from ema_model.recordings.formats import Format, format_of
 from ema_model.recordings.formats.clocks import Clocks
 from ema_model.recordings.formats.text_layout import Head, Hints
-from ema_model.recordings.measurement import PHASES, Measurement, with_current, without_delays
+from ema_model.recordings.measurement import (
+    PHASES,
+    Measurement,
+    with_current,
+    with_motor_side,
+    with_third_phase,
+    without_delays,
+)
 from ema_model.recordings.side_file import SideFile, find_side_file, read_side_file
 
 Array = NDArray[np.float64]
@@ -359,10 +367,31 @@ def prepared(measurement: Measurement, actuator: Actuator) -> Measurement:
     inside = replace(measurement, signals=axes.inside(measurement.signals), axes=axes, of_other_axes=others)
     if others:
         inside = inside.with_notes(f"left aside, as the actuator's axes are of another kind: {listed(others)}")
-    made = with_current(inside, actuator.motor.pole_pairs, actuator.motor.rotor_offset_rad)
+    made = _with_made(inside, actuator)
     if made is inside:
         return made
-    return replace(made, reading=replace(made.reading, made=("current_A",)))
+    names = tuple(name for name in made if name not in inside)
+    remarks = (*made.reading.remarks, *made.notes[len(inside.notes) :])
+    return replace(made, reading=replace(made.reading, made=names, remarks=remarks))
+
+
+def _with_made(inside: Measurement, actuator: Actuator) -> Measurement:
+    """What the actuator's model needs and was not recorded, of what was: the motor's motion, phases and current."""
+    ratio, between = actuator.transmission.gear_ratio, _between(actuator)
+    needs_current = "current_A" not in inside and sum(name in inside for name in PHASES) > 1
+    if actuator.controller.kind == "unknown" or needs_current:
+        made = with_motor_side(inside, ratio, between)
+    else:  # a loop has the user's position, which the motor's would only repeat; its speed tells more
+        made = inside if between else with_motor_side(inside, ratio, speed_only=True)
+    if needs_current:
+        made = with_third_phase(made)
+    return with_current(made, actuator.motor.pole_pairs, actuator.motor.rotor_offset_rad)
+
+
+def _between(actuator: Actuator) -> list[str]:
+    """What lies between the motor and the user in an actuator's model, by the names in its file."""
+    play = ["transmission.backlash_rad"] if actuator.transmission.backlash_rad > 0.0 else []
+    return [*play, *(name for name in _BETWEEN if name in actuator.effects)]
 
 
 # --- the one door: any file of a known actuator becomes the measurement as the model needs it -------------------------
@@ -374,7 +403,8 @@ WITHOUT_COMMAND = (  # the end of a line that asks for one
     "where no command was recorded, add --open-loop to compare or discover, "
     'or choose an actuator with [controller] kind = "unknown"'
 )
-_MAKES_CURRENT = [*PHASES, "motor_position_rad"]
+_BETWEEN = ("torsional_compliance", "screw_lead_error")  # effects that part the user's motion from the motor's
+_POSITIONS = ("motor_position_rad", "user_position_rad")
 _MOTION = ("motor_position_rad", "user_position_rad", "motor_speed_rad_s")
 
 
@@ -422,7 +452,7 @@ def recorded(
     measurement = read_measurement(path, reading.mapping, side=side, max_bytes=max_bytes, hints=hints)
     return replace(
         measurement,
-        reading=replace(reading, clocks=measurement.reading.clocks, layout=measurement.reading.layout),
+        reading=replace(measurement.reading, mapping=reading.mapping, guessed=reading.guessed, doubts=reading.doubts),
     )
 
 
@@ -467,9 +497,9 @@ def how_to_read(
 def needed(actuator: Actuator, *, is_map: bool = False) -> Needs:
     """The groups of signals of each of which the actuator's model needs one; names inside."""
     if is_map:
-        return (("motor_position_rad",), ("current_A", "motor_torque_Nm"))
+        return (_POSITIONS, ("current_A", "motor_torque_Nm"))
     if actuator.controller.kind == "unknown":
-        return (("time_s",), ("motor_position_rad",), ("current_A", "motor_torque_Nm"))
+        return (("time_s",), _POSITIONS, ("current_A", "motor_torque_Nm"))
     if actuator.controller.kind == "open":
         return (*INPUT_ALONE, _MOTION)
     return (*COMMAND_ALONE, ("current_A", *_MOTION))
@@ -501,7 +531,15 @@ def _there(actuator: Actuator, mapping: ColumnMapping, header: Collection[str]) 
     """The signals, by their names inside, that a file so mapped has or can be given."""
     names = {entry.signal for entry in mapping.entries} | {name for name in header if name in SIGNALS}
     inside = set(actuator.axes.inside(dict.fromkeys(names)))
-    return inside | ({"current_A"} if inside.issuperset(_MAKES_CURRENT) else set())
+    has_current = inside.issuperset(_made_into_current(inside))
+    return inside | ({"current_A"} if has_current else set())
+
+
+def _made_into_current(known: Collection[str]) -> list[str]:
+    """The signals that a current is made of: two phases of those that there are, or three, and a position."""
+    phases = [name for name in PHASES if name in known]
+    position = next((name for name in _POSITIONS if name in known), _POSITIONS[0])
+    return [*(phases if len(phases) > 1 else PHASES), position]
 
 
 def _ask(path: str, actuator: Actuator, reading: Reading, header: Sequence[str], needs: Needs) -> None:
@@ -509,13 +547,15 @@ def _ask(path: str, actuator: Actuator, reading: Reading, header: Sequence[str],
     if not reading.is_guess:
         return  # what is missing is told by what needs it
     there = _there(actuator, reading.mapping, header)
+    of_person = ColumnMapping(tuple(entry for entry in reading.mapping.entries if entry not in reading.guessed))
+    stated = _there(actuator, of_person, ())
     doubts = {}
     for entry, why in reading.doubts:
         if not entry.unit:  # it may as well be of the kind that the actuator's axes have
             entry = replace(entry, signal=actuator.axes.signal(entry.signal))
         doubts |= {inside: (entry, why) for inside in actuator.axes.inside({entry.signal: 0})}
     questions, options, absent = [], [], []
-    for name in dict.fromkeys(name for group in needs for name in _to_be_said(group, there, doubts)):
+    for name in dict.fromkeys(name for group in needs for name in _to_be_said(group, there, doubts, stated)):
         entry, why = doubts.get(name) or (MappedColumn(actuator.axes.signal(name), "COLUMN"), "")
         if not why:
             absent.append(name)
@@ -534,10 +574,16 @@ def _ask(path: str, actuator: Actuator, reading: Reading, header: Sequence[str],
         raise refusal(path, f"{'; '.join(questions)}; {found}{hint}")
 
 
-def _to_be_said(group: Sequence[str], there: Collection[str], doubts: Collection[str]) -> list[str]:
-    """What a person must say for a group: nothing where the first signal of it that there is, is sure."""
+def _to_be_said(
+    group: Sequence[str], there: Collection[str], doubts: Collection[str], stated: AbstractSet[str]
+) -> list[str]:
+    """What a person must say for a group: nothing where the first signal of it that there is, is sure or stated."""
+    if not stated.isdisjoint(group):
+        return []
     for signal in group:
-        parts = [signal] if signal in there or signal in doubts or signal != "current_A" else _MAKES_CURRENT
+        parts = [signal]
+        if signal == "current_A" and signal not in there and signal not in doubts:
+            parts = _made_into_current({*there, *doubts})
         if all(part in there or part in doubts for part in parts):
             return [part for part in parts if part not in there]
     return [group[0]]

@@ -44,6 +44,7 @@ from ema_model.recordings.measurement import (
     without_delays,
 )
 from ema_model.recordings.side_file import SideFile, find_side_file, read_side_file
+from ema_model.recordings.wrapping import unwrapped
 
 Array = NDArray[np.float64]
 NONE = Hints()
@@ -95,7 +96,7 @@ def read_measurement(
     name = " ".join(filter(None, (bare.name, columns.title)))
     clocks = columns.clocks and _of_signals(columns.clocks, used)
     measurement = replace(bare, name=name, reading=Reading(clocks=clocks, layout=columns.layout))
-    measurement = without_delays(measurement, used)
+    measurement = without_delays(unwrapped(path, measurement, used), used)
     check_length(path, measurement.samples)
     if side.window_s is not None or side.segments is not None:
         try:

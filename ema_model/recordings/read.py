@@ -34,7 +34,7 @@ from ema_model.recordings.columns import (
 )
 from ema_model.recordings.formats import Format, format_of
 from ema_model.recordings.formats.clocks import Clocks
-from ema_model.recordings.formats.text_layout import Head, Hints
+from ema_model.recordings.formats.text_layout import Head, Hints, by_number
 from ema_model.recordings.measurement import (
     PHASES,
     Measurement,
@@ -78,8 +78,13 @@ def read_measurement(
     with _told(path):
         header = file_format.header(path, max_bytes)
         used = _merged(path, side, mapping, header)
+        rate = _rate(path, hints_of(path, side, hints), used, header)
         known, foreign = choose_columns(
-            path, header, used, needs_time=side.kind == "run", looked_at=isinstance(mapping, ColumnMapping)
+            path,
+            header,
+            used,
+            needs_time=side.kind == "run" and rate is None,
+            looked_at=isinstance(mapping, ColumnMapping),
         )
         columns = file_format.read(path, known, max_bytes, True)
         check_length(path, next(iter(columns.arrays.values())).size)
@@ -87,7 +92,10 @@ def read_measurement(
         signals, done = apply_mapping(columns.arrays, used)
         columns.arrays.clear()  # they are copied, and large; Arrow would keep their memory for later
         pa.default_memory_pool().release_unused()
-    if side.kind == "map" and "time_s" not in signals:
+    if rate is not None:
+        signals = {"time_s": np.arange(float(next(iter(signals.values())).size)) / rate, **signals}
+        done = (*done, f"time_s counts the samples at {rate:.6g} Hz, as was said")
+    elif side.kind == "map" and "time_s" not in signals:
         signals = {"time_s": np.arange(float(next(iter(signals.values())).size)), **signals}
         done = (*done, "a static map without time: time_s counts the samples")
     check_values(path, signals, columns.place)
@@ -147,14 +155,29 @@ def read_columns(path: str | os.PathLike[str], *, max_bytes: int = FILE_BYTES, h
 
 
 def hints_of(path: str, side: SideFile, given: Hints = NONE) -> Hints:
-    """What is said of a text's layout: as given, then as in the side file, which may stand beside other formats too."""
-    return given.before(side.text) if format_of(path).hinted is not None else given
+    """What is said of a file's layout: as given, then as in the side file, which may stand beside other formats too."""
+    if format_of(path).hinted is None:
+        return given.before(Hints(rate_Hz=side.text.rate_Hz))
+    return given.before(side.text)
+
+
+def _rate(path: str, hints: Hints, mapping: ColumnMapping, header: Sequence[str]) -> float | None:
+    """The rate that was said, Hz; InputError where the file has a time."""
+    rate = hints.rate_Hz
+    if rate is None:
+        return None
+    time = mapping.get("time_s") or ("time_s" in header and MappedColumn("time_s", "time_s"))
+    if time:
+        raise refusal(path, f"time_s stands in column {shown(time.column)!r}; leave the rate out, or that column")
+    if not 0.0 < rate <= _MOST_HZ:
+        raise refusal(path, f"the rate must be a number of samples a second, not {rate:g}")
+    return rate
 
 
 def said_format(path: str, hints: Hints) -> Format:
     """The file's format, reading it as somebody has said that it is laid out; InputError where it is no text."""
     found = format_of(path)
-    if hints == NONE:
+    if not hints.is_of_text:
         return found
     if found.hinted is None:
         raise refusal(path, f"is {found.title}, no text; leave --header-line and --encoding out")
@@ -231,6 +254,7 @@ def _measurement(
 Place = Callable[[int], str]
 
 FEWEST_SAMPLES = 100
+_MOST_HZ = 1e9
 LARGEST = 1e30  # absolute value, in any unit
 _SHORTEST_STEP_S = 1e-12
 _LONGEST_NAME = 1_000  # characters
@@ -261,9 +285,13 @@ def choose_columns(
     foreign = [name for name in header if name not in known]
     if needs_time and "time_s" not in signals and ("time_s" not in known or "time_s" in mapped):
         hints = [shown(name) for name in foreign if looks_like_time(name)]
+        if header and header[0] == by_number(0):
+            problem = "line 1: names of columns are expected, found numbers; add a header line, or say which column"
+            raise refusal(path, f"{problem} is which by its number: --map 'time_s=#1' (it has {listed(header)})")
         advice = "name the column of time, in seconds, time_s"
         if hints:
             advice = f"{hints[0]!r} looks like time: in seconds, name it time_s, or map it: --map 'time_s={hints[0]}'"
+        advice += ", or give the --rate of a file without one"
         raise refusal(path, f"no column time_s; {advice} (present: {listed(header)})")
     if not known:
         raise refusal(path, f"no column has a known name; map them with --map (present: {listed(header)})")
@@ -449,6 +477,8 @@ def recorded(
     reading = how_to_read(path, actuator, mapping, side=side, max_bytes=max_bytes, hints=hints)
     if needs is None:
         needs = needed(actuator, is_map=side.kind == "map")
+    if hints.rate_Hz:
+        needs = [group for group in needs if "time_s" not in group]
     _ask(path, actuator, reading, read_header(path, max_bytes, hints), needs)
     measurement = read_measurement(path, reading.mapping, side=side, max_bytes=max_bytes, hints=hints)
     return replace(
@@ -479,7 +509,7 @@ def how_to_read(
     for entry in given.entries:
         known = known.with_entry(entry)
     settled = {entry.column for entry in known.entries} | {"", *SIGNALS}
-    there = _there(actuator, known, header)
+    there = _there(actuator, known, header) | ({"time_s"} if hints.rate_Hz else set())
     needs = needed(actuator, is_map=side.kind == "map")
     missing = {name for group in needs if there.isdisjoint(group) for name in group}
     if by_side or (of_actuator and not missing) or settled.issuperset(header):
@@ -488,6 +518,8 @@ def how_to_read(
         read_columns(path, max_bytes=max_bytes, hints=hints) if columns is None else columns, known=known
     )
     fresh = [entry for entry in guess.entries if entry.column not in settled]
+    if hints.rate_Hz:  # whatever looks like a time is none
+        fresh = [entry for entry in fresh if entry.signal != "time_s"]
     if of_actuator:  # its file says what matters in its recordings, so that only what is needed is sought beside
         fresh = [entry for entry in fresh if actuator.axes.inside({entry.signal: 0}).keys() & missing]
     doubts = tuple((entry, why) for entry in fresh if (why := doubt(entry)))
@@ -555,9 +587,10 @@ def _ask(path: str, actuator: Actuator, reading: Reading, header: Sequence[str],
         if not entry.unit:  # it may as well be of the kind that the actuator's axes have
             entry = replace(entry, signal=actuator.axes.signal(entry.signal))
         doubts |= {inside: (entry, why) for inside in actuator.axes.inside({entry.signal: 0})}
+    nobody = "#N" if header and header[0] == by_number(0) else "COLUMN"
     questions, options, absent = [], [], []
     for name in dict.fromkeys(name for group in needs for name in _to_be_said(group, there, doubts, stated)):
-        entry, why = doubts.get(name) or (MappedColumn(actuator.axes.signal(name), "COLUMN"), "")
+        entry, why = doubts.get(name) or (MappedColumn(actuator.axes.signal(name), nobody), "")
         if not why:
             absent.append(name)
         doubtful = f"{shown(entry.column)!r} may be {entry.signal}, but {why}"

@@ -167,7 +167,7 @@ def robot_dataset(folder: Path) -> bytes:
 def whole(reader: str, folder: Path) -> list[bytes]:
     """Some files that the reader takes."""
     if reader == "csv":
-        return [as_text(","), as_text(";", ","), b"\xef\xbb\xbf" + as_text("\t")]
+        return [as_text(","), as_text(";", ","), b"\xef\xbb\xbf" + as_text("\t"), as_text(" ")]
     if reader == "parquet":
         plain = as_parquet(compression="none", use_dictionary=False)
         return [as_parquet(), plain, as_parquet(data_page_size=64)]

@@ -76,6 +76,36 @@ class Utf8(io.RawIOBase):
         super().close()
 
 
+class Aligned(io.RawIOBase):
+    """A text with columns between blanks, with one blank between two."""
+
+    def __init__(self, text: Utf8) -> None:
+        super().__init__()
+        self._text = text
+        self._rest, self._left = b"", b""
+
+    def readable(self) -> bool:
+        """It is."""
+        return True
+
+    def read(self, size: int | None = -1) -> bytes:
+        """So many bytes, fewer at the end."""
+        whole = size is None or size < 0
+        while whole or len(self._left) < (size or 0):
+            piece = self._text.read(1 << 16)
+            block = self._rest + piece
+            end = block.rfind(b"\n") + 1 if piece else len(block)
+            self._rest = block[end:]
+            lines = (b" ".join(line.split()) for line in block[:end].splitlines())
+            self._left += b"".join(line + b"\n" for line in lines)
+            if not piece:
+                break
+            if len(self._rest) > LINE_BYTES:
+                raise pa.ArrowInvalid("a line is too long")
+        given, self._left = (self._left, b"") if whole else (self._left[:size], self._left[size:])
+        return given
+
+
 # --- cells of a text understood one by one: what is no number, headers that come again, and text at the end -----------
 
 text_cells_pc: Any = pyarrow.compute  # its functions are made when it is imported
@@ -355,8 +385,8 @@ class TextTable:
     def is_plain(self) -> bool:
         """Whether there is nothing in the layout's first lines but a header and plain numbers below."""
         one = self.layout
-        usual = one.encoding == "utf-8" and not one.thousands and not one.units_line and one.separator != "|"
-        return usual and not self.stamps and not self.clocks and tuple(self.names) == one.cells
+        usual = one.encoding == "utf-8" and not one.thousands and not one.units_line and one.separator not in "| "
+        return usual and one.header_line > 0 and not self.stamps and not self.clocks and tuple(self.names) == one.cells
 
 
 def table_of(path: str, layout: Layout, hint: str | None = None) -> TextTable:
@@ -392,7 +422,7 @@ def parsed(
     wanted = [f"{i}" for i in places]
     with Utf8(table.path, table.layout) as text:
         return csv.read_csv(
-            text,
+            Aligned(text) if table.layout.separator == " " else text,
             csv.ReadOptions(column_names=columns, skip_rows=table.skipped, use_threads=threads),
             options,
             csv.ConvertOptions(

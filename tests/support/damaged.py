@@ -129,7 +129,8 @@ def in_groups(reader: str, folder: Path) -> list[bytes]:
     for groups in (TWO_CLOCKS, RUNS, {"robot": OF_A_ROBOT}):
         parts = [(group, name, values) for group, columns in groups.items() for name, values in columns.items()]
         if reader == "json columns":
-            path.write_text(json.dumps(groups, default=np.ndarray.tolist))
+            document = {"data": [*groups.values()]} if "robot" in groups else groups
+            path.write_text(json.dumps(document, default=np.ndarray.tolist))
         elif reader == "hdf5":
             with h5py.File(path, "w") as file:
                 for group, name, values in parts:

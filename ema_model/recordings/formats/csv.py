@@ -25,6 +25,7 @@ from ema_model.recordings.column_names import is_time, readings
 from ema_model.recordings.formats.channels import with_unit
 from ema_model.recordings.formats.clocks import Clocks, between, covered, is_state, main_clock, rule
 from ema_model.recordings.formats.format import Array, Columns, Format, check_size
+from ema_model.recordings.formats.own_clocks import beside_time, tokens
 from ema_model.recordings.formats.stamps import is_stamp, seconds
 from ema_model.recordings.formats.text_layout import (
     SEPARATORS,
@@ -290,17 +291,23 @@ def _check_text(table: TextTable, max_bytes: int) -> None:
 
 
 def own_clocks(names: Sequence[str]) -> dict[int, int]:
-    """Where columns of time stand before as many others each: those others' own times."""
+    """By column, that of its own time: times before as many others each, or named after them, t_speed and speed."""
     times = [i for i, name in enumerate(names) if is_time(name)]
-    if len(times) < 2 or times[0] != 0:
+    units = {one.unit for i in times for one in readings(names[i])[:1]}
+    if len(times) < 2 or len(units) != 1:
         return {}
     ends = [*times[1:], max(i for i, name in enumerate(names) if name) + 1]
-    if len({end - start for start, end in zip(times, ends)}) != 1 or ends[0] < 2:
-        return {}
-    units = {one.unit for i in times for one in readings(names[i])[:1]}
-    if len(units) != 1:
-        return {}
-    return {i: start for start, end in zip(times, ends) for i in range(start, end)}
+    if times[0] == 0 and len({end - start for start, end in zip(times, ends)}) == 1 and ends[0] > 1:
+        return {i: start for start, end in zip(times, ends) for i in range(start, end)}
+    after = {i: beside_time(names[i]) for i in times}
+    clocks = {i: i for i in times}
+    for i, name in enumerate(names):
+        if name and i not in after:
+            found = [time for time, rest in after.items() if rest and rest <= tokens(name)]
+            if len(found) != 1:
+                return {}
+            clocks[i] = found[0]
+    return clocks if all(after.values()) else {}
 
 
 def since_one_moment(

@@ -15,6 +15,7 @@ from ema_model.files.opened import listed, shown
 from ema_model.quantities.signals import SIGNALS
 from ema_model.quantities.units import Unit, dimensions_of, find_unit, known_units
 from ema_model.recordings.column_names import Context, Guess, guesses, readings
+from ema_model.recordings.exports import known_export
 from ema_model.recordings.formats.clocks import Clocks
 
 # --- which column of a file is which signal, in which unit and with which sign; its text form and its use -------------
@@ -365,10 +366,14 @@ def guess_mapping(
     settled = {entry.column for entry in known.entries}
     names = [name for name in map(str, columns) if name not in settled]
     shares = Context([*names, *settled], [entry.signal for entry in known.entries])
+    export = known_export([*map(str, columns)])
     ranked: list[tuple[float, int, str, Guess]] = []
     reasons = {name: "its name says nothing known" for name in names}
     for order, name in enumerate(names):
         found = guesses(name, shares, counts_per_turn)
+        if export is not None and export.columns:
+            told = export.guess(name)
+            found = told if isinstance(told, str) else [told]
         if isinstance(found, str):
             reasons[name] = found
             continue

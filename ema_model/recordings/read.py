@@ -32,6 +32,7 @@ from ema_model.recordings.columns import (
     with_places,
     without_unit,
 )
+from ema_model.recordings.exports import known_export
 from ema_model.recordings.formats import Format, format_of
 from ema_model.recordings.formats.clocks import Clocks
 from ema_model.recordings.formats.text_layout import Head, Hints, by_number
@@ -481,10 +482,9 @@ def recorded(
         needs = [group for group in needs if "time_s" not in group]
     _ask(path, actuator, reading, read_header(path, max_bytes, hints), needs)
     measurement = read_measurement(path, reading.mapping, side=side, max_bytes=max_bytes, hints=hints)
-    return replace(
-        measurement,
-        reading=replace(measurement.reading, mapping=reading.mapping, guessed=reading.guessed, doubts=reading.doubts),
-    )
+    found = measurement.reading
+    remarks = (*reading.remarks, *found.remarks)
+    return replace(measurement, reading=replace(reading, clocks=found.clocks, layout=found.layout, remarks=remarks))
 
 
 def how_to_read(
@@ -524,7 +524,9 @@ def how_to_read(
         fresh = [entry for entry in fresh if actuator.axes.inside({entry.signal: 0}).keys() & missing]
     doubts = tuple((entry, why) for entry in fresh if (why := doubt(entry)))
     sure = tuple(entry for entry in fresh if not doubt(entry))
-    return Reading(ColumnMapping((*known.entries, *sure), guess.unmapped), sure, doubts)
+    export = known_export(header)
+    remarks = (export.told,) if export is not None and export.names else ()
+    return Reading(ColumnMapping((*known.entries, *sure), guess.unmapped), sure, doubts, remarks=remarks)
 
 
 def needed(actuator: Actuator, *, is_map: bool = False) -> Needs:
@@ -605,6 +607,9 @@ def _ask(path: str, actuator: Actuator, reading: Reading, header: Sequence[str],
         found = f"say which column it is: {' '.join(options)} (the file has {listed(without_unit(header))})"
         is_of_model = "command_rad" in absent and needs != COMMAND_ALONE and not there.isdisjoint(INPUT_ALONE[1])
         hint = f"; {WITHOUT_COMMAND}" if is_of_model else ""
+        hint += "; a file without a time is read with --rate HZ" if "time_s" in absent else ""
+        if export := known_export(header):
+            hint += f"; {export.told}"
         raise refusal(path, f"{'; '.join(questions)}; {found}{hint}")
 
 

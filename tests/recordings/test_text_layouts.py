@@ -248,3 +248,66 @@ def test_a_side_file_says_the_rate_and_keeps_it(tmp_path):
         path.write_text(f"rate_Hz = {wrong}\n")
         with pytest.raises(InputError, match="rate_Hz must be a number"):
             read_side_file(path)
+
+
+VESC = "ms_today;input_voltage;temp_mos_max;temp_mos_1;temp_mos_2;temp_mos_3;temp_motor;current_motor;current_in;" \
+       "d_axis_current;q_axis_current;erpm;duty_cycle;amp_hours_used;amp_hours_charged;watt_hours_used;" \
+       "watt_hours_charged;tachometer;tachometer_abs;encoder_position;fault_code;vesc_id;d_axis_voltage;" \
+       "q_axis_voltage;ms_today_setup;"  # fmt: skip
+
+
+def test_a_vesc_tool_log_is_named_and_read(tmp_path):
+    """Its columns as vesc_tool's vescinterface.cpp writes them, each with a semicolon after it."""
+    names = VESC.rstrip(";").split(";")
+    table = {name: np.zeros(N) for name in names}
+    table |= {"ms_today": 36_000_000.0 + 10.0 * k, "q_axis_current": CURRENT, "current_motor": np.abs(CURRENT),
+              "erpm": 7.0 * 300.0 * np.cos(k / 30.0), "duty_cycle": 0.3 + 0.0 * k, "input_voltage": 24.0 + 0.0 * k,
+              "encoder_position": 10.0 * k % 360.0}  # fmt: skip
+    lines = [";".join(f"{value:.8g}" for value in row) + ";" for row in zip(*table.values())]
+    (tmp_path / "a.csv").write_text("\n".join([VESC, *lines]))
+    thesis = load_actuator()
+    blind = replace(thesis, controller=replace(thesis.controller, kind="unknown"))
+    with pytest.raises(InputError, match=r"motor_position_rad is needed; .* this is a VESC Tool log; its erpm is"):
+        read(tmp_path / "a.csv", blind)
+    asked = ["motor_position_rad=encoder_position[deg]", "motor_speed_rad_s=erpm[rpm, scale=0.142857142857]"]
+    found = read(tmp_path / "a.csv", blind, asked)
+    assert "this is a VESC Tool log" in found.reading.told
+    np.testing.assert_allclose(np.diff(found.time_s), 0.01, atol=1e-9)
+    np.testing.assert_allclose(found["current_A"], CURRENT, rtol=1e-6)
+    np.testing.assert_allclose(found["motor_speed_rad_s"], 10.0 * np.pi * np.cos(k / 30.0), atol=1e-4)
+    np.testing.assert_allclose(found["motor_position_rad"], np.radians(10.0 * k), atol=1e-9)
+
+
+def test_columns_of_the_simplefoc_monitor_are_named(tmp_path):
+    table = [ANGLE, 0.1 * ANGLE, 0.0 * ANGLE, CURRENT, 0.0 * CURRENT, np.gradient(ANGLE, TIME), ANGLE]
+    (tmp_path / "a.txt").write_text("\n".join("\t".join(f"{value:.4f}" for value in row) for row in zip(*table)))
+    with pytest.raises(InputError, match=r"current q and d \[mA\], .*, if this is all that SimpleFOC's monitor prints"):
+        read(tmp_path / "a.txt", load_actuator())
+    found = read_measurement(
+        tmp_path / "a.txt", ["current_A=#4[mA]", "motor_position_rad=#7"], hints=Hints(rate_Hz=1000.0)
+    )
+    np.testing.assert_allclose(found["current_A"], CURRENT / 1e3, atol=1e-6)
+
+
+def test_one_number_a_line_is_named(tmp_path):
+    (tmp_path / "oscilloscope.csv").write_text("\n".join(map(str, ANGLE)))
+    with pytest.raises(InputError, match=r"line 1: .*; of one number a line, as odrivetool's oscilloscope_dump writes"):
+        read_measurement(tmp_path / "oscilloscope.csv")
+
+
+@pytest.mark.parametrize("separator", [",", "\t", " ", ", "])
+def test_lines_of_the_arduino_plotter_have_their_labels_for_names(separator, tmp_path):
+    """By arduino/Arduino, ArduinoSerialPlotterProtocol.md: a colon between label and value, or labels alone above."""
+    labels = ("t_ms", "angle", "i_A")
+    rows_of = [separator.join(f"{name}:{value:.6f}" for name, value in zip(labels, row)) + separator.rstrip()
+               for row in zip(1e3 * TIME, ANGLE, CURRENT)]  # fmt: skip
+    above = [separator.join(f"{name}:" for name in labels), *rows(separator, *PLAIN)]
+    mapping = ["motor_position_rad=angle", "current_A=i_A"]
+    (tmp_path / "a.txt").write_text("\r\n".join(rows_of))
+    assert read_header(str(tmp_path / "a.txt"), 10**6) == list(labels)
+    found = read_measurement(tmp_path / "a.txt", ["time_s=t_ms", *mapping])
+    assert "a label before each number" in found.reading.layout
+    np.testing.assert_allclose(found.time_s, TIME, atol=1e-6)
+    np.testing.assert_allclose(found["current_A"], CURRENT, atol=1e-5)
+    (tmp_path / "b.txt").write_text("\n".join(above))
+    np.testing.assert_allclose(read_measurement(tmp_path / "b.txt", ["time_s=t_ms[s]", *mapping]).time_s, TIME)

@@ -86,6 +86,12 @@ def as_text(separator: str, decimal: str = ".") -> bytes:
     return "\n".join([separator.join(COLUMNS), *(row.replace(".", decimal) for row in rows)]).encode()
 
 
+def as_labels() -> bytes:
+    """As Arduino's plotter takes it."""
+    rows = (",".join(f"{name}:{value:.6g}" for name, value in zip(COLUMNS, row)) for row in zip(*COLUMNS.values()))
+    return "\n".join(rows).encode()
+
+
 def as_parquet(**options: object) -> bytes:
     return written(lambda file: pq.write_table(pa.table(COLUMNS), file, **options))
 
@@ -168,7 +174,7 @@ def robot_dataset(folder: Path) -> bytes:
 def whole(reader: str, folder: Path) -> list[bytes]:
     """Some files that the reader takes."""
     if reader == "csv":
-        return [as_text(","), as_text(";", ","), b"\xef\xbb\xbf" + as_text("\t"), as_text(" ")]
+        return [as_text(","), as_text(";", ","), b"\xef\xbb\xbf" + as_text("\t"), as_text(" "), as_labels()]
     if reader == "parquet":
         plain = as_parquet(compression="none", use_dictionary=False)
         return [as_parquet(), plain, as_parquet(data_page_size=64)]

@@ -78,11 +78,12 @@ class Utf8(io.RawIOBase):
 
 
 class Aligned(io.RawIOBase):
-    """A text with columns between blanks, with one blank between two."""
+    """A text with one blank where several part two columns, and without labels before its numbers."""
 
-    def __init__(self, text: Utf8) -> None:
+    def __init__(self, text: Utf8, layout: Layout) -> None:
         super().__init__()
         self._text = text
+        self._separator, self._is_labelled = layout.separator.encode(), layout.is_labelled
         self._rest, self._left = b"", b""
 
     def readable(self) -> bool:
@@ -97,14 +98,21 @@ class Aligned(io.RawIOBase):
             block = self._rest + piece
             end = block.rfind(b"\n") + 1 if piece else len(block)
             self._rest = block[end:]
-            lines = (b" ".join(line.split()) for line in block[:end].splitlines())
-            self._left += b"".join(line + b"\n" for line in lines)
+            self._left += b"".join(self._plain(line) + b"\n" for line in block[:end].splitlines())
             if not piece:
                 break
             if len(self._rest) > LINE_BYTES:
                 raise pa.ArrowInvalid("a line is too long")
         given, self._left = (self._left, b"") if whole else (self._left[:size], self._left[size:])
         return given
+
+    def _plain(self, line: bytes) -> bytes:
+        if self._separator == b" ":
+            line = b" ".join(line.split())
+        if not self._is_labelled:
+            return line
+        cells = line.strip(self._separator + b" \t").split(self._separator)
+        return self._separator.join(cell.rpartition(b":")[2].strip() for cell in cells)
 
 
 # --- cells of a text understood one by one: what is no number, headers that come again, and text at the end -----------
@@ -429,7 +437,7 @@ def parsed(
     wanted = [f"{i}" for i in places]
     with Utf8(table.path, table.layout) as text:
         return csv.read_csv(
-            Aligned(text) if table.layout.separator == " " else text,
+            Aligned(text, table.layout) if table.layout.separator == " " or table.layout.is_labelled else text,
             csv.ReadOptions(column_names=columns, skip_rows=table.skipped, use_threads=threads),
             options,
             csv.ConvertOptions(
@@ -610,7 +618,12 @@ def _dialect(path: str) -> _Dialect:
     names = [name.strip() for name in split(lines[first], separator)]
     if any(_NUMBER.fullmatch(name) for name in names):
         found = f"names of columns are expected, found {listed(names)}"
-        raise refusal(path, f"line {first + 1}: {found}; add a header line")
+        advice = "add a header line"
+        if len(names) == 1:  # odrive/ODrive, tools/odrive/utils.py: oscilloscope_dump
+            advice += (
+                "; of one number a line, as odrivetool's oscilloscope_dump writes, put several signals side by side"
+            )
+        raise refusal(path, f"line {first + 1}: {found}; {advice}")
     # The last line may be cut.
     cells = (cell for line in lines[first + 1 : -1] for cell in line.split(separator))
     comma = separator != "," and any(re.fullmatch(r"\s*[+-]?[0-9]*,[0-9]+(e[+-]?[0-9]+)?\s*", c, re.I) for c in cells)

@@ -21,6 +21,7 @@ HEAD_BYTES = 65_536
 SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", "|": "bars", " ": "blanks"}
 _SURE_SEPARATORS = tuple(SEPARATORS)[:-1]  # blanks stand in names and between others, too
 _COMMENTS = "#%"
+_PAIR = re.compile(r"([A-Za-z_][^:,;\t]{0,60}?)\s*:\s*[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 _MOST_BETWEEN = 3  # lines between the names and the numbers: units, types, descriptions
 _LOOKED_AT = 50  # rows below a header, to see whether it is one
 _FEWEST_ROWS = 2
@@ -85,11 +86,13 @@ class Layout:
     decimal: str
     thousands: str
     head: frozenset[str]  # the lines above the numbers, which may be repeated further down
+    is_labelled: bool = False  # each number has its column's name before it: angle:1.5
 
     @property
     def told(self) -> str:
         """What is unusual in it: "header in line 4, units in line 5, Windows-1252"."""
-        parts = ["no line of names, columns by number"] if self.header_line == 0 else []
+        unnamed = "a label before each number" if self.is_labelled else "no line of names, columns by number"
+        parts = [unnamed] if self.header_line == 0 else []
         if self.header_line > 1:
             parts.append(f"header in line {self.header_line}")
         if self.units_line:
@@ -193,7 +196,7 @@ def find_layout(path: str, hints: Hints) -> Layout | None:
         if hints.encoding is not None:
             told = ENCODINGS.get(encoding, encoding)
             raise refusal(path, f"no table is seen in it as {told}; name another encoding")
-        return None
+        return _labelled(lines, encoding, mark)
     at, first, separator = best
     rows = tables[separator]
     units_at = next((i for i in range(at + 1, first) if is_units(rows[i])), None) if at >= 0 else None
@@ -201,6 +204,8 @@ def find_layout(path: str, hints: Hints) -> Layout | None:
     cells = [cell.strip() for cell in rows[at]] if at >= 0 else [by_number(i) for i in range(len(rows[first]))]
     if at >= 0:
         cells[0] = cells[0].lstrip("#% ")
+        if all(cell.endswith(":") for cell in cells if cell):  # as Arduino's plotter takes them
+            cells = [cell.rstrip(": ") for cell in cells]
     units = [cell.strip().strip("[]()") for cell in rows[units_at]] if units_at is not None else []
     sample = [cell.strip() for row in rows[first : first + 300] for cell in row]
     decimal, thousands = _signs(sample, separator)
@@ -253,6 +258,31 @@ def _without_names(
             if len(alike) >= _MOST_OF_ROWS * len(below):
                 return -1, first, separator
     return None
+
+
+def _labelled(lines: Sequence[str], encoding: str, mark: int) -> Layout | None:
+    """The layout of lines that Arduino's plotter takes, of labels and values: angle:1.5,speed:3.2; None for others.
+
+    By arduino/Arduino, build/shared/ArduinoSerialPlotterProtocol.md: tabs, commas or blanks part the pairs.
+    """
+    first = next((i for i, line in enumerate(lines) if line.strip()), len(lines))
+    for separator in "\t, ":
+        rows = [_pairs(line, separator) for line in lines[first : first + _LOOKED_AT] if line.strip()]
+        if len(rows) <= _FEWEST_ROWS or len(rows[0]) < 2 or len(set(rows[0])) < len(rows[0]):
+            continue
+        if sum(row == rows[0] for row in rows) >= _MOST_OF_ROWS * len(rows):
+            names, units = tuple(rows[0]), ("",) * len(rows[0])
+            return Layout(
+                encoding, mark > 0, 0, None, first + 1, names, units, separator, ".", "", frozenset(), is_labelled=True
+            )
+    return None
+
+
+def _pairs(line: str, separator: str) -> list[str]:
+    """The labels of a line of labels and values; nothing where one of its parts is no such pair."""
+    parts = [part for part in line.strip(f"{separator} \t").split(separator) if part.strip()]
+    found = [_PAIR.fullmatch(part.strip()) for part in parts]
+    return [pair[1] for pair in found if pair] if all(found) else []
 
 
 def _is_content(row: Sequence[str]) -> bool:

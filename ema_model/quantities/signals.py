@@ -31,6 +31,7 @@ _ALL = (
     Signal("time_s", "Time", "t", "s", "time"),
     Signal("command_rad", "Command", "θ_cmd", "rad", "position", USER),
     Signal("user_position_rad", "User position", "θ_u", "rad", "position", USER),
+    Signal("user_speed_rad_s", "User speed", "ω_u", "rad/s", "speed", USER),
     Signal("motor_position_rad", "Motor position", "θ_m", "rad", "position", MOTOR),
     Signal("motor_speed_rad_s", "Motor speed", "ω_m", "rad/s", "speed", MOTOR),
     Signal("current_A", "Equivalent current", "I_eq", "A", "current"),
@@ -48,6 +49,7 @@ _ALL = (
     # linear axes
     Signal("command_m", "Command", "x_cmd", "m", "position", USER),
     Signal("user_position_m", "User position", "x_u", "m", "position", USER),
+    Signal("user_speed_m_s", "User speed", "v_u", "m/s", "speed", USER),
     Signal("motor_position_m", "Motor position", "x_m", "m", "position", MOTOR),
     Signal("motor_speed_m_s", "Motor speed", "v_m", "m/s", "speed", MOTOR),
     Signal("motor_force_N", "Motor force", "F_m", "N", "force", MOTOR),

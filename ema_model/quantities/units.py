@@ -122,7 +122,9 @@ _TABLE: dict[str, tuple[tuple[str, float, float, float], ...]] = {
     ),
     "": (("1 - ratio pu", 1, 1, 0), ("% percent pct", 1, 100, 0)),
 }
-_COUNTS = re.compile(r"(counts?|cnts?|ticks?|cts?|inc|increments?|lsb|steps?|pulses?)(/s)?(?:[/@:]([0-9]+))?(/s)?")
+_COUNTS = re.compile(
+    r"(counts?|cnts?|ticks?|cts?|inc|increments?|lsb|steps?|pulses?)(/s)?(?:[/@:]([0-9]+(?:\.[0-9]+)?))?(/s)?"
+)
 
 
 def plain(text: str) -> str:
@@ -132,7 +134,8 @@ def plain(text: str) -> str:
     text = re.sub(r"[\s·⋅*._]+(s-1|sec-1)$|(?<=[a-z°])(s-1)$", "/s", text)
     text = re.sub(r"(?<=.)[_/]\s*(s|sec|secs|second|seconds)$", "/s", text)
     text = re.sub(r"(?<=.)[_/]\s*(min|minute)$", "/min", text)
-    return re.sub(r"[\s·⋅*._]+|(?<=[a-z])-(?=[a-z])", "", text)
+    text = re.sub(r"^cps\b", "counts/s", text)
+    return re.sub(r"[\s·⋅*_]+|\.(?![0-9])|(?<![0-9])\.|(?<=[a-z])-(?=[a-z])", "", text)
 
 
 def _tabled() -> dict[str, dict[str, Unit]]:
@@ -168,11 +171,11 @@ def _spelt(spelling: str, dimension: str) -> Unit | None:
         return UNITS[dimension][spelling]
     counts = _COUNTS.fullmatch(spelling)
     if counts and dimension == ("rad/s" if counts[2] or counts[4] else "rad"):
-        per_turn = int(counts[3] or 0)
+        per_turn = float(counts[3] or 0)
         rate = "/s" if dimension == "rad/s" else ""
         if not per_turn:
             return Unit(f"counts{rate}", dimension, float("nan"))
-        return Unit(f"counts/{per_turn}{rate}", dimension, 2.0 * pi, float(per_turn))
+        return Unit(f"counts/{per_turn:.12g}{rate}", dimension, 2.0 * pi, per_turn)
     return None
 
 

@@ -44,7 +44,7 @@ BUS = frozenset("bus vbus vdc vin ubus udc vsupply vbat dc dclink supply battery
 # What spoils a match: another axis of the same quantity.
 OTHER = {
     "current": frozenset("id bus dc battery bat supply input limit max min".split()),
-    "speed": frozenset("limit max min user output load link".split()),
+    "speed": frozenset("limit max min".split()),
     "voltage": frozenset("vd limit max min".split()),
     "torque": frozenset("limit max min enable enabled friction".split()),
     "position": frozenset("limit max min error err".split()),
@@ -98,11 +98,21 @@ def readings(column: str) -> list[Name]:
         return [Name(_words(spoken[1]), spoken[2], True)]
     parts = [part for part in re.split(r"[\s_.,;:()\[\]{}|-]+", re.sub(r"(?<=[a-z])(?=[A-Z])", "_", column)) if part]
     found = []
+    counted = len(parts) - 1 if len(parts) > 2 and parts[-1].isdecimal() else 0  # one of several: q_rad_7
+    for length in range(min(_MOST_WORDS_OF_A_UNIT, counted - 1), 0, -1):
+        unit = "_".join(parts[counted - length : counted])
+        if _is_unit(unit):
+            found.append(Name(_words("_".join(parts[: counted - length])), unit))
     for length in range(min(_MOST_WORDS_OF_A_UNIT, len(parts) - 1), 0, -1):
         unit = "_".join(parts[-length:])
-        if _is_unit(unit):
+        if _is_unit(unit) and not unit.isdecimal():  # which counts columns
             found.append(Name(_words("_".join(parts[:-length])), unit))
     return [*found, Name(_words(column), "")]
+
+
+def is_time(name: str) -> bool:
+    """Whether a column's name says that it is time."""
+    return any(not QUANTITIES["time"].isdisjoint(one.words) for one in readings(name))
 
 
 def _is_unit(text: str) -> bool:
@@ -212,16 +222,20 @@ class Context:
         self.has_position_command = any(signal.startswith("command") for signal in known) or any(
             _is_commanded(name, what) for name in every if (what := _quantity(name)) in ("position", "")
         )
+        positions = {signal.rpartition("_")[0] for signal in known if "_position_" in signal}
+        self.is_at_user = positions == {"user_position"}  # the only place where motion was recorded
         self.has_duty = any(_quantity(name) == "duty" for name in every)
 
-    def phase_letter(self, name: str) -> tuple[str, str] | None:
-        """The letter that tells three columns apart, and the name without it: i_a beside i_b and i_c."""
+    def phase_letter(self, name: str) -> tuple[str, str, int] | None:
+        """The letter that tells two or three columns apart, the name without it, and how many there are: i_a, i_b."""
         lowered = name.lower()
-        for match in re.finditer(r"[a-cu-w]", lowered):
-            at = match.start()
-            for letters in ("abc", "uvw"):
-                if match[0] in letters and {lowered[:at] + x + lowered[at + 1 :] for x in letters} <= self.lowered:
-                    return match[0], name[:at] + name[at + 1 :]
+        for least in (3, 2):
+            for match in re.finditer(r"[a-cu-w]", lowered):
+                at = match.start()
+                for letters in ("abc", "uvw"):
+                    alike = {lowered[:at] + x + lowered[at + 1 :] for x in letters} & self.lowered
+                    if match[0] in letters and len(alike) >= least:
+                        return match[0], name[:at] + name[at + 1 :], len(alike)
         return None
 
 
@@ -295,15 +309,17 @@ def _by_name_with_unit(guess: Guess, name: Name, counts_per_turn: int | None) ->
     return replace(guess, unit=unit, reason=f"{guess.reason}; unit {unit}" if unit else guess.reason)
 
 
-def _phase(letter: str, rest: str) -> Guess | None:
-    """One of three columns, whose name without the phase's letter is `rest`."""
+def _phase(letter: str, rest: str, count: int) -> Guess | None:
+    """One of so many columns, whose name without the phase's letter is `rest`; two may as well be two motors'."""
     for name in readings(rest):
         unit = find_unit(name.unit, "A") if name.unit else None
         if name.has(COMMAND) or (name.unit and not unit):
             continue
         if unit or (name.has(_CURRENT_WORDS) and not name.has(QUANTITIES["voltage"])):
             signal = f"phase_{_PHASE_OF[letter]}_current_A"
-            return Guess(signal, unit.name if unit else "", 0.9, f"one of three columns, phase {letter.upper()}")
+            of = {2: "two", 3: "three"}[count]
+            sure = 0.9 if count == 3 else 0.55
+            return Guess(signal, unit.name if unit else "", sure, f"one of {of} columns, phase {letter.upper()}")
     return None
 
 
@@ -352,7 +368,10 @@ def _others(name: Name, quantity: str, said: str, context: Context) -> list[Gues
         return [Guess("time_s", "", sure + 0.1, f"{said!r} is time")]
     if quantity == "speed":
         linear = find_unit(name.unit, "m/s") is not None or "dx" in name.words or "xdot" in name.words
-        return [Guess("motor_speed_m_s" if linear else "motor_speed_rad_s", "", sure, f"{said!r} is a speed")]
+        unit = "m_s" if linear else "rad_s"
+        if (name.has(USER) or context.is_at_user) and not name.has(MOTOR):
+            return [Guess(f"user_speed_{unit}", "", 0.85, f"{said!r} is the speed of the output")]
+        return [Guess(f"motor_speed_{unit}", "", sure, f"{said!r} is a speed")]
     if quantity == "current":
         surer = 0.05 if name.has(frozenset({"iq", "ieq"})) else 0.0
         return [Guess("current_A", "", sure + surer, f"{said!r} is a current")]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -15,6 +15,7 @@ from ema_model.files.opened import listed, shown
 from ema_model.quantities.signals import SIGNALS
 from ema_model.quantities.units import Unit, dimensions_of, find_unit, known_units
 from ema_model.recordings.column_names import Context, Guess, guesses, readings
+from ema_model.recordings.exports import known_export
 from ema_model.recordings.formats.clocks import Clocks
 
 # --- which column of a file is which signal, in which unit and with which sign; its text form and its use -------------
@@ -134,23 +135,65 @@ class ColumnMapping:
         return ColumnMapping((*kept, entry), unmapped)
 
 
-def parse_mapping(texts: Iterable[str], columns: Collection[str] = ()) -> ColumnMapping:
+# A column by its place: the seventh of all, or of a matrix as NumPy (from 0) and MATLAB (from 1) write it.
+_BY_NUMBER = re.compile(r"#\s*(\d{1,9})")
+_BY_SLICE = re.compile(r"(.+?)\s*(?:\[\s*(?::\s*,\s*)?(\d{1,9})\s*\]|\(\s*:\s*,\s*(\d{1,9})\s*\))")
+
+
+def column_at(name: str, header: Sequence[str]) -> str:
+    """The column that a name or a place means: `#7`, `q[:,6]`, `q[6]` and `q(:,7)`; the name itself where it is none.
+
+    A matrix's columns are called q_1, q_2, … in a file, or q.0, q.1, … where its rows are lists.
+    """
+    if name in header:
+        return name
+    if number := _BY_NUMBER.fullmatch(name):
+        at = int(number[1])
+        return header[at - 1] if 0 < at <= len(header) else name
+    matrix, at = _of_matrix(name)
+    if not matrix:
+        return name
+    called = f"{matrix}_{at + 1}", f"{matrix}.{at}"
+    return next((one for one in header if one in called or one.partition(" [")[0] in called), name)
+
+
+def _of_matrix(name: str) -> tuple[str, int]:
+    """The matrix and which of its columns, from 0, that a name means; "" where it means none."""
+    if found := _BY_SLICE.fullmatch(name):
+        return found[1], int(found[2]) if found[2] else int(found[3]) - 1
+    counted = re.fullmatch(r"(.+)_(\d{1,9})", name)
+    return (counted[1], int(counted[2]) - 1) if counted else ("", 0)
+
+
+def with_places(mapping: ColumnMapping, header: Sequence[str]) -> ColumnMapping:
+    """The mapping with the names of the file's columns where it says their places."""
+    entries = []
+    for entry in mapping.entries:
+        column = column_at(entry.column, header)
+        unit = entry.unit or (unit_in_name(column, entry.signal) if column != entry.column else "")
+        entries.append(replace(entry, column=column, unit=unit) if column != entry.column else entry)
+    return replace(mapping, entries=tuple(entries))
+
+
+def parse_mapping(texts: Iterable[str], columns: Sequence[str] = ()) -> ColumnMapping:
     """The mapping that `signal=column[unit]` texts give.
 
     With the file's `columns`, one whose own name ends in brackets is found too: `speed [rpm]` is then a
-    column with its unit in the name.  Raises InputError for a text of another form.
+    column with its unit in the name, and a column may be given by its place, see `column_at`.  Raises InputError for a
+    text of another form.
     """
-    return ColumnMapping(tuple(_parsed(text, columns) for text in texts))
+    return with_places(ColumnMapping(tuple(_parsed(text, columns) for text in texts)), columns)
 
 
-def _parsed(text: str, columns: Collection[str]) -> MappedColumn:
+def _parsed(text: str, columns: Sequence[str]) -> MappedColumn:
     signal, equals, right = (part.strip() for part in text.partition("="))
     if not equals or not signal or not right:
         raise InputError(f"mapping {shown(text)!r} is not understood; {_FORM}")
     if signal not in SIGNALS:
         raise InputError(f"mapping {shown(text)!r}: {_no_signal(signal)}")
     inside = re.fullmatch(r"(.+?)\s*\[([^\[\]]*)\]", right)
-    if right in columns or not inside:
+    is_place = _BY_SLICE.fullmatch(right) and not (inside and find_unit(inside[2], SIGNALS[signal].unit))
+    if right in columns or not inside or is_place:
         return MappedColumn(signal, right, unit_in_name(right, signal))
     column = inside[1]
     given: dict[str, str] = {}
@@ -258,6 +301,7 @@ class Reading:
     made: tuple[str, ...] = ()  # signals made from others
     clocks: Clocks | None = None  # of the signals, by their names in files, where they had several
     layout: str = ""  # what was found out of how the file is laid out: "header in line 4, units in line 5"
+    remarks: tuple[str, ...] = ()  # what was done to the signals beyond what was asked for, a line each
 
     @property
     def is_guess(self) -> bool:
@@ -273,8 +317,8 @@ class Reading:
 
     @property
     def told(self) -> str:
-        """What was found out by itself, of the layout and the columns, in one line; "" where there was no question."""
-        return "; ".join(filter(None, (self.layout, self.assumed)))
+        """What was found out and done unasked, in one line; "" where there was no question."""
+        return "; ".join(filter(None, (self.layout, self.assumed, *self.remarks)))
 
     def proposed(self, columns: Iterable[str]) -> ColumnMapping:
         """Everything that somebody should look at: what is used, canonical names too, and what is in doubt."""
@@ -322,10 +366,14 @@ def guess_mapping(
     settled = {entry.column for entry in known.entries}
     names = [name for name in map(str, columns) if name not in settled]
     shares = Context([*names, *settled], [entry.signal for entry in known.entries])
+    export = known_export([*map(str, columns)])
     ranked: list[tuple[float, int, str, Guess]] = []
     reasons = {name: "its name says nothing known" for name in names}
     for order, name in enumerate(names):
         found = guesses(name, shares, counts_per_turn)
+        if export is not None and export.columns:
+            told = export.guess(name)
+            found = told if isinstance(told, str) else [told]
         if isinstance(found, str):
             reasons[name] = found
             continue

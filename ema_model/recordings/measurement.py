@@ -16,6 +16,7 @@ from ema_model.errors import InputError
 from ema_model.files.opened import listed, shown
 from ema_model.quantities.axes import Axes
 from ema_model.quantities.numbers import number
+from ema_model.quantities.sides import MOTOR, USER
 from ema_model.quantities.signals import SIGNALS
 from ema_model.recordings.columns import ColumnMapping, Reading
 from ema_model.recordings.formats.clocks import GAP, between
@@ -88,6 +89,16 @@ def can_have_current(measurement: Measurement) -> bool:
     return "current_A" not in measurement and all(name in measurement for name in (*PHASES, "motor_position_rad"))
 
 
+def with_third_phase(measurement: Measurement) -> Measurement:
+    """The measurement with the current of the phase that was not recorded: in a star the three add up to zero."""
+    recorded = [name for name in PHASES if name in measurement]
+    if len(recorded) != 2:
+        return measurement
+    third = next(name for name in PHASES if name not in recorded)
+    made = measurement.with_signals(**{third: -(measurement[recorded[0]] + measurement[recorded[1]])})
+    return made.with_notes(f"{third} is made of the other two phases' currents, since the three of a star add up to 0")
+
+
 def with_equivalent_current(measurement: Measurement, pole_pairs: float, rotor_offset_rad: float = 0.0) -> Measurement:
     """The measurement with `current_A` made from its phase currents and motor position; one that has it is kept.
 
@@ -121,6 +132,45 @@ def with_current(measurement: Measurement, pole_pairs: float, rotor_offset_rad: 
         offset = shown + step * round((rotor_offset_rad - shown) / step)
     made = with_equivalent_current(measurement, pole_pairs, offset)
     return made.with_notes(f"the rotor's offset is taken as {offset:.4g} rad") if offset != rotor_offset_rad else made
+
+
+# --- the motor's motion from the user's, where only the output was recorded -------------------------------------------
+
+_OF_USER = {"motor_position_rad": "user_position_rad", "motor_speed_rad_s": "user_speed_rad_s"}  # names inside
+
+
+def with_motor_side(
+    measurement: Measurement, gear_ratio: float, between: Sequence[str] = (), speed_only: bool = False
+) -> Measurement:
+    """The measurement with the motor's position and speed as the gear makes them of the user's: θ_m = θ_u/τ.
+
+    Signals by their names inside; those that were recorded stay.  gear_ratio: τ, the user's angle (or length) per
+    motor's; between: what of the model lies between the two sides and is not seen so.
+    """
+    axes = measurement.axes or Axes()
+    names = [name for name, source in _OF_USER.items() if name not in measurement and source in measurement]
+    if speed_only:
+        names = [name for name in names if SIGNALS[name].kind == "speed"]
+    if not names:
+        return measurement
+    made = measurement.with_signals(**{name: measurement[_OF_USER[name]] / gear_ratio for name in names})
+    told = [f"{axes.signal(name)} is made of {axes.signal(_OF_USER[name])} by {gear_in_words(gear_ratio, axes)}"
+            for name in names]  # fmt: skip
+    if between:
+        told.append(f"the model has {listed(between)} between motor and user, which a motion made so does not show")
+    return made.with_notes(*told)
+
+
+def gear_in_words(gear_ratio: float, axes: Axes) -> str:
+    """`the gear 1:101`, or `the screw's lead of 10 mm`."""
+    if (axes.motor, axes.user) == ("rotary", "linear"):
+        return f"the screw's lead of {2e3 * math.pi * gear_ratio:.6g} mm a turn"
+    if axes.motor == axes.user:
+        reduces = gear_ratio <= 1.0
+        ratio = 1.0 / gear_ratio if reduces else gear_ratio
+        said = f"{round(ratio)}" if abs(ratio / round(ratio) - 1.0) < 1e-6 else f"{ratio:.6g}"
+        return f"the gear 1:{said}" if reduces else f"the gear {said}:1"
+    return f"the ratio of {gear_ratio:.6g} {axes.unit('', USER, per=MOTOR)}"
 
 
 # --- signals of one run on a common time base -------------------------------------------------------------------------

@@ -6,6 +6,7 @@ import os
 import shlex
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -28,13 +29,23 @@ from ema_model.recordings.columns import (
     guess_mapping,
     parse_mapping,
     unit_in_name,
+    with_places,
     without_unit,
 )
+from ema_model.recordings.exports import known_export
 from ema_model.recordings.formats import Format, format_of
 from ema_model.recordings.formats.clocks import Clocks
-from ema_model.recordings.formats.text_layout import Head, Hints
-from ema_model.recordings.measurement import PHASES, Measurement, with_current, without_delays
+from ema_model.recordings.formats.text_layout import Head, Hints, by_number
+from ema_model.recordings.measurement import (
+    PHASES,
+    Measurement,
+    with_current,
+    with_motor_side,
+    with_third_phase,
+    without_delays,
+)
 from ema_model.recordings.side_file import SideFile, find_side_file, read_side_file
+from ema_model.recordings.wrapping import unwrapped
 
 Array = NDArray[np.float64]
 NONE = Hints()
@@ -68,8 +79,13 @@ def read_measurement(
     with _told(path):
         header = file_format.header(path, max_bytes)
         used = _merged(path, side, mapping, header)
+        rate = _rate(path, hints_of(path, side, hints), used, header)
         known, foreign = choose_columns(
-            path, header, used, needs_time=side.kind == "run", looked_at=isinstance(mapping, ColumnMapping)
+            path,
+            header,
+            used,
+            needs_time=side.kind == "run" and rate is None,
+            looked_at=isinstance(mapping, ColumnMapping),
         )
         columns = file_format.read(path, known, max_bytes, True)
         check_length(path, next(iter(columns.arrays.values())).size)
@@ -77,7 +93,10 @@ def read_measurement(
         signals, done = apply_mapping(columns.arrays, used)
         columns.arrays.clear()  # they are copied, and large; Arrow would keep their memory for later
         pa.default_memory_pool().release_unused()
-    if side.kind == "map" and "time_s" not in signals:
+    if rate is not None:
+        signals = {"time_s": np.arange(float(next(iter(signals.values())).size)) / rate, **signals}
+        done = (*done, f"time_s counts the samples at {rate:.6g} Hz, as was said")
+    elif side.kind == "map" and "time_s" not in signals:
         signals = {"time_s": np.arange(float(next(iter(signals.values())).size)), **signals}
         done = (*done, "a static map without time: time_s counts the samples")
     check_values(path, signals, columns.place)
@@ -86,7 +105,7 @@ def read_measurement(
     name = " ".join(filter(None, (bare.name, columns.title)))
     clocks = columns.clocks and _of_signals(columns.clocks, used)
     measurement = replace(bare, name=name, reading=Reading(clocks=clocks, layout=columns.layout))
-    measurement = without_delays(measurement, used)
+    measurement = without_delays(unwrapped(path, measurement, used), used)
     check_length(path, measurement.samples)
     if side.window_s is not None or side.segments is not None:
         try:
@@ -137,14 +156,29 @@ def read_columns(path: str | os.PathLike[str], *, max_bytes: int = FILE_BYTES, h
 
 
 def hints_of(path: str, side: SideFile, given: Hints = NONE) -> Hints:
-    """What is said of a text's layout: as given, then as in the side file, which may stand beside other formats too."""
-    return given.before(side.text) if format_of(path).hinted is not None else given
+    """What is said of a file's layout: as given, then as in the side file, which may stand beside other formats too."""
+    if format_of(path).hinted is None:
+        return given.before(Hints(rate_Hz=side.text.rate_Hz))
+    return given.before(side.text)
+
+
+def _rate(path: str, hints: Hints, mapping: ColumnMapping, header: Sequence[str]) -> float | None:
+    """The rate that was said, Hz; InputError where the file has a time."""
+    rate = hints.rate_Hz
+    if rate is None:
+        return None
+    time = mapping.get("time_s") or ("time_s" in header and MappedColumn("time_s", "time_s"))
+    if time:
+        raise refusal(path, f"time_s stands in column {shown(time.column)!r}; leave the rate out, or that column")
+    if not 0.0 < rate <= _MOST_HZ:
+        raise refusal(path, f"the rate must be a number of samples a second, not {rate:g}")
+    return rate
 
 
 def said_format(path: str, hints: Hints) -> Format:
     """The file's format, reading it as somebody has said that it is laid out; InputError where it is no text."""
     found = format_of(path)
-    if hints == NONE:
+    if not hints.is_of_text:
         return found
     if found.hinted is None:
         raise refusal(path, f"is {found.title}, no text; leave --header-line and --encoding out")
@@ -170,8 +204,8 @@ def _merged(
         given = [given]
     if given is not None and not isinstance(given, ColumnMapping):
         given = parse_mapping(given, header)
-    merged = side.mapping or ColumnMapping()
-    for entry in given.entries if given else ():
+    merged = with_places(side.mapping or ColumnMapping(), header)
+    for entry in with_places(given, header).entries if given else ():
         merged = merged.with_entry(entry)
     for entry in merged.entries:
         if entry.column not in header:
@@ -221,6 +255,7 @@ def _measurement(
 Place = Callable[[int], str]
 
 FEWEST_SAMPLES = 100
+_MOST_HZ = 1e9
 LARGEST = 1e30  # absolute value, in any unit
 _SHORTEST_STEP_S = 1e-12
 _LONGEST_NAME = 1_000  # characters
@@ -251,9 +286,13 @@ def choose_columns(
     foreign = [name for name in header if name not in known]
     if needs_time and "time_s" not in signals and ("time_s" not in known or "time_s" in mapped):
         hints = [shown(name) for name in foreign if looks_like_time(name)]
+        if header and header[0] == by_number(0):
+            problem = "line 1: names of columns are expected, found numbers; add a header line, or say which column"
+            raise refusal(path, f"{problem} is which by its number: --map 'time_s=#1' (it has {listed(header)})")
         advice = "name the column of time, in seconds, time_s"
         if hints:
             advice = f"{hints[0]!r} looks like time: in seconds, name it time_s, or map it: --map 'time_s={hints[0]}'"
+        advice += ", or give the --rate of a file without one"
         raise refusal(path, f"no column time_s; {advice} (present: {listed(header)})")
     if not known:
         raise refusal(path, f"no column has a known name; map them with --map (present: {listed(header)})")
@@ -358,10 +397,31 @@ def prepared(measurement: Measurement, actuator: Actuator) -> Measurement:
     inside = replace(measurement, signals=axes.inside(measurement.signals), axes=axes, of_other_axes=others)
     if others:
         inside = inside.with_notes(f"left aside, as the actuator's axes are of another kind: {listed(others)}")
-    made = with_current(inside, actuator.motor.pole_pairs, actuator.motor.rotor_offset_rad)
+    made = _with_made(inside, actuator)
     if made is inside:
         return made
-    return replace(made, reading=replace(made.reading, made=("current_A",)))
+    names = tuple(name for name in made if name not in inside)
+    remarks = (*made.reading.remarks, *made.notes[len(inside.notes) :])
+    return replace(made, reading=replace(made.reading, made=names, remarks=remarks))
+
+
+def _with_made(inside: Measurement, actuator: Actuator) -> Measurement:
+    """What the actuator's model needs and was not recorded, of what was: the motor's motion, phases and current."""
+    ratio, between = actuator.transmission.gear_ratio, _between(actuator)
+    needs_current = "current_A" not in inside and sum(name in inside for name in PHASES) > 1
+    if actuator.controller.kind == "unknown" or needs_current:
+        made = with_motor_side(inside, ratio, between)
+    else:  # a loop has the user's position, which the motor's would only repeat; its speed tells more
+        made = inside if between else with_motor_side(inside, ratio, speed_only=True)
+    if needs_current:
+        made = with_third_phase(made)
+    return with_current(made, actuator.motor.pole_pairs, actuator.motor.rotor_offset_rad)
+
+
+def _between(actuator: Actuator) -> list[str]:
+    """What lies between the motor and the user in an actuator's model, by the names in its file."""
+    play = ["transmission.backlash_rad"] if actuator.transmission.backlash_rad > 0.0 else []
+    return [*play, *(name for name in _BETWEEN if name in actuator.effects)]
 
 
 # --- the one door: any file of a known actuator becomes the measurement as the model needs it -------------------------
@@ -373,7 +433,8 @@ WITHOUT_COMMAND = (  # the end of a line that asks for one
     "where no command was recorded, add --open-loop to compare or discover, "
     'or choose an actuator with [controller] kind = "unknown"'
 )
-_MAKES_CURRENT = [*PHASES, "motor_position_rad"]
+_BETWEEN = ("torsional_compliance", "screw_lead_error")  # effects that part the user's motion from the motor's
+_POSITIONS = ("motor_position_rad", "user_position_rad")
 _MOTION = ("motor_position_rad", "user_position_rad", "motor_speed_rad_s")
 
 
@@ -417,12 +478,13 @@ def recorded(
     reading = how_to_read(path, actuator, mapping, side=side, max_bytes=max_bytes, hints=hints)
     if needs is None:
         needs = needed(actuator, is_map=side.kind == "map")
+    if hints.rate_Hz:
+        needs = [group for group in needs if "time_s" not in group]
     _ask(path, actuator, reading, read_header(path, max_bytes, hints), needs)
     measurement = read_measurement(path, reading.mapping, side=side, max_bytes=max_bytes, hints=hints)
-    return replace(
-        measurement,
-        reading=replace(reading, clocks=measurement.reading.clocks, layout=measurement.reading.layout),
-    )
+    found = measurement.reading
+    remarks = (*reading.remarks, *found.remarks)
+    return replace(measurement, reading=replace(reading, clocks=found.clocks, layout=found.layout, remarks=remarks))
 
 
 def how_to_read(
@@ -440,14 +502,14 @@ def how_to_read(
     side = _side_file(path, actuator, side, max_bytes)
     hints = hints_of(path, side, hints)
     header = read_header(path, max_bytes, hints)
-    given = mapping if isinstance(mapping, ColumnMapping) else parse_mapping(mapping, header)
+    given = with_places(mapping, header) if isinstance(mapping, ColumnMapping) else parse_mapping(mapping, header)
     by_side = side.mapping is not None and bool(side.mapping.entries)
-    known = side.mapping if by_side and side.mapping else _usual(actuator, header)
+    known = with_places(side.mapping, header) if by_side and side.mapping else _usual(actuator, header)
     of_actuator = bool(known.entries) and not by_side
     for entry in given.entries:
         known = known.with_entry(entry)
     settled = {entry.column for entry in known.entries} | {"", *SIGNALS}
-    there = _there(actuator, known, header)
+    there = _there(actuator, known, header) | ({"time_s"} if hints.rate_Hz else set())
     needs = needed(actuator, is_map=side.kind == "map")
     missing = {name for group in needs if there.isdisjoint(group) for name in group}
     if by_side or (of_actuator and not missing) or settled.issuperset(header):
@@ -456,19 +518,23 @@ def how_to_read(
         read_columns(path, max_bytes=max_bytes, hints=hints) if columns is None else columns, known=known
     )
     fresh = [entry for entry in guess.entries if entry.column not in settled]
+    if hints.rate_Hz:  # whatever looks like a time is none
+        fresh = [entry for entry in fresh if entry.signal != "time_s"]
     if of_actuator:  # its file says what matters in its recordings, so that only what is needed is sought beside
         fresh = [entry for entry in fresh if actuator.axes.inside({entry.signal: 0}).keys() & missing]
     doubts = tuple((entry, why) for entry in fresh if (why := doubt(entry)))
     sure = tuple(entry for entry in fresh if not doubt(entry))
-    return Reading(ColumnMapping((*known.entries, *sure), guess.unmapped), sure, doubts)
+    export = known_export(header)
+    remarks = (export.told,) if export is not None and export.names else ()
+    return Reading(ColumnMapping((*known.entries, *sure), guess.unmapped), sure, doubts, remarks=remarks)
 
 
 def needed(actuator: Actuator, *, is_map: bool = False) -> Needs:
     """The groups of signals of each of which the actuator's model needs one; names inside."""
     if is_map:
-        return (("motor_position_rad",), ("current_A", "motor_torque_Nm"))
+        return (_POSITIONS, ("current_A", "motor_torque_Nm"))
     if actuator.controller.kind == "unknown":
-        return (("time_s",), ("motor_position_rad",), ("current_A", "motor_torque_Nm"))
+        return (("time_s",), _POSITIONS, ("current_A", "motor_torque_Nm"))
     if actuator.controller.kind == "open":
         return (*INPUT_ALONE, _MOTION)
     return (*COMMAND_ALONE, ("current_A", *_MOTION))
@@ -490,7 +556,7 @@ def _side_file(path: str, actuator: Actuator, side: SideFile | None, max_bytes: 
     return replace(side, kind="map") if is_map and not side.path else side
 
 
-def _usual(actuator: Actuator, columns: Collection[str]) -> ColumnMapping:
+def _usual(actuator: Actuator, columns: Sequence[str]) -> ColumnMapping:
     """The part of the actuator's mapping that these columns are in."""
     usual = parse_mapping(actuator.mapping, columns)
     return ColumnMapping(tuple(entry for entry in usual.entries if entry.column in columns))
@@ -500,7 +566,15 @@ def _there(actuator: Actuator, mapping: ColumnMapping, header: Collection[str]) 
     """The signals, by their names inside, that a file so mapped has or can be given."""
     names = {entry.signal for entry in mapping.entries} | {name for name in header if name in SIGNALS}
     inside = set(actuator.axes.inside(dict.fromkeys(names)))
-    return inside | ({"current_A"} if inside.issuperset(_MAKES_CURRENT) else set())
+    has_current = inside.issuperset(_made_into_current(inside))
+    return inside | ({"current_A"} if has_current else set())
+
+
+def _made_into_current(known: Collection[str]) -> list[str]:
+    """The signals that a current is made of: two phases of those that there are, or three, and a position."""
+    phases = [name for name in PHASES if name in known]
+    position = next((name for name in _POSITIONS if name in known), _POSITIONS[0])
+    return [*(phases if len(phases) > 1 else PHASES), position]
 
 
 def _ask(path: str, actuator: Actuator, reading: Reading, header: Sequence[str], needs: Needs) -> None:
@@ -508,14 +582,17 @@ def _ask(path: str, actuator: Actuator, reading: Reading, header: Sequence[str],
     if not reading.is_guess:
         return  # what is missing is told by what needs it
     there = _there(actuator, reading.mapping, header)
+    of_person = ColumnMapping(tuple(entry for entry in reading.mapping.entries if entry not in reading.guessed))
+    stated = _there(actuator, of_person, ())
     doubts = {}
     for entry, why in reading.doubts:
         if not entry.unit:  # it may as well be of the kind that the actuator's axes have
             entry = replace(entry, signal=actuator.axes.signal(entry.signal))
         doubts |= {inside: (entry, why) for inside in actuator.axes.inside({entry.signal: 0})}
+    nobody = "#N" if header and header[0] == by_number(0) else "COLUMN"
     questions, options, absent = [], [], []
-    for name in dict.fromkeys(name for group in needs for name in _to_be_said(group, there, doubts)):
-        entry, why = doubts.get(name) or (MappedColumn(actuator.axes.signal(name), "COLUMN"), "")
+    for name in dict.fromkeys(name for group in needs for name in _to_be_said(group, there, doubts, stated)):
+        entry, why = doubts.get(name) or (MappedColumn(actuator.axes.signal(name), nobody), "")
         if not why:
             absent.append(name)
         doubtful = f"{shown(entry.column)!r} may be {entry.signal}, but {why}"
@@ -530,13 +607,22 @@ def _ask(path: str, actuator: Actuator, reading: Reading, header: Sequence[str],
         found = f"say which column it is: {' '.join(options)} (the file has {listed(without_unit(header))})"
         is_of_model = "command_rad" in absent and needs != COMMAND_ALONE and not there.isdisjoint(INPUT_ALONE[1])
         hint = f"; {WITHOUT_COMMAND}" if is_of_model else ""
+        hint += "; a file without a time is read with --rate HZ" if "time_s" in absent else ""
+        if export := known_export(header):
+            hint += f"; {export.told}"
         raise refusal(path, f"{'; '.join(questions)}; {found}{hint}")
 
 
-def _to_be_said(group: Sequence[str], there: Collection[str], doubts: Collection[str]) -> list[str]:
-    """What a person must say for a group: nothing where the first signal of it that there is, is sure."""
+def _to_be_said(
+    group: Sequence[str], there: Collection[str], doubts: Collection[str], stated: AbstractSet[str]
+) -> list[str]:
+    """What a person must say for a group: nothing where the first signal of it that there is, is sure or stated."""
+    if not stated.isdisjoint(group):
+        return []
     for signal in group:
-        parts = [signal] if signal in there or signal in doubts or signal != "current_A" else _MAKES_CURRENT
+        parts = [signal]
+        if signal == "current_A" and signal not in there and signal not in doubts:
+            parts = _made_into_current({*there, *doubts})
         if all(part in there or part in doubts for part in parts):
             return [part for part in parts if part not in there]
     return [group[0]]

@@ -23,7 +23,7 @@ Kind = Literal["run", "map"]
 Sampling = Literal["mean", "instantaneous"]
 
 OF_A_FOLDER = "recordings.toml"
-_KEYS = ("schema", "actuator", "kind", "sampling", "segments", "window", "text", "mapping", "sensors")
+_KEYS = ("schema", "actuator", "kind", "sampling", "segments", "window", "rate_Hz", "text", "mapping", "sensors")
 _LARGEST = 2**53  # up to which whole numbers are exact as floats
 _COLUMN_KEYS = ("column", "unit", *NUMBERS)
 
@@ -53,7 +53,7 @@ class SideFile:
     sensors: dict[str, float] = field(default_factory=dict)  # of SENSOR_KEYS
     window_s: tuple[float, float] | None = None
     segments: tuple[int, ...] | None = None  # those to use
-    text: Hints = field(default_factory=Hints)  # how a text is laid out, where another layout is found by itself
+    text: Hints = field(default_factory=Hints)  # how the file is laid out, where another layout is found by itself
     path: str | None = None
 
     @property
@@ -145,7 +145,7 @@ def _parsed(path: str, document: dict[str, Any]) -> SideFile:
         accuracy,
         _window(path, document),
         _segments(path, document),
-        _text(path, _table(path, document, "text")),
+        replace(_text(path, _table(path, document, "text")), rate_Hz=_rate(path, document)),
         path,
     )
 
@@ -207,6 +207,14 @@ def _segments(path: str, document: dict[str, Any]) -> tuple[int, ...] | None:
     ):
         raise refusal(path, f"segments must be a list of whole numbers, e.g. [0, 1, 4], not {shown(given)}")
     return tuple(given)
+
+
+def _rate(path: str, document: dict[str, Any]) -> float | None:
+    given = document.get("rate_Hz")
+    rate = None if given is None else _number(path, "rate_Hz", given, least=0.0)
+    if rate == 0.0:
+        raise refusal(path, "rate_Hz must be a number above 0")
+    return rate
 
 
 def _text(path: str, table: dict[str, Any]) -> Hints:
@@ -300,7 +308,7 @@ def _over(text: str, side: SideFile, known: SideFile) -> str:
     }
     document = {
         **_given(schema=1, kind=side.kind, actuator=side.actuator, sampling=side.sampling),
-        **_given(segments=None if side.segments is None else list(side.segments)),
+        **_given(segments=None if side.segments is None else list(side.segments), rate_Hz=side.text.rate_Hz),
         **{name: table for name, table in tables.items() if table},
     }
     return toml_text(document, text)

@@ -121,7 +121,7 @@ def _column(arguments: argparse.Namespace, files: list[str]) -> str:
         raise InputError("--by names a column, and --unit patterns: give one of them")
     if arguments.unit:
         return ""
-    hints = Hints(arguments.header_line, arguments.encoding)
+    hints = Hints(arguments.header_line, arguments.encoding, arguments.rate)
     columns = read_header(files[0], FILE_BYTES, hints)
     if arguments.by in columns:
         if arguments.runs:

@@ -111,12 +111,12 @@ def read_one(
     progress: Progress | None = None,
     needs: Needs | None = None,
 ) -> Measurement:
-    """A recording as --map, --header-line, --encoding and --runs say; needs: of its signals, all by default."""
+    """A recording as --map, --header-line, --encoding, --rate and --runs say; needs: of its signals, all by default."""
     runs = getattr(arguments, "runs", None)
     if not runs and not any(text.partition("=")[0].strip() == "segment" for text in arguments.mapping):
         runs = column_of_runs(file)
     by_run = [f"segment={runs}"] if runs and runs != "segment" else []
-    hints = Hints(arguments.header_line, arguments.encoding)
+    hints = Hints(arguments.header_line, arguments.encoding, arguments.rate)
     measurement = read(file, actuator, [*arguments.mapping, *by_run], needs=needs, hints=hints)
     if told := measurement.reading.told:
         say(f"{Path(file).name}: {told}", progress)

@@ -145,14 +145,15 @@ def add_faults(parser: argparse.ArgumentParser) -> None:
 
 
 def add_mapping(parser: argparse.ArgumentParser) -> None:
-    """--map, repeated; --header-line and --encoding"""
+    """--map, repeated; --header-line, --encoding and --rate"""
     parser.add_argument(
         "--map",
         action="append",
         default=[],
         dest="mapping",
         metavar="signal=column",
-        help="a column's meaning, with its unit where it is not SI: motor_speed_rad_s=speed[rpm]; repeat for more",
+        help="a column's meaning, with its unit where it is not SI: motor_speed_rad_s=speed[rpm]; #7 is the seventh "
+        "column; repeat for more",
     )
     parser.add_argument(
         "--header-line",
@@ -163,6 +164,7 @@ def add_mapping(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--encoding", type=_encoding, metavar="NAME", help="of a text: utf-8, cp1252, utf-16, … where another is found"
     )
+    parser.add_argument("--rate", type=SAMPLE_RATE, metavar="HZ", help="samples a second, of a file without a time")
 
 
 def _encoding(text: str) -> str:

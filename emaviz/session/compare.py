@@ -305,15 +305,17 @@ class Comparing:
         if opened is None or hints == opened.hints:
             return
         try:
-            # Another header makes other columns, of which the mapping says nothing.
-            side = side_with(opened, self.folder, text=hints, mapping=None)
+            # Another header makes other columns, of which the mapping says nothing; another rate makes none.
+            of_text = replace(hints, rate_Hz=None) != replace(opened.hints, rate_Hz=None)
+            more = {"mapping": None} if of_text else {}
+            side = side_with(opened, self.folder, text=hints, **more)
             found = read_opened(name, opened.path, self.actuator, side)
             if found.problem:
                 raise refusal(name, found.problem)
         except InputError:
             self.events.refused()
             raise
-        self._remember(found, side, text=hints, mapping=None)
+        self._remember(found, side, text=hints, **more)
 
     def _remember(self, found: Opened, side: SideFile, **said: Any) -> None:
         """Puts what was said into the side file, and tells; where it cannot be written, it holds all the same."""

@@ -216,6 +216,25 @@ def test_a_side_file_of_another_layout_is_corrected(comparing, heard, recording)
     assert heard.wait(heard.opened, 2).measurement is not None
 
 
+def test_columns_without_names_and_without_a_time_are_said_on_the_page(comparing, heard, recording):
+    table = np.column_stack([np.rad2deg(recording["command_rad"]), recording["current_A"]])
+    np.savetxt(comparing.folder.uploads / "bare.txt", table)
+    comparing.add("uploads/bare.txt")
+    opened = heard.wait(heard.opened)
+    assert list(opened.columns) == ["#1", "#2"] and "columns by number" in opened.head.told
+    comparing.use_layout(opened.name, Hints(rate_Hz=1000.0))
+    assert heard.wait(heard.opened, 2).hints.rate_Hz == 1000.0
+    mapping = ColumnMapping((MappedColumn("command_rad", "#1", "deg"), MappedColumn("current_A", "#2")))
+    comparing.use_mapping(opened.name, mapping)
+    found = heard.wait(heard.opened, 3).measurement
+    np.testing.assert_allclose(np.diff(found.time_s), 1e-3)
+    np.testing.assert_allclose(found["current_A"], recording["current_A"])
+    comparing.use_layout(opened.name, Hints(rate_Hz=500.0))
+    again = heard.wait(heard.opened, 4).measurement
+    np.testing.assert_allclose(np.diff(again.time_s), 2e-3)
+    np.testing.assert_allclose(again["current_A"], recording["current_A"])
+
+
 def test_a_text_without_a_table_is_there_to_look_at(comparing, heard):
     (comparing.folder.uploads / "note.csv").write_text("What was measured\non Monday\n")
     comparing.add("uploads/note.csv")

@@ -14,8 +14,10 @@ from ema_model.actuator import load_actuator
 from ema_model.comparison import as_dict, compare, regions
 from ema_model.comparison.regions import worst_regions
 from ema_model.comparison.residuals import Residuals
+from ema_model.discovery.observed.transmission import transmission_seen
 from ema_model.errors import InputError
-from ema_model.recordings import SIGNALS, Measurement
+from ema_model.recordings import SIGNALS, Measurement, read
+from ema_model.recordings.read import prepared
 
 COGGING = {"cogging_torque": {"amplitude_Nm": 0.012}}
 
@@ -214,3 +216,60 @@ def test_linear_axis_speaks_of_newtons_and_metres(tmp_path):
     assert found.explained_by[0].variable == "user_position" and not found.orders
     assert any(re.search(r" N more force .* m?m than", sentence) for sentence in found.sentences), found.sentences
     assert as_dict(found)["calibration"]["parameters"]["motor.mass_kg"]["unit"] == "kg"
+
+
+OUTPUT = """
+name = "output side"
+{axes}
+[controller]
+kind = "unknown"
+[motor]
+torque_constant_Nm_A = 0.05
+inertia_kgm2 = {{ value = 1e-4, tolerance = 0.3 }}
+viscous_friction_Nms_rad = {{ value = 2e-5, sigma = 2e-5 }}
+static_friction_Nm = 0.0
+dynamic_friction_Nm = {{ value = 0.01, sigma = 0.01 }}
+{transmission}
+"""
+SCREW = '[axes]\nuser = "linear"', "[transmission]\ngear_ratio = 1.5915494309189535e-3"
+GEAR = "", "[transmission]\ngear_ratio = 0.02"
+
+
+@pytest.mark.parametrize(
+    ("actuator", "ratio", "columns", "told"),
+    [
+        (SCREW, 0.01 / (2.0 * np.pi), ("travel [mm]", "rod speed [mm/s]"), "by the screw's lead of 10 mm a turn"),
+        (GEAR, 0.02, ("joint angle [deg]", "joint speed [deg/s]"), "by the gear 1:50"),
+    ],
+    ids=["screw", "gear"],
+)
+def test_the_output_alone_shows_the_motor(actuator, ratio, columns, told, tmp_path):
+    """What was recorded behind a gear of known ratio, from the equation of motion alone, gives inertia and friction."""
+    (tmp_path / "output.toml").write_text(OUTPUT.format(axes=actuator[0], transmission=actuator[1]), encoding="utf-8")
+    time = np.arange(0.0, 6.0, 1e-3)
+    angle, speed, acceleration = np.zeros((3, time.size))
+    for size, rate in ((40.0, 0.3), (6.0, 1.7), (1.5, 4.0)):
+        w = 2.0 * np.pi * rate
+        angle += size * np.sin(w * time)
+        speed += size * w * np.cos(w * time)
+        acceleration -= size * w * w * np.sin(w * time)
+    torque = 1.2e-4 * acceleration + 3e-5 * speed + 0.014 * np.sign(speed)
+    noise = np.random.default_rng(4).standard_normal((2, time.size))
+    user = ratio * (angle + 1e-4 * noise[0])
+    scale = 1e3 if "mm" in columns[0] else 180.0 / np.pi
+    table = np.column_stack([time, scale * user, scale * ratio * speed, torque / 0.05 + 0.01 * noise[1]])
+    header = ",".join(["time_s", *columns, "iq [A]"])
+    np.savetxt(tmp_path / "a.csv", table, delimiter=",", header=header, comments="", fmt="%.9g")
+    loaded = load_actuator(tmp_path / "output.toml")
+    mapping = [f"{loaded.axes.signal('user_position_rad')}={columns[0]}"]
+    recording = read(tmp_path / "a.csv", loaded, mapping)
+    np.testing.assert_allclose(recording["motor_position_rad"], angle, atol=1e-3)
+    np.testing.assert_allclose(recording["motor_speed_rad_s"], speed, atol=1e-3)
+    user_name = loaded.axes.signal("user_position_rad")
+    assert f"motor_position_rad is made of {user_name} {told}" in recording.reading.remarks
+    found = compare([recording], loaded).calibration.actuator
+    assert found.motor.inertia_kgm2 == pytest.approx(1.2e-4, rel=0.02)
+    assert found.motor.dynamic_friction_Nm == pytest.approx(0.014, rel=0.03)
+    assert found.motor.viscous_friction_Nms_rad == pytest.approx(3e-5, rel=0.1)
+    alone = {"time_s": time, user_name: ratio * angle, "current_A": torque / 0.05}
+    assert transmission_seen([prepared(Measurement(alone), loaded)], loaded) is None  # it would show itself

@@ -52,7 +52,10 @@ def test_npz_of_vectors(save, tmp_path):
          motor_position_rad=COLUMNS["motor_position_rad"], table=np.zeros((N, 2)))  # fmt: skip
     measurement = read_measurement(path)
     assert_same(measurement)
-    assert measurement.notes == ("left aside, as they are no columns of numbers: gain, label, table",)
+    assert measurement.notes == (
+        "left aside, as they are no columns of numbers: gain, label",
+        "left aside, as their names are not known: table_1, table_2",
+    )
 
 
 @pytest.mark.parametrize("dtype", ["f2", "f4", ">f8", "<f8", "f16", "i1", "u2", ">i4", "u8", "?"])
@@ -86,7 +89,7 @@ def test_mat_of_vectors(packed, oned_as, tmp_path):
     assert measurement.notes == (
         "single numbers in the file: gain = 3, cells{1} = 1",
         "left aside, as they are no columns of numbers: label, cells{2}",
-        "left aside, as their names are not known: table(:,1), table(:,2)",
+        "left aside, as their names are not known: table_1, table_2",
     )
 
 
@@ -96,14 +99,89 @@ def test_mat_matrices_structs_in_a_row_and_cells(tmp_path):
     savemat(tmp_path / "a.mat", {"data": table, "log": two, "cells": np.array([k, "x", table], object), "kp": 7.0})
     columns = read_columns(tmp_path / "a.mat")
     assert list(columns) == [
-        *("data(:,1)", "data(:,2)", "data(:,3)", "log(1).speed", "log(1).angle", "log(2).speed", "log(2).angle"),
-        *("cells{1}", "cells{3}(:,1)", "cells{3}(:,2)", "cells{3}(:,3)"),
+        *("data_1", "data_2", "data_3", "log(1).speed", "log(1).angle", "log(2).speed", "log(2).angle"),
+        *("cells{1}", "cells{3}_1", "cells{3}_2", "cells{3}_3"),
     ]
-    np.testing.assert_array_equal(columns["data(:,2)"], np.sin(k))
+    np.testing.assert_array_equal(columns["data_2"], np.sin(k))
     np.testing.assert_array_equal(columns["log(2).angle"], 4.0 * k)
-    mapped = read_measurement(tmp_path / "a.mat", ["time_s=data(:,1)", "current_A=data(:,3)[mA]"])
+    mapped = read_measurement(tmp_path / "a.mat", ["time_s=data(:,1)", "current_A=data_3[mA]"])
     np.testing.assert_allclose(mapped["current_A"], np.cos(k) / 1e3)
     assert "single numbers in the file: kp = 7" in mapped.notes
+
+
+AXES, SAMPLES = 7, 150
+TIME = np.arange(SAMPLES) / 500.0
+ANGLES = np.sin(np.linspace(0.0, 3.0, SAMPLES)[:, None] * np.arange(1, AXES + 1))  # (samples, axes)
+
+
+def _npz_of_a_robot(path, angles):
+    np.savez(path, time=TIME, q=angles, home=np.zeros(AXES), image=np.zeros((SAMPLES, 10_000), "u1"))
+
+
+def _mat_of_a_robot(path, angles):
+    savemat(path, {"time": TIME, "q": angles, "home": np.zeros(AXES), "image": np.zeros((SAMPLES, 10_000), "u1")})
+
+
+def _hdf5_of_a_robot(path, angles):
+    import h5py
+
+    with h5py.File(path, "w") as file:
+        file["robot/time"], file["robot/q"], file["robot/home"] = TIME, angles, np.zeros(AXES)
+        file["image"] = np.zeros((SAMPLES, 10_000), "u1")
+
+
+def _mat73_of_a_robot(path, angles):
+    import h5py
+
+    with h5py.File(path, "w", userblock_size=512) as file:
+        for name, values in {"time": TIME[:, None], "q": angles, "image": np.zeros((SAMPLES, 10_000), "u1")}.items():
+            file.create_dataset(name, data=values.T).attrs["MATLAB_class"] = np.bytes_("double")
+    with open(path, "r+b") as file:
+        file.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\0\2IM")
+
+
+def _json_of_a_robot(path, angles):
+    image = np.zeros((SAMPLES, 100)).tolist()
+    path.write_text(json.dumps({"log": {"time": TIME.tolist(), "q": angles.tolist()}, "image": image}))
+
+
+OF_A_ROBOT = {
+    ".npz": _npz_of_a_robot,
+    ".mat": _mat_of_a_robot,
+    ".h5": _hdf5_of_a_robot,
+    "73.mat": _mat73_of_a_robot,
+    ".json": _json_of_a_robot,
+}
+
+
+@pytest.mark.parametrize("turned", [False, True], ids=["a column a joint", "a row a joint"])
+@pytest.mark.parametrize("suffix", OF_A_ROBOT)
+def test_a_matrix_gives_a_column_for_each_joint(suffix, turned, tmp_path):
+    path = tmp_path / f"a{suffix}"
+    OF_A_ROBOT[suffix](path, ANGLES.T if turned else ANGLES)
+    assert {f"q_{i + 1}" for i in range(AXES)} <= set(read_columns(path))
+    for place, joint in {"q_7": 6, "q[:,6]": 6, "q[6]": 6, "q(:, 7)": 6, "q[:, 0]": 0, "q_3[deg]": 2}.items():
+        found = read_measurement(path, ["time_s=time", f"motor_position_rad={place}"])
+        scale = np.pi / 180 if "deg" in place else 1.0
+        np.testing.assert_allclose(found["motor_position_rad"], scale * ANGLES[:, joint], rtol=1e-14)
+        assert any("image" in note and "over 64 columns" in note for note in found.notes)
+    with pytest.raises(InputError, match=r"no column 'q\[:,7\]' for motor_position_rad"):
+        read_measurement(path, ["time_s=time", "motor_position_rad=q[:,7]"])
+
+
+def test_the_length_of_time_says_which_way_a_matrix_lies(tmp_path):
+    signals = np.arange(40.0)[:, None] * np.arange(60.0)  # (40, 60)
+    for samples, first, last in ((40, signals[:, 0], 60), (60, signals[0], 40)):
+        np.savez(tmp_path / "a.npz", t=np.arange(float(samples)), q=signals)
+        columns = read_columns(tmp_path / "a.npz")
+        assert list(columns) == ["t", *(f"q_{i + 1}" for i in range(last))]
+        np.testing.assert_array_equal(columns["q_1"], first)
+
+
+def test_a_matrix_of_too_many_columns_alone_is_refused(tmp_path):
+    np.savez(tmp_path / "a.npz", q=np.zeros((200, 10_000), "u1"))
+    with pytest.raises(InputError, match=r"a.npz: holds no rows of numbers \(q \(200×10000, over 64 columns\)\)"):
+        read_measurement(tmp_path / "a.npz", ["time_s=q[:,0]"])
 
 
 @pytest.mark.parametrize("packed", [False, True])

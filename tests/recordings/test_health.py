@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -17,6 +18,7 @@ from ema_model.recordings import (
     with_equivalent_current,
 )
 from ema_model.recordings.health.card import health
+from ema_model.recordings.read import prepared
 from ema_model.simulation.run import Run, Sensors, simulate_reference
 
 ACTUATOR = load_actuator()
@@ -281,3 +283,34 @@ def test_equivalent_current_from_the_phases():
     difference = again["current_A"] - recording["current_A"]
     assert np.sqrt(np.mean(difference**2)) < 0.05 * np.std(recording["current_A"])
     assert "made from the phase currents" in again.notes[-1]
+
+
+@pytest.mark.parametrize("missing", "abc")
+def test_the_third_phase_of_a_star_from_two(missing):
+    recording = reference("sine")
+    left_out = {"current_A", f"phase_{missing}_current_A"}
+    two = Measurement({name: values for name, values in recording.signals.items() if name not in left_out})
+    found = prepared(two, ACTUATOR)
+    assert found.reading.remarks[0].startswith(f"phase_{missing}_current_A is made of the other two phases' currents")
+    difference = found["current_A"] - recording["current_A"]
+    assert np.sqrt(np.mean(difference**2)) < 0.05 * np.std(recording["current_A"])
+    one = Measurement({name: two[name] for name in two if not name.startswith("phase_") or "c" in name[6]})
+    assert "current_A" not in prepared(one, ACTUATOR)
+
+
+def test_the_output_stands_for_the_motor_with_a_word_on_what_lies_between():
+    recording = reference("sine")
+    names = [name for name in recording if name.startswith(("time", "command", "user", "phase"))]
+    output = Measurement({name: recording[name] for name in names})
+    assert "current_A" in prepared(output, ACTUATOR)
+    for play, effects, named in ((1e-3, {}, "transmission.backlash_rad"), (0.0, {"torsional_compliance": {}}, "tors")):
+        actuator = replace(ACTUATOR, effects=effects, transmission=replace(ACTUATOR.transmission, backlash_rad=play))
+        warned = prepared(output, actuator).reading.remarks
+        assert any(f"the model has {named}" in one and "between motor and user" in one for one in warned), warned
+    # A loop has the user's position; of the motor's side it needs no more than the speed.
+    speeds = Measurement({"time_s": output.time_s, "user_position_rad": output["user_position_rad"],
+                          "user_speed_rad_s": np.gradient(output["user_position_rad"], output.time_s)})  # fmt: skip
+    rigid = replace(ACTUATOR, transmission=replace(ACTUATOR.transmission, backlash_rad=0.0))
+    found = prepared(speeds, rigid)
+    assert "motor_speed_rad_s" in found and "motor_position_rad" not in found
+    assert "motor_speed_rad_s" not in prepared(speeds, actuator)

@@ -72,7 +72,7 @@ HEADERS = {
     "time (sec),ref_position_rad,position_rad,velocity_rad_per_s,torque_Nm,enable": "time_s command_rad "
     "user_position_rad motor_speed_rad_s motor_torque_Nm drive_enabled",
     "Time_ns,joint_position_deg,joint_velocity_deg_s,motor_current_A,supply_voltage_V": "time_s:ns "
-    "user_position_rad:deg motor_speed_rad_s:deg/s current_A bus_voltage_V",
+    "user_position_rad:deg user_speed_rad_s:deg/s current_A bus_voltage_V",
     "time_s,trial,angle_deg,torque_mNm,T_winding_C": "time_s segment motor_position_rad:deg motor_torque_Nm:mNm "
     "temperature_C",
     "timestamp [us],shaft encoder [ticks],bus current [A],q current [A],dc link voltage [V]": "time_s:us "
@@ -149,6 +149,11 @@ UNSURE = {  # header: why, by signal; the others are sure
         "user_position_rad": "'pos_2 [deg]' may be it as well",
         "motor_position_rad": "'pos 2' is a position",
     },
+    "t [s],q_rad_1,q_rad_2,tau_Nm_1": {"motor_position_rad": "'q_rad_2' may be it", "user_position_rad": "a position"},
+    "t [s],pos [deg],ia [A],ib [A]": {
+        "phase_a_current_A": "one of two columns, phase A",
+        "phase_b_current_A": "one of two columns, phase B",
+    },
     "t [s],cmd [deg],output angle [deg],encoder [deg],board temp [degC],coil temp [degC]": {
         "temperature_C": "'coil temp [degC]' may be it as well"
     },
@@ -211,7 +216,17 @@ ONE_IN_SI = {
         "arcmin": pi / 10800,
         "counts/4096": pi / 2048,
     },
-    "rad/s": {"rpm": pi / 30, "1/min": pi / 30, "U/min": pi / 30, "deg/s": pi / 180, "rev/s": 2 * pi, "rad s^-1": 1.0},
+    "rad/s": {
+        "rpm": pi / 30,
+        "1/min": pi / 30,
+        "U/min": pi / 30,
+        "deg/s": pi / 180,
+        "rev/s": 2 * pi,
+        "rad s^-1": 1.0,
+        "counts/1456/s": pi / 728,
+        "cps/1456": pi / 728,
+        "ticks/819.2/s": pi / 409.6,
+    },
     "m": {"mm": 1e-3, "µm": 1e-6, "in": 0.0254},
     "m/s": {"mm/s": 1e-3, "m/min": 1 / 60},
     "A": {"mA": 1e-3, "A": 1.0},

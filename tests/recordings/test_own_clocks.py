@@ -69,6 +69,11 @@ def mat_73(folder):
     return path
 
 
+def npz_flat(folder):
+    np.savez(folder / "a.npz", **FLAT)
+    return folder / "a.npz"
+
+
 def json_columns(folder):
     (folder / "a.json").write_text(json.dumps({n: {k: v.tolist() for k, v in g.items()} for n, g in GROUPS.items()}))
     return folder / "a.json"
@@ -91,7 +96,9 @@ def tdms(folder):
     return folder / "a.tdms"
 
 
-@pytest.mark.parametrize("write", [h5_groups, h5_flat, mat_structs, mat_flat, mat_73, json_columns, json_records, tdms])
+@pytest.mark.parametrize(
+    "write", [h5_groups, h5_flat, mat_structs, mat_flat, mat_73, npz_flat, json_columns, json_records, tdms]
+)
 def test_each_channel_has_its_own_time(write, tmp_path):
     path = write(tmp_path)
     time, position, rate = sorted(read_header(str(path), 10**9), key=lambda name: ("speed" in name, "angle" in name))
@@ -108,6 +115,27 @@ def test_each_channel_has_its_own_time(write, tmp_path):
         assert {"single numbers in the file: kp = 3", "left aside, as they are no columns of numbers: who"} <= set(
             measurement.notes
         )
+
+
+PAIRS = {
+    "a time before each": {"t1": FAST, "v1": angle(FAST), "t2": SLOW, "v2": LATE},
+    "a time after each": {"v1": angle(FAST), "t1": FAST, "v2": LATE, "t2": SLOW},
+    "one time for two": {"t_1": FAST, "v1": angle(FAST), "t_2": SLOW, "v2": LATE, "temperature_2": 0.0 * SLOW},
+}
+
+
+@pytest.mark.parametrize("pairs", PAIRS)
+def test_pairs_of_time_and_value_in_a_text(pairs, tmp_path):
+    """Columns end where their signal ends."""
+    columns = PAIRS[pairs]
+    most = max(values.size for values in columns.values())
+    cells = [[f"{value:.7f}" for value in values] + [""] * (most - values.size) for values in columns.values()]
+    (tmp_path / "a.csv").write_text("\n".join([",".join(columns), *map(",".join, zip(*cells))]))
+    time = next(name for name in columns if name.startswith("t") and name.endswith("1"))
+    found = read_measurement(tmp_path / "a.csv", [f"time_s={time}", f"{POSITION}=v1", f"{SPEED}=v2"])
+    np.testing.assert_allclose(found[POSITION], angle(found.time_s), atol=1e-6)
+    np.testing.assert_allclose(found[SPEED], speed(found.time_s - DELAY), atol=0.01)
+    assert any("each with a time of its own" in note and "v2" in note for note in found.notes)
 
 
 def test_units_of_times_are_taken_out(tmp_path):

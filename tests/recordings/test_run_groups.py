@@ -10,6 +10,7 @@ from scipy.io import savemat
 from support.mat_structs import row_of_structs
 
 from ema_model.recordings import read_columns
+from ema_model.recordings.formats.text_layout import Hints
 from ema_model.recordings.read import read_header, read_measurement
 from ema_model.recordings.recording_set import runs_of
 
@@ -73,3 +74,39 @@ def test_groups_that_are_no_runs(groups, tmp_path):
     savemat(tmp_path / "a.mat", groups)
     columns = read_columns(tmp_path / "a.mat")
     assert "run" not in columns and len(columns) >= 4
+
+
+def test_a_list_of_runs_in_json(tmp_path):
+    """Each a record with a list for each signal, of its own length; samples may be lists of one or more numbers."""
+    random = np.random.default_rng(2)
+    lengths, runs = (150, 50, 75), []
+    for length, kind in zip(lengths, ("chirp", "step", "prbs")):
+        goal = random.standard_normal(length)
+        angle = (0.5 * goal)[:, None]
+        runs.append({"type": kind, "targets": [0.1, 0.2], "actions": goal.tolist(), "sensor_data": angle.tolist(),
+                     "currents": np.column_stack([goal, 2.0 * goal]).tolist(), "kp": 32.0})  # fmt: skip
+    document = {"dataset": "real", "config": {"action_hz": 50}, "data": runs}
+    (tmp_path / "a.json").write_text(json.dumps(document))
+    names = read_header(str(tmp_path / "a.json"), 10**8)
+    assert names == ["actions", "sensor_data", "currents_1", "currents_2", "run"]
+    mapping = ["command_rad=actions", "user_position_rad=sensor_data", "current_A=currents[:,1]", "segment=run"]
+    found = read_measurement(tmp_path / "a.json", mapping, hints=Hints(rate_Hz=50.0))
+    assert found.samples == sum(lengths) and [run.stop - run.start for run in found.runs] == list(lengths)
+    np.testing.assert_allclose(found["user_position_rad"], 0.5 * found["command_rad"])
+    np.testing.assert_allclose(found["current_A"], 2.0 * found["command_rad"])
+    np.testing.assert_allclose(np.diff(found.time_s), 0.02)
+    assert "a run a record, 3 in all: 1 is chirp, 2 is step, 3 is prbs" in found.notes
+    assert any("config.action_hz = 50" in note for note in found.notes)
+
+
+def test_a_single_run_in_a_list(tmp_path):
+    (tmp_path / "a.json").write_text(json.dumps({"data": [{"x": list(range(120)), "y": list(range(120))}]}))
+    assert list(read_columns(tmp_path / "a.json")) == ["x", "y", "run"]
+
+
+def test_samples_in_json_that_hold_lists_are_no_runs(tmp_path):
+    rows = [{"t": i / 100.0, "q": [float(i)] * 30, "dq": [2.0 * i] * 30} for i in range(120)]
+    (tmp_path / "a.json").write_text(json.dumps(rows))
+    found = read_measurement(tmp_path / "a.json", ["time_s=t", "motor_position_rad=q[:,29]", "motor_speed_rad_s=dq_1"])
+    np.testing.assert_allclose(found["motor_position_rad"], np.arange(120.0))
+    np.testing.assert_allclose(found["motor_speed_rad_s"], 2.0 * np.arange(120.0))

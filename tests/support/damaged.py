@@ -69,6 +69,8 @@ TWO_CLOCKS = {
     "drive": {"time_s": SLOW, "current_A": np.sin(SLOW)},
 }
 RUNS = {"trial_1": COLUMNS, "trial_2": {**COLUMNS, "time_s": COLUMNS["time_s"] + 1.0}}
+JOINTS = np.sin(k[:, None] * np.arange(1, 8))
+OF_A_ROBOT = {**COLUMNS, "q": JOINTS, "torque": JOINTS.T}
 Change = Callable[[bytes, random.Random], bytes]
 
 
@@ -82,6 +84,12 @@ def written(write: Callable[..., object], *args: object, **kw: object) -> bytes:
 def as_text(separator: str, decimal: str = ".") -> bytes:
     rows = (separator.join(f"{value:.6g}" for value in row) for row in zip(*COLUMNS.values()))
     return "\n".join([separator.join(COLUMNS), *(row.replace(".", decimal) for row in rows)]).encode()
+
+
+def as_labels() -> bytes:
+    """As Arduino's plotter takes it."""
+    rows = (",".join(f"{name}:{value:.6g}" for name, value in zip(COLUMNS, row)) for row in zip(*COLUMNS.values()))
+    return "\n".join(rows).encode()
 
 
 def as_parquet(**options: object) -> bytes:
@@ -122,19 +130,22 @@ def recording(folder: Path) -> bytes:
 
 
 def in_groups(reader: str, folder: Path) -> list[bytes]:
-    """The same with two clocks, and with a group for each run, in formats that know of neither."""
+    """The same with two clocks, a group for each run, and matrices, in formats that know of none of these."""
     path, found = folder / "in groups", []
-    for groups in (TWO_CLOCKS, RUNS):
+    for groups in (TWO_CLOCKS, RUNS, {"robot": OF_A_ROBOT}):
         parts = [(group, name, values) for group, columns in groups.items() for name, values in columns.items()]
         if reader == "json columns":
-            path.write_text(json.dumps(groups, default=np.ndarray.tolist))
+            document = {"data": [*groups.values()]} if "robot" in groups else groups
+            path.write_text(json.dumps(document, default=np.ndarray.tolist))
         elif reader == "hdf5":
             with h5py.File(path, "w") as file:
                 for group, name, values in parts:
                     file[f"{group}/{name}"] = values
-        elif reader == "tdms":
+        elif reader == "tdms" and "robot" not in groups:
             with nptdms.TdmsWriter(path) as file:
                 file.write_segment([nptdms.ChannelObject(*part) for part in parts])
+        elif reader == "tdms":
+            continue
         else:
             return []
         found.append(path.read_bytes())
@@ -163,16 +174,21 @@ def robot_dataset(folder: Path) -> bytes:
 def whole(reader: str, folder: Path) -> list[bytes]:
     """Some files that the reader takes."""
     if reader == "csv":
-        return [as_text(","), as_text(";", ","), b"\xef\xbb\xbf" + as_text("\t")]
+        return [as_text(","), as_text(";", ","), b"\xef\xbb\xbf" + as_text("\t"), as_text(" "), as_labels()]
     if reader == "parquet":
         plain = as_parquet(compression="none", use_dictionary=False)
         return [as_parquet(), plain, as_parquet(data_page_size=64)]
     if reader == "npz":
         table = written(np.savez, table=np.asarray(TABLE), label="x")
-        return [written(np.savez, **COLUMNS), written(np.savez_compressed, **COLUMNS), table]
+        return [
+            written(np.savez, **COLUMNS),
+            written(np.savez_compressed, **COLUMNS),
+            table,
+            written(np.savez, **OF_A_ROBOT),
+        ]
     if reader in ("mat", "packed mat"):
         rig = {"rig": {**COLUMNS, "label": "x", "inner": {"x": k}}, "cells": np.array([k, "a"], object)}
-        kinds = (COLUMNS, rig, TWO_CLOCKS, RUNS)
+        kinds = (COLUMNS, rig, TWO_CLOCKS, RUNS, OF_A_ROBOT)
         found = [written(savemat, arrays, do_compression=reader == "packed mat") for arrays in kinds]
         return found if reader == "packed mat" else [*found, dspace(folder)]
     if reader in ("robot dataset", "servo log"):

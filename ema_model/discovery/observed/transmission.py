@@ -122,7 +122,8 @@ def _strongest(position: Array, left: Array, actuator: Actuator) -> Order | None
 
 
 def _has_both(one: Measurement) -> bool:
-    return not one.is_map and "motor_position_rad" in one and "user_position_rad" in one
+    has_both = "motor_position_rad" in one and "user_position_rad" in one
+    return has_both and not one.is_map and "motor_position_rad" not in one.reading.made
 
 
 def _left(one: Measurement, run: slice, actuator: Actuator) -> tuple[Array, ...] | None:

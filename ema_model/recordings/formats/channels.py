@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from typing import Any
@@ -15,9 +15,10 @@ from ema_model.errors import InputError
 from ema_model.files.limits import COLUMNS
 from ema_model.files.opened import shown
 from ema_model.quantities.units import dimensions_of
+from ema_model.recordings.column_names import is_time
 
 Array = NDArray[np.float64]
-MOST_COLUMNS = 64  # of a table without names: beyond, it is an image, or the table lies on its side
+MOST_COLUMNS = 64  # of a matrix: beyond, it is an image
 _LONGEST_UNIT = 24
 _SAYS_NOTHING = ("data", "value", "values")  # of a name: what a group or a topic holds, not what it is
 
@@ -91,25 +92,79 @@ def with_unit(name: str, unit: str) -> str:
     return f"{name} [{unit}]" if is_known and not name.endswith("]") and unit not in ("1", "-") else name
 
 
-def table(
-    path: tuple[str, ...],
-    rows: int,
-    count: int,
-    column: Callable[[int], NDArray[Any]],
-    names: Sequence[str] = (),
-    units: Sequence[str] = (),
-) -> list[Channel]:
-    """The columns of a matrix (rows, count), under their names where they have some, else as MATLAB writes them."""
-    if len(names) != count or len(set(names)) != count or not all(names):
-        names = [f"{path[-1]}(:,{i + 1})" for i in range(count)]
-        path = path[:-1]
-    units = units if len(units) == count else [""] * count
-    return [Channel((*path, name), rows, lambda i=i: column(i), units[i]) for i, name in enumerate(names)]
+@dataclass(frozen=True)
+class Matrix:
+    """Numbers in rows and columns, of which one way is time; sizes of one are left out of the shape."""
+
+    path: tuple[str, ...]
+    shape: tuple[int, int]
+    values: Callable[[], NDArray[Any]]  # (rows, columns)
+    names: Sequence[str] = ()  # of its signals, where they have some
+    units: Sequence[str] = ()
 
 
-def is_table(shape: Sequence[int]) -> bool:
-    """Whether a matrix has columns to offer: few and long."""
-    return len(shape) == 2 and 1 < shape[1] <= MOST_COLUMNS and shape[0] > shape[1]
+def in_columns(found: Sequence[Channel | Matrix]) -> tuple[list[Channel], list[str]]:
+    """The channels, each matrix as those that it holds, and the names and sizes of matrices that hold none."""
+    lengths = times_of((one.path[-1], one.samples) for one in found if isinstance(one, Channel))
+    channels: list[Channel] = []
+    aside = []
+    for one in found:
+        if isinstance(one, Channel):
+            channels.append(one)
+        elif (way := way_of_time(one.shape, lengths, len(one.names))) is None:
+            aside.append(without_columns(".".join(one.path), one.shape))
+        else:
+            channels += _columns(one, way)
+    return channels, aside
+
+
+def _columns(matrix: Matrix, way: int) -> list[Channel]:
+    samples, count = matrix.shape[way], matrix.shape[1 - way]
+    *group, name = matrix.path
+    names = column_names_of(name, count)
+    if len(matrix.names) == count == len(set(matrix.names)) and all(matrix.names):
+        group, names = [*group, name], matrix.names
+    units = matrix.units if len(matrix.units) == count else [""] * count
+    whole: list[NDArray[Any]] = []
+
+    def column(i: int) -> NDArray[Any]:
+        if not whole:  # read at once: what is stored row by row has a column in every part
+            whole.append(matrix.values())
+        return whole[0][:, i] if way == 0 else whole[0][i]
+
+    return [Channel((*group, name), samples, lambda i=i: column(i), units[i]) for i, name in enumerate(names)]
+
+
+def column_names_of(matrix: str, count: int) -> list[str]:
+    """What the columns of a matrix are called: q_1, q_2, …"""
+    return [f"{matrix}_{i + 1}" for i in range(count)]
+
+
+def times_of(vectors: Iterable[tuple[str, int]]) -> set[int]:
+    """The lengths that time has in a file, by the names and lengths of its vectors; without one, the longest length."""
+    vectors = list(vectors)
+    times = {size for name, size in vectors if is_time(name)}
+    return times or {max((size for _, size in vectors), default=0)}
+
+
+def way_of_time(shape: Sequence[int], times: Collection[int], signals: int = 0) -> int | None:
+    """Along which of its two sizes a matrix has its samples: that of a time, else the long one; None for an image.
+
+    signals: how many there are, where that is known.
+    """
+    if len(shape) != 2:
+        return None
+    fitting = [way for way in (0, 1) if 1 < shape[1 - way] <= MOST_COLUMNS and shape[way] > 1]
+    of_time = [way for way in fitting if shape[way] in times]
+    of_names = [way for way in fitting if signals > 1 and shape[1 - way] == signals]
+    long = [way for way in fitting if shape[way] > shape[1 - way]]
+    return next((way for way in (*of_time, *of_names, *long)), None)
+
+
+def without_columns(name: str, shape: Sequence[int]) -> str:
+    """How a message calls numbers that give no columns: with their sizes."""
+    over = f", over {MOST_COLUMNS} columns" if len(shape) == 2 and min(shape) > MOST_COLUMNS else ""
+    return f"{name} ({'×'.join(map(str, shape))}{over})"
 
 
 def told(parameters: dict[str, float]) -> str:

@@ -21,10 +21,11 @@ from ema_model.files.limits import LINE_BYTES, megabytes
 from ema_model.files.opened import listed, refusal, shown
 from ema_model.quantities.signals import SIGNALS
 from ema_model.quantities.units import find_unit
-from ema_model.recordings.column_names import QUANTITIES, readings
+from ema_model.recordings.column_names import is_time, readings
 from ema_model.recordings.formats.channels import with_unit
 from ema_model.recordings.formats.clocks import Clocks, between, covered, is_state, main_clock, rule
 from ema_model.recordings.formats.format import Array, Columns, Format, check_size
+from ema_model.recordings.formats.own_clocks import beside_time, tokens
 from ema_model.recordings.formats.stamps import is_stamp, seconds
 from ema_model.recordings.formats.text_layout import (
     SEPARATORS,
@@ -74,6 +75,44 @@ class Utf8(io.RawIOBase):
         """Closes the file."""
         self._file.close()
         super().close()
+
+
+class Aligned(io.RawIOBase):
+    """A text with one blank where several part two columns, and without labels before its numbers."""
+
+    def __init__(self, text: Utf8, layout: Layout) -> None:
+        super().__init__()
+        self._text = text
+        self._separator, self._is_labelled = layout.separator.encode(), layout.is_labelled
+        self._rest, self._left = b"", b""
+
+    def readable(self) -> bool:
+        """It is."""
+        return True
+
+    def read(self, size: int | None = -1) -> bytes:
+        """So many bytes, fewer at the end."""
+        whole = size is None or size < 0
+        while whole or len(self._left) < (size or 0):
+            piece = self._text.read(1 << 16)
+            block = self._rest + piece
+            end = block.rfind(b"\n") + 1 if piece else len(block)
+            self._rest = block[end:]
+            self._left += b"".join(self._plain(line) + b"\n" for line in block[:end].splitlines())
+            if not piece:
+                break
+            if len(self._rest) > LINE_BYTES:
+                raise pa.ArrowInvalid("a line is too long")
+        given, self._left = (self._left, b"") if whole else (self._left[:size], self._left[size:])
+        return given
+
+    def _plain(self, line: bytes) -> bytes:
+        if self._separator == b" ":
+            line = b" ".join(line.split())
+        if not self._is_labelled:
+            return line
+        cells = line.strip(self._separator + b" \t").split(self._separator)
+        return self._separator.join(cell.rpartition(b":")[2].strip() for cell in cells)
 
 
 # --- cells of a text understood one by one: what is no number, headers that come again, and text at the end -----------
@@ -258,26 +297,25 @@ def _check_text(table: TextTable, max_bytes: int) -> None:
 
 # --- texts in which each channel has a column of its own time, as loggers with a buffer for each export them ----------
 
-_TIME = QUANTITIES["time"]
-
-
-def is_time(name: str) -> bool:
-    """Whether a column's name says that it is time."""
-    return any(not _TIME.isdisjoint(one.words) for one in readings(name))
-
 
 def own_clocks(names: Sequence[str]) -> dict[int, int]:
-    """Where columns of time stand before as many others each: those others' own times."""
+    """By column, that of its own time: times before as many others each, or named after them, t_speed and speed."""
     times = [i for i, name in enumerate(names) if is_time(name)]
-    if len(times) < 2 or times[0] != 0:
+    units = {one.unit for i in times for one in readings(names[i])[:1]}
+    if len(times) < 2 or len(units) != 1:
         return {}
     ends = [*times[1:], max(i for i, name in enumerate(names) if name) + 1]
-    if len({end - start for start, end in zip(times, ends)}) != 1 or ends[0] < 2:
-        return {}
-    units = {one.unit for i in times for one in readings(names[i])[:1]}
-    if len(units) != 1:
-        return {}
-    return {i: start for start, end in zip(times, ends) for i in range(start, end)}
+    if times[0] == 0 and len({end - start for start, end in zip(times, ends)}) == 1 and ends[0] > 1:
+        return {i: start for start, end in zip(times, ends) for i in range(start, end)}
+    after = {i: beside_time(names[i]) for i in times}
+    clocks = {i: i for i in times}
+    for i, name in enumerate(names):
+        if name and i not in after:
+            found = [time for time, rest in after.items() if rest and rest <= tokens(name)]
+            if len(found) != 1:
+                return {}
+            clocks[i] = found[0]
+    return clocks if all(after.values()) else {}
 
 
 def since_one_moment(
@@ -362,8 +400,8 @@ class TextTable:
     def is_plain(self) -> bool:
         """Whether there is nothing in the layout's first lines but a header and plain numbers below."""
         one = self.layout
-        usual = one.encoding == "utf-8" and not one.thousands and not one.units_line and one.separator != "|"
-        return usual and not self.stamps and not self.clocks and tuple(self.names) == one.cells
+        usual = one.encoding == "utf-8" and not one.thousands and not one.units_line and one.separator not in "| "
+        return usual and one.header_line > 0 and not self.stamps and not self.clocks and tuple(self.names) == one.cells
 
 
 def table_of(path: str, layout: Layout, hint: str | None = None) -> TextTable:
@@ -399,7 +437,7 @@ def parsed(
     wanted = [f"{i}" for i in places]
     with Utf8(table.path, table.layout) as text:
         return csv.read_csv(
-            text,
+            Aligned(text, table.layout) if table.layout.separator == " " or table.layout.is_labelled else text,
             csv.ReadOptions(column_names=columns, skip_rows=table.skipped, use_threads=threads),
             options,
             csv.ConvertOptions(
@@ -580,7 +618,12 @@ def _dialect(path: str) -> _Dialect:
     names = [name.strip() for name in split(lines[first], separator)]
     if any(_NUMBER.fullmatch(name) for name in names):
         found = f"names of columns are expected, found {listed(names)}"
-        raise refusal(path, f"line {first + 1}: {found}; add a header line")
+        advice = "add a header line"
+        if len(names) == 1:  # odrive/ODrive, tools/odrive/utils.py: oscilloscope_dump
+            advice += (
+                "; of one number a line, as odrivetool's oscilloscope_dump writes, put several signals side by side"
+            )
+        raise refusal(path, f"line {first + 1}: {found}; {advice}")
     # The last line may be cut.
     cells = (cell for line in lines[first + 1 : -1] for cell in line.split(separator))
     comma = separator != "," and any(re.fullmatch(r"\s*[+-]?[0-9]*,[0-9]+(e[+-]?[0-9]+)?\s*", c, re.I) for c in cells)

@@ -1,4 +1,4 @@
-"""HDF5, and MATLAB's version 7.3 with it: each dataset of one dimension is a column, of two a table, in any group.
+"""HDF5, and MATLAB's version 7.3 with it: each dataset of one dimension is a column, of two several, in any group.
 
 The format lets a file name others, from which its library would read: external links, external storage and virtual
 datasets.  A file that does so is refused, since whoever wrote it would choose which files of this machine are read.
@@ -6,7 +6,7 @@ datasets.  A file that does so is refused, since whoever wrote it would choose w
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -15,7 +15,7 @@ import numpy as np
 from ema_model.errors import InputError
 from ema_model.files.limits import ARRAYS
 from ema_model.files.opened import listed, refusal, shown
-from ema_model.recordings.formats.channels import Channel, Log, NoLog, is_table, table
+from ema_model.recordings.formats.channels import Channel, Log, Matrix, NoLog, in_columns
 from ema_model.recordings.formats.logs import log_format
 
 _DEEPEST = 8
@@ -92,7 +92,7 @@ def _elsewhere(path: str, what: str, target: str) -> InputError:
 def _log(path: str, file: Any, most_bytes: int) -> Log:
     import h5py
 
-    channels: list[Channel] = []
+    channels: list[Channel | Matrix] = []
     parameters: dict[str, float] = {}
     aside: list[str] = []
     unresolved: list[str] = []
@@ -134,7 +134,8 @@ def _log(path: str, file: Any, most_bytes: int) -> Log:
         if isinstance(value, (int, float, np.number)) and np.isfinite(float(value)):
             parameters[name] = float(value)
     notes = (f"links that lead nowhere, or in a circle, are left out: {listed(unresolved)}",) if unresolved else ()
-    return Log(channels, parameters=parameters, notes=notes, left_aside=tuple(aside))
+    columns, images = in_columns(channels)
+    return Log(columns, parameters=parameters, notes=notes, left_aside=(*aside, *images))
 
 
 def _item(group: Any, name: str) -> Any:
@@ -155,8 +156,8 @@ def _reason(error: Exception) -> str:
     return str(error).split("(")[0].strip()
 
 
-def _channels(item: Any, path: tuple[str, ...], most_bytes: int) -> list[Channel] | float:
-    """A dataset's columns, or its single number; nothing for what holds neither."""
+def _channels(item: Any, path: tuple[str, ...], most_bytes: int) -> Sequence[Channel | Matrix] | float:
+    """A dataset's columns, matrix or single number; nothing for what holds none of these."""
     shape: tuple[int, ...] = tuple(item.shape or ())
     dtype = item.dtype
     matlab = _text(_attribute(item, _MATLAB))
@@ -172,20 +173,19 @@ def _channels(item: Any, path: tuple[str, ...], most_bytes: int) -> list[Channel
         return float(np.asarray(_read(item, most_bytes)).reshape(-1)[0])
     if sum(size != 1 for size in shape) == 1:
         return [Channel(path, item.size, lambda: _read(item, most_bytes).reshape(-1), unit)]
+    size = tuple(one for one in shape if one != 1)
+    if len(size) != 2:
+        return []
     turned = matlab != ""  # MATLAB stores column by column
-    if len(shape) == 2 and is_table(shape[::-1] if turned else shape):
-        names = next((text for name in _NAMES if (text := _texts(_attribute(item, name)))), [])
-        count, rows = shape if turned else shape[::-1]
-        whole: list[Any] = []
 
-        def column(i: int) -> Any:
-            if not whole:  # read at once, since a column alone lies in every chunk
-                whole.append(_read(item, most_bytes))
-            return whole[0][i] if turned else whole[0][:, i]
+    def values() -> Any:
+        whole = _read(item, most_bytes).reshape(size)
+        return whole.T if turned else whole
 
-        units = next((text for name in _UNIT if len(text := _texts(_attribute(item, name))) > 1), [unit] * count)
-        return table(path, rows, count, column, names, units)
-    return []
+    names = next((text for name in _NAMES if (text := _texts(_attribute(item, name)))), [])
+    count = len(names) if len(names) in size else min(size)
+    units = next((text for name in _UNIT if len(text := _texts(_attribute(item, name))) > 1), [unit] * count)
+    return [Matrix(path, size[::-1] if turned else size, values, names, units)]
 
 
 def _read(item: Any, most_bytes: int) -> Any:

@@ -1,8 +1,12 @@
-"""JSON logs: records, one a line or in a list, or columns as lists, at any depth; single numbers are parameters."""
+"""JSON logs: records, one a line or in a list, or columns as lists, at any depth; single numbers are parameters.
+
+A record may be a sample, or a run with a list for each signal: {"data": [{"type": "step", "actions": […], …}, …]}.
+"""
 
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
@@ -10,13 +14,19 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from ema_model.files.limits import ARRAYS
+from ema_model.files.limits import ARRAYS, RUNS
+from ema_model.files.opened import shown
+from ema_model.recordings.column_names import is_time
 from ema_model.recordings.formats import servo_log
-from ema_model.recordings.formats.channels import Channel, Log, NoLog, is_table, table
+from ema_model.recordings.formats.channels import Channel, Log, Matrix, NoLog, in_columns
 from ema_model.recordings.formats.logs import log_format
+from ema_model.recordings.formats.run_groups import RUN
 
 _DEEPEST = 8
 _FEWEST = 2  # numbers that make a column
+_SHORTEST_RUN = 20  # samples, by which a list of them is told from the parts of one
+_KINDS = ("type", "name", "kind", "id")  # keys under which a run says what it is
+_MOST_TOLD = 12
 _SPLIT = {"columns", "data"}  # pandas' "split": names, and rows of numbers
 
 
@@ -38,14 +48,21 @@ def opened(path: str, most_bytes: int) -> Iterator[Log]:
         title, document = servo_log.title(document), servo_log.with_units(document)
     found = _Found()
     found.walk(document, ())
-    yield Log(found.channels, parameters=found.parameters, left_aside=tuple(found.aside), title=title)
+    channels, aside = in_columns(found.channels)
+    yield Log(
+        channels,
+        parameters=found.parameters,
+        notes=tuple(found.notes),
+        left_aside=tuple(dict.fromkeys((*found.aside, *aside))),
+        title=title,
+    )
 
 
 def numbers_of_records(records: Sequence[Any]) -> list[tuple[tuple[str, ...], Any]]:
     """What records have numbers under, all of them: the keys' path, and the numbers (n,)."""
     found = _Found()
     found.walk(list(records), ())
-    return [(channel.path, np.asarray(channel.values())) for channel in found.channels]
+    return [(channel.path, np.asarray(channel.values())) for channel in in_columns(found.channels)[0]]
 
 
 def decoded(text: bytes) -> Any:
@@ -76,9 +93,10 @@ class _Found:
     """Collects what is in a document."""
 
     def __init__(self) -> None:
-        self.channels: list[Channel] = []
+        self.channels: list[Channel | Matrix] = []
         self.parameters: dict[str, float] = {}
         self.aside: list[str] = []
+        self.notes: list[str] = []
         self.begin: Any = None  # the first stamp that there is: all count from it
 
     def walk(self, item: Any, path: tuple[str, ...]) -> None:
@@ -106,7 +124,8 @@ class _Found:
 
     def _list(self, items: list[Any], path: tuple[str, ...]) -> None:
         name = ".".join(path) or "list"
-        if len(items) < _FEWEST:
+        is_run = len(items) == 1 and isinstance(items[0], dict) and _are_runs(items)
+        if len(items) < _FEWEST and not is_run:
             self.aside.append(name)
         elif isinstance(items[0], dict):
             self._records(items, path)
@@ -123,6 +142,8 @@ class _Found:
         if not all(isinstance(record, dict) for record in records):
             self.aside.append(".".join(path) or "list")
             return
+        if _are_runs(records) and self._runs(records):
+            return
         for key, first in records[0].items():
             inner = [record.get(key) for record in records]
             if isinstance(first, dict):
@@ -135,16 +156,54 @@ class _Found:
             else:
                 self.aside.append(key)
 
+    def _runs(self, records: list[dict[str, Any]]) -> bool:
+        """Records that are runs, one after the other, and a column of their numbers; False where nothing is shared."""
+        runs: list[dict[tuple[str, ...], Channel]] = []
+        for record in records:
+            found = _Found()
+            found.begin = self.begin
+            found.walk(record, ())
+            self.begin = self.begin if self.begin is not None else found.begin
+            channels, _ = in_columns(found.channels)
+            lengths = Counter(one.samples for one in channels)
+            samples = max(lengths, key=lambda length: lengths[length], default=0)
+            runs.append({one.path: one for one in channels if one.samples == samples})
+        shared = [path for path in runs[0] if all(path in run for run in runs)]
+        if len(shared) < _FEWEST:
+            return False
+        sizes = [run[shared[0]].samples for run in runs]
+        for path in shared:
+            values = np.concatenate([np.asarray(run[path].values(), np.float64) for run in runs])
+            self.channels.append(Channel(path, values.size, lambda values=values: values))
+        numbers = np.repeat(np.arange(1.0, len(runs) + 1.0), sizes)
+        self.channels.append(Channel((RUN,), numbers.size, lambda: numbers, holds=True))
+        single = {path[0] for path in shared}
+        self.aside += [key for key in records[0] if key not in single]
+        kinds = [next((one[key] for key in _KINDS if isinstance(one.get(key), str)), "") for one in records]
+        told = [f"{i} is {shown(kind, 30)}" for i, kind in enumerate(kinds, 1) if kind][:_MOST_TOLD]
+        more = f": {', '.join(told)}{', …' if len(runs) > len(told) else ''}" if told else ""
+        self.notes.append(f"a run a record, {len(runs)} in all{more}")
+        return True
+
     def _rows(self, rows: list[Any], path: tuple[str, ...], names: Sequence[str]) -> bool:
         """Rows of numbers as a table; False if they are none, or of different widths."""
         try:
             values = np.array(rows, np.float64)
         except (TypeError, ValueError, OverflowError):
             return False
-        if values.ndim != 2 or not (is_table(values.shape) or (names and values.shape[1] == len(names))):
+        if values.size == 0:
             return False
-        self.channels += table(path, values.shape[0], values.shape[1], lambda i: values[:, i], names)
-        return True
+        if names and values.ndim == 2 and values.shape[1] == len(names):
+            self.channels += [
+                Channel((*path, name), values.shape[0], lambda i=i: values[:, i]) for i, name in enumerate(names)
+            ]
+            return True
+        values = np.squeeze(values)
+        if values.ndim == 1 and values.size > 1:
+            self.channels.append(Channel(path, values.size, lambda: values))
+        elif values.ndim == 2:
+            self.channels.append(Matrix(path, values.shape, lambda: values))
+        return values.ndim in (1, 2)
 
     def _numbers(self, items: Sequence[Any]) -> Any:
         """The numbers, truth being 0 and 1, stamps of date and time seconds; None for anything else, and for blanks."""
@@ -162,6 +221,19 @@ class _Found:
             self.begin = stamps[0] if self.begin is None else self.begin
             return (stamps - self.begin) * 1e-9
         return None
+
+
+def _are_runs(records: Sequence[dict[str, Any]]) -> bool:
+    """Whether each record has lists as long as each other, long ones, and no time of its own as a sample has."""
+    if not 0 < len(records) <= RUNS:
+        return False
+    for record in records:
+        lengths = Counter(len(value) for value in record.values() if isinstance(value, list))
+        if max((count for length, count in lengths.items() if length >= _SHORTEST_RUN), default=0) < _FEWEST:
+            return False
+        if any(isinstance(value, (int, float)) and is_time(key) for key, value in record.items()):
+            return False
+    return True
 
 
 def _indexed(item: dict[str, Any]) -> list[Any] | None:

@@ -8,7 +8,7 @@ import re
 import struct
 import zlib
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import BinaryIO
 
@@ -16,14 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.files.limits import ARRAYS, megabytes
-from ema_model.files.opened import listed, refusal, shown
+from ema_model.files.opened import refusal, shown
 from ema_model.quantities.signals import SIGNALS
 from ema_model.recordings.formats import common_clock, hdf5
-from ema_model.recordings.formats.channels import Channel, Log, is_table, told, with_unit
+from ema_model.recordings.formats.channels import Channel, Log, column_names_of, times_of, told, way_of_time, with_unit
 from ema_model.recordings.formats.format import Array, Columns, Format
-from ema_model.recordings.formats.npz import Kind, check_lengths, column_names, is_column, take
-from ema_model.recordings.formats.own_clocks import with_own_clocks
-from ema_model.recordings.formats.run_groups import with_runs
+from ema_model.recordings.formats.npz import Kind, column_names, is_column, put_together, take, together
 
 _DATA = ("data", "values")
 _NAMES, _UNITS, _RASTER = ("name", "label"), ("unit", "units"), "raster"
@@ -102,10 +100,12 @@ class Leaf:
     dtype: str = "f8"
     other: str = ""
     text: str = ""
+    first: int = 0  # of the data's numbers it takes this one
+    step: int = 1  # and each so many after it
 
     def values(self) -> NDArray[np.float64]:
         """The numbers in MATLAB's order, column by column; (n,)."""
-        return np.frombuffer(self.data, self.dtype).astype(np.float64, copy=False)
+        return np.frombuffer(self.data, self.dtype)[self.first :: self.step].astype(np.float64, copy=False)
 
 
 def leaves(file: BinaryIO, max_bytes: int) -> Iterator[Leaf]:
@@ -286,7 +286,7 @@ def _header(path: str, max_bytes: int) -> list[str]:
         return hdf5.FORMAT.header(path, max_bytes)
     arrays = _load(path, max_bytes)
     log = _put_together(arrays)
-    return list(common_clock.offered(path, log)) if log else column_names(_kinds(arrays))
+    return list(common_clock.offered(path, log)) if log else column_names(path, _kinds(arrays))
 
 
 def _read(path: str, names: Sequence[str], max_bytes: int, strict: bool) -> Columns:
@@ -295,7 +295,7 @@ def _read(path: str, names: Sequence[str], max_bytes: int, strict: bool) -> Colu
     arrays = _load(path, max_bytes)
     numbers = {name: float(leaf.values()[0]) for name, leaf in arrays.items() if _is_number(leaf)}
     if log := _put_together(arrays):
-        columns = _together(path, log, names, max_bytes, strict)
+        columns = together(path, log, names, max_bytes, strict)
         return replace(columns, notes=(*_told(numbers), *columns.notes))
     kinds = {name: kind for name, kind in _kinds(arrays).items() if name not in numbers or name in names}
     columns = take(path, kinds, names, max_bytes, strict, lambda name: arrays.pop(name).values())
@@ -314,18 +314,7 @@ def _put_together(arrays: Mapping[str, Leaf]) -> Log | None:
         for name, leaf in arrays.items()
         if is_column(kinds[name])
     ]
-    aside = [name for name, leaf in arrays.items() if not is_column(kinds[name]) and not _is_number(leaf)]
-    log = Log(channels, left_aside=tuple(aside))
-    found = with_own_clocks(with_runs(log))
-    return None if found is log else found
-
-
-def _together(path: str, log: Log, names: Sequence[str], max_bytes: int, strict: bool) -> Columns:
-    arrays, notes, clocks = common_clock.taken(path, log, names, max_bytes, strict)
-    if strict:
-        check_lengths(path, arrays)
-    aside = [f"left aside, as they are no columns of numbers: {listed(log.left_aside)}"] if log.left_aside else []
-    return Columns(arrays, lambda row: f"sample {row + 1}", (*aside, *log.notes, *notes), clocks=clocks)
+    return put_together(channels, [n for n, leaf in arrays.items() if not is_column(kinds[n]) and not _is_number(leaf)])
 
 
 def _write(signals: Mapping[str, Array], path: str) -> None:
@@ -339,17 +328,25 @@ def _is_number(leaf: Leaf) -> bool:
     return not leaf.other and math.prod(leaf.shape) == 1
 
 
-def _columns(leaf: Leaf) -> list[Leaf]:
-    """A matrix of a few long columns as these; anything else as it is."""
-    if leaf.other or leaf.path[-1] in SIGNALS or not is_table(leaf.shape):
+def _columns(leaf: Leaf, times: Collection[int]) -> list[Leaf]:
+    """A matrix that holds signals as these; anything else as it is.  times: the lengths that time has in the file."""
+    size = tuple(one for one in leaf.shape if one != 1)
+    way = None if leaf.other or leaf.path[-1] in SIGNALS else way_of_time(size, times)
+    if way is None:
         return [leaf]
-    rows, count = leaf.shape
-    size = rows * np.dtype(leaf.dtype).itemsize
-    names = [f"{leaf.path[-1]}(:,{i + 1})" for i in range(count)]
+    rows, count = size[0], size[1 - way]
+    column = rows * np.dtype(leaf.dtype).itemsize
     return [
-        Leaf((*leaf.path[:-1], name), (rows, 1), leaf.data[i * size : (i + 1) * size], leaf.dtype)
-        for i, name in enumerate(names)
+        Leaf((*leaf.path[:-1], name), (rows, 1), leaf.data[i * column : (i + 1) * column], leaf.dtype)
+        if way == 0
+        else Leaf((*leaf.path[:-1], name), (size[1], 1), leaf.data, leaf.dtype, first=i, step=rows)
+        for i, name in enumerate(column_names_of(leaf.path[-1], count))
     ]
+
+
+def _times(found: Sequence[Leaf]) -> set[int]:
+    vectors = (leaf for leaf in found if not leaf.other and sum(size != 1 for size in leaf.shape) == 1)
+    return times_of((leaf.path[-1], math.prod(leaf.shape)) for leaf in vectors)
 
 
 def _kinds(arrays: Mapping[str, Leaf]) -> dict[str, Kind]:
@@ -375,7 +372,9 @@ def _load(path: str, max_bytes: int) -> dict[str, Leaf]:
             raise refusal(path, f"unpacks to over {megabytes(max_bytes)}, which is the limit; split it") from None
         except TooMany:
             raise refusal(path, f"holds over {ARRAYS} arrays, which is the limit; save the columns alone") from None
-    found = [one for leaf in with_names(found) for one in _columns(leaf)]
+    found = with_names(found)
+    times = _times(found)
+    found = [one for leaf in found for one in _columns(leaf, times)]
     twice = [path for path, count in Counter(leaf.path for leaf in found).items() if count > 1]
     if twice:
         raise refusal(path, f"array {shown('.'.join(twice[0]))!r} stands twice; save it again with one of each name")

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from ema_model.files.opened import refusal, shown
-from ema_model.recordings.formats.channels import Channel, Log, NoLog, broken_file, is_table, table
+from ema_model.recordings.formats.channels import Channel, Log, Matrix, NoLog, broken_file, in_columns
 from ema_model.recordings.formats.format import check_size
 from ema_model.recordings.formats.logs import log_format
 
@@ -37,10 +38,9 @@ def _channels(path: str, array: Any) -> list[Channel]:
         ]
     if array.dtype.kind not in "fiub":
         raise refusal(path, f"holds {shown(array.dtype)}; numbers are expected, store it as double")
-    if array.ndim == 2 and is_table(array.shape[::-1]):
-        array = array.T  # a row for each signal
-    if array.ndim == 2 and is_table(array.shape):
-        return table(("data",), array.shape[0], array.shape[1], lambda i: np.array(array[:, i]))
+    size = tuple(size for size in array.shape if size != 1)
+    if len(size) == 2 and (columns := in_columns([Matrix(("data",), size, lambda: array.reshape(size))])[0]):
+        return [replace(one, values=lambda one=one: np.array(one.values())) for one in columns]
     shape = "×".join(map(str, array.shape)) or "a single value"
     raise refusal(path, f"is {shape}; a structured array, or a matrix with a column for each signal is expected")
 

@@ -17,7 +17,19 @@ from ema_model.errors import InputError
 from ema_model.files.limits import ARRAYS
 from ema_model.files.opened import Damaged, Member, Refused, SafeZip, listed, opened_zip, refusal, shown
 from ema_model.quantities.signals import SIGNALS
+from ema_model.recordings.column_names import is_time
+from ema_model.recordings.formats import common_clock
+from ema_model.recordings.formats.channels import (
+    Channel,
+    Log,
+    column_names_of,
+    times_of,
+    way_of_time,
+    without_columns,
+)
 from ema_model.recordings.formats.format import Array, Columns, Format, check_size
+from ema_model.recordings.formats.own_clocks import with_own_clocks
+from ema_model.recordings.formats.run_groups import with_runs
 
 Shape = tuple[int, ...]
 Kind = tuple[Shape, np.dtype[Any]]
@@ -29,13 +41,28 @@ def is_column(kind: Kind) -> bool:
     return dtype.kind in "fiub" and np.prod(shape, dtype=float) > 1 and sum(size != 1 for size in shape) == 1
 
 
-def column_names(kinds: Mapping[str, Kind]) -> list[str]:
-    """The names to offer as columns.
+def column_names(path: str, kinds: Mapping[str, Kind]) -> list[str]:
+    """The names to offer as columns; InputError where there is none.
 
-    Scalars, tables and text are left aside, since such files hold parameters and labels too; under a
+    Scalars, images and text are left aside, since such files hold parameters and labels too; under a
     canonical name they stay, so that reading them says what is wrong with them.
     """
-    return [name for name, kind in kinds.items() if is_column(kind) or name in SIGNALS]
+    names = [name for name, kind in kinds.items() if is_column(kind) or name in SIGNALS]
+    if not names:
+        aside = f" ({listed(_aside(kinds))})" if kinds else ""
+        raise refusal(path, f"holds no rows of numbers{aside}; a time and its signals are expected")
+    return names
+
+
+def _aside(kinds: Mapping[str, Kind]) -> list[str]:
+    """What holds no columns, as a message calls it."""
+    return [
+        without_columns(name, shape)
+        if dtype.kind in "fiub" and len(shape) > 1 and np.prod(shape, dtype=float) > 1
+        else name
+        for name, (shape, dtype) in kinds.items()
+        if not is_column((shape, dtype))
+    ]
 
 
 def check_column(path: str, name: str, kind: Kind) -> None:
@@ -82,7 +109,7 @@ def take(
             columns[name] = np.require(values(name).reshape(-1), np.float64, ["C", "A"])
     if strict:
         check_lengths(path, columns)
-    aside = [name for name, kind in kinds.items() if not is_column(kind)]
+    aside = _aside(kinds)
     notes = (f"left aside, as they are no columns of numbers: {listed(aside)}",) if aside else ()
     return Columns(columns, lambda row: f"sample {row + 1}", notes)
 
@@ -96,7 +123,23 @@ def check_lengths(path: str, columns: Mapping[str, Array]) -> None:
             raise refusal(path, f"column {shown(name)!r} has {found}; one length is expected, cut or resample it")
 
 
-# --- numPy's .npz: one array per signal; a structured array gives a column per field ----------------------------------
+def put_together(channels: Sequence[Channel], aside: Sequence[str]) -> Log | None:
+    """The columns as a log, where they have several clocks or are several runs; else nothing."""
+    log = Log(channels, left_aside=tuple(aside))
+    found = with_own_clocks(with_runs(log))
+    return None if found is log else found
+
+
+def together(path: str, log: Log, names: Sequence[str], max_bytes: int, strict: bool) -> Columns:
+    """Columns of such a log on one clock; raises InputError as a format's `read` does."""
+    arrays, notes, clocks = common_clock.taken(path, log, names, max_bytes, strict)
+    if strict:
+        check_lengths(path, arrays)
+    aside = [f"left aside, as they are no columns of numbers: {listed(log.left_aside)}"] if log.left_aside else []
+    return Columns(arrays, lambda row: f"sample {row + 1}", (*aside, *log.notes, *notes), clocks=clocks)
+
+
+# --- numPy's .npz: one array per signal; a structured array gives a column per field, a matrix its columns ------------
 
 _SUFFIX = ".npy"
 _HEAD_BYTES = 20_000  # numpy takes headers of up to 10,000, but reads them to their declared end first
@@ -104,36 +147,67 @@ _FAR_TOO_MANY = 2**62  # beyond which numpy cannot count; a header may have thou
 
 
 class _Place(NamedTuple):
-    """Where a column is: the archive's member, its size in memory, and the field in it or None."""
+    """Where a column is: the archive's member, its size in memory, the field in it or None, and the part of that."""
 
     kind: Kind
     member: str
     member_bytes: int
     field: str | None
+    size: Shape = ()  # of a matrix, without sizes of one; the columns' kind is that of one of them
+    part: tuple[slice | int, ...] = ()
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether it is all that its member holds."""
+        return self.field is None and not self.part
 
 
 def _header(path: str, max_bytes: int) -> list[str]:
     with _opened(path, max_bytes) as archive:
-        return column_names({name: place.kind for name, place in _contents(path, archive).items()})
+        places = _contents(path, archive)
+        kinds = {name: place.kind for name, place in places.items()}
+        log = _log(path, archive, places, kinds, max_bytes)
+        return list(common_clock.offered(path, log)) if log else column_names(path, kinds)
 
 
 def _read(path: str, names: Sequence[str], max_bytes: int, strict: bool) -> Columns:
     with _opened(path, max_bytes) as archive:
         places = _contents(path, archive)
-        whole: dict[str, np.ndarray] = {}
-
-        def values(name: str) -> np.ndarray:
-            place = places[name]
-            if place.field is None:
-                return _array(path, archive, place.member)
-            # A structured array is read whole, whatever its other fields hold.
-            if place.member not in whole:
-                whole[place.member] = _array(path, archive, place.member)
-            return whole[place.member][place.field]
-
-        members = {places[name].member: places[name].member_bytes for name in names if places[name].field is not None}
+        kinds = {name: place.kind for name, place in places.items()}
+        if log := _log(path, archive, places, kinds, max_bytes):
+            return together(path, log, names, max_bytes, strict)
+        # A structured array is read whole, whatever its other fields hold, and so is a matrix.
+        members = {places[name].member: places[name].member_bytes for name in names if not places[name].is_whole}
         check_size(path, sum(members.values()) / 8, max_bytes)
-        return take(path, {name: place.kind for name, place in places.items()}, names, max_bytes, strict, values)
+        return take(path, kinds, names, max_bytes, strict, _values(path, archive, places, max_bytes))
+
+
+def _values(path: str, archive: SafeZip, places: Mapping[str, _Place], max_bytes: int) -> Callable[[str], np.ndarray]:
+    whole: dict[str, np.ndarray] = {}
+
+    def values(name: str) -> np.ndarray:
+        place = places[name]
+        check_size(path, place.member_bytes / 8, max_bytes)
+        if place.is_whole and not is_time(name):  # a time is looked at before it is read
+            return _array(path, archive, place.member)
+        if place.member not in whole:
+            whole[place.member] = _array(path, archive, place.member)
+        array = whole[place.member] if place.field is None else whole[place.member][place.field]
+        return array.reshape(place.size)[place.part] if place.part else array
+
+    return values
+
+
+def _log(
+    path: str, archive: SafeZip, places: Mapping[str, _Place], kinds: Mapping[str, Kind], max_bytes: int
+) -> Log | None:
+    values = _values(path, archive, places, max_bytes)
+    channels = [
+        Channel((name,), math.prod(kind[0]), lambda name=name: values(name))
+        for name, kind in kinds.items()
+        if is_column(kind)
+    ]
+    return put_together(channels, _aside(kinds))
 
 
 def _write(signals: Mapping[str, Array], path: str) -> None:
@@ -142,7 +216,7 @@ def _write(signals: Mapping[str, Array], path: str) -> None:
 
 
 def _contents(path: str, archive: SafeZip) -> dict[str, _Place]:
-    """Where each column is; a field whose name another array has is called `array.field`."""
+    """Where each column is; a field whose name another array has is called `array.field`, so is a matrix's column."""
     contents: dict[str, _Place] = {}
     structured: list[_Place] = []
     for member in archive.names:
@@ -158,7 +232,25 @@ def _contents(path: str, archive: SafeZip) -> dict[str, _Place]:
     for place in structured:
         field = str(place.field)
         contents[field if field not in contents else f"{place.member.removesuffix(_SUFFIX)}.{field}"] = place
-    return contents
+    return _in_columns(contents)
+
+
+def _in_columns(contents: Mapping[str, _Place]) -> dict[str, _Place]:
+    """The same, each matrix that holds signals as these."""
+    times = times_of((name, math.prod(place.kind[0])) for name, place in contents.items() if is_column(place.kind))
+    found: dict[str, _Place] = {}
+    for name, place in contents.items():
+        shape, dtype = place.kind
+        size = tuple(one for one in shape if one != 1)
+        way = None if name in SIGNALS or dtype.kind not in "fiub" else way_of_time(size, times)
+        if way is None:
+            found[name] = place
+            continue
+        for i, column in enumerate(column_names_of(name, size[1 - way])):
+            part = (slice(None), i) if way == 0 else (i,)
+            unique = column if column not in contents else f"{name}.{column}"
+            found[unique] = place._replace(kind=((size[way],), dtype), size=size, part=part)
+    return found
 
 
 def _array_header(file: Member) -> Kind:

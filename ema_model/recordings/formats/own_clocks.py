@@ -13,10 +13,9 @@ from functools import partial
 import numpy as np
 
 from ema_model.quantities.units import Unit, find_unit
-from ema_model.recordings.column_names import QUANTITIES, readings
+from ema_model.recordings.column_names import QUANTITIES, is_time, readings
 from ema_model.recordings.formats.channels import Array, Channel, Log, with_unit
 from ema_model.recordings.formats.clocks import usable
-from ema_model.recordings.formats.csv import is_time
 
 _TIME = QUANTITIES["time"]
 _RISING = 0.9  # of a clock's steps
@@ -25,7 +24,7 @@ _LOOKED_AT = 1_000_000  # of its samples
 
 def with_own_clocks(log: Log) -> Log:
     """The log with its channels of time as clocks, where the others have two or more of them; else as it is."""
-    if log.clocks:
+    if log.clocks or sum(is_time(one.path[-1]) for one in log.channels) < 2:
         return log
     times = {i: one for i, one in enumerate(log.channels) if is_clock(one)}
     if len(times) < 2:
@@ -54,10 +53,10 @@ def _time_of(
 
     near: times by group and length.
     """
-    own = _tokens(channel.path[-1])
+    own = tokens(channel.path[-1])
     for depth in range(len(channel.path) - 1, -1, -1):
         here = near.get((channel.path[:depth], channel.samples), ())
-        after = [i for i in here if (rest := _rest(times[i])) and rest <= own]
+        after = [i for i in here if (rest := beside_time(times[i].path[-1])) and rest <= own]
         for found in (after, here):
             if len(found) == 1:
                 return found[0]
@@ -94,12 +93,11 @@ def _seconds(channel: Channel, unit: Unit | None) -> Array:
     return values if unit is None else unit.to_si(values)
 
 
-def _rest(time: Channel) -> frozenset[str]:
+def beside_time(name: str) -> frozenset[str]:
     """What a time's name says beside that it is time, and in which unit."""
-    name = time.path[-1]
-    return _tokens(name) - _TIME - _tokens(readings(name)[0].unit)
+    return tokens(name) - _TIME - tokens(readings(name)[0].unit)
 
 
-def _tokens(name: str) -> frozenset[str]:
+def tokens(name: str) -> frozenset[str]:
     """Its words and numbers in small letters: `t_motorSpeed2` has t, motor, speed and 2."""
     return frozenset(re.findall(r"[^\W\d_]+|\d+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).lower()))

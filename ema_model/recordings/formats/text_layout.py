@@ -9,7 +9,7 @@ from __future__ import annotations
 import codecs
 import csv
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -18,10 +18,14 @@ from ema_model.quantities.units import dimensions_of
 from ema_model.recordings.formats.stamps import is_stamp
 
 HEAD_BYTES = 65_536
-SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", "|": "bars"}
+SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", "|": "bars", " ": "blanks"}
+_SURE_SEPARATORS = tuple(SEPARATORS)[:-1]  # blanks stand in names and between others, too
+_COMMENTS = "#%"
+_PAIR = re.compile(r"([A-Za-z_][^:,;\t]{0,60}?)\s*:\s*[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 _MOST_BETWEEN = 3  # lines between the names and the numbers: units, types, descriptions
 _LOOKED_AT = 50  # rows below a header, to see whether it is one
 _FEWEST_ROWS = 2
+_MOST_OF_ROWS = 0.9  # that are numbers, where no names stand above
 _NUMBER = re.compile(
     r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?|[+-]?\d{1,3}([.,'\u00a0\u202f ]\d{3})+([.,]\d+)?|[+-]?(nan|inf)",
     re.IGNORECASE,
@@ -53,10 +57,18 @@ class Hints:
 
     header_line: int | None = None  # from 1
     encoding: str | None = None
+    rate_Hz: float | None = None  # of a file of any format without a time
 
     def before(self, others: Hints) -> Hints:
         """These; what they leave open is as the others say."""
-        return Hints(self.header_line or others.header_line, self.encoding or others.encoding)
+        return Hints(
+            self.header_line or others.header_line, self.encoding or others.encoding, self.rate_Hz or others.rate_Hz
+        )
+
+    @property
+    def is_of_text(self) -> bool:
+        """Whether something of them is of texts alone."""
+        return self.header_line is not None or self.encoding is not None
 
 
 @dataclass(frozen=True)
@@ -65,7 +77,7 @@ class Layout:
 
     encoding: str
     has_mark: bool  # a byte-order mark begins it
-    header_line: int
+    header_line: int  # 0 where the numbers stand without names
     units_line: int | None
     data_line: int
     cells: tuple[str, ...]  # of the header, as they stand
@@ -74,11 +86,13 @@ class Layout:
     decimal: str
     thousands: str
     head: frozenset[str]  # the lines above the numbers, which may be repeated further down
+    is_labelled: bool = False  # each number has its column's name before it: angle:1.5
 
     @property
     def told(self) -> str:
         """What is unusual in it: "header in line 4, units in line 5, Windows-1252"."""
-        parts = []
+        unnamed = "a label before each number" if self.is_labelled else "no line of names, columns by number"
+        parts = [unnamed] if self.header_line == 0 else []
         if self.header_line > 1:
             parts.append(f"header in line {self.header_line}")
         if self.units_line:
@@ -166,17 +180,14 @@ def find_layout(path: str, hints: Hints) -> Layout | None:
     lines, encoding, mark, is_cut = lines_of(path, hints.encoding)
     if is_cut:
         lines = lines[:-1]
-    best: tuple[float, int, int, str] | None = None
-    tables = {separator: [split(line, separator) for line in lines] for separator in SEPARATORS}
     if hints.header_line is not None and not 0 < hints.header_line <= len(lines):
         raise refusal(path, f"has no line {hints.header_line} among its first; name another header line")
-    for separator, rows in tables.items():
-        for at in range(len(rows)) if hints.header_line is None else [hints.header_line - 1]:
-            if hints.header_line is None and not _is_names(rows, at):
-                continue
-            first, score = _rows_below(rows, at)
-            if score > 0.0 and (best is None or score > best[0]):
-                best = score, at, first, separator
+    tables = {separator: [split(line, separator) for line in lines] for separator in SEPARATORS}
+    best = None
+    for separators in (_SURE_SEPARATORS, " "):
+        best = best or _best(tables, separators, hints.header_line)
+        if best is None and hints.header_line is None:
+            best = _without_names(tables, separators)
     if best is None:
         if hints.header_line is not None:
             found = shown(lines[hints.header_line - 1], 60)
@@ -185,13 +196,16 @@ def find_layout(path: str, hints: Hints) -> Layout | None:
         if hints.encoding is not None:
             told = ENCODINGS.get(encoding, encoding)
             raise refusal(path, f"no table is seen in it as {told}; name another encoding")
-        return None
-    _, at, first, separator = best
+        return _labelled(lines, encoding, mark)
+    at, first, separator = best
     rows = tables[separator]
-    units_at = next((i for i in range(at + 1, first) if is_units(rows[i])), None)
-    width = max(len(rows[at]), len(rows[first]))
-    cells = [cell.strip() for cell in rows[at]]
-    cells[0] = cells[0].lstrip("#% ")
+    units_at = next((i for i in range(at + 1, first) if is_units(rows[i])), None) if at >= 0 else None
+    width = max(len(rows[max(at, 0)]), len(rows[first]))
+    cells = [cell.strip() for cell in rows[at]] if at >= 0 else [by_number(i) for i in range(len(rows[first]))]
+    if at >= 0:
+        cells[0] = cells[0].lstrip("#% ")
+        if all(cell.endswith(":") for cell in cells if cell):  # as Arduino's plotter takes them
+            cells = [cell.rstrip(": ") for cell in cells]
     units = [cell.strip().strip("[]()") for cell in rows[units_at]] if units_at is not None else []
     sample = [cell.strip() for row in rows[first : first + 300] for cell in row]
     decimal, thousands = _signs(sample, separator)
@@ -210,8 +224,82 @@ def find_layout(path: str, hints: Hints) -> Layout | None:
     )
 
 
+def by_number(i: int) -> str:
+    """What a column without a name is called, by its place from 0."""
+    return f"#{i + 1}"
+
+
+def _best(
+    tables: Mapping[str, Sequence[Sequence[str]]], separators: Iterable[str], said: int | None
+) -> tuple[int, int, str] | None:
+    """Line of names and of the first numbers, from 0, and separator, of the table with the most rows."""
+    best: tuple[float, int, int, str] | None = None
+    for separator in separators:
+        rows = tables[separator]
+        for at in range(len(rows)) if said is None else [said - 1]:
+            if said is None and not _is_names(rows, at):
+                continue
+            first, score = _rows_below(rows, at)
+            if score > 0.0 and (best is None or score > best[0]):
+                best = score, at, first, separator
+    return best[1:] if best else None
+
+
+def _without_names(
+    tables: Mapping[str, Sequence[Sequence[str]]], separators: Iterable[str]
+) -> tuple[int, int, str] | None:
+    """The same of a text that begins with numbers, but for blank lines and comments; -1 for the line of names."""
+    for separator in separators:
+        rows = tables[separator]
+        first = next((i for i, row in enumerate(rows) if _is_content(row)), len(rows))
+        below = rows[first : first + _LOOKED_AT]
+        if len(below) > _FEWEST_ROWS and len(below[0]) > 1 and _are_numbers(below[0]):
+            alike = [row for row in below if len(row) == len(below[0]) and _are_numbers(row)]
+            if len(alike) >= _MOST_OF_ROWS * len(below):
+                return -1, first, separator
+    return None
+
+
+def _labelled(lines: Sequence[str], encoding: str, mark: int) -> Layout | None:
+    """The layout of lines that Arduino's plotter takes, of labels and values: angle:1.5,speed:3.2; None for others.
+
+    By arduino/Arduino, build/shared/ArduinoSerialPlotterProtocol.md: tabs, commas or blanks part the pairs.
+    """
+    first = next((i for i, line in enumerate(lines) if line.strip()), len(lines))
+    for separator in "\t, ":
+        rows = [_pairs(line, separator) for line in lines[first : first + _LOOKED_AT] if line.strip()]
+        if len(rows) <= _FEWEST_ROWS or len(rows[0]) < 2 or len(set(rows[0])) < len(rows[0]):
+            continue
+        if sum(row == rows[0] for row in rows) >= _MOST_OF_ROWS * len(rows):
+            names, units = tuple(rows[0]), ("",) * len(rows[0])
+            return Layout(
+                encoding, mark > 0, 0, None, first + 1, names, units, separator, ".", "", frozenset(), is_labelled=True
+            )
+    return None
+
+
+def _pairs(line: str, separator: str) -> list[str]:
+    """The labels of a line of labels and values; nothing where one of its parts is no such pair."""
+    parts = [part for part in line.strip(f"{separator} \t").split(separator) if part.strip()]
+    found = [_PAIR.fullmatch(part.strip()) for part in parts]
+    return [pair[1] for pair in found if pair] if all(found) else []
+
+
+def _is_content(row: Sequence[str]) -> bool:
+    return any(cell.strip() for cell in row) and not row[0].lstrip().startswith(tuple(_COMMENTS))
+
+
+def _are_numbers(row: Sequence[str]) -> bool:
+    filled = [cell for cell in row if cell.strip()]
+    return bool(filled) and all(is_number(cell) or is_stamp(cell) for cell in filled)
+
+
 def split(line: str, separator: str) -> list[str]:
-    """A line's cells."""
+    """A line's cells; several blanks between two are one."""
+    if separator == " ":
+        line = re.sub(r"\s+", " ", line).strip()
+        if line.startswith(tuple(_COMMENTS)):
+            line = line.lstrip(f"{_COMMENTS} ")
     if '"' not in line:
         return line.split(separator)
     try:

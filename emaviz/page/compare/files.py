@@ -199,7 +199,7 @@ _LAYOUT_BOX = Html('style="padding:0 10px 6px;font-size:12.5px;line-height:1.4"'
 
 
 class LayoutControls:
-    """Two dropdowns; a change reads the file anew, and one that does not fit is told and taken back."""
+    """Of a text two dropdowns, of any file its rate; a change reads it anew, one that does not fit is taken back."""
 
     def __init__(self, page: Page, comparing: Comparing) -> None:
         self._page, self._comparing = page, comparing
@@ -208,7 +208,9 @@ class LayoutControls:
         self._told = add_html(gui, visible=False)
         self.header = gui.add_dropdown("Header in line", [_FOUND], visible=False)
         self._encoding = gui.add_dropdown("Encoding", [_FOUND], visible=False)
-        for control in (self.header, self._encoding):
+        hint = "of a file without a time, in samples a second; 0 where a column is the time"
+        self.rate = gui.add_number("Rate [Hz]", 0.0, min=0.0, max=1e9, step=1.0, hint=hint, visible=False)
+        for control in (self.header, self._encoding, self.rate):
             control.on_update(lambda event: event.client and page.screen.post("layout", self._say))
 
     def show(self, opened: Opened) -> None:
@@ -216,6 +218,10 @@ class LayoutControls:
         self._name, head, said = opened.name, opened.head, opened.hints
         for control in (self._told, self.header, self._encoding):
             control.visible = head is not None
+        self.rate.visible = said.rate_Hz is not None or "time_s" not in {
+            entry.signal for entry in opened.mapping.entries
+        }
+        self.rate.value = said.rate_Hz or 0.0
         if head is None:
             return
         what = "As said" if said != Hints() else "Found"
@@ -229,7 +235,9 @@ class LayoutControls:
         line, encoding = str(self.header.value), str(self._encoding.value)
         names = {title: name for name, title in ENCODINGS.items()}
         said = Hints(
-            None if line == _FOUND else int(line), None if encoding == _FOUND else names.get(encoding, encoding)
+            None if line == _FOUND else int(line),
+            None if encoding == _FOUND else names.get(encoding, encoding),
+            self.rate.value or None,
         )
         self._comparing.use_layout(self._name, said)
 

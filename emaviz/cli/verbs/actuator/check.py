@@ -59,12 +59,11 @@ def _beside(actuator: Actuator, arguments: argparse.Namespace) -> dict[str, list
     """What the recording and a calibration by it say."""
     from ema_model.actuator.naming import on_axes
     from ema_model.actuator.steps import usual_filter
-    from ema_model.recordings import read
-    from emaviz.cli import output
+    from emaviz.cli import given, output
 
     progress = output.Progress(arguments)
     try:
-        recording = read(arguments.recording, actuator, arguments.mapping)
+        recording = given.read_one(arguments.recording, arguments, actuator, progress)
         from ema_model.comparison import compare  # takes a second: recordings are refused before
 
         result = compare([recording], actuator, on_progress=progress.show)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from ema_model.challenges.challenge import folder, make, truths
+from ema_model.challenges.challenge import folder
+from ema_model.challenges.truth import make, truths
 from ema_model.errors import InputError
 
 

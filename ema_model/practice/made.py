@@ -8,7 +8,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from ema_model.actuator import load_actuator
-from ema_model.challenges.challenge import EFFECTS, Challenge, challenges, folder, read_toml
+from ema_model.challenges.challenge import EFFECTS, Challenge, challenges, folder
+from ema_model.challenges.truth import read_toml
 from ema_model.errors import InputError, quoted
 from ema_model.files.opened import shown
 from ema_model.practice.kinds import KINDS

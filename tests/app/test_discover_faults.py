@@ -10,7 +10,7 @@ from support.on_page import wait_until
 from support.rig import Rig
 
 from ema_model.actuator import load_actuator
-from ema_model.challenges.challenge import Truth
+from ema_model.challenges.truth import Truth
 from ema_model.comparison.criteria import BAND
 from ema_model.discovery.criteria import LEAST_BIC
 from ema_model.discovery.result import Change

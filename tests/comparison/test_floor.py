@@ -16,7 +16,7 @@ from ema_model.comparison import compare
 from ema_model.comparison.compare import _typical_floor
 from ema_model.comparison.residuals import Residuals
 from ema_model.comparison.verdict import slow_ratio
-from ema_model.estimation import Floor, calibrate, floor
+from ema_model.estimation import Floor, after_fit, calibrate, floor
 from ema_model.estimation.floor import spread, twin_error
 from ema_model.models import ClosedLoop
 from ema_model.recordings.noise import held
@@ -62,7 +62,7 @@ def test_a_true_model_is_at_its_floor_once_fitted():
         model = ClosedLoop([seen], ACTUATOR)
         before = [floor(model, 0)]
         found = calibrate(model, before)
-        after = calibrate(before, found, [twin_error(model, 0, found.actuator, found.k)])
+        after = after_fit(before, found, [twin_error(model, 0, found.actuator, found.k)])
         names = list(found.weighted_sensitivities[0])
         positions = [one.sigma("user_position_rad") for one in (before[0], after[0])]
         assert np.mean(positions[1]) < 0.7 * np.mean(positions[0])

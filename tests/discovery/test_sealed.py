@@ -13,7 +13,7 @@ import pytest
 
 from ema_model.actuator import load_actuator
 from ema_model.challenges import challenge, opened, sealed_challenge
-from ema_model.challenges.challenge import RUNS, Truth, seal, unseal
+from ema_model.challenges.truth import RUNS, Truth, seal, unseal
 from ema_model.effects import CATALOGUE
 from ema_model.errors import InputError
 from ema_model.recordings import read

@@ -11,7 +11,7 @@ from support.flights import flights
 from ema_model import practice
 from ema_model.actuator import load_actuator
 from ema_model.challenges import challenges, folder
-from ema_model.challenges.challenge import read_toml
+from ema_model.challenges.truth import read_toml
 from ema_model.errors import InputError
 from ema_model.lives import drawn, worn_life
 from ema_model.practice import made

@@ -21,7 +21,7 @@ from scipy.io import savemat
 from ema_model.actuator import load_actuator
 from ema_model.actuator.file import shipped
 from ema_model.challenges import challenge as challenge_challenges
-from ema_model.challenges.challenge import Truth, seal
+from ema_model.challenges.truth import Truth, seal
 from emaviz.recording import RecordingWriter
 from emaviz.session.settings import Settings
 from support.foreign_files import FILES

@@ -145,7 +145,7 @@ def _session(path: Path, _: int) -> None:
 def _challenge(path: Path, _: int) -> None:
     from ema_model.actuator import load_actuator
     from ema_model.challenges import opened, sealed_challenge
-    from ema_model.challenges.challenge import unseal
+    from ema_model.challenges.truth import unseal
     from ema_model.files.limits import CHALLENGE_RECORDING_BYTES
     from ema_model.recordings import read
 

@@ -9,8 +9,7 @@ import pytest
 from support.flights import flights
 
 from ema_model.errors import InputError
-from ema_model.lives import healthy_life, worn_life
-from ema_model.lives import life as life_lives
+from ema_model.lives import drawn, healthy_life, worn_life
 from ema_model.tracking.flight import Flight
 from ema_model.tracking.summary import as_dict
 from ema_model.tracking.track import Tracker, track
@@ -73,7 +72,7 @@ def test_backlash_is_told_though_its_sensitivity_grows_with_it(law, seed):
     begin = life.repaired or 0
     onset, end = max(life.onset, begin), life.flights
     tracker, first = Tracker({"k2": life.threshold}), end
-    for i, flight in enumerate(life_lives(life)):
+    for i, flight in enumerate(drawn(life)):
         tracker.add(flight)
         if i >= begin + 5 and first == end and tracker.has_trend("k2"):
             first = i
@@ -108,7 +107,7 @@ def test_a_small_step_back_is_seen_once_more_flights_follow():
 def test_a_jump_is_told_without_what_the_unit_adds():
     """Measured, k4 stood below 0 before its part was replaced, and as far above it in truth."""
     life = worn_life("onset", 63001, 0.5)
-    seen = track(life_lives(life)[:130]).faults["k4"]
+    seen = track(drawn(life)[:130]).faults["k4"]
     (one,) = seen.jumps
     assert life.repaired == 103 and one.flight == "flight_0103"
     assert one.towards_healthy and one.before > 0.06 and abs(one.after) < 0.03 and not seen.trend
@@ -118,7 +117,7 @@ def test_a_drift_that_may_be_none_has_no_end_but_a_least_life():
     """After 64 of its flights this life's drift may be as good as none: no middle of what remains is told."""
     life = worn_life("onset", 63025, 1.0)
     tracker = Tracker({life.fault: life.threshold}, life.seed)
-    for flight in life_lives(life)[:254]:
+    for flight in drawn(life)[:254]:
         tracker.add(flight)
     one = tracker.look().faults[life.fault]
     assert one.trend and one.remaining is None
@@ -161,7 +160,7 @@ def test_a_gain_may_drift_to_either_side():
 def test_drawn_lives_are_told_before_they_end(law):
     life = worn_life(law, 7)
     tracker, told = Tracker({life.fault: life.threshold}), []
-    for i, flight in enumerate(life_lives(life)):
+    for i, flight in enumerate(drawn(life)):
         tracker.add(flight)
         if i % 40 == 39 and tracker.has_trend(life.fault):
             told.append(tracker.look().faults[life.fault].remaining)
@@ -170,7 +169,7 @@ def test_drawn_lives_are_told_before_they_end(law):
 
 def test_healthy_lives_have_no_trend():
     for seed in range(6):
-        assert not any(one.trend or one.jumps for one in track(life_lives(healthy_life(seed, 150))).faults.values())
+        assert not any(one.trend or one.jumps for one in track(drawn(healthy_life(seed, 150))).faults.values())
 
 
 @pytest.mark.parametrize(

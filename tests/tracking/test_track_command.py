@@ -11,8 +11,7 @@ from pathlib import Path
 import pytest
 from support.documents import result_of
 
-from ema_model.lives import life as life_lives
-from ema_model.lives import worn_life
+from ema_model.lives import drawn, worn_life
 from emaviz.cli import main
 
 
@@ -31,7 +30,7 @@ def folder(tmp_path: Path) -> Path:
 def test_all_outputs(folder, tmp_path, monkeypatch, capsys):
     """The identification, which takes seconds a flight, is replaced by a drawn life's."""
     life = worn_life("linear", 1)
-    flights = life_lives(life)[: int(0.6 * life.flights)]
+    flights = drawn(life)[: int(0.6 * life.flights)]
     monkeypatch.setattr("ema_model.tracking.identify.identify_all", lambda *_: iter(flights))
     written = [tmp_path / name for name in ("track.json", "track.html", "track.rrd")]
     options = [text for name, path in zip(("--json", "--report", "--record"), written) for text in (name, str(path))]
@@ -90,7 +89,7 @@ def test_an_empty_folder(tmp_path, capsys):
 def test_flights_that_arrive_are_taken_up(folder, tmp_path, monkeypatch, capsys):
     """Once they are whole; a name that tells no time is told once, and the rest goes on."""
     told = tmp_path / "track.json"
-    flights = life_lives(worn_life("linear", 1))
+    flights = drawn(worn_life("linear", 1))
     monkeypatch.setattr(
         "ema_model.tracking.identify.identify_all",
         lambda paths, *_: (replace(flights[int(path.stem[7:])], name=path.stem) for path in paths),

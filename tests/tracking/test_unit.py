@@ -8,8 +8,7 @@ from support.flights import flights
 
 from ema_model import faults
 from ema_model.estimation.unknowns import to_vector
-from ema_model.lives import life as life_lives
-from ema_model.lives import worn_life
+from ema_model.lives import drawn, worn_life
 from ema_model.lives.life import base_of
 from ema_model.tracking.track import Tracker, track
 from ema_model.tracking.unit import Unit
@@ -85,7 +84,7 @@ def test_wear_is_not_taken_for_the_unit(fault):
     for seed in range(6):
         life = worn_life("accelerating", seed, 1.0, fault)
         last = (life.repaired or life.flights) - 1
-        usable = [one if not one.excluded else None for one in life_lives(life)[:last]]
+        usable = [one if not one.excluded else None for one in drawn(life)[:last]]
         unit = Unit(15, ONE_SIDED, HEALTHY)
         for i, one in enumerate(usable):
             if one is not None:
@@ -124,7 +123,7 @@ def test_intervals_hold_lives_of_a_few_seeds():
     for seed in range(8):
         life = worn_life("linear", seed)
         tracker, last = Tracker({life.fault: life.threshold}, seed), life.flights - 1
-        for i, flight in enumerate(life_lives(life)):
+        for i, flight in enumerate(drawn(life)):
             tracker.add(flight)
             if i % 15 == 14 and (life.repaired or 0) + 20 < i < last and tracker.has_trend(life.fault):
                 left = tracker.look().faults[life.fault].remaining

@@ -10,8 +10,7 @@ import pytest
 
 from ema_model.actuator import load_actuator, save_actuator
 from ema_model.estimation import calibrate
-from ema_model.fleets import draw
-from ema_model.fleets import fleet as fleet_fleets
+from ema_model.fleets import draw, recorded
 from ema_model.recordings import Measurement
 from ema_model.units import fit as fitting
 from ema_model.units.block import linearised, unit_of, wider
@@ -33,7 +32,7 @@ def units_of(count: int, changes: dict[tuple[int, str], float], seed: int = 0):
     for (unit, path), change in changes.items():
         x[unit, fleet.parameters.index(path)] += change
     fleet = replace(fleet, x=x)
-    every = [fleet_fleets(fleet.unit(unit), seed, unit, (*RUNS, "unseen")) for unit in range(count)]
+    every = [recorded(fleet.unit(unit), seed, unit, (*RUNS, "unseen")) for unit in range(count)]
     fitted = {fleet.names[i]: [one[run] for run in RUNS] for i, one in enumerate(every)}
     return fitted, {fleet.names[i]: [one["unseen"]] for i, one in enumerate(every)}
 
@@ -117,12 +116,12 @@ def test_a_warmer_winding_is_the_recordings_and_not_the_units(warmer_K, allowed)
     fleet = draw(ACTUATOR, 5, units=2, differing=0)
     fleet = replace(fleet, x=np.tile(SHARED, (2, 1)))
     every = {
-        name: [fleet_fleets(fleet.unit(i), seed, i, (run,))[run] for seed, run in enumerate(("chirp", "step", "step"))]
+        name: [recorded(fleet.unit(i), seed, i, (run,))[run] for seed, run in enumerate(("chirp", "step", "step"))]
         for i, name in enumerate(fleet.names)
     }
     cold = fleet.unit(1)
     warm = cold.with_values({"motor.resistance_Ohm": cold.motor.resistance_Ohm * (1.0 + 0.0039 * warmer_K)})
-    every["unit_02"][2] = fleet_fleets(warm, 2, 1, ("step",))["step"]
+    every["unit_02"][2] = recorded(warm, 2, 1, ("step",))["step"]
     found = compare_units(every, ACTUATOR)
     assert not found.differences and allowed == ("do not differ" in sentences(found)[0])
     (one,) = found.of_recordings
@@ -207,7 +206,7 @@ def test_a_unit_that_differs_by_much_in_one_parameter_is_not_left_where_several_
 def test_a_unit_far_from_the_others_does_not_lead_the_search_astray(seed):
     """Torque constant and bus voltage differ by a tolerance: the unit must not be linearised as the others are."""
     fleet = draw(ACTUATOR, seed, units=5, size=5.0)
-    every = [fleet_fleets(fleet.unit(i), seed, i) for i in range(5)]
+    every = [recorded(fleet.unit(i), seed, i) for i in range(5)]
     fitted = {name: [one[run] for run in fleet.runs] for name, one in zip(fleet.names, every)}
     found = compare_units(fitted, ACTUATOR, seed=seed)
     true = {(fleet.names[unit], one.parameter) for one in fleet.differences for unit in one.units}

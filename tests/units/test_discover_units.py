@@ -7,8 +7,7 @@ from dataclasses import replace
 import pytest
 
 from ema_model.actuator import load_actuator
-from ema_model.fleets import draw
-from ema_model.fleets import fleet as fleet_fleets
+from ema_model.fleets import draw, recorded
 from ema_model.units.discovery import discover_units
 from ema_model.units.discovery.words import sentences
 
@@ -23,7 +22,7 @@ def test_all_units_lack_cogging_and_one_has_more_play():
     x = fleet.x.copy()
     x[1, fleet.parameters.index(BACKLASH)] += 0.8
     fleet = replace(fleet, x=x)
-    every = [fleet_fleets(replace(fleet.unit(i), effects={"cogging_torque": COGGING}), 5, i) for i in range(3)]
+    every = [recorded(replace(fleet.unit(i), effects={"cogging_torque": COGGING}), 5, i) for i in range(3)]
     fitted = {name: [one[run] for run in fleet.runs] for name, one in zip(fleet.names, every)}
     held = {name: [one["unseen"]] for name, one in zip(fleet.names, every)}
     found = discover_units(fitted, ACTUATOR, holdout=held)

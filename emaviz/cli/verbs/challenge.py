@@ -87,6 +87,6 @@ def _answer(one: Challenge) -> list[str]:
         from ema_model.practice import made
 
         return list(made.reveal(one).lines)
-    from ema_model.challenges.challenge import read_truth
+    from ema_model.challenges.truth import read_truth
 
     return [read_truth(folder() / "truth" / f"{one.name}.toml").answer]

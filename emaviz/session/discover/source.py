@@ -18,7 +18,8 @@ from ema_model.actuator import Actuator, load_actuator
 from ema_model.actuator.readings import sentences
 from ema_model.actuator.write import as_toml
 from ema_model.challenges import Challenge, challenges, folder, opened, sealed_challenge
-from ema_model.challenges.challenge import SENSORS, SUFFIX, Truth, read_truth, seal, unseal
+from ema_model.challenges.challenge import SUFFIX
+from ema_model.challenges.truth import SENSORS, Truth, read_truth, seal, unseal
 from ema_model.commands import command
 from ema_model.discovery import Discovery
 from ema_model.discovery.result import Added, Experiment

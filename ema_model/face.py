@@ -37,7 +37,8 @@ from ema_model.recordings import Measurement
 from ema_model.recordings.health.card import Health, health_of
 from ema_model.recordings.recording_set import long_enough
 from ema_model.simulation import plant
-from ema_model.simulation.run import Run, Sensors
+from ema_model.simulation.run import Run
+from ema_model.simulation.sensors import Sensors
 from ema_model.tracking import order
 from ema_model.tracking import track as tracking
 from ema_model.tracking.identify import identified

@@ -29,7 +29,8 @@ from ema_model.quantities.numbers import as_number
 from ema_model.recordings import Measurement, find_side_file, read
 from ema_model.recordings.recording_set import check_held_out
 from ema_model.simulation.plant import simulate
-from ema_model.simulation.run import Run, Sensors
+from ema_model.simulation.run import Run
+from ema_model.simulation.sensors import Sensors
 
 SEVERITIES = ("slight", "clear", "strong")
 NEEDS_LOAD = ("gear_load_friction", "load_dependent_friction")  # do nothing to an actuator without a load

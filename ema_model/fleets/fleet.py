@@ -21,7 +21,8 @@ from ema_model.errors import InputError
 from ema_model.files.opened import shown
 from ema_model.files.written import whole_file
 from ema_model.recordings import Measurement, write_measurement
-from ema_model.simulation.run import Run, Sensors, simulate_reference
+from ema_model.simulation.run import Run, simulate_reference
+from ema_model.simulation.sensors import Sensors
 from ema_model.units.block import linearised, pooled, unit_of
 
 _LENGTH_S = 0.4

@@ -22,7 +22,8 @@ from ema_model.identification.objective import Objective
 from ema_model.identification.uncertainty import uncertainty
 from ema_model.recordings import Measurement, write_measurement
 from ema_model.simulation.plant import simulate
-from ema_model.simulation.run import Run, Sensors
+from ema_model.simulation.run import Run
+from ema_model.simulation.sensors import Sensors
 from ema_model.tracking.flight import Flight
 from ema_model.tracking.identify import UNFIT
 

@@ -18,7 +18,8 @@ from ema_model.quantities.axes import ROTARY, Axes
 from ema_model.quantities.sides import MOTOR, USER
 from ema_model.simulation.load_profile import SHAPES, LoadProfile
 from ema_model.simulation.plant import FITNESSES
-from ema_model.simulation.run import Run, Sensors
+from ema_model.simulation.run import Run
+from ema_model.simulation.sensors import Sensors
 from emaviz.session.described import checked, number, setting
 
 SLIDERS = ""

@@ -14,7 +14,7 @@ import pytest
 
 from ema_model.actuator import load_actuator
 from emaviz.page.app import App
-from emaviz.recording import RecordingError, file, read
+from emaviz.recording import RecordingError, entry, read
 from emaviz.session.session import Session
 
 Usage = namedtuple("Usage", "total used free")
@@ -76,7 +76,7 @@ def test_a_disk_that_fills_while_recording_is_told_and_the_answer_stays(session,
     def fill(race):
         if not begun.is_set():
             begun.set()
-            monkeypatch.setattr(file.shutil, "disk_usage", lambda _: Usage(10**9, 10**9, 10**6))
+            monkeypatch.setattr(entry.shutil, "disk_usage", lambda _: Usage(10**9, 10**9, 10**6))
 
     session.settings.set("iterations", 150)
     session.identifying.progressed.connect(fill)
@@ -88,7 +88,7 @@ def test_a_disk_that_fills_while_recording_is_told_and_the_answer_stays(session,
 
 
 def test_a_disk_that_is_full_at_the_start_is_told(session, monkeypatch):
-    monkeypatch.setattr(file.shutil, "disk_usage", lambda _: Usage(10**9, 10**9, 10**6))
+    monkeypatch.setattr(entry.shutil, "disk_usage", lambda _: Usage(10**9, 10**9, 10**6))
     race, told = identified(session)
     assert race.path is None and math.isfinite(race.best.answer.rmse)
     assert len(told) == 1 and "200 MB are needed" in told[0][1]

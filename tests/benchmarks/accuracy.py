@@ -18,7 +18,8 @@ from ema_model.identification.objective import Objective
 from ema_model.identification.optimisers import create
 from ema_model.identification.run import identify
 from ema_model.simulation.plant import simulated
-from ema_model.simulation.run import Run, Sensors
+from ema_model.simulation.run import Run
+from ema_model.simulation.sensors import Sensors
 
 ALGORITHMS = ("ssa", "hba", "do")
 

@@ -121,7 +121,8 @@ def main() -> None:
     from ema_model.identification.objective import Objective
     from ema_model.identification.run import identify
     from ema_model.simulation.plant import simulated
-    from ema_model.simulation.run import Run, Sensors
+    from ema_model.simulation.run import Run
+    from ema_model.simulation.sensors import Sensors
 
     with tempfile.TemporaryDirectory() as folder:
         discovery.record(Path(folder))

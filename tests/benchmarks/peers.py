@@ -32,7 +32,8 @@ from ema_model.campaign.thesis import CASES
 from ema_model.identification.objective import Objective
 from ema_model.identification.run import ROBUST, steps, warm_up
 from ema_model.simulation.plant import simulated
-from ema_model.simulation.run import Run, Sensors
+from ema_model.simulation.run import Run
+from ema_model.simulation.sensors import Sensors
 
 Array = NDArray[np.float64]
 

@@ -16,7 +16,8 @@ from ema_model.comparison.summary import as_dict
 from ema_model.discovery import discover
 from ema_model.recordings import Measurement
 from ema_model.simulation.load_profile import LoadProfile
-from ema_model.simulation.run import Run, Sensors, simulate_reference
+from ema_model.simulation.run import Run, simulate_reference
+from ema_model.simulation.sensors import Sensors
 
 WHEN_S = 0.23
 CHIRP = ("chirp", {}, 0.5)

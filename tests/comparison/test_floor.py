@@ -20,7 +20,8 @@ from ema_model.estimation import Floor, after_fit, calibrate, floor
 from ema_model.estimation.floor import spread, twin_error
 from ema_model.models import ClosedLoop
 from ema_model.recordings.noise import held
-from ema_model.simulation.run import Run, Sensors, simulate_reference
+from ema_model.simulation.run import Run, simulate_reference
+from ema_model.simulation.sensors import Sensors
 
 ACTUATOR = load_actuator()
 

@@ -20,7 +20,8 @@ from ema_model.identification.fit import setting
 from ema_model.identification.objective import Objective
 from ema_model.models import model_for
 from ema_model.simulation.plant import simulated
-from ema_model.simulation.run import Run, Sensors, simulate_reference
+from ema_model.simulation.run import Run, simulate_reference
+from ema_model.simulation.sensors import Sensors
 
 ACTUATOR = load_actuator()
 BLIND = replace(ACTUATOR, controller=replace(ACTUATOR.controller, kind="unknown"))

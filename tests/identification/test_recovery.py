@@ -17,7 +17,8 @@ from ema_model.identification.objective import Objective
 from ema_model.identification.run import Identification, Progress, identify, steps
 from ema_model.identification.uncertainty import uncertainty
 from ema_model.simulation.plant import simulated
-from ema_model.simulation.run import Run, Sensors
+from ema_model.simulation.run import Run
+from ema_model.simulation.sensors import Sensors
 
 ACTUATOR = load_actuator()
 CASES = ({"k2": 0.75}, {"k1": 0.25}, {"k3": 0.25}, {"k8": 0.75})

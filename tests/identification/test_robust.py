@@ -23,7 +23,8 @@ from ema_model.identification.model_bias import TWINS, _spread, twins
 from ema_model.identification.objective import Objective
 from ema_model.identification.run import identify
 from ema_model.simulation.plant import simulated
-from ema_model.simulation.run import Run, Sensors, simulate_reference
+from ema_model.simulation.run import Run, simulate_reference
+from ema_model.simulation.sensors import Sensors
 
 ACTUATOR = load_actuator()
 MULTI = {"k1": 0.0133, "k2": 0.05, "k3": 0.003, "k6": 0.012, "k8": 0.35}

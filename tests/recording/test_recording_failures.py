@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import subprocess
 import sys
 import threading
@@ -13,11 +14,12 @@ import psutil
 import pytest
 from rerun import chunk
 
-from emaviz.recording import RecordingError, RecordingWriter, file
+from emaviz.recording import RecordingError, RecordingWriter, entry
 from emaviz.recording.file import RrdFile
 from emaviz.recording.read import read
 
 Usage = namedtuple("Usage", "total used free")
+reading = importlib.import_module("emaviz.recording.read")  # the package gives the function that name
 
 
 def test_a_recording_that_cannot_start_says_why(tmp_path, monkeypatch):
@@ -30,7 +32,7 @@ def test_a_recording_that_cannot_start_says_why(tmp_path, monkeypatch):
     (tmp_path / "b.rrd").mkdir()
     with pytest.raises(RecordingError, match="folder"):
         RecordingWriter(tmp_path / "b.rrd")
-    monkeypatch.setattr(file.shutil, "disk_usage", lambda _: Usage(10**9, 10**9, 10**7))
+    monkeypatch.setattr(entry.shutil, "disk_usage", lambda _: Usage(10**9, 10**9, 10**7))
     with pytest.raises(RecordingError, match="10 MB free, 200 MB are needed"):
         RecordingWriter(tmp_path / "c.rrd")
     assert [p.name for p in tmp_path.iterdir()] == ["b.rrd"]
@@ -82,7 +84,7 @@ def test_a_write_failure_turns_the_writer_off(tmp_path, signals, monkeypatch):
 
 def test_a_disk_that_runs_full_ends_the_recording_in_time(tmp_path, signals, monkeypatch):
     writer = RecordingWriter(tmp_path / "a.rrd")
-    monkeypatch.setattr(file.shutil, "disk_usage", lambda _: Usage(10**9, 10**9, 10**6))
+    monkeypatch.setattr(entry.shutil, "disk_usage", lambda _: Usage(10**9, 10**9, 10**6))
     writer.signals("reference", *signals)
     assert writer.failed is not None and "1 MB free" in writer.failed
     writer.signals("monitor", *signals)
@@ -175,7 +177,7 @@ def test_what_the_program_cannot_verify_never_reaches_the_reader(tmp_path, signa
     with RecordingWriter(tmp_path / "a.rrd") as writer:
         writer.signals("reference", time_s, values)
     assert read(tmp_path / "a.rrd").complete
-    program = file.run
+    program = reading.run
     asked = []
 
     def run(*arguments, **options):
@@ -190,7 +192,7 @@ def test_what_the_program_cannot_verify_never_reaches_the_reader(tmp_path, signa
         assert path.name == "repaired.rrd", "it is read"
         return native(path)
 
-    monkeypatch.setattr(file, "run", run)
+    monkeypatch.setattr(reading, "run", run)
     monkeypatch.setattr(chunk, "RrdReader", reader)
     with pytest.raises(RecordingError, match="is damaged and cannot be repaired: its contents cannot be decoded"):
         read(tmp_path / "a.rrd")

@@ -19,7 +19,8 @@ from ema_model.recordings import (
 )
 from ema_model.recordings.health.card import health
 from ema_model.recordings.read import prepared
-from ema_model.simulation.run import Run, Sensors, simulate_reference
+from ema_model.simulation.run import Run, simulate_reference
+from ema_model.simulation.sensors import Sensors
 
 ACTUATOR = load_actuator()
 PERIOD = 1e-3

@@ -183,7 +183,7 @@ def _simulated(arguments: argparse.Namespace, actuator: Actuator, truth: np.ndar
     """The run that the options ask for, as the sensors have it."""
     assert truth is not None
     from ema_model.simulation.plant import simulated
-    from ema_model.simulation.run import Sensors
+    from ema_model.simulation.sensors import Sensors
     from emaviz.cli import given
 
     sensors = Sensors(arguments.noise_current, arguments.encoder_bits)

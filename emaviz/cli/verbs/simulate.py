@@ -58,7 +58,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     from ema_model.actuator.readings import readings
     from ema_model.recordings import write_measurement
-    from ema_model.simulation.run import Sensors
+    from ema_model.simulation.sensors import Sensors
     from emaviz.cli import given, output
 
     actuator = given.actuator_of(arguments)

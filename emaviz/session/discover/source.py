@@ -31,7 +31,7 @@ from ema_model.files.limits import CHALLENGE_RECORDING_BYTES
 from ema_model.quantities.numbers import amount
 from ema_model.quantities.titles import in_sentence
 from ema_model.recordings import Measurement, read
-from ema_model.simulation.run import Sensors
+from ema_model.simulation.sensors import Sensors
 from ema_model.text import Document, Lines, Remark, Remarks, Severity
 from emaviz.session.compare import USUAL, Comparing
 from emaviz.session.data_folder import DataFolder, sanitised

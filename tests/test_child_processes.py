@@ -23,8 +23,8 @@ KINDS = {
     "another program": "import shutil; child = start_program([shutil.which('sleep'), '90'])",
     "reader of foreign files": """
 import threading
-from ema_model.files import apart
-ask = lambda: apart.ask("time:sleep", 90, most_bytes=10**9, patience_s=90.0)
+from ema_model.files import sandbox
+ask = lambda: sandbox.ask("time:sleep", 90, most_bytes=10**9, patience_s=90.0)
 threading.Thread(target=ask, daemon=True).start()
 """,
     "compiler": """

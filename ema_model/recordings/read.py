@@ -401,7 +401,8 @@ def prepared(measurement: Measurement, actuator: Actuator) -> Measurement:
     if made is inside:
         return made
     names = tuple(name for name in made if name not in inside)
-    remarks = (*made.reading.remarks, *made.notes[len(inside.notes) :])
+    said = made.notes[len(inside.notes) :] if names != ("current_A",) else ()  # phase currents are what it means
+    remarks = (*made.reading.remarks, *said)
     return replace(made, reading=replace(made.reading, made=names, remarks=remarks))
 
 

@@ -35,6 +35,7 @@ FITTED = 2e-2
 
 HASH = r"\b(?=[0-9a-f]*\d)(?=\d*[a-f])[0-9a-f]{7,40}\b"
 NUMBER = re.compile(
+_PROGRESS = re.compile(r"(?m)^\[\d+:\d+:\d+\] .*\n")  # of a machine that is slow
     HASH + r"|(?<![A-Za-z_0-9])[+−-]?(?<![A-Za-z_])\d+(?:[.,]\d+)*(?:[eE][+−-]?\d+|·10[⁺⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?"
 )
 RANKED = re.compile(r"(?:^ ?[A-Z][A-Za-z -]+ #\n)+", re.MULTILINE)  # what is as good as nothing may change places
@@ -145,7 +146,7 @@ def test_a_verb_says_and_writes_what_it_did(case, inputs, capsys, monkeypatch):
     said = capsys.readouterr()
     _hold(case, "out", _masked(said.out, inputs))
     if not case.long:  # which may say how far it is
-        _hold(case, "err", _masked(said.err, inputs))
+        _hold(case, "err", _masked(_PROGRESS.sub("", said.err), inputs))
     for name in case.written:
         _hold(case, Path(name).suffix[1:], HELD[Path(name).suffix](inputs / name, inputs))
 
@@ -179,7 +180,7 @@ def _hold(case: Case, kind: str, found: Any) -> None:
 
 def _masked(text: str, folder: Path) -> str:
     """Numbers as #, spaces between columns as one: their widths follow the numbers."""
-    text = NUMBER.sub("#", text.replace(str(folder), "…")).replace("#–", "–")
+    text = NUMBER.sub("#", text.replace(str(folder), "…")).replace("#–", "–").replace("commit #+", "commit #")
     lines = "".join(f"{re.sub(r' +', ' ', line).rstrip()}\n" for line in text.split("\n")).rstrip("\n")
     return RANKED.sub(lambda rows: "".join(sorted(rows[0].splitlines(True))), f"{lines}\n") if lines.strip() else ""
 

@@ -34,8 +34,8 @@ EXACT = 1e-6
 FITTED = 2e-2
 
 HASH = r"\b(?=[0-9a-f]*\d)(?=\d*[a-f])[0-9a-f]{7,40}\b"
-NUMBER = re.compile(
 _PROGRESS = re.compile(r"(?m)^\[\d+:\d+:\d+\] .*\n")  # of a machine that is slow
+NUMBER = re.compile(
     HASH + r"|(?<![A-Za-z_0-9])[+−-]?(?<![A-Za-z_])\d+(?:[.,]\d+)*(?:[eE][+−-]?\d+|·10[⁺⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?"
 )
 RANKED = re.compile(r"(?:^ ?[A-Z][A-Za-z -]+ #\n)+", re.MULTILINE)  # what is as good as nothing may change places

@@ -24,6 +24,12 @@ from numba.core.caching import NullCache
 from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
 
+# --- where compiled kernels lie between runs, and whose that place is -------------------------------------------------
+# Whoever may write there runs code in this process: a compiled kernel is a pickle with machine code. So a folder is
+# used only when no other user can write to it, or put another in its place; else a temporary one of this process
+# stands in, which goes at its end. Kernels lie under a hash of the sources that they are made of and of the versions
+# that compile them: an edited effect is another folder, and an old kernel is never served.
+
 _PACKAGE = Path(__file__).parent
 # All that a kernel may inline, and how it is composed and kept; `tests/model/test_stacks.py` checks that kernels
 # import nothing else of ours.
@@ -202,6 +208,9 @@ def _age_s(path: Path) -> float:
 
 
 # --- compiled kernels in files that are read only when whole ----------------------------------------------------------
+# numba's own cache trusts what it finds: a cut index is an exception in the kernel's call, a changed byte of machine
+# code a wrong number or a crash. Here each kernel, compiled for given types of arguments, is one file that begins
+# with its checksum; another than was written is removed and compiled again.
 
 _CHECKSUM = hashlib.sha256().digest_size
 
@@ -310,6 +319,3 @@ def _tell(path: Path) -> None:
     if not _told:
         print(f"emaviz: {path} is damaged; kernels that cannot be read are compiled again", file=sys.stderr)
     _told.append(path)
-
-
-# --- compiled kernels between runs: where they lie, whose that place is, and files that are read only when wh------

@@ -8,6 +8,9 @@ from html import escape
 from importlib import import_module
 from typing import Literal
 
+# --- what a result says, as data --------------------------------------------------------------------------------------
+# What a result says, as data: lines, notes, remarks, facts, tables; a terminal, a page and a notebook show them.
+
 Severity = Literal["good", "bad", "warning", "note"]
 # As CSS has it, on light and on dark.  A warning has neither a fault's colour nor a model's.
 COLOURS: dict[Severity, str] = {
@@ -202,20 +205,3 @@ class InWords:
 
     def _repr_html_(self) -> str:
         return self.document.html
-
-
-# --- a result in words: made once, beside the result, and shown as plain text or in a notebook ------------------------
-
-__all__ = [
-    "COLOURS",
-    "Block",
-    "Document",
-    "Facts",
-    "InWords",
-    "Lines",
-    "Note",
-    "Remark",
-    "Remarks",
-    "Severity",
-    "Table",
-]

@@ -19,6 +19,8 @@ from ema_model.errors import InputError, quoted
 from ema_model.quantities.axes import Axes
 from ema_model.quantities.numbers import number
 
+# --- what an actuator's file lacks, and what in it is hard to believe, told without a recording -----------------------
+
 # Units that data sheets have, by the SI unit that a file wants.
 _ON_DATA_SHEETS: dict[str, tuple[tuple[str, float], ...]] = {
     "kg·m²": (("kg·cm²", 1e-4), ("g·cm²", 1e-7)),
@@ -137,7 +139,11 @@ def _too_fast(actuator: Actuator) -> Iterator[str]:
         yield f"{gain} makes a speed loop of {number(rate)} 1/s, too fast for steps of {number(actuator.step_s)} s"
 
 
-# --- an actuator from what somebody knows of it: the rest is guessed, with a wide tolerance, so that it can b---
+# --- an actuator from what somebody knows of it -----------------------------------------------------------------------
+# An actuator from what somebody knows of it: the rest is guessed, with a wide tolerance, so that it can be
+# calibrated.
+#
+# A description is what its file would hold, as tables of entries under the names that files have.
 
 # Drives that each controller may act through, the usual one first.
 DRIVES = {"cascade": ("current", "hysteresis"), "position": ("voltage", "current"), "open": (), "unknown": ()}

@@ -21,6 +21,8 @@ from ema_model.quantities.numbers import number
 if TYPE_CHECKING:
     from ema_model.effects.user import UserEffect
 
+# --- what stands in an actuator's file, as tables; `ema_model.actuator.file` reads the same ---------------------------
+
 
 def tables_of(actuator: Actuator) -> dict[str, Any]:
     """All its parameters with their tolerances, its effects, faults and recordings, in the file's order."""

@@ -32,6 +32,8 @@ from ema_model.simulation.plant import simulate
 from ema_model.simulation.run import Run
 from ema_model.simulation.sensors import Sensors
 
+# --- what is drawn at random for a task, each from its seed alone: plants, faults, effects, loads ---------------------
+
 SEVERITIES = ("slight", "clear", "strong")
 NEEDS_LOAD = ("gear_load_friction", "load_dependent_friction")  # do nothing to an actuator without a load
 _TEETH = 12.0  # the order of what is periodic
@@ -211,6 +213,8 @@ def _actuator(text: str) -> Actuator:
 
 
 # --- the axes of a plan's group: what each of its entries may be, and the choices that they stand for -----------------
+# An entry is one choice, or a list of them, which makes it an axis. What is drawn at random is a choice too: a table
+# that says how, drawn anew from each seed.
 
 MOST_TASKS = 1_000_000  # of a plan
 

@@ -13,7 +13,7 @@ from typing import Any
 import msgspec
 
 from ema_model.actuator import Actuator, actuator_text, parse_actuator, shipped
-from ema_model.campaign import axes as axes_campaign
+from ema_model.campaign import axes as plan_axes
 from ema_model.campaign.axes import AXES, MOST_TASKS, USUAL, Choice, check_count, choices_of, digest, run_of
 from ema_model.campaign.kinds import KINDS
 from ema_model.campaign.task import Excitation, File, Recorded, Simulated, Task
@@ -22,6 +22,8 @@ from ema_model.files.limits import TEXT_BYTES
 from ema_model.files.opened import listed, open_user_file
 from ema_model.files.shipped import shipped_folder
 from ema_model.files.written import inline, toml_of, toml_text
+
+# --- a plan's text: read over that of the plan that it is like, its entries checked, and written as one file ----------
 
 _DEEPEST = 5  # plans that are like others
 
@@ -254,10 +256,10 @@ class Group:
             value = {name: choice.at(seed) for name, choice in point.items()}
             load, effects = value["load_torque_Nm"], value["effects"]
             if isinstance(load, tuple):
-                load = load[1] if set(effects) & set(axes_campaign.NEEDS_LOAD) else 0.0
+                load = load[1] if set(effects) & set(plan_axes.NEEDS_LOAD) else 0.0
             values = {}
             if value["tolerances"]:
-                values = axes_campaign.base_parameters(self._actuator, which, value["tolerances"], seed)
+                values = plan_axes.base_parameters(self._actuator, which, value["tolerances"], seed)
             for path, more in value["off_by"].items():
                 values[path] = values.get(path, self._actuator.value(path)) + more
             self._actuator.with_values(values)  # a draw can be impossible
@@ -403,8 +405,3 @@ def plan_path(path: str | os.PathLike[str]) -> Path:
 def shipped_plans() -> dict[str, Path]:
     """The plans that come with the package (assets/plans), by name."""
     return {path.stem: path for path in sorted(shipped_folder("plans").glob("*.toml"))}
-
-
-# --- a plan: a TOML file that says which tasks a campaign has, as products of axes or as lists of recordings ----------
-
-__all__ = ["Plan", "load_plan", "plan_path", "shipped_plans"]

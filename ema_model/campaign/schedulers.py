@@ -25,6 +25,8 @@ from ema_model.campaign.task import Task
 from ema_model.child_processes import end_with_parent, on_lasting_thread
 from ema_model.errors import InputError, quoted
 
+# --- what computes tasks ----------------------------------------------------------------------------------------------
+
 MOST_DEATHS = 3  # of the workers that had a task, after which it counts as an error
 
 
@@ -81,10 +83,11 @@ class Steady(WorkerPlugin):
 
 
 # --- processes of this machine ----------------------------------------------------------------------------------------
+# Each has a pipe of its own, so that it is known what a process that dies had; it alone is lost, and given to
+# another. They end with this process, however it ends.
 
-_PROCESSES_AHEAD = (
-    2  # tasks that a process has: the one that it computes, and the next; the last ones go to whoever is free
-)
+# Tasks that a process has: the one that it computes, and the next; the last ones go to whoever is free.
+_PROCESSES_AHEAD = 2
 _MOST_MB = 1500.0  # of a process, after which another takes its place: each stack of effects that it met stays in it
 _POLL_S = 0.5
 
@@ -234,6 +237,8 @@ def _environment() -> Iterator[None]:
 
 
 # --- any cluster that Dask runs on: `dask scheduler` somewhere, `dask worker` on each host ----------------------------
+# Dask gives a task whose worker is killed to another; when its scheduler goes, what is there is kept, and the same
+# command goes on once there is one again.
 
 _CONNECT_S = 10.0
 _WORKERS_S = 60.0  # to wait for the first one
@@ -349,11 +354,6 @@ class Cluster:
         return InputError(
             f"--scheduler {self._address}: has gone; all rows so far are kept: begin it anew, and give the same command"
         )
-
-
-# --- who computes the tasks: processes of this machine, or any cluster that Dask runs on ------------------------------
-
-__all__ = ["MOST_DEATHS", "Died", "Outcome", "Scheduler", "scheduler"]
 
 
 def scheduler(address: str | None, workers: int | None) -> Scheduler:

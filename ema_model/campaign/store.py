@@ -25,6 +25,8 @@ from ema_model.errors import InputError, quoted
 from ema_model.files.opened import reason, refusal
 from ema_model.files.written import FileLock, remove_abandoned, whole_file
 
+# --- what results depend on besides their task: the sources, and the libraries that compute ---------------------------
+
 _PACKAGE = Path(__file__).parents[1]
 _LIBRARIES = ("numpy", "scipy", "numba", "llvmlite")
 _OF_A_RESULT = ("task.py", "given.py", "showable.py", "kinds/")  # of this folder; the rest only moves tasks and rows
@@ -65,7 +67,12 @@ def commit() -> str:
         return ""
 
 
-# --- a campaign's folder: the plan, the actuators, and the rows so far, each file written whole or not at all---------
+# --- a campaign's folder: the plan, the actuators, and the rows so far, each file written whole or not at all ---------
+# campaign.json      what is computed, with which version
+# plan.toml          a copy of the plan
+# actuators/*.toml   the files' texts, by hash
+# parts/*.parquet    rows as they came, by kind: what is there is never computed again
+# KIND.parquet       the table: all rows of a kind, sorted by name, once a run has ended
 
 _SCHEMA = 1
 _MOST_PARTS = 200  # small ones of a kind, before they are joined
@@ -305,7 +312,8 @@ def _write(path: Path, content: bytes) -> None:
         draft.write_bytes(content)
 
 
-# --- what a campaign's rows say together: a table a kind, a line a group, and one a case where a group has se----
+# --- what a campaign's rows say together ------------------------------------------------------------------------------
+# What a campaign's rows say together: a table a kind, a line a group, and one a case where a group has several.
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,8 @@ from ema_model.recordings import Measurement
 from ema_model.simulation.plant import simulate
 from ema_model.simulation.run import Run, simulate_monitor
 
+# --- the eleven actuators on which the thesis judges its algorithms (T 5.0.1, T 5.3) ----------------------------------
+
 ALGORITHMS = {"ssa": "SSA", "hba": "HBA", "do": "DOA"}  # by our name, the thesis's
 EVERY = (*ALGORITHMS, ROBUST)
 MULTIPLE = "multiple"
@@ -173,7 +175,8 @@ DEVIATIONS = (
 )
 
 
-# --- what the thesis prints: the rows of tables 5.1–5.36, their means (5.11, 5.23, 5.35), the coefficients (5---
+# --- what the thesis prints -------------------------------------------------------------------------------------------
+# What the thesis prints: the rows of tables 5.1–5.36, their means (5.11, 5.23, 5.35), the coefficients (5.39–5.43).
 
 _OURS = {thesis: ours for ours, thesis in ALGORITHMS.items()}
 
@@ -244,7 +247,8 @@ def _read(name: str) -> Iterator[dict[str, str]]:
         yield from csv.DictReader(file)
 
 
-# --- a fault and an algorithm: the thesis's ten runs beside ours, and the performance coefficients that follo--------
+# --- a fault and an algorithm -----------------------------------------------------------------------------------------
+# A fault and an algorithm: the thesis's ten runs beside ours, and the performance coefficients that follow.
 
 MISSED_PERCENT = 5.0  # of Err: "healthy" has 9.8 % of a single low fault, and 6.2 % of several at once
 SINGLE = "single"  # the five faults that stand alone, together
@@ -353,7 +357,9 @@ def _apart(errors: Sequence[float]) -> tuple[int, int, float]:
     return len(errors), len(errors) - len(others), float(np.mean(others)) if others else float("nan")
 
 
-def scores_coefficients(found: Sequence[Score], algorithms: Sequence[str] = tuple(ALGORITHMS)) -> list[Coefficient]:
+def performance_coefficients(
+    found: Sequence[Score], algorithms: Sequence[str] = tuple(ALGORITHMS)
+) -> list[Coefficient]:
     """T 5.4 as the thesis has it: errors and times of low and high are averaged, then compared between algorithms.
 
     The coefficient of `single` is the mean of the five faults' (T 5.42).  A fault that not every algorithm has been
@@ -394,7 +400,8 @@ def _printed(fault: str, algorithm: str) -> PrintedCoefficient | None:
     return printed_coefficients().get((fault, algorithm))
 
 
-# --- the responses that the thesis draws: both models beside each other, the actuator at five severities of a---
+# --- the responses that the thesis draws ------------------------------------------------------------------------------
+# The responses that the thesis draws: both models beside each other, the actuator at five severities of a fault.
 
 RUNS = {"chirp": Run(command("chirp")), "step": Run(command("step"), 1.0)}  # in 0.5 s, 1 rad is not reached
 SIGNALS = ("user_position_rad", "motor_speed_rad_s", "current_A")  # of which it shows severities
@@ -661,7 +668,7 @@ class Evaluation:
     @cached_property
     def coefficients(self) -> list[Coefficient]:
         """T 5.39–5.43."""
-        return scores_coefficients(self.scores)
+        return performance_coefficients(self.scores)
 
     @cached_property
     def points(self) -> list[Point]:
@@ -740,8 +747,3 @@ def _mean(values: list[float]) -> float:
 
 def _number(value: float) -> float | None:
     return value if np.isfinite(value) else None
-
-
-# --- the thesis's evaluation (tables 5.1–5.43, chapter 6) from a campaign's rows: its numbers beside ours -------------
-
-__all__ = ["Evaluation"]

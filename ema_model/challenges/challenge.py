@@ -1,4 +1,4 @@
-"""Challenges: what is hidden, sealed, and made."""
+"""What a challenge gives away, and the one file that it is handed on as."""
 
 from __future__ import annotations
 
@@ -23,7 +23,11 @@ from ema_model.files.opened import Damaged, Refused, check_user_file, opened_zip
 from ema_model.files.shipped import shipped_folder
 from ema_model.files.written import whole_file
 
-# --- a challenge as one file to hand on: NAME.challenge, a zip of its recordings, its story, its actuator, it---
+# --- a challenge as one file to hand on -------------------------------------------------------------------------------
+# A challenge as one file to hand on: NAME.challenge, a zip of its recordings, its story, its actuator, its seal.
+#
+# The seal is a digest over all other parts and a salt: a part that was changed is noticed, and what is hidden cannot
+# be guessed from it. The part that tells the answer is carried here unread; `truth.py` writes and reads it.
 
 SUFFIX = ".challenge"
 SCHEMA = 1

@@ -97,7 +97,10 @@ def truth_of(told: Mapping[str, Any], name: str, where: str) -> Truth:
         raise InputError(f"{where}: not a challenge's truth: {quoted(error)}") from None
 
 
-# --- seals a challenge, and tells the answer of a sealed one.  Nothing that looks for effects may read this -----------
+# --- seals a challenge, and tells the answer of a sealed one ----------------------------------------------------------
+# Nothing that looks for effects may read this.
+#
+# The answer is packed so that nobody reads it by a glance into the file; who wants to cheat can.
 
 _HELD_OUT = "unseen"
 _GRADE = 0  # nobody has judged how hard it is
@@ -166,7 +169,10 @@ def _packed(truth: Truth) -> bytes:
     return base64.b64encode(zlib.compress(json.dumps(told).encode(), 9))
 
 
-# --- makes a challenge's recordings: the three-phase model with what is hidden, off within its tolerances, wi---
+# --- makes a challenge's recordings -----------------------------------------------------------------------------------
+# Makes a challenge's recordings: the three-phase model with what is hidden, off within its tolerances, with noise.
+#
+# The same truth gives the same values: all that is drawn comes from its seed.
 
 RUNS = {
     "chirp": Run(command("chirp"), 0.5),

@@ -16,6 +16,8 @@ from ema_model.quantities.axes import Axes
 from ema_model.quantities.variables import MODULATORS, VARIABLES
 from ema_model.recordings import SIGNALS
 
+# --- families of curves of one variable, from the simplest to the finest that data can carry --------------------------
+
 Array = NDArray[np.float64]
 
 HIGHEST_ORDER = 96  # per revolution
@@ -80,6 +82,8 @@ def orders_in(turns: float, advance: Array | None = None) -> NDArray[np.intp]:
 
 
 # --- orders: how a residual repeats with each turn of the motor -------------------------------------------------------
+# A part of the residual that goes A sin(h θ + φ) has the order h. The turn is seldom evenly covered, so sines and
+# cosines are not orthogonal on the samples and a Fourier sum would leak between orders: all are fitted together.
 
 _RIDGE = 1e-3  # of the number of samples: directions that the angles hardly cover do not blow up
 _AROUND = 25  # orders, over which noise is as strong
@@ -145,7 +149,9 @@ def colour(chi2: Array) -> Array:
     return np.maximum(1.0, around / _MEDIAN_CHI2)
 
 
-# --- pitches: how a residual repeats along a linear motor, which has no turn that would make its orders whole---------
+# --- pitches: how a residual repeats along a linear motor, which has no turn that would make its orders whole ---------
+# Each order alone is fitted beside a constant (Lomb and Scargle's periodogram of unevenly spaced values), on a grid
+# that the travel resolves. Magnets, poles and a screw's leads stand out of it as peaks.
 
 HIGHEST = 20_000.0  # periods in 2π m: a pitch of 0.3 mm
 _PER_TRAVEL = 3.0  # orders tried for one that the travel can tell from its neighbour
@@ -206,7 +212,11 @@ def _explained(x: Array, y: Array, orders: Array) -> Array:
     return x.size * power / np.maximum(1.0 - power, 1e-9)
 
 
-# --- what explains a residual: curves of each variable, times a modulator, judged on parts that were left out---------
+# --- what explains a residual: curves of each variable, times a modulator, judged on parts that were left out ---------
+# The residual's share that a curve tells ahead is compared between variables. Many go together — in a sine the speed
+# follows from the position, the acceleration is the position turned over — so that of explanations that do equally
+# well the simpler counts: the fewer knots, the plainer modulator, and the variable that an effect acts through more
+# directly.
 
 _PAIRS = (1, 3, 6)  # orders that a curve of the angle is made of
 _LEAST_T = 4.0  # of the mean gain over its standard error, so that 1 % of all recordings raise a false alarm

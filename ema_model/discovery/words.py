@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.actuator.naming import on_axes
-from ema_model.actuator.readings import sentences
 from ema_model.actuator.readings import sentences as phrases_of
 from ema_model.comparison.criteria import BAND
 from ema_model.comparison.sentences import dependence
@@ -44,6 +43,8 @@ from ema_model.quantities.sides import USER
 from ema_model.quantities.titles import all_of, in_sentence
 from ema_model.simulation.run import run_in_words
 from ema_model.text import Document, Facts, Lines, Note, Table
+
+# --- what the parts of a discovery are called: effects, steps of the ladder, fitted values ----------------------------
 
 _FAULTS = {"k6": "Rotor eccentricity"}  # that are called otherwise than their number: with its phase it is one cause
 _SIGNS = {"effect": "+", "removed": "−"}
@@ -122,7 +123,7 @@ def fitted_of(found: Discovery, one: Added, name: str) -> Calibrated:
     return found.calibration.parameters.get(f"effects.{one.key}.{name}", one.parameters[name])
 
 
-# --- the fitted recordings of a discovery as lines over time: measured, the model of each step, and the floor---------
+# --- the fitted recordings of a discovery as lines over time: measured, the model of each step, and the floor ---------
 
 Array = NDArray[np.float64]
 
@@ -192,7 +193,8 @@ def _onward(parts: list[Array]) -> Array:
     return np.concatenate(times)
 
 
-# --- what each fault is, as an engineer is told who finds it in the ranking: equation, cause, size, what it l---
+# --- what each fault is, as an engineer is told who finds it in the ranking -------------------------------------------
+# What each fault is, as an engineer is told who finds it in the ranking: equation, cause, size, what it looks like.
 
 _TYPICAL = (0.25, 0.75)  # k of a low and a high fault, as the thesis has them
 
@@ -268,14 +270,14 @@ def page_of(name: str) -> FaultPage:
 
 def size(one: Candidate, actuator: Actuator) -> str:
     """A fault's suggested size, physical and in k: 'backlash 703 µrad, k2 ≈ 0.20'."""
-    phrases = dict(zip(NAMES, sentences(vector(one.settings), actuator)))
+    phrases = dict(zip(NAMES, phrases_of(vector(one.settings), actuator)))
     return ", ".join([*(phrases[name] for name in one.settings), f"{one.name} ≈ {one.settings[one.name]:.2f}"])
 
 
 def typical(name: str, actuator: Actuator) -> str:
     """'friction × 1.50 to 2.50 (k1 0.25 to 0.75)'."""
     first = cause_of(name)[0]
-    low, high = (sentences(vector({first: k}), actuator)[NAMES.index(first)].split(" ") for k in _TYPICAL)
+    low, high = (phrases_of(vector({first: k}), actuator)[NAMES.index(first)].split(" ") for k in _TYPICAL)
     apart = next(i for i, (one, other) in enumerate(zip(low, high)) if one != other)
     return f"{' '.join(low)} to {' '.join(high[apart:])} ({first} {_TYPICAL[0]:g} to {_TYPICAL[1]:g})"
 
@@ -363,7 +365,8 @@ def _three(rmse: float | None) -> str:
     return "" if rmse is None else f"{rmse:.3f}"
 
 
-# --- further sentences of a discovery, as page, reports and recordings show them: its warnings, what had been---
+# --- further sentences of a discovery, as page, reports and recordings show them --------------------------------------
+# Further sentences of a discovery, as page, reports and recordings show them: its warnings, what had been masked.
 
 LOOP_UNTOLD = (
     "In the closed loop no effect explains the whole error, and nothing shows another control law than the file's: how "
@@ -452,7 +455,8 @@ def untold(first: str, second: str) -> str:
     return f"No command within the range of these recordings tells {one} from {other}."
 
 
-# --- a discovery in plain numbers, as `emaviz discover --json` writes it: what each field means, and where it---
+# --- a discovery in plain numbers, as `emaviz discover --json` writes it ----------------------------------------------
+# A discovery in plain numbers, as `emaviz discover --json` writes it: what each field means, and where it is from.
 
 _FAULT = "fault"  # in place of the family of a candidate that is one
 _RMSE = "rms error pooled over signals, in units of the floor; 1 is the floor"
@@ -762,9 +766,9 @@ def _added(one: Added, axes: Axes) -> AddedJson:
     }
 
 
-# --- what a discovery found, in plain words: for the terminal, a notebook, the report and the recording alike---------
+# --- what a discovery found, in plain words: for the terminal, a notebook, the report and the recording alike ---------
 
-WORDS_VERDICTS = {
+VERDICT_WORDS = {
     "effects_found": "effects are missing, and have been added",
     "adequate": "nothing is missing: the residual is noise and the model's own floor",
     "partly_explained": "a part of what is missing has been found, and added; of the rest the cause is not known",
@@ -799,7 +803,7 @@ def headline(found: Discovery) -> str:
 def so_far(found: Discovery) -> str:
     """What the model has, and how far that brought the error, while there is no verdict yet."""
     has = [text for text in (_named(found), _faulty(found)) if text]
-    return f"{f'So far: {all_of(has)}. ' if has else ''}{words_sentences(found)[0]}"
+    return f"{f'So far: {all_of(has)}. ' if has else ''}{sentences(found)[0]}"
 
 
 def _answer(found: Discovery) -> str:
@@ -822,7 +826,7 @@ def _answer(found: Discovery) -> str:
         if found.not_claimed:  # an effect that would pay does explain some of it
             return f"Something is missing, and nothing that was tried can be claimed for it: {remains(found)}."
         return f"Something is missing that none of the known effects explains: {remains(found)}."
-    text = WORDS_VERDICTS.get(found.verdict, verdict_name(found))
+    text = VERDICT_WORDS.get(found.verdict, verdict_name(found))
     return f"{text[:1].upper()}{text[1:]}."
 
 
@@ -876,7 +880,7 @@ def not_claimed(found: Discovery) -> list[str]:
     return [f"{effect_title(name)} is not claimed: {why}." for name, why in found.not_claimed.items()]
 
 
-def words_sentences(found: Discovery) -> list[str]:
+def sentences(found: Discovery) -> list[str]:
     """What follows the headline: how far the error falls, what cannot be told apart, what is left."""
     told = []
     first, last = found.ladder[0], found.ladder[-1]
@@ -996,7 +1000,7 @@ def document_of(found: Discovery) -> Document:
     asked = next_experiment(found)
     return Document(
         [
-            Lines([f"{verdict_name(found)}: {headline(found)}", *words_sentences(found)]),
+            Lines([f"{verdict_name(found)}: {headline(found)}", *sentences(found)]),
             *(Note(warning) for warning in found.warnings),
             *added(found),
             *(table for table in tables if table is not None),

@@ -23,6 +23,10 @@ from ema_model.quantities.titles import in_sentence
 from ema_model.side_by_side import windows
 from ema_model.text import Severity, Table
 
+# --- which of an actuator's free parameters a recording tells of, and which it cannot separate ------------------------
+# By the Fisher information of the calibration: F = JᵀJ of the signals over their floors, in units of each parameter's
+# own tolerance, so that the covariance beside the prior is (F + 1)⁻¹ (Bayesian Cramér–Rao bound).
+
 _NOTHING = 0.9  # of the prior's σ that is left were all others known, from which on the recording told nothing
 _MUCH = 0.45  # of it that is left: n parameters of which only a ratio shows keep 1/√n each
 _BY_OTHERS = 3.0  # how many times more is left than were all others known, where they take it up
@@ -152,7 +156,8 @@ def _floors_left(
     return [replace(one, left=its) for one, its in zip(floors, left)]
 
 
-# --- a calibration in words: whether it has converged, what it moved and how surely, what it cannot tell apar--------
+# --- a calibration in words -------------------------------------------------------------------------------------------
+# A calibration in words: whether it has converged, what it moved and how surely, what it cannot tell apart.
 
 
 def convergence(fit: Calibration) -> str:

@@ -15,6 +15,8 @@ from ema_model.models.model import Signals
 from ema_model.quantities.numbers import HALF_90
 from ema_model.recordings.noise import SCATTER, white_noise
 
+# --- how well a floor is known: between which multiples of it the error of a true model lies --------------------------
+
 Array = NDArray[np.float64]
 
 _ROUNDING = 1e-9
@@ -63,6 +65,13 @@ def band(spread: float, least: float = 1.0) -> tuple[float, float]:
 
 
 # --- the floor of a comparison: what a perfect Monitor Model would still differ from a recording by -------------------
+# Two parts, for each signal and block: the sensors' noise, estimated from the recording itself, and the model floor,
+# how far the Monitor Model is from its three-phase twin under the same command (MODEL §2). The twin differs most in
+# transients, so its floor is local: the rms within 12.5 ms on either side. Where the motor stands, friction holds it
+# at any place in a band, and the model's error there is one error, however long it stands. When a command jumped is
+# known to within a sample, which moves the transient that follows.
+#
+# A fit takes part of the twin's difference up in its parameters: `after_fit` tells what a true model then leaves.
 
 BAND_SIGMAS = 2.0  # σ on either side: 95 of 100 blocks of a perfect model lie within
 CORRELATED_S = 0.025  # how long the model's error, and a sensor's inaccuracy, stay alike

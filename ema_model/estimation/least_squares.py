@@ -11,6 +11,12 @@ from numpy.typing import NDArray
 
 from ema_model.estimation.problem import Problem
 
+# --- one descent of a fit, in two ways one after the other ------------------------------------------------------------
+# One descent of a fit, in two ways one after the other, each ended where nothing changes any more that counts.
+#
+# scipy's trust region goes far along a valley that bends; from a start at a bound, or in a valley that is narrow and
+# rough, it goes nowhere. There Marquardt's steps go on.
+
 Array = NDArray[np.float64]
 
 _LONGEST = 40  # evaluations, or steps, of each way
@@ -42,7 +48,7 @@ def descended(
 
 
 def _by_trust_region(
-    problem: descent_Problem, start: Array, tell: Callable[[], None]
+    problem: BoundedProblem, start: Array, tell: Callable[[], None]
 ) -> tuple[Array, tuple[Array, Array]]:
     """The lowest point that was seen, and the problem's `jacobians` there."""
     from scipy.optimize import least_squares  # takes a third of a second to import
@@ -66,7 +72,7 @@ def _by_trust_region(
 
 
 def _by_marquardt(
-    problem: descent_Problem, start: Array, known: tuple[Array, Array], tell: Callable[[], None]
+    problem: BoundedProblem, start: Array, known: tuple[Array, Array], tell: Callable[[], None]
 ) -> Descended:
     descent = Descent.begin(problem, start, known)
     before, idle, steps = np.inf, 0, 0
@@ -86,7 +92,7 @@ class _Ended(Exception):
 class _Way:
     """What is known on the way: the lowest point, and the Jacobian of the last one, which comes with its residual."""
 
-    def __init__(self, problem: descent_Problem, tell: Callable[[], None]) -> None:
+    def __init__(self, problem: BoundedProblem, tell: Callable[[], None]) -> None:
         self.x, self._cost = np.zeros(0), np.inf
         self._problem, self._tell = problem, tell
         self._at, self._jacobian = np.zeros(0), np.zeros((0, 0))
@@ -146,14 +152,18 @@ class _Soft:
         return residuals * np.sqrt(2.0 / (1.0 + root)), np.sqrt(0.5 * (1.0 + root)) / root
 
 
-# --- bounded least squares from many starts at once: Levenberg and Marquardt's steps, an active set at the bo-----
+# --- bounded least squares from many starts at once -------------------------------------------------------------------
+# Bounded least squares from many starts at once: Levenberg and Marquardt's steps, an active set at the bounds.
+#
+# D. W. Marquardt, An algorithm for least-squares estimation of nonlinear parameters, J. SIAM 11 (1963) 431–441. All
+# starts' derivatives are one population of the kernel, and so are all steps with several dampings each.
 
 _DAMPINGS = (1e-4, 1e-2, 1.0, 30.0)  # of one step, times the start's own
 _SMALL = 1e-3  # least fall of the cost, in units of χ², that is worth another step
 _RELATIVE = 1e-5
 
 
-class descent_Problem(Protocol):
+class BoundedProblem(Protocol):
     """Least squares within bounds, of many candidates x (…, count) at once; their prior is among the residuals."""
 
     low: Array  # (count,)
@@ -193,7 +203,7 @@ class descent_Problem(Protocol):
 class Descent:
     """Where n starts stand; `step` moves each of them downhill."""
 
-    problem: descent_Problem
+    problem: BoundedProblem
     x: Array  # (n, unknowns)
     cost: Array  # (n,), χ² with the prior
     damping: Array
@@ -203,7 +213,7 @@ class Descent:
     _best: int = 0  # of the dampings, in the last step
 
     @classmethod
-    def begin(cls, problem: descent_Problem, x: Array, known: tuple[Array, Array] | None = None) -> Descent:
+    def begin(cls, problem: BoundedProblem, x: Array, known: tuple[Array, Array] | None = None) -> Descent:
         """At these starts (n, unknowns); known: the problem's `jacobians` there, if they were asked for before."""
         given = np.atleast_2d(np.asarray(x, dtype=float))
         x = problem.clip(given)
@@ -268,7 +278,7 @@ class Descent:
         self.damping, self.moving = self.damping[rows], self.moving[rows]
 
 
-def _newton(problem: descent_Problem, x: Array, residuals: Array, slopes: Array, dampings: Array) -> Array:
+def _newton(problem: BoundedProblem, x: Array, residuals: Array, slopes: Array, dampings: Array) -> Array:
     """The damped Gauss–Newton points of x (n, unknowns) for dampings (n, d), (n, d, unknowns).
 
     What stands at a bound and would leave it is held there.

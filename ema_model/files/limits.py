@@ -1,4 +1,9 @@
-"""How large files, and what is read of them, may be."""
+"""How large a file from elsewhere may be: said here once, with the reason, and used by all that read one.
+
+A few kilobytes can unpack to any size, so a limit bounds three things alike: the file on the disk, the numbers that are
+taken from it (8 bytes each), and whatever is unpacked on the way to them.  A file within it is read in less than three
+times the limit of memory, and any other is refused in one line: in 20 s, either.
+"""
 
 from __future__ import annotations
 

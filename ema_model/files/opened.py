@@ -15,6 +15,8 @@ from typing import IO, BinaryIO
 from ema_model.errors import InputError, quoted
 from ema_model.files.limits import megabytes
 
+# --- one clear line for a file that cannot be used --------------------------------------------------------------------
+
 _NAMES_SHOWN = 12
 
 
@@ -41,6 +43,7 @@ def reason(error: Exception) -> str:
 
 
 # --- the door for files that a user names: a regular file of a bearable size, or one clear line -----------------------
+# A pipe would be waited for, and a device read for ever.
 
 
 def check_user_file(
@@ -96,7 +99,12 @@ def _unreadable(path: str | os.PathLike[str], error: Exception) -> InputError:
     return refusal(path, f"cannot be read ({reason(error)}); check the name and the permissions")
 
 
-# --- takes a zip apart that may mean harm: .npz files, sessions and sealed challenges are zips, and come from---
+# --- takes a zip apart that may mean harm -----------------------------------------------------------------------------
+# Takes a zip apart that may mean harm: .npz files, sessions and sealed challenges are zips, and come from elsewhere.
+#
+# The sizes that a zip declares are only claims, some ways of packing unpack gigabytes at a time, and members may
+# share their bytes. So only stored and deflated members are taken, piece by piece, and every byte that comes out is
+# counted.
 
 _PIECE = 1 << 20
 _DIRECTORY_BYTES = 4 << 20  # the list of members, which zipfile reads at once: each takes 46 and its name

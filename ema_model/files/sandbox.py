@@ -22,7 +22,11 @@ from numpy.typing import NDArray
 from ema_model.child_processes import end_with_parent, start_python
 from ema_model.errors import InputError, quoted
 
-# --- work on a file that may mean harm, done by a process of its own, which may crash, hang or fill its memor--------
+# --- work on a file that may mean harm, done by a process of its own, which may crash ---------------------------------
+# Work on a file that may mean harm, done by a process of its own, which may crash, hang or fill its memory.
+#
+# Many formats are read by libraries in C, which end the whole process on some damaged files. So their work is done by
+# a process beside, with a bound to its memory and its time; when it ends, the next file gets a new one.
 
 Array = NDArray[np.float64]
 Answer = tuple[Any, list[Array]]

@@ -21,6 +21,8 @@ from tomlkit.items import InlineTable, Null, Table
 from ema_model.errors import InputError
 from ema_model.files.opened import open_user_file
 
+# --- a file lock that dies with its process: tells a recording being written from one left behind ---------------------
+
 _NO_LOCKS = (errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP, errno.EINVAL)  # what such file systems answer
 
 
@@ -200,7 +202,7 @@ def toml_of(text: str) -> dict[str, Any]:
         raise ValueError("a number has too many digits") from None
 
 
-# --- tOML is written: comments, order and spelling of an older text stay, where what they say stays -------------------
+# --- TOML is written: comments, order and spelling of an older text stay, where what they say stays -------------------
 
 _FAILURES = (TOMLKitError, ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError)
 

@@ -25,6 +25,10 @@ from ema_model.simulation.run import Run, simulate_reference
 from ema_model.simulation.sensors import Sensors
 from ema_model.units.block import linearised, pooled, unit_of
 
+# --- how well the recordings of one unit tell each of its parameters, and which are only known together ---------------
+# It is what a fit of that unit alone leaves open, at the file's values, with the file's tolerances as all else that
+# is known: the covariance is (G + 1)⁻¹ in tolerances, G as of `units.block`.
+
 _LENGTH_S = 0.4
 RUNS = {
     "chirp": Run(command("chirp"), _LENGTH_S),
@@ -167,7 +171,11 @@ def draw(
     return Fleet(seed, actuator, size, spread, runs, names, paths, x, tuple(differences))
 
 
-# --- the recordings of a fleet: the same commands for each unit, as a test bench gives them, and one to hold ------
+# --- the recordings of a fleet ----------------------------------------------------------------------------------------
+# The recordings of a fleet: the same commands for each unit, as a test bench gives them, and one to hold out.
+#
+# Each recording starts a little elsewhere in the encoder's step and in the play, so that no two are alike to the last
+# digit and the chopping's ripple is another in each.
 
 SENSORS = Sensors(current_noise_A=0.45, encoder_bits=12)
 UNSEEN = {
@@ -200,7 +208,10 @@ def recorded(
     return found
 
 
-# --- a fleet as a folder: UNIT/RECORDING.parquet, the actuator's file, and what differs, packed so that none ---
+# --- a fleet as a folder ----------------------------------------------------------------------------------------------
+# A fleet as a folder: UNIT/RECORDING.parquet, the actuator's file, and what differs, packed so that none reads it.
+#
+# Nothing that compares units may read the truth.
 
 TRUTH, ACTUATOR = "truth.sealed", "actuator.toml"
 _MOST_BYTES = 100_000

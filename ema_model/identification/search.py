@@ -16,6 +16,8 @@ from ema_model.faults import HEALTHY, NAMES
 from ema_model.identification.fit import Fitted
 from ema_model.quantities.numbers import amount
 
+# --- where a logger took the current and the positions at other moments, said in words --------------------------------
+
 _SAMPLES = 0.3  # from which on it is worth saying
 _SIGMAS = 4.0  # of its own uncertainty
 
@@ -36,8 +38,8 @@ def logged_apart(found: Fitted, covariance: NDArray[np.float64]) -> tuple[str, .
 
 # --- the cost over two k around an answer, the six others held there, and the ways from where searches ended ----------
 
-landscape_Array = NDArray[np.floating]
-Cost = Callable[[landscape_Array], landscape_Array]  # k (n, 8) → (n,), A: of an answer its corrected error
+Floats = NDArray[np.floating]
+Cost = Callable[[Floats], Floats]  # k (n, 8) → (n,), A: of an answer its corrected error
 
 POINTS = 41  # along each axis
 _ROWS = 2  # simulated at once: about two iterations of a usual search
@@ -54,10 +56,10 @@ class Landscape:
 
     x: int  # number of the k across, 0 … 7
     y: int  # and upwards
-    through: landscape_Array  # (8,), what the others are held at
-    across: landscape_Array  # (POINTS,), values of k x
-    upwards: landscape_Array  # (POINTS,)
-    error_A: landscape_Array  # (upwards, across)
+    through: Floats  # (8,), what the others are held at
+    across: Floats  # (POINTS,), values of k x
+    upwards: Floats  # (POINTS,)
+    error_A: Floats  # (upwards, across)
     rows: int  # done
 
     @property
@@ -85,9 +87,7 @@ class Way:
         return self.error_A > _WORSE * self.answer_A
 
 
-def extent(
-    through: landscape_Array, k: int, interval90: landscape_Array | None = None, close: bool = False
-) -> tuple[float, float]:
+def extent(through: Floats, k: int, interval90: Floats | None = None, close: bool = False) -> tuple[float, float]:
     """From and to along one k: all of 0 … 1, or close to the answer, a few of its 90 % intervals wide."""
     if not close:
         return 0.0, 1.0
@@ -99,7 +99,7 @@ def extent(
 
 def slices(
     cost: Cost,
-    through: landscape_Array,
+    through: Floats,
     x: int,
     y: int,
     across: tuple[float, float] = (0.0, 1.0),
@@ -123,7 +123,7 @@ def slices(
         yield Landscape(x, y, np.array(through), xs, ys, error.copy(), first + len(some))
 
 
-def ways(cost: Cost, ends: Mapping[str, landscape_Array], answer: landscape_Array) -> dict[str, Way]:
+def ways(cost: Cost, ends: Mapping[str, Floats], answer: Floats) -> dict[str, Way]:
     """The straight ways from the searches' ends (8,) to the answer (8,), by the searches' names; k7 is an angle."""
     share = np.linspace(0.0, 1.0, _WAY_POINTS)[:, None]
     found = {}
@@ -138,7 +138,10 @@ def ways(cost: Cost, ends: Mapping[str, landscape_Array], answer: landscape_Arra
     return found
 
 
-# --- the global part of a robust identification: many niches descend together, and the fewer the better known---------
+# --- the global part of a robust identification: many niches descend together, and the fewer the better known ---------
+# A first draw covers the box evenly; the best of it, kept apart from each other, become niches that all go downhill
+# by least squares. As they settle, niches in one basin are merged and the hopeless are left. What is left is the
+# distinct basins, the deepest first.
 
 Array = NDArray[np.float64]
 

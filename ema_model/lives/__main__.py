@@ -1,6 +1,6 @@
 """`python -m ema_model.lives`: finds anew how well identifications tell k."""
 
-from ema_model.lives.life import accuracy_write
+from ema_model.lives.life import write_accuracy
 
 if __name__ == "__main__":
-    print(accuracy_write())
+    print(write_accuracy())

@@ -27,6 +27,8 @@ from ema_model.simulation.sensors import Sensors
 from ema_model.tracking.flight import Flight
 from ema_model.tracking.identify import UNFIT
 
+# --- what a flight asks of the actuator: a command and a load, the harder the more it wears ---------------------------
+
 SENSORS = Sensors(current_noise_A=0.45, encoder_bits=12)
 _LOADS_Nm = (0.0, 8.0, 20.0)  # of the gentle, the usual and the hard flights
 _HARD = (0.6, 1.3)  # severities between them
@@ -62,6 +64,8 @@ def profiles_of(life: Life) -> np.ndarray:
 
 
 # --- the flights of a life without recordings: k̂ drawn from what identifications can tell ----------------------------
+# What is common to a unit's flights (its base parameters) is drawn once, what is a flight's own in each flight; both
+# change with the flight's profile and with how worn the unit is.
 
 _STATED = 0.2  # by which what an identification says of its own σ² varies about what it is, in natural logarithms
 
@@ -96,7 +100,11 @@ def _states(off: np.ndarray) -> np.ndarray:
     return np.concatenate([[1.0 - worn.sum()], worn])
 
 
-# --- what truly happens to a unit: its wear, flight by flight, with the load of each flight, a repair, bad re---
+# --- what truly happens to a unit -------------------------------------------------------------------------------------
+# What truly happens to a unit: its wear, flight by flight, with the load of each flight, a repair, bad recordings.
+#
+# Each flight wears by its severity, which is Gamma distributed with mean 1 and a coefficient of variation, so that
+# the time in which a part wears is a sum over flights and no count of them. Three laws say how k follows that time.
 
 Array = NDArray[np.float64]
 
@@ -204,7 +212,11 @@ def _severities(random: np.random.Generator, variation: float, count: int) -> Ar
     return random.gamma(shape, 1.0 / shape, count)
 
 
-# --- how well an identification of each profile tells k, found once by identifying recordings of the three-ph---
+# --- how well an identification of each profile tells k ---------------------------------------------------------------
+# How well an identification of each profile tells k, found once by identifying recordings of the three-phase model.
+#
+# `python -m ema_model.lives` makes assets/lives/accuracy.npz anew, in some minutes: for each profile, of the healthy
+# actuator and of one with each fault, the own covariance and what the base parameters move (`tracking.flight`).
 
 WORN_AT = 0.3  # from healthy, of the fault of each state
 STATES: tuple[dict[str, float], ...] = (
@@ -251,7 +263,7 @@ def find() -> Accuracy:
     return Accuracy(*(np.reshape(values, (*shape, *np.shape(values)[1:])) for values in (own, common)))
 
 
-def accuracy_write() -> Path:
+def write_accuracy() -> Path:
     """Finds it and keeps it."""
     found, path = find(), shipped_folder("lives") / _FILE
     np.savez_compressed(path, own=found.own, common=found.common)
@@ -293,7 +305,7 @@ def recorded(life: Life, actuator: Actuator, flights: range | None = None) -> It
         yield f"flight_{i + 1:04d}", Measurement(kept, name=f"flight_{i + 1:04d}")
 
 
-def recorded_write(life: Life, actuator: Actuator, folder: Path, flights: range | None = None) -> list[Path]:
+def write_flights(life: Life, actuator: Actuator, folder: Path, flights: range | None = None) -> list[Path]:
     """The same as files in a folder that must be there."""
     found = []
     for name, one in recorded(life, actuator, flights):

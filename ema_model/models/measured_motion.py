@@ -17,6 +17,9 @@ from ema_model.recordings import Measurement
 from ema_model.recordings.noise import NEAR, WITHIN, sample_noise
 from ema_model.simulation.run import FASTEST_HZ, SLOWEST_HZ, steps_per_sample
 
+# --- what of a recording's sampling a model can follow ----------------------------------------------------------------
+# What of a recording's sampling a model can follow: checked before anything is laid out in steps of the model.
+
 MOST_STEPS = 20_000_000  # of the model, over all recordings at once: 200 s at 10 µs, half a gigabyte of inputs
 _MOST_FILLED = 10.0  # samples on an even grid for each that was recorded, before its time counts as full of gaps
 _SLOWEST = 100.0  # half widths of the motion's filter
@@ -121,6 +124,9 @@ def _of(measurement: Measurement, share: float, parts: int, actuator: Actuator) 
 
 
 # --- speed and acceleration of a measured position, and the filter that they have passed ------------------------------
+# Local parabolas (Savitzky–Golay) give the acceleration; what smoothing that implies is known exactly: the
+# acceleration of a motion filtered by h, where h is the twice summed kernel of the second difference. All that is
+# held against the acceleration passes the same h, so that a comparison is free of the filter's own error.
 
 Array = NDArray[np.float64]
 
@@ -172,6 +178,13 @@ def _convolved(values: Array, kernel: Array) -> Array:
 
 
 # --- a recording's motion for inverse dynamics: filtered, with the blocks in which friction's law is known ------------
+# It is held to what differentiation can tell. What the position is off by (quantisation, jitter of its time stamps)
+# acts on the current through the inertia; after the filter it lasts as long as the filter does, and stands in the
+# floor as such: a regression that took it for white would be too sure of all that it finds (Janot, Vandanjon and
+# Gautier, IEEE Trans. Control Syst. Technol. 22 (2014), on noise in the regressors). About a reversal, friction is no
+# step of the measured speed's sign, and until a stroke is on its way bristles may bend where the motor seems to
+# slide. Where the actuator asks for it, as a second opinion does, blocks within the filter's reach of either are left
+# out, as usual in the identification of robots.
 
 _BLOCKS_PER_FILTER = 6  # compared values in a half width of the motion's filter
 _STILL_STEPS = 3.0  # of the encoder within the filter, under which the motor counts as standing

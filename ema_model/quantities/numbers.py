@@ -14,6 +14,8 @@ from numpy.typing import ArrayLike
 from ema_model.errors import InputError, quoted
 from ema_model.quantities.si import BY_SHOWN
 
+# --- intervals as they are told: each holds 90 % ----------------------------------------------------------------------
+
 HALF_90 = 1.645  # σ of a normal distribution, on either side
 IntervalJson = Annotated[list[float], Meta(min_length=2, max_length=2)]  # its lower and its upper end
 
@@ -30,7 +32,7 @@ def round_numbers(low: float, high: float, about: float, steps: Sequence[float] 
     return [step * i for i in range(first, last + 1)]
 
 
-# --- numbers as files and people write them: read, shown with so many digits, in a unit that suits their size---------
+# --- numbers as files and people write them: read, shown with so many digits, in a unit that suits their size ---------
 
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _SMALLEST = 0.09995  # reads as 0.1, and is shown as it is; what is smaller gets the next prefix

@@ -1,4 +1,7 @@
-"""SI units: as people see them, as names of columns and parameters end in them, and on a linear axis."""
+"""SI units: as people see them, as names of columns and parameters end in them, and what takes their place elsewhere.
+
+On a linear axis an angle is a length, a torque a force, an inertia a mass: each unit says its counterpart there.
+"""
 
 from __future__ import annotations
 

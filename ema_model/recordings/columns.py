@@ -288,7 +288,8 @@ def _told(entry: MappedColumn) -> str:
     return f"column {shown(entry.column)!r}{unit}{turned}{scale}{offset}"
 
 
-# --- how a file was read: which columns are which signals, what of it was guessed, and what was made from oth------
+# --- how a file was read ----------------------------------------------------------------------------------------------
+# How a file was read: which columns are which signals, what of it was guessed, and what was made from others.
 
 
 @dataclass(frozen=True)
@@ -372,8 +373,8 @@ def guess_mapping(
     for order, name in enumerate(names):
         found = guesses(name, shares, counts_per_turn)
         if export is not None and export.columns:
-            told = export.guess(name)
-            found = told if isinstance(told, str) else [told]
+            of_tool = export.guess(name)
+            found = of_tool if isinstance(of_tool, str) else [of_tool]
         if isinstance(found, str):
             reasons[name] = found
             continue
@@ -458,6 +459,3 @@ def _time_unit(guess: Guess, step: float) -> Guess:
         return guess
     reason = f"{guess.reason}; steps of {step:.4g}, so in {chosen}"
     return replace(guess, unit=chosen, confidence=guess.confidence - 0.1, reason=reason)
-
-
-# --- which column of a file is which signal: names, units, guesses and mappings ---------------------------------------

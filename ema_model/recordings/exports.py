@@ -1,6 +1,6 @@
 """Logs of tools whose columns are known by their makers' code: what is in which column, in which unit.
 
-A tool's columns are told by their names; one that writes numbers alone is no more than likely, and is only named.
+A tool is known by the names of its columns; one that writes numbers alone is no more than likely, and is only named.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class Export:
         return Guess(*self.columns[column], 0.95, f"{self.title} has it so")
 
     @property
-    def told(self) -> str:
+    def sentence(self) -> str:
         """In a line: "this is a VESC Tool log; …"."""
         return f"this is {self.title}; {self.hint}" if self.names else f"{self.hint}, if this is {self.title}"
 

@@ -24,6 +24,8 @@ from ema_model.recordings.health.estimates import rotation_order
 from ema_model.recordings.side_file import SideFile
 from ema_model.text import Document, InWords, Lines, Table
 
+# --- a measurement in words: its size, how its file was read, and its signals with their ranges -----------------------
+
 
 def document_of(measurement: Measurement) -> Document:
     """Signals by their names in files, in SI; beside each the column that it was read from."""

@@ -47,6 +47,9 @@ from ema_model.recordings.measurement import (
 from ema_model.recordings.side_file import SideFile, find_side_file, read_side_file
 from ema_model.recordings.wrapping import unwrapped
 
+# --- a file of any format as columns, and as a measurement once it is known which column is which signal --------------
+# `ema_model.recordings.read` is the way in; this is what it is built on.
+
 Array = NDArray[np.float64]
 NONE = Hints()
 
@@ -426,6 +429,8 @@ def _between(actuator: Actuator) -> list[str]:
 
 
 # --- the one door: any file of a known actuator becomes the measurement as the model needs it -------------------------
+# Which column is which signal is said by hand, else by the file's side file, else by the actuator's file; canonical
+# names speak for themselves, and what is then still open is guessed. A guess that is not sure is asked about.
 
 Needs = Sequence[Sequence[str]]  # of each group one signal, the first that there is; names inside
 COMMAND_ALONE: Needs = (("time_s",), ("command_rad",))
@@ -526,7 +531,7 @@ def how_to_read(
     doubts = tuple((entry, why) for entry in fresh if (why := doubt(entry)))
     sure = tuple(entry for entry in fresh if not doubt(entry))
     export = known_export(header)
-    remarks = (export.told,) if export is not None and export.names else ()
+    remarks = (export.sentence,) if export is not None and export.names else ()
     return Reading(ColumnMapping((*known.entries, *sure), guess.unmapped), sure, doubts, remarks=remarks)
 
 
@@ -610,7 +615,7 @@ def _ask(path: str, actuator: Actuator, reading: Reading, header: Sequence[str],
         hint = f"; {WITHOUT_COMMAND}" if is_of_model else ""
         hint += "; a file without a time is read with --rate HZ" if "time_s" in absent else ""
         if export := known_export(header):
-            hint += f"; {export.told}"
+            hint += f"; {export.sentence}"
         raise refusal(path, f"{'; '.join(questions)}; {found}{hint}")
 
 

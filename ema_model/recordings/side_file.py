@@ -19,6 +19,11 @@ from ema_model.quantities.signals import SIGNALS
 from ema_model.recordings.columns import NUMBERS, ColumnMapping, MappedColumn, parse_mapping
 from ema_model.recordings.formats.text_layout import Hints, known_encoding
 
+# --- the side file NAME.toml beside a recording -----------------------------------------------------------------------
+# The side file NAME.toml beside a recording: its actuator, mapping, sensors, sampling, window, kind and text layout.
+#
+# One named recordings.toml serves the recordings of its folder that have none of their own.
+
 Kind = Literal["run", "map"]
 Sampling = Literal["mean", "instantaneous"]
 
@@ -322,6 +327,3 @@ def _column(entry: MappedColumn) -> Any:
     """One entry on a line, in which any column's name can stand."""
     unit = {"unit": entry.unit} if entry.unit else {}
     return inline({"column": entry.column, **unit, **entry.numbers})
-
-
-# --- the side file NAME.toml beside a recording, read and written -----------------------------------------------------

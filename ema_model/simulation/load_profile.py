@@ -1,4 +1,4 @@
-"""How the load on the user's shaft goes over time: constant, a step, a sine or a chirp."""
+"""How the load on the user shaft goes over time: constant, a step, a sine or a chirp (the thesis's load block)."""
 
 from __future__ import annotations
 

@@ -27,6 +27,8 @@ from ema_model.simulation.run import (
     simulate_reference,
 )
 
+# --- several runs of the Reference Model at once: actuators that differ, under one command ----------------------------
+
 Array = NDArray[np.float64]
 
 SHOWN = ("current_A", "motor_speed_rad_s", "motor_position_rad", "user_position_rad")

@@ -1,4 +1,4 @@
-"""One run: load, sensors, simulation, words."""
+"""One run of a model: a command and a load in, signals out; and the kernels that do it for a population."""
 
 from __future__ import annotations
 
@@ -26,6 +26,8 @@ from ema_model.simulation.pack import initial_reference_state, initial_state, mo
 from ema_model.simulation.precompile import wait_for
 from ema_model.stacks import Stack
 
+# --- a run as a part of a sentence ------------------------------------------------------------------------------------
+
 
 def run_in_words(command: str, settings: Mapping[str, float], duration_s: float, axes: Axes = ROTARY) -> str:
     """'a sine with amplitude 0.03 rad, frequency 2 Hz, for 0.5 s'."""
@@ -38,7 +40,8 @@ def run_in_words(command: str, settings: Mapping[str, float], duration_s: float,
     return f"{article} {in_sentence(title)} with {', '.join(parts) or 'its usual settings'}, for {duration_s:g} s"
 
 
-# --- the Monitor Model's and inverse dynamics' kernels called for a population, its blocks of lanes side by s------
+# --- the Monitor Model's and inverse dynamics' kernels called for a population ----------------------------------------
+# The Monitor Model's and inverse dynamics' kernels called for a population, its blocks of lanes side by side.
 
 Array = NDArray[np.float64]
 AnyFloat = NDArray[np.floating]

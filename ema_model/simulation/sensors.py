@@ -1,4 +1,4 @@
-"""What sensors do to the signals: noise and quantisation, in the recording only; the loop does not see them."""
+"""What sensors do to the signals: noise and quantisation, in the recording only (the loop does not see them)."""
 
 from __future__ import annotations
 

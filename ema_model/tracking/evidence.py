@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import log_ndtr
 
+# --- every number that decides in the tracking of flights -------------------------------------------------------------
+
 FALSE_TREND = 0.01  # probability of a trend that is none, of a unit's whole life, all k and all looks together
 ONSET_EVERY = 4  # flights between two onsets that are looked at
 SLOPES = (1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2)  # of k in a flight, spread of what a trend may be
@@ -88,6 +90,12 @@ def _slope(k: Array) -> float:
 
 
 # --- evidence for a trend of each k that may be looked at after each flight -------------------------------------------
+# Without a trend k̂_t = c + s_t · u + e_t: c any constant, u the base parameters (σ = 1 each), e_t the flight's own
+# noise; s_t is stated for one state of wear (`tracking.sensitivity`). With one, a slope is added from an onset on.
+# The marginal likelihoods' ratio, c flat in both (the ratio is then one of the differences alone, whatever c),
+# averaged over onsets and slopes, is a martingale without a trend: the probability that it ever reaches 1/α is α at
+# most (Ville; Ramdas et al., Statistical Science 38, 2023, for such e-processes). The noise is the stated one, or
+# what successive flights differ by where that is more.
 
 
 class Evidence:

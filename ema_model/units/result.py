@@ -18,6 +18,9 @@ from ema_model.quantities.titles import in_sentence
 from ema_model.text import Block, Document, InWords, Lines, Note, Table
 from ema_model.units.criteria import MISFIT
 
+# --- what was found in comparing units --------------------------------------------------------------------------------
+# What was found in comparing units: in what which of them differ, how they are of a type, which model suits which.
+
 Array = NDArray[np.float64]
 Interval = tuple[float, float]
 
@@ -299,7 +302,8 @@ def _of_type(one: OfType) -> OfTypeJson:
     return OfTypeJson(**{**asdict(one), "mean90": list(one.mean90)})
 
 
-# --- what units differ in, in words: sentences first, then what differs, the type, which model suits which, w---
+# --- what units differ in, in words -----------------------------------------------------------------------------------
+# What units differ in, in words: sentences first, then what differs, the type, which model suits which, what lacks.
 
 _WIDEST = 10  # units, up to which the matrix stands in a terminal
 _MOST_NAMED = 6

@@ -16,7 +16,6 @@ from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.files.limits import FILE_BYTES
 from ema_model.files.opened import listed
 from ema_model.recordings import Measurement, read_header
-from ema_model.recordings.formats.text_layout import Hints
 from ema_model.recordings.recording_set import RUN, held_out, is_pattern
 from ema_model.units.folders import check_same_type
 from emaviz.cli import flow, given, output
@@ -121,8 +120,7 @@ def _column(arguments: argparse.Namespace, files: list[str]) -> str:
         raise InputError("--by names a column, and --unit patterns: give one of them")
     if arguments.unit:
         return ""
-    hints = Hints(arguments.header_line, arguments.encoding, arguments.rate)
-    columns = read_header(files[0], FILE_BYTES, hints)
+    columns = read_header(files[0], FILE_BYTES, given.hints_of(arguments))
     if arguments.by in columns:
         if arguments.runs:
             raise InputError("--runs and --by COLUMN both cut the files into runs; give one of them")

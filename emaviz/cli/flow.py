@@ -75,5 +75,5 @@ def finish(arguments: argparse.Namespace, answer: Answer, progress: output.Progr
                 failed.append(error)
     progress.done()
     if failed:
-        raise InputError(str(failed[0])) from failed[0]
+        raise InputError("; ".join(map(str, failed))) from failed[0]
     return ExitCode.DONE if answer.is_whole else ExitCode.INTERRUPTED

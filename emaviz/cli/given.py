@@ -116,11 +116,15 @@ def read_one(
     if not runs and not any(text.partition("=")[0].strip() == "segment" for text in arguments.mapping):
         runs = column_of_runs(file)
     by_run = [f"segment={runs}"] if runs and runs != "segment" else []
-    hints = Hints(arguments.header_line, arguments.encoding, arguments.rate)
-    measurement = read(file, actuator, [*arguments.mapping, *by_run], needs=needs, hints=hints)
+    measurement = read(file, actuator, [*arguments.mapping, *by_run], needs=needs, hints=hints_of(arguments))
     if told := measurement.reading.told:
         say(f"{Path(file).name}: {told}", progress)
     return measurement
+
+
+def hints_of(arguments: argparse.Namespace) -> Hints:
+    """How files are laid out: --header-line, --encoding and --rate."""
+    return Hints(arguments.header_line, arguments.encoding, arguments.rate)
 
 
 def actuator_of(arguments: argparse.Namespace) -> Actuator:

@@ -14,6 +14,8 @@ from ema_model.files.opened import shown
 from ema_model.members import stated, stated_in
 from emaviz.cli import files
 
+# --- the numbers that options take, checked while the options are read ------------------------------------------------
+
 
 @dataclass(frozen=True)
 class Number:
@@ -49,6 +51,8 @@ def whole(low: int, high: int) -> Number:
 
 
 # --- options that several commands share; what they give is read by `given` -------------------------------------------
+# Names of commands, effects and the like are read from the sources that state them: the parser must answer at once,
+# and to import what computes takes a second.
 
 
 @cache

@@ -20,6 +20,8 @@ from emaviz.colours import ALGORITHMS, CASES, REFERENCE_SHADES
 from emaviz.figures import theme
 from emaviz.figures.theme import line
 
+# --- how often each answer was given: bars, a row a case, its parts side by side --------------------------------------
+
 
 def counted(title: str, counts: Mapping[str, Mapping[str, int]], *, dark: bool = False) -> go.Figure:
     """counts: by case, of each answer."""

@@ -21,6 +21,9 @@ from emaviz.figures import theme
 from emaviz.figures.theme import DARK, LIGHT, Binned, band, binned, edges_for, envelope, line, scattered
 from emaviz.recording.read import Recording
 
+# --- a signal as measured, and as the model has it before and after calibration ---------------------------------------
+# A signal as measured, and as the model has it before and after calibration, the floor a band about the model.
+
 
 def overlay(
     comparison: Comparison,
@@ -128,7 +131,8 @@ def residual_time(
     return chart
 
 
-# --- what is left of a signal against a variable: the blocks, their mean in bins, the floor, the worst region--------
+# --- what is left of a signal against a variable ----------------------------------------------------------------------
+# What is left of a signal against a variable: the blocks, their mean in bins, the floor, the worst regions.
 
 _FEWEST = 20  # blocks that can be drawn as a cloud with a mean
 

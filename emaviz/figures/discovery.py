@@ -33,8 +33,10 @@ from ema_model.simulation.with_effect import SHOWN, WithEffect, few_periods
 from emaviz.colours import DIFFERENCE, FITTED, HELD_OUT, MONITOR, REFERENCE
 from emaviz.figures import theme
 from emaviz.figures.runs import LAST_MORE_PX, PLANT_LINE, charts, legend, time_axis, value_axis
-from emaviz.figures.theme import Binned, Series, binned, chart, edges_for, envelope, line, scattered, svg_told
+from emaviz.figures.theme import Binned, Series, binned, chart, edges_for, envelope, line, scattered, svg_number
 from emaviz.text.html import Html, add_html, html, joined, mathml
+
+# --- the error ladder: how far the model is from the recordings, step by step, in units of the floor ------------------
 
 _WIDE = 15.0  # times the floor, from which on the scale is logarithmic
 _TOP = 1.2  # of a straight scale, times the largest error
@@ -184,7 +186,8 @@ def candidates(found: Discovery, *, dark: bool = False) -> go.Figure:
     return chart
 
 
-# --- what the residual depended on before the first step, and what it depends on now: how much each variable ----
+# --- what the residual depended on before the first step, and what it depends on now ----------------------------------
+# What the residual depended on before the first step, and what it depends on now: how much each variable tells.
 
 _PALE = 0.3
 _TITLE = "What the residual depends on"
@@ -308,7 +311,8 @@ def _residual(found: Discovery) -> Quantity:
     return Quantity(f"{told.title}, with the motion", told.unit, told.factor) if modulator == "sign_speed" else told
 
 
-# --- an effect's signature beside what is left: what it would change, and what the model lacks, over one vari-----
+# --- an effect's signature beside what is left ------------------------------------------------------------------------
+# An effect's signature beside what is left: what it would change, and what the model lacks, over one variable.
 
 Array = NDArray[np.float64]
 
@@ -561,7 +565,11 @@ def effect_residual_legend(effect: Effect) -> Html:
     shown = Quantity("", first.unit).scaled(effect.severities)
     lines = (
         html(
-            '<span><b style="color:{}">━</b> {}: {} {}</span>', colour, name, svg_told(shown.factor * value), shown.unit
+            '<span><b style="color:{}">━</b> {}: {} {}</span>',
+            colour,
+            name,
+            svg_number(shown.factor * value),
+            shown.unit,
         )
         for (name, colour), value in zip(SEVERITIES, effect.severities)
     )

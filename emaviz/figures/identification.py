@@ -38,6 +38,8 @@ from emaviz.figures.runs import (
 from emaviz.figures.theme import envelope, line
 from emaviz.text.html import Html, add_html, html, html_escape, joined, unescaped
 
+# --- k1…k8 as dots with whiskers about the healthy value, in HTML that the app and reports share ----------------------
+
 _LEAST_LIMIT = 1e-9
 _ECCENTRICITY, _PHASE = 5, 6
 _FAULT_BARS_INK = "currentColor"
@@ -247,6 +249,7 @@ def _row(row: Row) -> Html:
 
 
 # --- the live chart of identifications: the best error of each iteration, all optimisers in one plot ------------------
+# While they search it is the simplified model's own; once all have ended, what that model is known to lack is added.
 
 _CONVERGENCE_LEAST_A = 1e-9  # a logarithmic axis has no zero
 
@@ -340,7 +343,7 @@ def _convergence_scales(iterations: int) -> Any:
 
 # --- a swarm of candidates as it converges: in the plane of two k, or as lines across all eight; SVG in HTML ----------
 
-swarm_Array = NDArray[np.floating]
+Floats = NDArray[np.floating]
 
 _WIDTH, _PLANE_HEIGHT, _LINES_HEIGHT = 460, 572, 572  # as fills a column of a usual window
 _SWARM_LEFT, _RIGHT, _TOP, _BOTTOM = 44, 14, 10, 36
@@ -356,20 +359,18 @@ class Swarm:
 
     name: str
     colour: str
-    population: swarm_Array  # (n, 8)
-    best: swarm_Array  # (8,)
+    population: Floats  # (n, 8)
+    best: Floats  # (8,)
 
 
-def plane(
-    swarms: Sequence[Swarm], x: int, y: int, truth: swarm_Array | None = None, trails: Sequence[swarm_Array] = ()
-) -> Html:
+def plane(swarms: Sequence[Swarm], x: int, y: int, truth: Floats | None = None, trails: Sequence[Floats] = ()) -> Html:
     """Candidates as points over k number x and y (0 … 7); ringed: the best; cross: the truth.
 
     trails: for each swarm the way of its best, (m, 8).
     """
     right, low = _WIDTH - _RIGHT, _PLANE_HEIGHT - _BOTTOM
 
-    def at(k: swarm_Array) -> tuple[swarm_Array, swarm_Array]:
+    def at(k: Floats) -> tuple[Floats, Floats]:
         k = np.atleast_2d(k)
         return _SWARM_LEFT + (right - _SWARM_LEFT) * k[:, x], low - (low - _TOP) * k[:, y]
 
@@ -403,12 +404,12 @@ def plane(
     )
 
 
-def lines(swarms: Sequence[Swarm], truth: swarm_Array | None = None) -> Html:
+def lines(swarms: Sequence[Swarm], truth: Floats | None = None) -> Html:
     """Candidates as lines across eight upright axes, 0 below and 1 above; bold: the best; green: the truth."""
     low = _LINES_HEIGHT - _BOTTOM - 8
     xs = np.linspace(_SWARM_LEFT, _WIDTH - _RIGHT - 12, len(NAMES))
 
-    def way(k: swarm_Array) -> str:
+    def way(k: Floats) -> str:
         ys = low - (low - _TOP) * np.asarray(k, dtype=float)
         return "M" + "L".join(f"{px:.0f} {py:.1f}" for px, py in zip(xs, ys))
 
@@ -470,7 +471,6 @@ def _picture(parts: Sequence[str], height: int) -> Html:
 
 # --- the cost over two k: as a map, with the answer, its interval, the truth, and where each search ended -------------
 
-landscape_Array = NDArray[np.floating]
 
 _LANDSCAPE_LEAST_A = 1e-6  # a logarithmic colour has no zero
 _STEPS = (1.0, 2.0, 5.0)
@@ -482,10 +482,10 @@ _ANSWER = theme.MARK
 class Marks:
     """What stands on the map."""
 
-    answer: landscape_Array  # (8,)
-    interval90: landscape_Array | None = None  # (8, 2)
-    truth: landscape_Array | None = None  # (8,)
-    ends: Mapping[str, landscape_Array] | None = None  # (8,) each, by the search's name
+    answer: Floats  # (8,)
+    interval90: Floats | None = None  # (8, 2)
+    truth: Floats | None = None  # (8,)
+    ends: Mapping[str, Floats] | None = None  # (8,) each, by the search's name
 
 
 def figure(landscape: Landscape, marks: Marks, *, dark: bool = False) -> go.Figure:
@@ -549,7 +549,7 @@ def _point(
     )  # fmt: skip
 
 
-def _landscape_box(drawn: go.Figure, across: landscape_Array, upwards: landscape_Array) -> None:
+def _landscape_box(drawn: go.Figure, across: Floats, upwards: Floats) -> None:
     """The 90 % intervals of the two k."""
     drawn.add_shape(
         type="rect", x0=across[0], x1=across[1], y0=upwards[0], y1=upwards[1],
@@ -559,7 +559,7 @@ def _landscape_box(drawn: go.Figure, across: landscape_Array, upwards: landscape
 
 # --- the measured current and the monitor's of each optimiser, live, and what they leave ------------------------------
 
-fitted_current_Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 _FITTED_CURRENT_LEFT = "Monitor − measured"
 
 
@@ -608,9 +608,9 @@ class LiveFit:
 
     def show(
         self,
-        time_s: fitted_current_Array,
-        measured_A: fitted_current_Array,
-        fitted_A: Mapping[str, fitted_current_Array],
+        time_s: Array,
+        measured_A: Array,
+        fitted_A: Mapping[str, Array],
     ) -> None:
         """All arrays (blocks,); fitted by algorithm."""
         if not fitted_A:

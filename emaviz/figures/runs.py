@@ -26,12 +26,14 @@ from emaviz.recording.entry import Entry, error_key, setting
 from emaviz.recording.read import Recording
 from emaviz.text.html import Html, add_html, html, joined
 
+# --- the live charts of one run: reference, monitor, a frozen run, and the difference on an axis of its own -----------
+
 Array = NDArray[np.float64]
 POINTS = 800  # of a line, at most
 PADDING = (10, 4, 0, 0)  # top, right, bottom, left, px: the uppermost tick needs half a line
 _GREY = "#868e96"
 _VALUES_PX, _LABEL_PX = 22, 16  # of a time axis
-LEAST_SPACE_PX = 12  # between two values of an axis, which a low chart needs; `chart_heights.py` gives high ones more
+LEAST_SPACE_PX = 12  # between two values of an axis, which a low chart needs; the page gives high ones more
 _FRAME = 3.0  # of the difference's axis over its largest value
 LAST_MORE_PX = _VALUES_PX + _LABEL_PX  # by which the last chart of a column is taller than those above it
 
@@ -252,7 +254,8 @@ def _within(time_s: Array, window_s: tuple[float, float]) -> slice:
     return slice(first, max(last, first + 2))
 
 
-# --- which signals of a run have a chart, and in which units: with the prefix that reads well in the range dr------
+# --- which signals of a run have a chart, and in which units ----------------------------------------------------------
+# Which signals of a run have a chart, and in which units: with the prefix that reads well in the range drawn.
 
 
 @dataclass(frozen=True)
@@ -493,7 +496,8 @@ def _run_metrics_number(value: float, missing: str) -> str:
     return f"{value:.4g}" if math.isfinite(value) else missing
 
 
-# --- two identifications on the same axes: a signal, what each model leaves of it, and how each search conver------
+# --- two identifications on the same axes -----------------------------------------------------------------------------
+# Two identifications on the same axes: a signal, what each model leaves of it, and how each search converged.
 
 FIRST, SECOND = RUNS
 _TWO_RECORDINGS_POINTS = 2000

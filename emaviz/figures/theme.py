@@ -19,6 +19,8 @@ from ema_model.quantities.numbers import Quantity, number, round_numbers
 from emaviz.colours import COMMAND, DIFFERENCE, LIMIT, MONITOR, REFERENCE
 from emaviz.text.html import Html, html_escape, unescaped
 
+# --- how all figures of a comparison look, on light and on dark: one template each, margins, legends, shading ---------
+
 MEASURED = REFERENCE
 MODEL = MONITOR
 INITIAL = COMMAND
@@ -178,7 +180,8 @@ def moment(figure: go.Figure, x: float | None) -> None:
         figure.add_shape(type="line", x0=x, x1=x, yref="y domain", y0=0, y1=1, line={"width": 1.5, "color": EDGE})
 
 
-# --- a chart as inline SVG, for pages without a script; its ink is the page's, so that it is read on light an---
+# --- a chart as inline SVG, for pages without a script ----------------------------------------------------------------
+# A chart as inline SVG, for pages without a script; its ink is the page's, so that it is read on light and dark.
 
 Array = NDArray[np.float64]
 
@@ -223,7 +226,7 @@ def chart(title: str, x: Quantity, y: Quantity, series: Sequence[Series], least:
     )
 
 
-def svg_told(value: float) -> str:
+def svg_number(value: float) -> str:
     """A round number, without zeros at its end: 0.05, 3·10⁻⁵."""
     mantissa, dot, power = number(value, 4).partition("·")
     return (mantissa.rstrip("0").rstrip(".") if "." in mantissa else mantissa) + dot + power
@@ -253,11 +256,11 @@ def _grid(x: _Axis, y: _Axis) -> str:
     for value in x.ticks:
         at = float(x.at(np.array(value)))
         lines.append(f"M{at:.1f} {y.start:g}V{y.end:g}")
-        texts.append(_text(at, y.start + 15, svg_told(value), "middle"))
+        texts.append(_text(at, y.start + 15, svg_number(value), "middle"))
     for value in y.ticks:
         at = float(y.at(np.array(value)))
         lines.append(f"M{x.start:g} {at:.1f}H{x.end:g}")
-        texts.append(_text(x.start - 6, at + 4, svg_told(value), "end"))
+        texts.append(_text(x.start - 6, at + 4, svg_number(value), "end"))
     zero = f"M{x.start:g} {float(y.at(np.array(0.0))):.1f}H{x.end:g}" if y.low <= 0.0 <= y.high else ""
     return (
         f'<path d="{"".join(lines)}" stroke="currentColor" opacity=".15"/>'
@@ -367,7 +370,8 @@ def scattered(x: Array, y: Array, points: int) -> NDArray[np.intp]:
     return np.union1d(extremes, others)
 
 
-# --- the mean of a residual in bins of a variable, with an error that neighbouring blocks cannot make too sma-------
+# --- the mean of a residual in bins of a variable ---------------------------------------------------------------------
+# The mean of a residual in bins of a variable, with an error that neighbouring blocks cannot make too small.
 
 _FEWEST = 5  # blocks in a bin
 
@@ -437,7 +441,8 @@ def edges_for(variable: str, x: Array) -> Array:
     return np.unique(np.quantile(x, np.linspace(0.0, 1.0, 29)))
 
 
-# --- an axis about zero that a few values, as those of a start, would set for all the others: it is cut, and ---
+# --- an axis about zero that a few values, as those of a start, would set for all the others --------------------------
+# An axis about zero that a few values, as those of a start, would set for all the others: it is cut, and says so.
 
 _PERCENT, _USUAL, _FAR = 99.0, 1.5, 1.3  # of the values; times that one the axis ends; beyond times that it is cut
 _STEPS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)  # an end is one of them, so that it seldom changes

@@ -15,6 +15,8 @@ from ema_model.tracking.result import FaultTrack, Tracked
 from emaviz.colours import COMMAND, MONITOR, REFERENCE
 from emaviz.figures import theme
 
+# --- one k over the flights of a unit, with its band, its jumps, and the fan to its threshold -------------------------
+
 CLICKED = "flights"  # by which a page knows the chart, of which a point's text is its flight
 _K_OVER_FLIGHTS_BAND = "rgba(240,140,0,0.18)"
 _FAN = "rgba(240,140,0,0.30)"
@@ -163,7 +165,8 @@ def _runs(said: list) -> list[list]:
     return runs
 
 
-# --- the remaining life as a distribution: the probability that the threshold is crossed within so many fligh-------
+# --- the remaining life as a distribution -----------------------------------------------------------------------------
+# The remaining life as a distribution: the probability that the threshold is crossed within so many flights.
 
 _POINTS = 400
 _REMAINING_LIFE_ROOM = 0.15  # of the axis, that a label left of its point needs
@@ -179,9 +182,8 @@ def remaining_life(left: Remaining, *, came: int | None = None, dark: bool = Fal
     for share, at in ((0.05, left.p05), (0.5, left.p50), (0.95, left.p95)):
         mark = {"size": 8, "color": theme.MARK}
         label = [f"{100.0 * share:.0f} %: {at:.0f}"]
-        beside = (
-            "top left" if at > _REMAINING_LIFE_ROOM * x[-1] else "top right"
-        )  # of the curve, and inside of the axes
+        # Of the curve, and inside of the axes.
+        beside = "top left" if at > _REMAINING_LIFE_ROOM * x[-1] else "top right"
         side = beside if share < 0.1 else "bottom right"
         chart.add_trace(
             go.Scatter(x=[at], y=[share], mode="markers+text", text=label, textposition=side, marker=mark,

@@ -16,6 +16,9 @@ from ema_model.units.result import UnitsCompared
 from emaviz.colours import LIMIT, REFERENCE
 from emaviz.figures import theme
 
+# --- each unit's parameters with their intervals, beside what the type shares -----------------------------------------
+# Each unit's parameters with their intervals, beside what the type shares: a small chart for each parameter.
+
 _TYPE = "rgba(134,142,150,0.30)"
 _COLUMNS = 3
 _HEAD_PX, _AXIS_PX = 38, 60  # of the whole, and below each chart

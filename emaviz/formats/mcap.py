@@ -14,6 +14,9 @@ import pyarrow as pa
 from ema_model.recordings.formats.channels import Log, NoLog, broken_file
 from ema_model.recordings.formats.logs import log_format
 
+# --- whether an MCAP file's chunks unpack to what they declare, by the specification (mcap.dev/spec) ------------------
+# Rerun's reader never ends on some chunks that do not; so each is unpacked here first, and its checksum compared.
+
 _MAGIC = b"\x89MCAP0\r\n"
 _CHUNK, _DATA_END, _FOOTER = 6, 15, 2
 _CODECS = {"": None, "zstd": "zstd", "lz4": "lz4"}
@@ -70,7 +73,7 @@ def _check_chunk(record: bytes, most_bytes: int) -> int:
     return size
 
 
-# --- mCAP of ROS 2 and Foxglove: topics whose messages are CDR, Protobuf or JSON, each with its stamps ----------------
+# --- MCAP of ROS 2 and Foxglove: topics whose messages are CDR, Protobuf or JSON, each with its stamps ----------------
 
 # A message's own stamp goes before the time at which it was logged.
 _TIMELINES = ("ros2_timestamp", "timestamp", "message_publish_time", "message_log_time")

@@ -19,6 +19,8 @@ from emaviz.session.inputs import Provenance
 from emaviz.session.worker import Worker
 from emaviz.text.html import Html, add_html, html, joined, said
 
+# --- campaigns, below the recordings: which one, its progress, and the row that opens as a run ------------------------
+
 NONE = "–"
 _MOST_ROWS = 500  # that can be chosen from: of a group, the errors and the worst first
 _BOX = Html('style="padding:2px 10px;font-size:12.5px;line-height:1.45"')
@@ -154,6 +156,3 @@ def _worst(row: Mapping[str, Any]) -> tuple[bool, float, int]:
 
 def _box(text: str) -> Html:
     return html("<div {}>{}</div>", _BOX, text)
-
-
-# --- campaigns: their progress and tables, and a row as a run ---------------------------------------------------------

@@ -16,6 +16,8 @@ from emaviz.page.docked import LEFT_PX, TWO_COLUMNS_PX
 from emaviz.server.viser_private import Inside, id_of
 from emaviz.text.html import Html, unescaped
 
+# --- charts over time that stand below each other, and figures, as high in each window as fills it --------------------
+
 # Heights by which windows are told apart: charts are laid out for the tallest that is no taller than the window.
 WINDOWS_PX = (600, 640, 680, 700, 740, 780, 820, 860, 900, 940, 980, 1020, 1060, 1100, 1150, 1200, 1300, 1400)
 _USUAL_WIDTH_PX, _USUAL_PX = 1400, 900  # of a window, for which charts are built
@@ -135,6 +137,8 @@ def style() -> Html:
 
 
 # --- what every chart of the page can do: its values stand at the cursor, and a button saves it as a picture ----------
+# viser's charts take no functions from Python, so that a script on the page looks at them: live ones (uPlot), static
+# ones (Plotly), and pictures of ours in HTML. Where a name in viser's page has changed, the charts are as without it.
 
 _SCRIPT = r"""
 (() => {

@@ -24,6 +24,8 @@ from emaviz.server.viser_private import selector_of
 from emaviz.session.library import Library
 from emaviz.text.html import BOX, add_html, html, mathml, note, unescaped
 
+# --- an effect opened: its text, its equation, and what each parameter does -------------------------------------------
+
 WORKSPACE = Workspace("library", "Library", viser.Icon.BOOK, 7)
 
 _FIRST = "cogging_torque"  # shown until another one is chosen
@@ -222,6 +224,3 @@ class LibraryTab(Tab):
     def build(self) -> None:
         """Search and cards."""
         LibraryPanel(self.page, self._library, self._effect)
-
-
-# --- the Library tab --------------------------------------------------------------------------------------------------

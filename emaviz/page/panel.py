@@ -23,6 +23,8 @@ from emaviz.text.html import BOX, Html, add_html, boxed, html, joined
 from emaviz.text.results import begun, large, warned
 from emaviz.text.time_left import going_on
 
+# --- what a long run says of itself: how far it is, what came of it, and the buttons that pause and stop it -----------
+
 
 class JobLine:
     """A line of text; while the job runs, a bar, what goes on, and how long it still takes where that is known."""
@@ -196,7 +198,8 @@ class Leads:
         button.on_click(follow)
 
 
-# --- buttons that keep what is shown in the data folder, and what they have written; the browser saves it as -----
+# --- buttons that keep what is shown in the data folder, and what they have written -----------------------------------
+# Buttons that keep what is shown in the data folder, and what they have written; the browser saves it as well.
 
 
 class Cleared(Protocol):

@@ -35,6 +35,8 @@ from emaviz.session.saved import Part, Recorded
 from emaviz.session.worker import Worker
 from emaviz.text.html import Html, add_html, begin, boxed, html, joined, said
 
+# --- everything on the page as one file: saved to the data folder and to the browser, loaded from either --------------
+
 WORKSPACE = Workspace("runs", "Runs", viser.Icon.LIST, 8, share=0.66)  # for the Rerun viewer
 
 _NONE = "–"
@@ -515,6 +517,3 @@ class RunsTab(Tab):
         """A campaign's row was simulated again, and recorded there."""
         self.panel.choose(path.name)
         self.shared.strip.put(motion(run, HEALTHY, self.page.session.actuator), WORKSPACE.name)
-
-
-# --- the Runs tab and its panels --------------------------------------------------------------------------------------

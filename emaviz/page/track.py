@@ -48,6 +48,9 @@ from emaviz.session.worker import Worker
 from emaviz.text.html import BOX, DIM, Html, add_html, begin, boxed, html, joined, note
 from emaviz.text.results import warned, whole
 
+# --- a click on a flight in its chart ---------------------------------------------------------------------------------
+# A click on a flight in its chart: the page knows which point is hovered, and tells it through an unseen field.
+
 WORKSPACE = Workspace("track", "Track", viser.Icon.TIMELINE, 6, share=0.66, lower=True)
 
 _BETWEEN = "|"  # after it stands the time, so that a second click on a flight is another text
@@ -137,7 +140,8 @@ class FlightLead:
         comparing.add(name)
 
 
-# --- track's panel on the right: one sentence, k over the flights, the life that remains, and what was said w------
+# --- track's panel on the right ---------------------------------------------------------------------------------------
+# Track's panel on the right: one sentence, k over the flights, the life that remains, and what was said when.
 
 _CONFIG = {"displayModeBar": False}
 _NONE = "–"
@@ -478,6 +482,3 @@ class TrackTab(Tab):
     def close(self) -> None:
         """Ends the watch of the folder."""
         self.following.close()
-
-
-# --- the Track tab ----------------------------------------------------------------------------------------------------

@@ -21,6 +21,8 @@ from emaviz.session.units import TYPE, ComparingUnits
 from emaviz.text.html import BOX, DIM, Html, add_html, begin, html, joined, note
 from emaviz.text.results import MEANINGS, begun, of_units, warned, whole
 
+# --- what stays of compared units: the report, and the type as an actuator's file -------------------------------------
+
 WORKSPACE = Workspace("units", "Units", viser.Icon.LAYOUT_GRID, 5, share=0.66, lower=True)
 
 _TYPE = Keeps(
@@ -43,7 +45,8 @@ class UnitsKeep(KeepButtons):
         )
 
 
-# --- units' panel on the right: what differs in words, each unit's parameters, which model suits which, what ----
+# --- units' panel on the right ----------------------------------------------------------------------------------------
+# Units' panel on the right: what differs in words, each unit's parameters, which model suits which, what lacks.
 
 _CONFIG = {"displayModeBar": False}
 _STEPS = (
@@ -260,6 +263,3 @@ class UnitsTab(Tab):
     def close(self) -> None:
         """Ends the run."""
         self.comparing.job.stop()
-
-
-# --- the Units tab ----------------------------------------------------------------------------------------------------

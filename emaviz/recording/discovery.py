@@ -28,11 +28,13 @@ from ema_model.estimation.calibrate import calibration_table, convergence, warni
 from ema_model.estimation.floor import BAND_SIGMAS
 from ema_model.text import Block, Lines, Note
 from emaviz import colours
-from emaviz.recording import writer as writer_recording
+from emaviz.recording import writer as drawn_as
 from emaviz.recording.entry import RecordingError, configured
 from emaviz.recording.layout import Contents, arranged, plot, signal_view
 from emaviz.recording.style import GROUP_COLOURS, ITERATION, plain, series_title
 from emaviz.recording.writer import RecordingWriter, written
+
+# --- how a discovery's recording opens: Ladder, Candidates, Signals, Residuals, Configuration -------------------------
 
 LADDER, CANDIDATES, VERDICT = "/discovery/ladder", "/discovery/candidates", "/discovery/verdict"
 _AIR = 1.05
@@ -93,7 +95,8 @@ def _residual(step: Step) -> rrb.View:
     )
 
 
-# --- a discovery told as a recording: the signals, the ladder of errors, the candidates, what each step leave--------
+# --- a discovery told as a recording ----------------------------------------------------------------------------------
+# A discovery told as a recording: the signals, the ladder of errors, the candidates, what each step leaves.
 
 Array = NDArray[np.float64]
 
@@ -263,11 +266,8 @@ class DiscoveryWriter(RecordingWriter):
     def _static(self, path: str, value: rr.AsComponents) -> None:
         self._file.do(lambda stream: stream.log(path, value, static=True))
 
-    def _at(self, path: str, drawn: writer_recording.Style, time_s: ArrayLike, values: Array) -> None:
+    def _at(self, path: str, drawn: drawn_as.Style, time_s: ArrayLike, values: Array) -> None:
         seconds = np.asarray(time_s, dtype=float)
         time = [rr.TimeColumn("sim_time", duration=np.rint(seconds * 1e9).astype("timedelta64[ns]"))]
         with self._file.lock:
             self._send(path, drawn, time, values)
-
-
-# --- a discovery told as a recording ----------------------------------------------------------------------------------

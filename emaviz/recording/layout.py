@@ -1,4 +1,4 @@
-"""How a recording opens: styles, views, the dashboard, the blueprint."""
+"""How a recording opens: curves that follow the iteration, the dashboard, the layout that is stored in it."""
 
 from __future__ import annotations
 
@@ -31,7 +31,11 @@ from emaviz.recording.style import (
     signal_title,
 )
 
-# --- curves over seconds that follow the timeline `iteration`: measured and model, drawn as line strips in 2D---
+# --- curves over seconds that follow the timeline `iteration` ---------------------------------------------------------
+# Curves over seconds that follow the timeline `iteration`: measured and model, drawn as line strips in 2D views.
+#
+# One timeline serves all views of a recording, so that curves over time beside what happens over iterations cannot be
+# plots over time. A 2D view keeps x and y alike and its y points down: what is drawn is scaled by hand.
 
 Array = NDArray[np.float64]
 

@@ -26,6 +26,8 @@ from ema_model.files.written import FileLock, lock_path, whole_file
 from emaviz.recording.entry import RecordingError, free_name
 from emaviz.recording.style import APPLICATION, GROUPS, ITERATION, K_NAMES, PROPERTIES, SIM_TIME
 
+# --- reads a recording back into arrays -------------------------------------------------------------------------------
+
 _TIMEOUT_S = 120.0
 _NUL, _NUL_IN_A_TYPE = b"\0", b"\\0"  # as the program prints a name, and one within a type
 

@@ -25,7 +25,7 @@ from ema_model.campaign.thesis import (
 from ema_model.errors import InputError
 from emaviz import colours
 from emaviz.recording import layout, style
-from emaviz.recording import writer as writer_recording
+from emaviz.recording import writer as drawn_as
 from emaviz.recording.entry import RecordingError
 from emaviz.recording.layout import Array, Chart, plot
 from emaviz.recording.style import algorithm_colour, signal_title
@@ -105,7 +105,7 @@ class ReproductionWriter(RecordingWriter):
                 for name in _SIGNALS:
                     self._plotted(
                         f"models/{pair.name}/{name}/{group}",
-                        writer_recording.signal_style(group, name),
+                        drawn_as.signal_style(group, name),
                         _time(run),
                         run[name],
                     )
@@ -114,12 +114,10 @@ class ReproductionWriter(RecordingWriter):
                 runs = drawn.families[family.name, command]
                 for at, (severity, run) in enumerate(runs.items()):
                     for name in SIGNALS:
-                        line = writer_recording.line(
-                            f"{severity}, {signal_title(name)}", _SHADES[at % len(_SHADES)], 1.5
-                        )
+                        line = drawn_as.line(f"{severity}, {signal_title(name)}", _SHADES[at % len(_SHADES)], 1.5)
                         self._plotted(f"severities/{family.name}/{command}/{name}/s{at}", line, _time(run), run[name])
 
-    def _plotted(self, place: str, drawn: writer_recording.Style, time: list[rr.TimeColumn], values: ArrayLike) -> None:
+    def _plotted(self, place: str, drawn: drawn_as.Style, time: list[rr.TimeColumn], values: ArrayLike) -> None:
         self._send(f"{ROOT}/{place}", drawn, time, np.asarray(values, dtype=float))
 
     def _layout(self) -> rrb.Blueprint:

@@ -1,4 +1,4 @@
-"""What recordings share: names of timelines, groups and properties, colours, and how signals are drawn."""
+"""Where things lie in a recording and how they look: entity paths, series names with units, colours."""
 
 from __future__ import annotations
 

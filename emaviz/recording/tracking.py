@@ -15,7 +15,7 @@ from ema_model.errors import InputError
 from ema_model.quantities.numbers import HALF_90
 from ema_model.tracking.result import Tracked
 from ema_model.tracking.summary import as_dict
-from emaviz.recording import writer as writer_recording
+from emaviz.recording import writer as drawn_as
 from emaviz.recording.entry import RecordingError
 from emaviz.recording.layout import plot
 from emaviz.recording.style import GROUP_COLOURS, K_TITLES
@@ -79,7 +79,7 @@ class TrackingWriter(RecordingWriter):
 
     def _line(self, place: str, title: str, colour: Any, at: ArrayLike, values: ArrayLike) -> None:
         time = [rr.TimeColumn(FLIGHT, sequence=np.asarray(at, dtype=np.int64))]
-        self._send(f"{ROOT}/{place}", writer_recording.line(title, colour, 1.5), time, np.asarray(values, dtype=float))
+        self._send(f"{ROOT}/{place}", drawn_as.line(title, colour, 1.5), time, np.asarray(values, dtype=float))
 
     def _layout(self) -> rrb.Blueprint:
         views = [plot(K_TITLES[name], [f"{ROOT}/{name}/**"], legend=False) for name in self._result.faults]

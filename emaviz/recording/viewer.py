@@ -25,6 +25,8 @@ from ema_model.files.written import FileLock, lock_path
 from emaviz.recording.entry import RecordingError, part_of
 from emaviz.recording.read import check, started
 
+# --- the Rerun web viewer's files, as they ship in the wheel (43 MB, inside the program) ------------------------------
+
 _TYPES = {
     "index.html": "text/html; charset=utf-8",
     "re_viewer.js": "text/javascript; charset=utf-8",

@@ -22,6 +22,8 @@ from emaviz.recording.file import RrdFile
 from emaviz.recording.layout import Algorithm, Chart, Contents, build, send
 from emaviz.recording.style import ITERATION, K_NAMES, Colour, algorithm_path
 
+# --- what a result says, and mappings, as Markdown --------------------------------------------------------------------
+
 _SIGNS = str.maketrans({"|": r"\|", "\n": " ", "\r": " ", "`": "'", "<": "&lt;", "[": r"\[", "*": r"\*", "_": r"\_"})
 
 

@@ -234,7 +234,7 @@ class Effort(Section[Rows]):
         return pair(*drawn)
 
 
-# --- the report of a campaign, a file for each section ----------------------------------------------------------------
+# --- the report of a campaign, section by section ---------------------------------------------------------------------
 
 SECTIONS: tuple[Section[Rows], ...] = (
     Progress(),

@@ -143,7 +143,8 @@ def _around(comparison: Comparison, region: Region, recording: int, time_s: floa
     return start, min(start + width, last)
 
 
-# --- what explains the residual: the ranking, the orders of the motor's turn, and the residual against each v---
+# --- what explains the residual ---------------------------------------------------------------------------------------
+# What explains the residual: the ranking, the orders of the motor's turn, and the residual against each variable.
 
 _FIRST = 4  # explanations are written out; the bars show all
 _EXPLANATION_NOTE = (

@@ -23,9 +23,9 @@ from ema_model.discovery.words import (
     next_experiment,
     per_recording,
     primary,
+    sentences,
     tracks,
     verdict_name,
-    words_sentences,
 )
 from ema_model.effects import Effect, find
 from ema_model.effects.effect import FAMILIES
@@ -81,7 +81,7 @@ class Verdict(Section[Told]):
         return (
             f'<p><span class="verdict {of_discovery(found)}">{escape(verdict_name(found))}</span></p>'
             + paragraph(headline(found), "answer")
-            + "".join(paragraph(sentence) for sentence in words_sentences(found))
+            + "".join(paragraph(sentence) for sentence in sentences(found))
             + bullets(found.warnings, "warning")
         )
 
@@ -333,7 +333,7 @@ class HowMade(Section[Told]):
         return paragraph(_METHOD) + table(["Setting", "value"], rows, text_columns=2)
 
 
-# --- the report of a discovery, a file for each section ---------------------------------------------------------------
+# --- the report of a discovery, section by section --------------------------------------------------------------------
 
 SECTIONS: tuple[Section[Told], ...] = (
     Verdict(),

@@ -141,7 +141,7 @@ class Settings(Section[Identified]):
         return made + (table(["Moved beside k", "file", "fitted"], moved) if moved else "")
 
 
-# --- the report of an identification, a file for each section ---------------------------------------------------------
+# --- the report of an identification, section by section --------------------------------------------------------------
 
 SECTIONS: tuple[Section[Identified], ...] = (Faults(), Fit(), Convergence(), Settings())
 

@@ -125,7 +125,7 @@ class Section(ABC, Generic[Subject]):
         """The HTML below the heading; "" leaves the section out."""
 
 
-# --- a whole page: styles, sections, figures and the script that draws them, in one file that asks no network---------
+# --- a whole page: styles, sections, figures and the script that draws them, in one file that asks no network ---------
 
 
 def page(title: str, lead: str, sections: Sequence[Section[Subject]], subject: Subject) -> str:

@@ -417,7 +417,7 @@ class HowMade(Section[Reproduced]):
         return "".join(part.body(subject.rows, figures) for part in (Progress(), Errors(), Effort()))
 
 
-# --- the report of the thesis's evaluation, a file for each section ---------------------------------------------------
+# --- the report of the thesis's evaluation, section by section --------------------------------------------------------
 
 SECTIONS: tuple[Section[Reproduced], ...] = (
     Answer(),

@@ -35,7 +35,7 @@ class RemainingLife(Section[Tracked]):
         )
 
 
-# --- all k over the flights -------------------------------------------------------------------------------------------
+# --- all k over the flights so far: their evidence, and where each jumped, from where on it is judged anew ------------
 
 
 class Flights(Section[Tracked]):

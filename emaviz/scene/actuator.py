@@ -43,6 +43,8 @@ from emaviz.scene.solids import (
     tube,
 )
 
+# --- the load on the control surface as an arrow: its length follows the torque, its side the direction ---------------
+
 _LONGEST = 0.26
 _HEAD, _SHAFT_RADIUS, _HEAD_RADIUS = 0.09, 0.013, 0.036
 _AT = (0.34, 0.0, 0.012)  # on the surface, from its hinge
@@ -156,7 +158,8 @@ def _tube(line: ArrayLike, radius: float, around: int = 6) -> Solid:
     return Solid(rings.reshape(-1, 3).astype(np.float32), faces.astype(np.uint32))
 
 
-# --- from the rotor to the user in 3D: a gear pair, the ball screw and its nut, the rod, the horn and the sur-----
+# --- from the rotor to the user in 3D ---------------------------------------------------------------------------------
+# From the rotor to the user in 3D: a gear pair, the ball screw and its nut, the rod, the horn and the surface.
 
 ARM = 0.2  # of the horn: what the nut's travel is to the surface's turn
 _SCREW_Z = -0.165
@@ -281,6 +284,8 @@ def _flap() -> Solid:
 
 
 # --- the motor in 3D: a housing cut open, coils of three phases, the rotor with its magnets, bearings -----------------
+# The coils of phase i lie about the azimuth −2πi/3 from phase A's, and the rotor's axis is off towards θ_m − φ: so
+# the drawn gap under a phase is thin when the model's factor 1 + ζ cos(θ_m − φ + 2πi/3) is large.
 
 AIR_GAP = 0.025  # as drawn, where the rotor's radius is 0.125
 _BORE = 0.15
@@ -465,7 +470,7 @@ def _bearing(x: float) -> Solid:
     return joined(tube(x - 0.018, x + 0.018, 0.036, 0.05), tube(x - 0.018, x + 0.018, 0.074, 0.09))
 
 
-# --- the actuator in 3D: motor and drivetrain, lights, labels, the first view.  Built once; poses only move i--------
+# --- the actuator in 3D: motor and drivetrain, lights, labels, the first view. Built once; poses only move it ---------
 
 _ROOT, _LABELS = "/actuator", "/labels"
 _OWN = "/own"  # root of what one window has for itself

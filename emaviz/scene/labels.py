@@ -18,6 +18,8 @@ from ema_model.faults import FAULTS
 from emaviz.scene.framing import BOXES, Frame, frame
 from emaviz.scene.solids import FAULT, SATIN
 
+# --- what differs from healthy, said in physical units at its place on the machine ------------------------------------
+
 _LEAST = 0.005  # of a k beyond healthy: a step of its slider
 Place = tuple[float, float, float]
 PLACES: dict[str, Place] = {
@@ -62,7 +64,8 @@ def callouts(k: ArrayLike, actuator: Actuator, play_enlarged: float, gap_enlarge
     )
 
 
-# --- names and callouts in the picture, laid out so that none covers another where the camera stands at first---------
+# --- names and callouts in the picture, laid out so that none covers another where the camera stands at first ---------
+# They hang in a scene, which windows may share: they are laid out for the picture that was framed last.
 
 _EM_PX = 12.0  # of viser's labels, at scale 1
 _WIDE_EM, _LINE_EM, _PADDING_EM = 0.58, 1.3, 0.5  # of a letter on average, a line, and around the text

@@ -12,6 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from emaviz import colours
 
+# --- a solid in the scene: the one place that says how the actuator's parts are drawn ---------------------------------
+
 
 def add_mesh(
     scene: viser.SceneApi,
@@ -37,7 +39,8 @@ def add_mesh(
     )
 
 
-# --- colours of the actuator: greys, phases in subdued tones, one colour for what is broken, another for an e-----
+# --- colours of the actuator ------------------------------------------------------------------------------------------
+# Colours of the actuator: greys, phases in subdued tones, one colour for what is broken, another for an error.
 
 Colour = tuple[int, int, int]
 
@@ -62,6 +65,9 @@ AT_REST = tuple(between(between(one, IRON, 0.5), DARK, 0.35) for one in PHASES) 
 
 
 # --- solids of few triangles, as arrays of vertices (n, 3) and faces (m, 3) -------------------------------------------
+# The actuator's axis is x; an azimuth is counted about it from +y towards +z, as a positive turn goes. Each face of a
+# solid has vertices of its own, so that edges stay sharp and round sides look round; and every triangle winds so that
+# it is seen from outside, which spares the browser the drawing of insides.
 
 TURN = 2.0 * np.pi
 

@@ -24,6 +24,8 @@ from emaviz.server.complaints import Complaints
 from emaviz.server.messages import Refused, checked
 from emaviz.server.viser_private import Inside
 
+# --- what the page may do in the browser: speak to its own server, and show the Rerun viewer's page -------------------
+
 # All that viser's client needs is in its own page; blob: and data: are its workers, textures and saved files.
 _PAGE = "default-src 'self' 'unsafe-inline' 'unsafe-eval' blob: data:"
 _REST = "frame-ancestors 'self'; object-src 'none'; base-uri 'none'; form-action 'none'"
@@ -45,6 +47,7 @@ def protect(headers: Headers, host: str, viewer: str | None) -> None:
 
 
 # --- lets through, of what a browser says, what this page can mean ----------------------------------------------------
+# viser checks nothing: not a value's type or bounds, not whether a control is disabled, not a message's form.
 
 TYPING_S = 1.5  # without another digit, after which a number is taken as typed
 _ORDINARY = (1000, 1001, 1006, 1011)  # ends of a connection: left, going, torn, asleep
@@ -146,7 +149,8 @@ class Gate:
         self._waiting.clear()
 
 
-# --- who gets an answer: this machine's own page; from a network, who asks by an allowed name and has the tok-------
+# --- who gets an answer -----------------------------------------------------------------------------------------------
+# Who gets an answer: this machine's own page; from a network, who asks by an allowed name and has the token.
 
 _NAME = re.compile(r"[a-z0-9_]([a-z0-9_.-]{0,251}[a-z0-9_])?")
 _NETLOC = re.compile(r"(?P<name>\[[0-9a-f:.]+\]|[a-z0-9_-]+(\.[a-z0-9_-]+)*\.?)(:(?P<port>[0-9]{0,5}))?")

@@ -11,6 +11,9 @@ import msgspec
 import viser
 from msgspec import Meta
 
+# --- whether a value that a page sends may become the value of a control ----------------------------------------------
+# viser stores what it is sent: a number it cannot pack again ends every connection, for good.
+
 _Bounds = Callable[[int], tuple[float | None, float | None]]
 LONGEST_TEXT = 10_000  # characters; a challenge's story is the longest that anybody writes
 
@@ -91,7 +94,13 @@ def _plain(number: float) -> str:
     return str(int(number)) if abs(number) <= MOST_INT and number == int(number) else f"{float(number):g}"
 
 
-# --- everything that viser's page says to its server, and nothing else: names, types and sizes of each messag--------
+# --- everything that viser's page says to its server, and nothing else ------------------------------------------------
+# Everything that viser's page says to its server, and nothing else: names, types and sizes of each message.
+#
+# Read in viser 1.1.1's client and in the handlers of its server. A message that is not one of these, or has another
+# field or type, or a number that is not finite, is left out whole; the others are looked at again by `gate`. Not
+# here, so never let through: ShareUrlRequest and ShareUrlDisconnect (a public tunnel), and every message that only a
+# server sends.
 
 MOST_INT = 2**53 - 1  # up to which a browser's numbers are exact
 LARGEST_FRAME = 1 << 20  # bytes; the page sends files in parts of 512 KiB
@@ -154,7 +163,7 @@ class CommandTriggerMessage(Message):
     uuid: _Id
 
 
-# --- files ------------------------------------------------------------------------------------------------------------
+# --- files of users: opened, limited, taken apart safely, written whole, locked ---------------------------------------
 
 
 class FileTransferStartUpload(Message):

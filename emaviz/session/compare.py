@@ -27,6 +27,8 @@ from emaviz.session.session import Session
 from emaviz.session.signal import Signal
 from emaviz.session.worker import Worker, report
 
+# --- what the screen listens to of Compare ----------------------------------------------------------------------------
+
 OPEN, MAP, LAY_OUT, SAVE = "open", "map", "lay out", "save"  # what is done with files
 
 
@@ -43,7 +45,8 @@ class CompareEvents:
     kept: Signal[[Path]] = field(default_factory=Signal)  # a report or a recording is written
 
 
-# --- a comparison that is asked for is made: once the files on their way are read, and no other long run goes------
+# --- a comparison that is asked for is made ---------------------------------------------------------------------------
+# A comparison that is asked for is made: once the files on their way are read, and no other long run goes on.
 
 
 class Asking:
@@ -120,7 +123,8 @@ class Asking:
         return f"{reading[0]}{more} to be read"
 
 
-# --- what is done with files on a thread of its own: a large one takes seconds, in which the other tabs shall---
+# --- what is done with files on a thread of its own -------------------------------------------------------------------
+# What is done with files on a thread of its own: a large one takes seconds, in which the other tabs shall answer.
 
 _CANNOT = {
     OPEN: "The file cannot be read",
@@ -490,6 +494,3 @@ class Comparing:
 
 def _freed(actuator: Actuator) -> set[str]:
     return {path for path, tolerance in actuator.tolerances.items() if tolerance.free}
-
-
-# --- the session's part of Compare ------------------------------------------------------------------------------------

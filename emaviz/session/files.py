@@ -34,6 +34,8 @@ from emaviz.session.inputs import digest, version_of
 from emaviz.session.job import Job, Run
 from emaviz.session.signal import Signal
 
+# --- a recording that is chosen for Compare: its table, its mapping, and what was measured ----------------------------
+
 Array = NDArray[np.float64]
 
 
@@ -212,7 +214,7 @@ class Description:
         return UPLOADED + folder.name_of(path), [*missing(actuator), *implausible(actuator)]
 
 
-# --- challenges of one kind in the data folder: those that can be made there, and the one that a folder holds---------
+# --- challenges of one kind in the data folder: those that can be made there, and the one that a folder holds ---------
 
 
 class Practice:

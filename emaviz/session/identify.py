@@ -34,7 +34,9 @@ from emaviz.session.worker import Steps, Worker
 if TYPE_CHECKING:
     from emaviz.recording.story import IdentificationStory
 
-race_Array = NDArray[np.float64]
+# --- a race of optimisers: the same recording, one iteration of each in turn, told and recorded as it goes ------------
+
+Array = NDArray[np.float64]
 OpenFile = Callable[[str], Measurement]  # by the name of a file in the data folder
 
 MOST_FRAMES = 200  # of a swarm, kept to look at again
@@ -48,7 +50,7 @@ class Frame:
 
     iteration: int
     population: NDArray[np.float32]  # (n, 8)
-    k: race_Array  # (8,), the best so far
+    k: Array  # (8,), the best so far
     rmse: float  # A, of the best
 
 
@@ -62,7 +64,7 @@ class Track:
     last: Progress | None = None
     frames: list[Frame] = field(default_factory=list)  # every `stride` iterations
     stride: int = 1
-    current_A: race_Array | None = None  # (blocks,), of the best
+    current_A: Array | None = None  # (blocks,), of the best
     answer: Identification | None = None
     fitting: tuple[str, float] | None = None  # after the last iteration: what goes on, and its share done
 
@@ -84,7 +86,7 @@ class Track:
         return [*map(float, answer.corrected_history), *([answer.corrected_rmse] if answer.polished else [])]
 
     @property
-    def k(self) -> race_Array | None:
+    def k(self) -> Array | None:
         """(8,), the best so far, or the answer."""
         if self.answer is not None:
             return self.answer.k
@@ -107,9 +109,9 @@ class Race:
 
     settings: Settings
     tracks: dict[str, Track]
-    time_s: race_Array  # (blocks,), of the current that is fitted
-    measured_A: race_Array  # (blocks,)
-    truth: race_Array | None  # (8,), of the sliders' plant
+    time_s: Array  # (blocks,), of the current that is fitted
+    measured_A: Array  # (blocks,)
+    truth: Array | None  # (8,), of the sliders' plant
     measurement: Measurement  # what is identified
     objective: Objective  # and its cost
     known: bool = False  # the actuator's own parameters are exact, as in a simulation of the same file
@@ -169,7 +171,7 @@ class Race:
 
 def target(
     settings: Settings, actuator: Actuator, open_file: OpenFile
-) -> Generator[None, None, tuple[Measurement, race_Array | None]]:
+) -> Generator[None, None, tuple[Measurement, Array | None]]:
     """Steps that end with the recording to identify, and the true k if it is the sliders' plant."""
     if settings.source != SLIDERS:
         return (yield from _elsewhere(lambda: open_file(settings.source))), None
@@ -198,7 +200,7 @@ def _elsewhere(read: Callable[[], Measurement]) -> Generator[None, None, Measure
     return found[0]
 
 
-def begin(settings: Settings, objective: Objective, truth: race_Array | None, known: bool | None = None) -> Race:
+def begin(settings: Settings, objective: Objective, truth: Array | None, known: bool | None = None) -> Race:
     """A race that has not started; known: see `Race`, by default where the truth is."""
     window = objective.windows[0]
     time = objective.measurements[0].time_s[0] + window.block_s * (1.0 + np.arange(window.blocks))
@@ -272,7 +274,7 @@ def run(race: Race, asked: Run, tell: Callable[[Progress | None], object]) -> St
 
 # --- the session's part of the landscape: the cost over two k around an answer, on the compute thread -----------------
 
-landscape_Array = NDArray[np.floating]
+Floats = NDArray[np.floating]
 
 
 class Landscapes:
@@ -284,7 +286,7 @@ class Landscapes:
         self.drawn: Signal[[Race, Mapping[str, Way]]] = Signal()  # to its end, or to where it was stopped
         self._ways: dict[Race, dict[str, Way]] = {}  # of the last race
 
-    def draw(self, race: Race, x: int, y: int, through: landscape_Array, close: bool) -> bool:
+    def draw(self, race: Race, x: int, y: int, through: Floats, close: bool) -> bool:
         """Begins a slice along k x and y (0 … 7), the others held at through (8,); False while another run goes on.
 
         close: a few intervals wide, else all of 0 … 1.  InputError unless the two differ.
@@ -319,12 +321,12 @@ class Landscapes:
         return self.job.begin("Drawing the landscape", work, done)
 
 
-def ends(race: Race) -> dict[str, landscape_Array]:
+def ends(race: Race) -> dict[str, Floats]:
     """Where each search of a race ended, before any fit, (8,)."""
     return {name: track.last.k for name, track in race.tracks.items() if track.last is not None}
 
 
-# --- the session's part of Identify: a race of searches against one recording, kept as a recording of its own---------
+# --- the session's part of Identify: a race of searches against one recording, kept as a recording of its own ---------
 
 _SEARCH = ("population", "iterations", "fitness", "seed")
 _PLANT = (  # settings of the sliders' plant beside its k and its command
@@ -465,6 +467,3 @@ def _search(settings: Settings) -> dict[str, Any]:
         "fitness": settings.fitness,
         "seed": settings.seed,
     }
-
-
-# --- the session's part of Identify: the race of searches, its answer, and the cost around it -------------------------

@@ -25,6 +25,8 @@ from emaviz.session.run_summary import summary
 if TYPE_CHECKING:
     from emaviz.recording.read import Recording
 
+# --- past recordings: what the folder holds, with settings and results; renamed, deleted, read back -------------------
+
 _ENDING = ".rrd"
 
 
@@ -136,6 +138,7 @@ def recovered(recordings: Path) -> list[str]:
 
 
 # --- a session as one file: what the page is set to and has found, with the measured files that it needs --------------
+# NAME.emaviz is a zip of `session.json` and the files under `files/`, so that it opens on another computer.
 
 SCHEMA = 1
 _DOCUMENT, _FILES = "session.json", "files/"

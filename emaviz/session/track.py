@@ -38,6 +38,9 @@ from emaviz.session.session import Session
 from emaviz.session.signal import Signal
 from emaviz.session.worker import Worker
 
+# --- what a session's file holds of Track -----------------------------------------------------------------------------
+# What a session's file holds of Track: thresholds and identified flights, so that none is identified again.
+
 MOST = 2000  # flights, two kilobytes each; a unit with more is identified anew
 _PART = "part of Track"
 _K = len(faults.NAMES)
@@ -441,6 +444,3 @@ class Following:
             f"track {suffix}",
             lambda: self.events.kept(keep(found, self.session.actuator.name, self.folder, suffix)),
         )
-
-
-# --- the session's part of Track: a folder of flights, followed on the compute thread ---------------------------------

@@ -20,7 +20,7 @@ from ema_model.recordings.recording_set import long_enough
 from ema_model.recordings.side_file import SideFile
 from ema_model.units.folders import check_same_type, units_in
 from ema_model.units.result import Alone, Difference, Need, OfRecording, OfType, Transfer, UnitsCompared
-from emaviz.session import files as files_session
+from emaviz.session import files as session_files
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.described import taken
 from emaviz.session.files import Practice, side_file_of
@@ -29,6 +29,9 @@ from emaviz.session.job import Job, Run
 from emaviz.session.session import Session
 from emaviz.session.signal import Signal
 from emaviz.session.worker import Worker
+
+# --- what a session's file holds of Units -----------------------------------------------------------------------------
+# What a session's file holds of Units: what is chosen, and the answer as it was found: nothing is run again.
 
 _PART = "part of Units"
 _Rows = tuple[tuple[float, ...], ...]
@@ -224,7 +227,7 @@ class ComparingUnits:
 
     def actuators(self) -> list[str]:
         """The one that the app was started with, those that come with it, and the uploaded ones."""
-        return list(dict.fromkeys([self.session.actuator.name, *files_session.names(self.folder)]))
+        return list(dict.fromkeys([self.session.actuator.name, *session_files.names(self.folder)]))
 
     def choose(self, name: Any) -> None:
         """A folder by its name; InputError where there is none."""
@@ -235,7 +238,7 @@ class ComparingUnits:
     def choose_actuator(self, name: Any) -> None:
         """One of `actuators`; InputError for another, or a file that is no actuator."""
         own = self.session.actuator
-        self.actuator = own if name == own.name else files_session.named(str(name), self.folder)
+        self.actuator = own if name == own.name else session_files.named(str(name), self.folder)
         self.actuator_name = str(name)
 
     def begin(self) -> bool:
@@ -314,9 +317,9 @@ class ComparingUnits:
             raise InputError("units are being compared; stop that first")
         told, found = read_saved(saved)
         actuator = told.actuator
-        if actuator.startswith(files_session.UPLOADED):
-            name = actuator.removeprefix(files_session.UPLOADED)
-            actuator = files_session.UPLOADED + names.get(name, name)
+        if actuator.startswith(session_files.UPLOADED):
+            name = actuator.removeprefix(session_files.UPLOADED)
+            actuator = session_files.UPLOADED + names.get(name, name)
         if actuator in self.actuators():
             self.choose_actuator(actuator)
         self.chosen, self.rule, self.found = told.folder, told.rule, found
@@ -326,8 +329,8 @@ class ComparingUnits:
 
     def files(self) -> list[str]:
         """Names in the data folder of what a session needs for it."""
-        uploaded = self.actuator_name.startswith(files_session.UPLOADED)
-        return [self.actuator_name.removeprefix(files_session.UPLOADED)] if uploaded else []
+        uploaded = self.actuator_name.startswith(session_files.UPLOADED)
+        return [self.actuator_name.removeprefix(session_files.UPLOADED)] if uploaded else []
 
     def _keep(self, found: UnitsCompared, suffix: str) -> None:
         if suffix == REPORT:
@@ -362,6 +365,3 @@ def _held_out(units: dict[str, list[Path]], rule: str) -> tuple[dict[str, list[P
 def _stems(units: dict[str, list[Path]]) -> str:
     names: Sequence[str] = list(dict.fromkeys(file.stem for files in units.values() for file in files))
     return ", ".join(names[:6]) + (" …" if len(names) > 6 else "")
-
-
-# --- the session's part of Units: a folder of units' folders, compared on the compute thread --------------------------

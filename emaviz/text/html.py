@@ -12,6 +12,12 @@ from typing import TYPE_CHECKING, Any, Literal, LiteralString
 if TYPE_CHECKING:
     import viser
 
+# --- text on the page: what comes from files and people is shown as it is, and never becomes markup -------------------
+# A name of a file, a column or an actuator, an expression, an error that quotes them: all are plain text. `html` puts
+# them into a template of ours, escaped. `add_html` is the one place from which the page gets HTML: what was not made
+# by `html` is plain text to it, and shown letter by letter. Markdown on the page is for texts of our own alone, as
+# its renderer takes HTML and turns bare addresses into links.
+
 
 class Html(str):
     """Text that is HTML already: literals of ours, and what the functions below return.  Foreign text never is."""
@@ -100,7 +106,11 @@ class _Escaping(string.Formatter):
 _ESCAPING = _Escaping()
 
 
-# --- an effect's equation, as its file has it, typeset: plain text to MathML, which browsers draw without a s----
+# --- an effect's equation, as its file has it, typeset ----------------------------------------------------------------
+# An effect's equation, as its file has it, typeset: plain text to MathML, which browsers draw without a script.
+#
+# Known: names with _ and ^ (one sign, or braces around several), fractions where "/" stands without spaces, functions
+# of names of several letters, brackets, bars. What is not known is shown as it stands.
 
 _TOKEN = re.compile(r"\s+|\d+(?:\.\d+)?|[^\W\d_]['̇]*(?:[^\W\d_]['̇]*)*|.", re.UNICODE)
 _FUNCTIONS = frozenset("sin cos tan exp sgn max min sat".split())

@@ -15,6 +15,8 @@ from ema_model.text import COLOURS, Block, Document, Table
 from ema_model.units.result import UnitsCompared
 from emaviz.text.html import Html, boxed, html, joined, unescaped
 
+# --- what a verdict means, which its colour says on the page as in a report -------------------------------------------
+
 Meaning = Literal["good", "found", "warning", "bad", "open"]
 MEANINGS: dict[Meaning, str] = {
     "good": COLOURS["good"],  # nothing is missing
@@ -43,7 +45,8 @@ def of_discovery(found: Discovery) -> Meaning:
     return "found" if found.verdict == "effects_found" else "warning"
 
 
-# --- a line as a sentence on the page: errors and notes begin with a small letter where they follow a program---
+# --- a line as a sentence on the page ---------------------------------------------------------------------------------
+# A line as a sentence on the page: errors and notes begin with a small letter where they follow a program's name.
 
 _WORD = re.compile(r"[a-z]+(?=[ ,;])")  # no file's name, no key of an actuator's file, no k1
 

@@ -14,7 +14,7 @@ from ema_model.challenges.truth import Truth
 from ema_model.comparison.criteria import BAND
 from ema_model.discovery.criteria import LEAST_BIC
 from ema_model.discovery.result import Change
-from ema_model.discovery.words import faults, headline, words_sentences
+from ema_model.discovery.words import faults, headline, sentences
 from ema_model.errors import InputError
 from emaviz.figures import discovery
 from emaviz.figures.discovery import equation
@@ -84,7 +84,7 @@ def test_it_is_added_by_its_name(worn):
     assert look.rmse < BAND < look.found.ladder[0].rmse
     assert headline(look.found) == "No physics is missing: the actuator has the fault k2 backlash."
     assert "k2 backlash" in faults(look.found)["k2"] and "µrad" in faults(look.found)["k2"]
-    assert any("k2 backlash" in text for text in words_sentences(look.found))
+    assert any("k2 backlash" in text for text in sentences(look.found))
     assert MEANINGS["found"] in answer(look), "at the floor, and not as it should be"
     assert "Backlash (fault k2):" in equation(look.found, look.added) and look.removable == ["k2"]
     assert worn.entries.current.result.startswith("1 added")

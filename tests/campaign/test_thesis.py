@@ -20,11 +20,11 @@ from ema_model.campaign.thesis import (
     Spread,
     case_of,
     missed,
+    performance_coefficients,
     points,
     printed_means,
     printed_rows,
     scores,
-    scores_coefficients,
     settled_at,
     stops,
 )
@@ -77,7 +77,7 @@ def test_printed_errors_follow_from_printed_k_and_printed_means_from_printed_err
 
 def test_the_thesis_s_rows_give_its_coefficients():
     """T 5.39–5.43, as far as errors with two digits tell: half a unit of Err moves the smallest by some per cent."""
-    made = scores_coefficients(scores(as_the_thesis_printed(), tuple(ALGORITHMS)))
+    made = performance_coefficients(scores(as_the_thesis_printed(), tuple(ALGORITHMS)))
     assert {one.fault for one in made} == {*FAULTS, MULTIPLE, SINGLE} and len(made) == 21
     for one in made:
         assert one.printed is not None
@@ -121,10 +121,10 @@ def test_a_coefficient_needs_every_algorithm_on_low_and_high():
         for name, error, time in (("ssa", 2.0, 3.0), ("hba", 1.0, 2.0), ("do", 4.0, 1.0))
         for size in ("low", "high")
     ]
-    found = scores_coefficients(scores(made))
+    found = performance_coefficients(scores(made))
     assert [(one.fault, one.algorithm) for one in found] == [("friction", name) for name in ALGORITHMS]
     assert [one.percent for one in found] == pytest.approx([50.0, 100.0 * (1 - 2 / 12), 100.0 * (1 - 4 / 12)])
-    assert scores_coefficients(scores(made[:-1])) == []
+    assert performance_coefficients(scores(made[:-1])) == []
     assert EVERY == (*ALGORITHMS, ROBUST)
 
 

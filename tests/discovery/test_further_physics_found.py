@@ -8,7 +8,7 @@ from support.hidden_effects import ACTUATOR, recorded
 from ema_model.commands import command
 from ema_model.discovery import discover
 from ema_model.discovery.candidates.fingerprints import variants
-from ema_model.discovery.words import words_sentences
+from ema_model.discovery.words import sentences
 from ema_model.effects import CATALOGUE, find
 from ema_model.simulation.run import Run, simulate_reference
 from ema_model.simulation.sensors import Sensors
@@ -118,4 +118,4 @@ def test_what_only_steps_show_is_named_beside_a_sine_that_was_held_out():
     assert one.name == "acceleration_limit" and found.verdict == "effects_found"
     assert one.parameters["ramp_s"].value == pytest.approx(0.01, rel=0.1)
     assert found.ladder[-1].rmse < 1.1 < 2.0 < found.ladder[0].rmse
-    assert "what was not fitted hardly shows it" in " ".join(words_sentences(found))
+    assert "what was not fitted hardly shows it" in " ".join(sentences(found))

@@ -18,8 +18,8 @@ from ema_model.discovery import as_dict, begun, result_of
 from ema_model.discovery.result import VERDICTS, Contradiction
 from ema_model.discovery.steps.snapshot import known_of
 from ema_model.discovery.steps.step import Step, rung_of
-from ema_model.discovery.words import WORDS_VERDICTS as IN_WORDS
-from ema_model.discovery.words import headline, so_far, words_sentences
+from ema_model.discovery.words import VERDICT_WORDS as IN_WORDS
+from ema_model.discovery.words import headline, sentences, so_far
 from ema_model.estimation.model_fit import floor_ratio
 
 CLEAR = {"load_dependent_friction": {"ratio": 0.25}}
@@ -133,7 +133,7 @@ def test_nothing_is_sure_that_misses_what_was_not_fitted(healthy, unseen, how, a
 def test_what_is_not_claimed_is_told_with_the_reason(healthy):
     found = replace(result_of(healthy), not_claimed={"torsional_compliance": "the fit with it did not converge"})
     line = "Torsional compliance is not claimed: the fit with it did not converge."
-    assert line in words_sentences(found) and line in str(found)
+    assert line in sentences(found) and line in str(found)
     rest = replace(found.ladder[-1], rmse=1.083)
     unknown = replace(found, verdict="unknown_effect", at_floor=False, ladder=[rest])
     said = "Something is missing, and nothing that was tried can be claimed for it: 1.08 times the floor remains"

@@ -17,8 +17,8 @@ from ema_model.discovery.words import (
     masked,
     moved,
     rung_label,
+    sentences,
     untold,
-    words_sentences,
 )
 from ema_model.estimation import Calibrated
 from ema_model.quantities.axes import ROTARY, Axes
@@ -43,7 +43,7 @@ def test_parameters_that_masked_an_effect_are_named_as_on_the_page(tmp_path):
         effects=[replace(one, stood_in=moved), later],
         warnings=[untold("cogging_torque", "torque_ripple"), NOT_REPEATABLE],
     )
-    assert lines[0] in as_dict(told)["warnings"] and lines[0] in words_sentences(told)
+    assert lines[0] in as_dict(told)["warnings"] and lines[0] in sentences(told)
     assert not any(RAW.search(line) for line in as_dict(told)["warnings"])
     write_discovery_report(told, tmp_path / "report.html")
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
@@ -78,7 +78,7 @@ def test_a_parameter_that_an_effect_takes_beyond_its_tolerance_is_told_by_the_ef
         calibration=calibration,
         parameters_outside_tolerance=[path],
     )
-    assert "Outside its tolerance: motor viscous friction." in words_sentences(told)
+    assert "Outside its tolerance: motor viscous friction." in sentences(told)
     assert [facts.title for facts in words.added(told)] == [facts.title for facts in words.added(found)]
 
 

@@ -147,6 +147,11 @@ def times_of(vectors: Iterable[tuple[str, int]]) -> set[int]:
     return times or {max((size for _, size in vectors), default=0)}
 
 
+def without_ones(shape: Sequence[int]) -> tuple[int, ...]:
+    """A shape without its sizes of one: a vector has one size, a matrix two."""
+    return tuple(size for size in shape if size != 1)
+
+
 def way_of_time(shape: Sequence[int], times: Collection[int], signals: int = 0) -> int | None:
     """Along which of its two sizes a matrix has its samples: that of a time, else the long one; None for an image.
 

@@ -39,6 +39,8 @@ from ema_model.recordings.formats.text_layout import (
     split,
 )
 
+# --- a text as UTF-8, whatever it is stored in ------------------------------------------------------------------------
+
 
 class Utf8(io.RawIOBase):
     """To read from its first letter on."""
@@ -117,9 +119,9 @@ class Aligned(io.RawIOBase):
 
 # --- cells of a text understood one by one: what is no number, headers that come again, and text at the end -----------
 
-text_cells_pc: Any = pyarrow.compute  # its functions are made when it is imported
+compute: Any = pyarrow.compute  # its functions are made when it is imported
 _MOST_AT_THE_END = 200  # lines of text below the numbers
-_TEXT_CELLS_NUMBER = r"^\s*[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\s*$|^\s*[+-]?(?i:nan|inf|infinity)\s*$"
+_NUMBER_CELL = r"^\s*[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\s*$|^\s*[+-]?(?i:nan|inf|infinity)\s*$"
 
 
 def understood(
@@ -200,8 +202,8 @@ def _column(table: TextTable, i: int, text: pa.ChunkedArray) -> tuple[Array, np.
     """A column's numbers, which of its cells are none, and which are blank."""
     blank = np.asarray(text.is_null())
     if i in table.stamps and not blank.all():
-        whole = text_cells_pc.fill_null(text, "")
-        right = np.asarray(text_cells_pc.match_substring_regex(whole, r"\d{1,2}:\d{2}:\d{2}"))
+        whole = compute.fill_null(text, "")
+        right = np.asarray(compute.match_substring_regex(whole, r"\d{1,2}:\d{2}:\d{2}"))
         values = np.full(len(text), np.nan)
         stamps = seconds(pa.chunked_array([whole.filter(pa.array(right))])) if right.any() else None
         if stamps is not None:
@@ -209,12 +211,12 @@ def _column(table: TextTable, i: int, text: pa.ChunkedArray) -> tuple[Array, np.
             return values, ~right, blank
         return values, np.ones(len(text), bool), blank
     if table.layout.thousands:
-        text = text_cells_pc.replace_substring(text, table.layout.thousands, "")
+        text = compute.replace_substring(text, table.layout.thousands, "")
     if table.layout.decimal == ",":
-        text = text_cells_pc.replace_substring(text, ",", ".")
-    right = np.asarray(text_cells_pc.fill_null(text_cells_pc.match_substring_regex(text, _TEXT_CELLS_NUMBER), False))
-    kept = text_cells_pc.if_else(pa.array(right), text.combine_chunks(), pa.scalar(None, pa.string()))
-    values = text_cells_pc.cast(text_cells_pc.utf8_trim_whitespace(kept), pa.float64()).to_numpy(zero_copy_only=False)
+        text = compute.replace_substring(text, ",", ".")
+    right = np.asarray(compute.fill_null(compute.match_substring_regex(text, _NUMBER_CELL), False))
+    kept = compute.if_else(pa.array(right), text.combine_chunks(), pa.scalar(None, pa.string()))
+    values = compute.cast(compute.utf8_trim_whitespace(kept), pa.float64()).to_numpy(zero_copy_only=False)
     return values, ~right, blank
 
 
@@ -475,7 +477,10 @@ def _lines(table: TextTable) -> Iterator[bytes]:
             yield rest
 
 
-# --- cSV: a header line, then numbers; commas, semicolons or tabs between them ----------------------------------------
+# --- CSV: a header line, then numbers; commas, semicolons or tabs between them ----------------------------------------
+# A file of another layout, as instruments write it, is read by `text_columns`. A plain one is read at full speed.
+# Only when that fails it is read again in blocks, and the one that fails is walked line by line, to name the bad
+# cell.
 
 _HEAD_BYTES = 65_536
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)(e[+-]?[0-9]+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE)

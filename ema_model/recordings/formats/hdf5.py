@@ -15,7 +15,7 @@ import numpy as np
 from ema_model.errors import InputError
 from ema_model.files.limits import ARRAYS
 from ema_model.files.opened import listed, refusal, shown
-from ema_model.recordings.formats.channels import Channel, Log, Matrix, NoLog, in_columns
+from ema_model.recordings.formats.channels import Channel, Log, Matrix, NoLog, in_columns, without_ones
 from ema_model.recordings.formats.logs import log_format
 
 _DEEPEST = 8
@@ -171,9 +171,9 @@ def _channels(item: Any, path: tuple[str, ...], most_bytes: int) -> Sequence[Cha
         return []
     if item.size == 1:
         return float(np.asarray(_read(item, most_bytes)).reshape(-1)[0])
-    if sum(size != 1 for size in shape) == 1:
+    if len(without_ones(shape)) == 1:
         return [Channel(path, item.size, lambda: _read(item, most_bytes).reshape(-1), unit)]
-    size = tuple(one for one in shape if one != 1)
+    size = without_ones(shape)
     if len(size) != 2:
         return []
     turned = matlab != ""  # MATLAB stores column by column

@@ -26,7 +26,7 @@ _DEEPEST = 8
 _FEWEST = 2  # numbers that make a column
 _SHORTEST_RUN = 20  # samples, by which a list of them is told from the parts of one
 _KINDS = ("type", "name", "kind", "id")  # keys under which a run says what it is
-_MOST_TOLD = 12
+_MOST_NAMED = 12
 _SPLIT = {"columns", "data"}  # pandas' "split": names, and rows of numbers
 
 
@@ -180,7 +180,7 @@ class _Found:
         single = {path[0] for path in shared}
         self.aside += [key for key in records[0] if key not in single]
         kinds = [next((one[key] for key in _KINDS if isinstance(one.get(key), str)), "") for one in records]
-        told = [f"{i} is {shown(kind, 30)}" for i, kind in enumerate(kinds, 1) if kind][:_MOST_TOLD]
+        told = [f"{i} is {shown(kind, 30)}" for i, kind in enumerate(kinds, 1) if kind][:_MOST_NAMED]
         more = f": {', '.join(told)}{', …' if len(runs) > len(told) else ''}" if told else ""
         self.notes.append(f"a run a record, {len(runs)} in all{more}")
         return True

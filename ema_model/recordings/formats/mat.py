@@ -19,9 +19,23 @@ from ema_model.files.limits import ARRAYS, megabytes
 from ema_model.files.opened import refusal, shown
 from ema_model.quantities.signals import SIGNALS
 from ema_model.recordings.formats import common_clock, hdf5
-from ema_model.recordings.formats.channels import Channel, Log, column_names_of, times_of, told, way_of_time, with_unit
+from ema_model.recordings.formats.channels import (
+    Channel,
+    Log,
+    column_names_of,
+    times_of,
+    told,
+    way_of_time,
+    with_unit,
+    without_ones,
+)
 from ema_model.recordings.formats.format import Array, Columns, Format
 from ema_model.recordings.formats.npz import Kind, column_names, is_column, put_together, take, together
+
+# --- MATLAB's structs that name their data in a field beside it, as Simulink's and dSPACE's do ------------------------
+# Simulink's "Structure with time" has time, and for each signal `signals(i).values` and `.label` (MathWorks, To
+# Workspace); ControlDesk exports `X(j).Data`, the times of each raster, and `Y(i).Data` with `.Name`, `.Unit`,
+# `.Raster`.
 
 _DATA = ("data", "values")
 _NAMES, _UNITS, _RASTER = ("name", "label"), ("unit", "units"), "raster"
@@ -58,7 +72,11 @@ def with_names(leaves: Sequence[Leaf]) -> list[Leaf]:
     return [one for one in found if not (one.text and one.path[:-1] in told and one.path[-1].lower() in naming)]
 
 
-# --- the layout of MATLAB's files of version 5 to 7: elements with a tag, packed or not, arrays within struct--------
+# --- the layout of MATLAB's files of version 5 to 7 -------------------------------------------------------------------
+# The layout of MATLAB's files of version 5 to 7: elements with a tag, packed or not, arrays within structs.
+#
+# A reader of our own, since files come by upload here, and scipy's ends the whole process with a segmentation fault
+# on about one in a hundred files of which three bytes are changed.
 
 HEADER_BYTES = 128
 _MATRIX, _COMPRESSED = 14, 15
@@ -278,7 +296,8 @@ def _text(name: memoryview) -> str:
     return bytes(name).split(b"\0")[0].decode("utf-8", "replace")
 
 
-# --- mATLAB's .mat, version 5 to 7: a vector per signal, or the columns of a matrix, alone or in structs and ----
+# --- MATLAB's .mat, version 5 to 7 ------------------------------------------------------------------------------------
+# MATLAB's .mat, version 5 to 7: a vector per signal, or the columns of a matrix, alone or in structs and cells.
 
 
 def _header(path: str, max_bytes: int) -> list[str]:
@@ -330,7 +349,7 @@ def _is_number(leaf: Leaf) -> bool:
 
 def _columns(leaf: Leaf, times: Collection[int]) -> list[Leaf]:
     """A matrix that holds signals as these; anything else as it is.  times: the lengths that time has in the file."""
-    size = tuple(one for one in leaf.shape if one != 1)
+    size = without_ones(leaf.shape)
     way = None if leaf.other or leaf.path[-1] in SIGNALS else way_of_time(size, times)
     if way is None:
         return [leaf]
@@ -345,7 +364,7 @@ def _columns(leaf: Leaf, times: Collection[int]) -> list[Leaf]:
 
 
 def _times(found: Sequence[Leaf]) -> set[int]:
-    vectors = (leaf for leaf in found if not leaf.other and sum(size != 1 for size in leaf.shape) == 1)
+    vectors = (leaf for leaf in found if not leaf.other and len(without_ones(leaf.shape)) == 1)
     return times_of((leaf.path[-1], math.prod(leaf.shape)) for leaf in vectors)
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ema_model.files.opened import refusal, shown
-from ema_model.recordings.formats.channels import Channel, Log, Matrix, NoLog, broken_file, in_columns
+from ema_model.recordings.formats.channels import Channel, Log, Matrix, NoLog, broken_file, in_columns, without_ones
 from ema_model.recordings.formats.format import check_size
 from ema_model.recordings.formats.logs import log_format
 
@@ -38,7 +38,7 @@ def _channels(path: str, array: Any) -> list[Channel]:
         ]
     if array.dtype.kind not in "fiub":
         raise refusal(path, f"holds {shown(array.dtype)}; numbers are expected, store it as double")
-    size = tuple(size for size in array.shape if size != 1)
+    size = without_ones(array.shape)
     if len(size) == 2 and (columns := in_columns([Matrix(("data",), size, lambda: array.reshape(size))])[0]):
         return [replace(one, values=lambda one=one: np.array(one.values())) for one in columns]
     shape = "×".join(map(str, array.shape)) or "a single value"

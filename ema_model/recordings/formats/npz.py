@@ -26,10 +26,13 @@ from ema_model.recordings.formats.channels import (
     times_of,
     way_of_time,
     without_columns,
+    without_ones,
 )
 from ema_model.recordings.formats.format import Array, Columns, Format, check_size
 from ema_model.recordings.formats.own_clocks import with_own_clocks
 from ema_model.recordings.formats.run_groups import with_runs
+
+# --- named arrays of any shape, as .npz and .mat files hold them, turned into columns ---------------------------------
 
 Shape = tuple[int, ...]
 Kind = tuple[Shape, np.dtype[Any]]
@@ -38,7 +41,7 @@ Kind = tuple[Shape, np.dtype[Any]]
 def is_column(kind: Kind) -> bool:
     """Whether it holds two or more real numbers in a row or a column: (n,), (n, 1) or (1, n)."""
     shape, dtype = kind
-    return dtype.kind in "fiub" and np.prod(shape, dtype=float) > 1 and sum(size != 1 for size in shape) == 1
+    return dtype.kind in "fiub" and np.prod(shape, dtype=float) > 1 and len(without_ones(shape)) == 1
 
 
 def column_names(path: str, kinds: Mapping[str, Kind]) -> list[str]:
@@ -139,7 +142,7 @@ def together(path: str, log: Log, names: Sequence[str], max_bytes: int, strict: 
     return Columns(arrays, lambda row: f"sample {row + 1}", (*aside, *log.notes, *notes), clocks=clocks)
 
 
-# --- numPy's .npz: one array per signal; a structured array gives a column per field, a matrix its columns ------------
+# --- numPy's .npz: one array per signal; a structured array gives a column per field ----------------------------------
 
 _SUFFIX = ".npy"
 _HEAD_BYTES = 20_000  # numpy takes headers of up to 10,000, but reads them to their declared end first
@@ -241,7 +244,7 @@ def _in_columns(contents: Mapping[str, _Place]) -> dict[str, _Place]:
     found: dict[str, _Place] = {}
     for name, place in contents.items():
         shape, dtype = place.kind
-        size = tuple(one for one in shape if one != 1)
+        size = without_ones(shape)
         way = None if name in SIGNALS or dtype.kind not in "fiub" else way_of_time(size, times)
         if way is None:
             found[name] = place

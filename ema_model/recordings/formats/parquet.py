@@ -20,6 +20,10 @@ from ema_model.recordings.formats import robot_dataset
 from ema_model.recordings.formats.channels import MOST_COLUMNS
 from ema_model.recordings.formats.format import Array, Columns, Format, check_size
 
+# --- what the columns of a Parquet file unpack to, by its list of contents and by each page's own header --------------
+# Its library makes room for whatever a page's header says, whatever the list of contents says, so that a page of 200
+# kB fills gigabytes. It also ends the whole process when asked for a damaged list's details; so both are read here.
+
 _MOST_PAGES = 200_000  # of all columns: of 8 kB, the smallest that is usual, 1.6 GB
 _HEADER_BYTES = (256, 65_536)  # to read: nearly always enough, and surely
 _DEEPEST = 12
@@ -173,7 +177,8 @@ def _varint(raw: bytes, at: int) -> tuple[int, int]:
             raise Damaged
 
 
-# --- parquet: a column per signal, or one with several numbers a row; ours say emaviz_schema = 1 in the metad------
+# --- parquet: a column per signal, or one with several numbers a row --------------------------------------------------
+# Parquet: a column per signal, or one with several numbers a row; ours say emaviz_schema = 1 in the metadata.
 
 pc: Any = pyarrow.compute  # its functions are made when it is imported
 _FOOTER_BYTES = 4_000_000

@@ -21,6 +21,9 @@ from emaviz.session.compare import Comparing
 from emaviz.session.files import Opened
 from emaviz.text.html import Html, add_html, html, joined, unescaped
 
+# --- short pieces of HTML on the Compare tab --------------------------------------------------------------------------
+# Short pieces of HTML on the Compare tab: the list of recordings, the mapping's table, the data health card.
+
 _MARKS = {"good": ("✓", COLOURS["good"]), "note": ("●", COLOURS["note"]), "warning": ("▲", COLOURS["warning"])}
 _CARDS_BOX = Html('style="padding:0 10px 6px;font-size:12.5px;line-height:1.4"')
 _DIM = Html('style="opacity:.65"')
@@ -119,7 +122,8 @@ def _mark(severity: str) -> Html:
     return html('<span style="color:{}" title="{}">{}</span>', colour, severity, sign)
 
 
-# --- the first lines of a text as they stand in the file, of which a click names the one with the columns' na------
+# --- the first lines of a text as they stand in the file --------------------------------------------------------------
+# The first lines of a text as they stand in the file, of which a click names the one with the columns' names.
 
 _SHOWN = 20
 _ABOVE = 15  # lines shown above a header that stands further down
@@ -191,7 +195,8 @@ def _styled(one: str, colours: str) -> str:
     )
 
 
-# --- how a text was understood, and what somebody says instead: the line with the columns' names, and the enc----
+# --- how a text was understood, and what somebody says instead --------------------------------------------------------
+# How a text was understood, and what somebody says instead: the line with the columns' names, and the encoding.
 
 _FOUND = "found by itself"
 _MOST_LINES = 200

@@ -36,6 +36,8 @@ from emaviz.session.files import Opened
 from emaviz.text.html import Html, add_html, begin, html, joined, note, unescaped
 from emaviz.text.results import folded, large, of_comparison, shown, warned
 
+# --- a compared recording on the 3D actuator: as measured, the screw glowing where the model fails --------------------
+
 _FULL = 4.0  # times its floor, at which a residual glows fully
 
 

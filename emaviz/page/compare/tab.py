@@ -36,6 +36,8 @@ from emaviz.session.files import UPLOADED, Description, Opened, Question
 from emaviz.session.saved import Part
 from emaviz.text.html import Html, HtmlPiece, add_html, html, joined
 
+# --- what a comparison is asked for: the actuator, what may be calibrated, the signals' weights, the window -----------
+
 
 class AskedControls:
     """Folders of the Compare tab."""
@@ -139,7 +141,8 @@ class AskedControls:
         self._page.checked(lambda: self._comparing.set_free(path, bool(box.value)), box)
 
 
-# --- a form that makes an actuator's file: its axes, controller and drive, then each parameter with its meani-------
+# --- a form that makes an actuator's file -----------------------------------------------------------------------------
+# A form that makes an actuator's file: its axes, controller and drive, then each parameter with its meaning.
 
 _BOX = Html('style="padding:0 10px 6px;font-size:12.5px;line-height:1.4"')
 _BELOW = Html('style="padding:0 10px 8px;margin-top:-6px;font-size:12px;line-height:1.35;opacity:.75"')

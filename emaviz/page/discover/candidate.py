@@ -31,6 +31,8 @@ from emaviz.session.described import number as setting_number
 from emaviz.session.discover.discovering import Discovering, Preview, Typed, typed
 from emaviz.text.html import BOX, Html, add_html, boxed, html, joined, mathml, note, unescaped
 
+# --- texts and styles of the Discover tab's cards: what each candidate would do, in one glance ------------------------
+
 _CARD = (
     "height:auto!important;min-height:2em;padding:5px 9px;font-weight:400;font-size:12.5px;"
     "background-color:rgba(134,142,150,.10)!important;color:inherit!important;"
@@ -177,7 +179,8 @@ def _range(name: str, limits: Any) -> tuple[float, float]:
     return low, high
 
 
-# --- one candidate opened: its signature beside what is left, its equation, cause, size, and what it is mista---
+# --- one candidate opened ---------------------------------------------------------------------------------------------
+# One candidate opened: its signature beside what is left, its equation, cause, size, and what it is mistaken for.
 
 CONFIG = {"displayModeBar": False, "responsive": False}
 
@@ -312,7 +315,8 @@ def typical(effect: Effect) -> str:
     return f"{first.title} {values} {shown.unit}".rstrip() + ": low, medium, high"
 
 
-# --- your own effect: an expression checked as it is typed, a slider for each parameter, and the curve of wha---
+# --- your own effect --------------------------------------------------------------------------------------------------
+# Your own effect: an expression checked as it is typed, a slider for each parameter, and the curve of what is left.
 
 _EXAMPLE = "-c*sign(omega)*sqrt(abs(omega))"
 _TYPED_S = 0.7  # after the last key, from which a text is taken for whole: its torque is compiled then

@@ -20,9 +20,9 @@ from ema_model.discovery.words import (
     headline,
     next_experiment,
     per_recording,
+    sentences,
     so_far,
     tracks,
-    words_sentences,
 )
 from ema_model.effects import CATALOGUE
 from ema_model.errors import InputError
@@ -41,6 +41,8 @@ from emaviz.session.discover import source
 from emaviz.session.discover.discovering import Discovering
 from emaviz.text.html import BOX, Html, add_html, begin, boxed, html, joined, note
 from emaviz.text.results import folded, large, of_discovery, shown, warned
+
+# --- suggested next test: the command and load that tell rivals apart; into Explore, or as CSV for a rig --------------
 
 _RATE_HZ = 10_000.0
 _ASK = "Of all tests that the actuator can follow, the one that would tell the two best candidates apart."
@@ -157,7 +159,8 @@ def run_of(track: Track, shown: str) -> Measurement:
     return Measurement({"time_s": time_s, "motor_speed_rad_s": np.gradient(motor, time_s), **signals}, track.name)
 
 
-# --- discover's panel on the right: the answer so far, the ladder, the opened candidate, the equation, what i---
+# --- discover's panel on the right ------------------------------------------------------------------------------------
+# Discover's panel on the right: the answer so far, the ladder, the opened candidate, the equation, what is left.
 
 _STEPS = (
     "Choose measurements on the left: those of Compare, or one of the challenges.",
@@ -314,9 +317,9 @@ def answer(look: Look) -> Html:
         best, meaning = look.promising[0].name, "warning"
         may_be_worn = any(name in BY_NAME for name in (best, *look.assessment.alike.get(best, ())))
         first = "Physics is missing, or the actuator has a fault." if may_be_worn else "Physics is missing."
-        others = [words_sentences(found)[0], *([left.sentence] if left is not None else [])]
+        others = [sentences(found)[0], *([left.sentence] if left is not None else [])]
     else:
-        first, others = headline(found), words_sentences(found)
+        first, others = headline(found), sentences(found)
     return html(
         '<div {}>{}{}{}<div style="opacity:.65;font-size:12px" title="{}">The floor is what noise and the model\'s own '
         "limits leave: 1 on the ladder.</div>{}</div>",

@@ -35,6 +35,9 @@ from emaviz.session.discover.source import COMPARED
 from emaviz.session.saved import Part
 from emaviz.text.html import DIM, Html, add_html, boxed, html, note, said
 
+# --- the recordings of a discovery ------------------------------------------------------------------------------------
+# The recordings of a discovery: Compare's, some of them held out, or a challenge, which may be a sealed file.
+
 _STARS = "●○"
 _SEALED = "Sealed: "  # before the names of such files
 

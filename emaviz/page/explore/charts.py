@@ -28,6 +28,8 @@ from emaviz.session.session import Simulation
 from emaviz.session.worker import Worker
 from emaviz.text.html import add_html, html, said
 
+# --- explore's tabs on the right: the signals, the phases, the run in numbers, and what can be taken away -------------
+
 
 class ChartsPanel:
     """Draws runs: the signals at once, phases and metrics a little later and where a window has them in front."""

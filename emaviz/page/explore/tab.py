@@ -41,6 +41,8 @@ from emaviz.session.settings import MONITORS, Settings
 from emaviz.session.undo import Undo
 from emaviz.text.html import Html, add_html, html, said
 
+# --- ready-made faults: those of the thesis's tables, each low and high, and its multi-fault case ---------------------
+
 _MULTI_FAULT = np.array([0.0133, 0.05, 0.003, 0.0, 0.0, 0.012, 0.5, 0.35])  # T 5.3
 CUSTOM = "custom"
 

@@ -28,6 +28,9 @@ from emaviz.session.worker import Worker
 from emaviz.text.html import Html, add_html, begin, joined, note
 from emaviz.text.results import sure_words
 
+# --- how the swarm is looked at ---------------------------------------------------------------------------------------
+# How the swarm is looked at: as points over two k or as lines across all eight, live or at an earlier iteration.
+
 _PLANE, _LINES = "points over two k", "lines across all k"
 _NAMES = tuple(fault.label for fault in FAULTS)
 

@@ -34,6 +34,8 @@ from emaviz.session.saved import Part
 from emaviz.session.settings import SLIDERS, Settings
 from emaviz.text.html import Html, add_html, html, joined
 
+# --- the Identify tab: what is identified, by which algorithms, and the race that one watches -------------------------
+
 PLANT = "The plant of Explore's sliders"
 _WHY = '<details style="opacity:.75"><summary style="cursor:pointer">★ why it is the best</summary>{}</details>'
 

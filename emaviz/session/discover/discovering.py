@@ -35,6 +35,8 @@ from emaviz.session.session import Session
 from emaviz.session.signal import Signal
 from emaviz.session.worker import Worker
 
+# --- what the page hears of a discovery, besides its job --------------------------------------------------------------
+
 
 @dataclass
 class DiscoverEvents:
@@ -49,7 +51,7 @@ class DiscoverEvents:
     verified: Signal[[Path, str]] = field(default_factory=Signal)  # a kept model, and how good it is
 
 
-# --- a user's own torque before it is in the model: the text as it is typed, and what its values would change---------
+# --- a user's own torque before it is in the model: the text as it is typed, and what its values would change ---------
 
 
 @dataclass(frozen=True)

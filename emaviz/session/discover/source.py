@@ -42,6 +42,9 @@ from emaviz.session.session import Session
 from emaviz.session.settings import Settings
 from emaviz.session.signal import Signal
 
+# --- what a session's file says of a discovery ------------------------------------------------------------------------
+# What a session's file says of a discovery: what it was made from, its steps, and the test that was suggested last.
+
 MOST_STEPS = 100
 _FARTHEST = 1e3  # σ that a fitted value may be off
 
@@ -265,7 +268,8 @@ def _severity(good: bool) -> Severity:
     return "good" if good else "bad"
 
 
-# --- what a discovery is made from: a challenge, or the recordings and the actuator of Compare, some of them ---
+# --- what a discovery is made from ------------------------------------------------------------------------------------
+# What a discovery is made from: a challenge, or the recordings and the actuator of Compare, some of them held out.
 
 COMPARED = "The measurements of Compare"
 NOTHING = "no measurement to fit is chosen; open one on Compare, or choose a challenge"

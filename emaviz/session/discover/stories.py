@@ -32,6 +32,9 @@ from emaviz.session.inputs import Inputs, Provenance
 from emaviz.session.job import RESTED, Job, Stopped, Tell
 from emaviz.session.signal import Signal
 
+# --- candidates refitted in the model of a story, each once -----------------------------------------------------------
+# Candidates refitted in the model of a story, each once; and the two between which a test would have to decide.
+
 _MOST_FOLLOWED = 8  # times that a fit is begun anew where the one before has ended
 
 
@@ -89,7 +92,7 @@ def undecided(story: Story, known: Mapping[Step, Assessment]) -> tuple[Story, li
 
 _DAMAGED = "the session's steps of Discover are damaged; save it anew"
 
-record_Tell = Callable[[str], None]
+Progress = Callable[[str], None]
 
 
 def steps_of(story: Story) -> tuple[SavedStep, ...]:
@@ -105,7 +108,7 @@ def steps_of(story: Story) -> tuple[SavedStep, ...]:
     )
 
 
-def take_again(story: Story, steps: Sequence[SavedStep], tell: record_Tell, shown: Callable[[], None]) -> None:
+def take_again(story: Story, steps: Sequence[SavedStep], tell: Progress, shown: Callable[[], None]) -> None:
     """Takes saved steps after the calibration; each fit begins where it ended then.  shown() follows each step.
 
     Raises InputError for steps that make no sense, with the steps before them taken.
@@ -116,7 +119,7 @@ def take_again(story: Story, steps: Sequence[SavedStep], tell: record_Tell, show
         shown()
 
 
-def _take(story: Story, saved: SavedStep, tell: record_Tell) -> None:
+def _take(story: Story, saved: SavedStep, tell: Progress) -> None:
     model, before = actuator_of(saved.model), story.current.actuator
     own = {path: one for path, one in model.tolerances.items() if path.startswith("effects.")}
     others = {path: one for path, one in before.tolerances.items() if not path.startswith("effects.")}
@@ -163,7 +166,8 @@ def _keys(step: Step) -> set[str]:
     return {one.key for one in step.added}
 
 
-# --- a story and all that belongs to it: what is known of its steps, what it was made from, how it is written----
+# --- a story and all that belongs to it -------------------------------------------------------------------------------
+# A story and all that belongs to it: what is known of its steps, what it was made from, how it is written down.
 
 
 @dataclass(eq=False)
@@ -211,7 +215,8 @@ class Telling:
         return SavedStory(self.recipe, steps_of(self.story), self.experiment)
 
 
-# --- all discoveries of a session: each keeps its story, so that one goes from one to the other without compu-----
+# --- all discoveries of a session -------------------------------------------------------------------------------------
+# All discoveries of a session: each keeps its story, so that one goes from one to the other without computing.
 
 _MOST_NAMES = 2  # of recordings, in an entry's words
 

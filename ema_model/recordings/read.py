@@ -400,26 +400,25 @@ def prepared(measurement: Measurement, actuator: Actuator) -> Measurement:
     inside = replace(measurement, signals=axes.inside(measurement.signals), axes=axes, of_other_axes=others)
     if others:
         inside = inside.with_notes(f"left aside, as the actuator's axes are of another kind: {listed(others)}")
-    made = _with_made(inside, actuator)
+    known = _with_other_side(inside, actuator)
+    made = with_current(known, actuator.motor.pole_pairs, actuator.motor.rotor_offset_rad)
     if made is inside:
         return made
     names = tuple(name for name in made if name not in inside)
-    said = made.notes[len(inside.notes) :] if names != ("current_A",) else ()  # phase currents are what it means
-    remarks = (*made.reading.remarks, *said)
+    # That three phase currents make the current goes without saying; what else was made is said.
+    remarks = (*made.reading.remarks, *known.notes[len(inside.notes) :])
     return replace(made, reading=replace(made.reading, made=names, remarks=remarks))
 
 
-def _with_made(inside: Measurement, actuator: Actuator) -> Measurement:
-    """What the actuator's model needs and was not recorded, of what was: the motor's motion, phases and current."""
+def _with_other_side(inside: Measurement, actuator: Actuator) -> Measurement:
+    """What the actuator's model needs and was not recorded, of what was: the motor's motion, and the third phase."""
     ratio, between = actuator.transmission.gear_ratio, _between(actuator)
     needs_current = "current_A" not in inside and sum(name in inside for name in PHASES) > 1
     if actuator.controller.kind == "unknown" or needs_current:
         made = with_motor_side(inside, ratio, between)
     else:  # a loop has the user's position, which the motor's would only repeat; its speed tells more
         made = inside if between else with_motor_side(inside, ratio, speed_only=True)
-    if needs_current:
-        made = with_third_phase(made)
-    return with_current(made, actuator.motor.pole_pairs, actuator.motor.rotor_offset_rad)
+    return with_third_phase(made) if needs_current else made
 
 
 def _between(actuator: Actuator) -> list[str]:

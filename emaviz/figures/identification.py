@@ -488,7 +488,7 @@ class Marks:
     ends: Mapping[str, Floats] | None = None  # (8,) each, by the search's name
 
 
-def figure(landscape: Landscape, marks: Marks, *, dark: bool = False) -> go.Figure:
+def landscape_figure(landscape: Landscape, marks: Marks, *, dark: bool = False) -> go.Figure:
     """Dark: a low error.  Points off the slice are drawn where their two k are."""
     x, y = landscape.x, landscape.y
     height = np.log10(np.maximum(landscape.error_A, _LANDSCAPE_LEAST_A))

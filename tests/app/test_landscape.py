@@ -96,7 +96,7 @@ def test_a_way_goes_the_short_way_round_the_angle():
 def test_the_map_has_units_marks_and_a_box():
     found = whole(TRUTH, 0, 5, points=9)[-1]
     interval = np.stack([TRUTH - 0.05, TRUTH + 0.05], axis=1)
-    drawn = identification.figure(found, identification.Marks(TRUTH, interval, TRUTH, {"do": HEALTHY}))
+    drawn = identification.landscape_figure(found, identification.Marks(TRUTH, interval, TRUTH, {"do": HEALTHY}))
     assert "k1" in drawn.layout.xaxis.title.text and "[–]" in drawn.layout.yaxis.title.text
     assert drawn.data[0].colorbar.title.text == "corrected error [A]"
     assert [trace.name for trace in drawn.data[1:]] == ["Dandelion ended", "truth", "answer, 90 %"]
@@ -108,7 +108,7 @@ def test_the_map_has_units_marks_and_a_box():
     half = whole(TRUTH, 0, 5, points=9)[1]
     assert landscape_words(half).startswith("Stopped at 44 %. Held: k2")
     empty = Landscape(0, 5, TRUTH, np.linspace(0, 1, 3), np.linspace(0, 1, 3), np.full((3, 3), np.nan), 0)
-    identification.figure(empty, identification.Marks(TRUTH))
+    identification.landscape_figure(empty, identification.Marks(TRUTH))
 
 
 @pytest.mark.parametrize("low, high", [(0.1, 3.0), (1e-9, 1e6), (0.31, 0.33), (5.0, 5.0)])

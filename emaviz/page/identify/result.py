@@ -237,7 +237,7 @@ class LandscapeView:
         if race is not self._race or best is None or best.k is None:
             return
         sure = best.answer.uncertainty.interval90 if best.answer is not None and best.answer.polished else None
-        figure = identification.figure(found, identification.Marks(best.k, sure, race.truth, ends(race)))
+        figure = identification.landscape_figure(found, identification.Marks(best.k, sure, race.truth, ends(race)))
         with self._page.server.atomic():
             if self._plot is None:
                 with self._place:

@@ -185,7 +185,8 @@ def _channels(item: Any, path: tuple[str, ...], most_bytes: int) -> Sequence[Cha
     names = next((text for name in _NAMES if (text := _texts(_attribute(item, name)))), [])
     count = len(names) if len(names) in size else min(size)
     units = next((text for name in _UNIT if len(text := _texts(_attribute(item, name))) > 1), [unit] * count)
-    return [Matrix(path, size[::-1] if turned else size, values, names, units)]
+    rows, columns = size
+    return [Matrix(path, (columns, rows) if turned else (rows, columns), values, names, units)]
 
 
 def _read(item: Any, most_bytes: int) -> Any:

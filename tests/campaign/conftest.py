@@ -7,8 +7,8 @@ import os
 import numba
 import pytest
 
+from ema_model import kernel_cache
 from ema_model.campaign.execute import ENVIRONMENT
-from ema_model.kernel_cache import kept
 from ema_model.simulation import one_stack
 
 
@@ -19,7 +19,7 @@ def _as_before(monkeypatch):
         monkeypatch.setenv(name, os.environ.get(name, ""))
         if not os.environ[name]:
             monkeypatch.delenv(name)
-    monkeypatch.setattr(kept, "turns", kept.turns)
+    monkeypatch.setattr(kernel_cache, "turns", kernel_cache.turns)
     monkeypatch.setattr(one_stack, "_only_library", one_stack._only_library)
     threads = numba.get_num_threads()
     yield

@@ -27,6 +27,7 @@ from ema_model.actuator import Actuator
 from ema_model.commands import command as command_of
 from ema_model.comparison import Comparison
 from ema_model.discovery import Discovery
+from ema_model.discovery.steps.begin import with_fitted_effects
 from ema_model.effects import find
 from ema_model.errors import InputError, quoted
 from ema_model.faults import vector
@@ -233,7 +234,7 @@ def compare(
     of: files' names or recordings, one or several, fitted together.
     actuator: what was recorded; the thesis's without one.
     k: (8,), 0 … 1, the actuator's faults, in place of those of its file.
-    effects: settings by the effect's name, besides the actuator's own.
+    effects: settings by the effect's name, besides the actuator's own; what has none is fitted with the parameters.
     calibrate: whether the actuator's parameters are fitted within their tolerances.
     free: parameters to fit, "k1" or "motor.inertia_kgm2", in place of those that the actuator's file leaves free.
     signals: names of signals to fit, or weights by name (1: as the noise says); current and positions without it.
@@ -241,8 +242,15 @@ def compare(
     on_progress: takes a text that says what goes on; what it raises ends the comparison.
     """
     actuator = actuator or load_actuator()
+    fitted = _read(of, actuator)
+    to_fit = [name for name, values in (effects or {}).items() if not values] if calibrate else []
+    if to_fit:
+        effects = {name: values for name, values in (effects or {}).items() if values}
+        known = {name: find(name, actuator.axes).settings(dict(values)) for name, values in effects.items()}
+        beside = replace(actuator, effects={**actuator.effects, **known})
+        actuator = with_fitted_effects(fitted, beside, to_fit, on_progress or (lambda text: None))
     return comparison.compare(
-        _read(of, actuator),
+        fitted,
         actuator,
         k=k,
         effects=effects,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from typing import Any
@@ -31,6 +31,8 @@ from ema_model.errors import InputError, quoted
 from ema_model.faults import vector
 from ema_model.quantities.axes import Axes
 
+CURRENT_INPUTS = ("current_A", "motor_torque_Nm")  # what an open loop is driven by, the first of them that there is
+VOLTAGE_INPUTS = ("motor_voltage_V", "duty")  # the same with a voltage drive
 _OPEN_STEP_S = 5e-5  # what an actuator without chopping is simulated with
 _LEARNED = 0.9  # of a tolerance: a fit that leaves more of it learned nothing of the parameter
 _FITTED = "The sigma of each fitted parameter is 1 σ of what the fit found; its 90 % interval is value ± 1.645 sigma."
@@ -80,16 +82,28 @@ class Actuator:
         """The most current, A, that controller and drive allow; (n,) where one of them is."""
         return np.minimum(self.controller.current_limit_A, self.inverter.current_limit_A)
 
-    def in_open_loop(self) -> Actuator:
-        """The same without controller and drive, and without what acts in them: a recorded current or torque is put in.
+    @property
+    def takes_voltage(self) -> bool:
+        """Whether a recorded voltage, or a duty, is put in."""
+        return self.controller.kind == "open" and self.inverter.kind == "voltage"
 
+    def in_open_loop(self, recorded: Container[str] = ()) -> Actuator:
+        """The same without a controller, and without what acts in it: what a recording has is put in.
+
+        That is its current or torque, and the drive is gone as well; with a voltage drive, where of these there is
+        none, or the actuator's file is of an open loop, it is its motor voltage or duty.  recorded: its signals.
         An actuator whose controller is not known has no play and end stops in its file, and so none here.
         """
-        gone = unread("open", "current")
+        is_driven = self.takes_voltage or not any(name in recorded for name in CURRENT_INPUTS)
+        takes_voltage = self.inverter.kind == "voltage" and any(name in recorded for name in VOLTAGE_INPUTS)
+        drive = "voltage" if takes_voltage and is_driven else "current"
+        gone = unread("open", drive)
         neutral = {path: default_of(path) for path in gone if not path.startswith(("controller.", "inverter."))}
-        bare = replace(self, controller=Controller(kind="open"), inverter=Inverter(kind="current")).varied(neutral)
+        inverter = replace(self.inverter, current_limit_A=math.inf) if drive == "voltage" else Inverter(kind="current")
+        bare = replace(self, controller=Controller(kind="open"), inverter=inverter).varied(neutral)
         usual = {"filter_s": Actuator.filter_s, "leaves_out_reversals": Actuator.leaves_out_reversals}
-        return replace(bare._as_read(), step_s=max(self.step_s, _OPEN_STEP_S), **usual)
+        step_s = self.step_s if drive == "voltage" else max(self.step_s, _OPEN_STEP_S)
+        return replace(bare._as_read(), step_s=step_s, **usual)
 
     def without_controller(self) -> Actuator:
         """The same for inverse dynamics: a measured motion is put in, and the current that it needs comes out.

@@ -61,15 +61,35 @@ def _check_reference_only(actuator: Actuator, where: str) -> None:
         )
 
 
-def _check_effect_acts(actuator: Actuator, name: str, where: str) -> None:
+def cannot_represent(actuator: Actuator, name: str) -> str:
+    """Why a model of this actuator has no place for an effect, whatever is recorded; "" where it has one."""
     from ema_model.effects import find  # the catalogue need not be loaded for an actuator without effects
 
     effect = find(name)
-    places = {function.__name__ for function in effect.places}
-    reason = idle(places, bool(effect.states), actuator.controller.kind, actuator.inverter.kind)
     if not effect.has_part(actuator.axes):
-        reason = "on a linear axis nothing turns that it could be of"
-    if reason:
+        return "on a linear axis nothing turns that it could be of"
+    places = {function.__name__ for function in effect.places}
+    return idle(places, bool(effect.states), actuator.controller.kind, actuator.inverter.kind)
+
+
+def check_represents(actuator: Actuator, name: str) -> None:
+    """Raises InputError with the reason where an effect would do nothing, and with what could hold it."""
+    if not (reason := cannot_represent(actuator, name)):
+        return
+    raise InputError(f"effect {name}: this model cannot represent it: {reason}; {_what_could(actuator, name)}")
+
+
+def _what_could(actuator: Actuator, name: str) -> str:
+    """What holds an effect that this model does not: another loop, or nothing."""
+    if actuator.controller.kind == "unknown" and not cannot_represent(actuator.in_open_loop(), name):
+        return "an open loop can (--open-loop), or a closed one: write the controller into the actuator's file"
+    if actuator.controller.kind in ("unknown", "open"):
+        return "a closed loop can: write the controller into the actuator's file"
+    return "leave it out"
+
+
+def _check_effect_acts(actuator: Actuator, name: str, where: str) -> None:
+    if reason := cannot_represent(actuator, name):
         raise InputError(f"{where}: effects.{name}: {reason}; leave it out")
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from ema_model.actuator.actuator import Actuator
 from ema_model.actuator.file import actuator_of
-from ema_model.actuator.layout import WITHOUT_DRIVE, layout
+from ema_model.actuator.layout import CONTROLLER_KINDS, drives_of, layout, says_drive
 from ema_model.actuator.naming import on_axes
 from ema_model.actuator.parameters import SECTIONS, default_of, facts_of
 from ema_model.actuator.steps import loop_rate, usual_filter, usual_step
@@ -39,6 +39,8 @@ _ON_DATA_SHEETS: dict[str, tuple[tuple[str, float], ...]] = {
     "s": (("ms", 1e-3), ("µs", 1e-6)),
 }
 _WIDE = 0.5  # a tolerance, relative, from which on 3 σ reach below nothing
+_POSITION_LOOPS_1_S = (0.3, 1e4)  # from a telescope's axis to a galvanometer's
+_SLOWER = 4.0  # times the speed loop's rate, from which on a position loop over it is damped by less than a quarter
 _APART = 0.2  # by which the controller's torque constant and the motor's may differ
 
 
@@ -105,9 +107,11 @@ def _contradictions(actuator: Actuator) -> Iterator[str]:
             _shown(actuator, f"motor.{name}") for name in ("static_friction_Nm", "dynamic_friction_Nm")
         )
         yield f"{both}: what stands is held by no less than what moves"
-    if controller.kind in WITHOUT_DRIVE:
+    if not says_drive(controller.kind, inverter.kind):
         return
     most = min(float(actuator.current_limit_A) * motor.torque_constant_Nm_A, motor.torque_limit_Nm)
+    if inverter.kind == "voltage" and inverter.bus_voltage_V == 0.0:
+        return  # the recordings say it
     if inverter.kind == "voltage":
         most = inverter.bus_voltage_V / motor.resistance_Ohm * motor.torque_constant_Nm_A * controller.output_limit
     held = max(motor.static_friction_Nm, motor.dynamic_friction_Nm)
@@ -120,6 +124,34 @@ def _contradictions(actuator: Actuator) -> Iterator[str]:
             told = [_shown(actuator, f"{one}.torque_constant_Nm_A") for one in ("controller", "motor")]
             yield f"{' and '.join(told)}: the controller counts with another motor"
         yield from _too_fast(actuator)
+    if controller.kind in ("cascade", "position"):
+        yield from _of_position_gain(actuator)
+
+
+def _of_position_gain(actuator: Actuator) -> Iterator[str]:
+    """A position loop that no axis has, and one that its speed loop cannot follow.
+
+    The gain is from an error at the user to what the motor does, so that it holds the gear, or 2π over a screw's lead.
+    """
+    low, high = _POSITION_LOOPS_1_S
+    motor, controller, tau = actuator.motor, actuator.controller, actuator.transmission.gear_ratio
+    is_cascade = controller.kind == "cascade"
+    path = "controller.position_gain_1_s" if is_cascade else "controller.gain_1_rad"
+    gain, unit = actuator.value(path), on_axes(path, actuator.axes).unit
+    rate = gain * tau if is_cascade else loop_rate(actuator)
+    said = f"{_shown(actuator, path)} {unit}"
+    if gain and not low <= rate <= high:
+        usual = f"makes a position loop of {number(rate)} 1/s, where {number(low)} … {number(high)} 1/s are usual"
+        other = ""
+        if is_cascade and low <= gain <= high:
+            other = f"; it is counted by the user's error and the motor's speed: {number(gain)} 1/s of either side "
+            other += f"alone is {number(gain / tau)} {unit} here"
+        yield f"{said} {usual}{other}"
+    elif is_cascade and rate * motor.inertia_kgm2 > _SLOWER * controller.speed_gain_Nms_rad:
+        speed = (
+            f"a speed loop of {number(loop_rate(actuator))} 1/s ({_shown(actuator, 'controller.speed_gain_Nms_rad')})"
+        )
+        yield f"{said} makes a position loop of {number(rate)} 1/s over {speed}, which is slower: it would swing"
 
 
 def _too_fast(actuator: Actuator) -> Iterator[str]:
@@ -145,8 +177,9 @@ def _too_fast(actuator: Actuator) -> Iterator[str]:
 #
 # A description is what its file would hold, as tables of entries under the names that files have.
 
-# Drives that each controller may act through, the usual one first.
-DRIVES = {"cascade": ("current", "hysteresis"), "position": ("voltage", "current"), "open": (), "unknown": ()}
+# Drives to choose from, by the controller, the usual one first.
+DRIVES = {kind: drives_of(kind) if len(drives_of(kind)) > 1 else () for kind in CONTROLLER_KINDS}
+_SUPPLY = "inverter.bus_voltage_V"
 _GUESSED = 0.3  # tolerance of a guess, relative: 3 σ reach a tenth and twice of it
 _SIMULATED_ALONE = ("motor.static_friction_Nm",)  # inverse dynamics leaves out rest, and sees nothing of it
 _ENTRY = re.compile(r"\s*([^±,]*?)\s*(?:(?:±|\+-)\s*([^±,%]*?)\s*(%)?)?\s*(fixed)?\s*")
@@ -178,12 +211,18 @@ def needed(controller: str, drive: str) -> tuple[str, ...]:
 
 
 def asked(controller: str, drive: str) -> tuple[str, ...]:
-    """What to ask of an actuator of these kinds, as "section.parameter"; the gear is always known to somebody."""
-    return tuple(dict.fromkeys(("transmission.gear_ratio", *needed(controller, drive))))
+    """What to ask of an actuator of these kinds, as "section.parameter"; the gear is always known to somebody.
+
+    So is the supply of a duty, which a recording may have as well.
+    """
+    supply = (_SUPPLY,) if (controller, drive) == ("open", "voltage") else ()
+    return tuple(dict.fromkeys(("transmission.gear_ratio", *supply, *needed(controller, drive))))
 
 
-def unanswered(path: str, axes: Axes) -> str:
+def unanswered(path: str, axes: Axes, controller: str = "") -> str:
     """What an answer left empty is taken for: 'guess 0.05', 'as if there were none'."""
+    if controller == "open" and path == _SUPPLY:
+        return "the recording's own, or a recorded motor voltage"
     guess = facts_of(path, axes).guess
     return "as if there were none" if guess == default_of(path) else f"guess {number(guess)}"
 
@@ -234,7 +273,7 @@ def described(
     """
     tables: dict[str, Any] = {name: dict(t) if isinstance(t, Mapping) else t for name, t in document.items()}
     tables.setdefault("controller", {})["kind"] = controller
-    if controller not in WITHOUT_DRIVE:
+    if says_drive(controller, drive):
         tables.setdefault("inverter", {})["kind"] = drive
     axes = actuator_axes(tables)
     every = [f"{section}.{name}" for section in SECTIONS for name in SECTIONS[section].__annotations__]

@@ -10,7 +10,7 @@ from typing import Any
 from ema_model.actuator.actuator import Actuator
 from ema_model.actuator.all_is_read import check_all_is_read
 from ema_model.actuator.keys import ENTRY, HEAD, TABLES
-from ema_model.actuator.layout import KINDS, USUAL, WITHOUT_DRIVE, layout
+from ema_model.actuator.layout import KINDS, USUAL, layout
 from ema_model.actuator.naming import on_axes
 from ema_model.actuator.parameters import SECTIONS, Rule, Tolerance, check_stops, check_value
 from ema_model.actuator.steps import LONGEST_S, SHORTEST_S, reader_step
@@ -80,7 +80,8 @@ def actuator_of(document: dict[str, Any], where: str) -> Actuator:
     kinds = {
         section: _choice(tables[section], "kind", USUAL[section], KINDS[section], section, where) for section in KINDS
     }
-    if kinds["controller"] in WITHOUT_DRIVE:
+    is_voltage = kinds["inverter"] == "voltage"
+    if kinds["controller"] == "unknown" or (kinds["controller"] == "open" and not is_voltage):
         kinds["inverter"] = "current"
     if kinds["controller"] == "position" and kinds["inverter"] == "hysteresis":
         raise InputError(f'{where}: [inverter] a position controller needs kind = "voltage" or "current"')

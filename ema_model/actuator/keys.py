@@ -38,13 +38,13 @@ KINDS = {
     "controller": {
         "cascade": "position and speed loop",
         "position": "a position loop alone, as servos have it",
-        "open": "left out: the recorded current, torque or force is put in and the motion comes out",
+        "open": "left out: the recorded current or torque, or with a voltage drive the voltage or duty, is put in",
         "unknown": "not described: the recorded motion is put in and the current that it needs comes out",
     },
     "inverter": {
         "hysteresis": "current relays that chop the bus voltage, with three phases (cascade only)",
         "current": "the current that is asked for, at once",
-        "voltage": "PWM voltage at the winding (position controller only)",
+        "voltage": "PWM voltage at the winding (not of a cascade)",
     },
 }
 ENTRY = {

@@ -10,7 +10,7 @@ CONTROLLER_KINDS, INVERTER_KINDS = tuple(keys.KINDS["controller"]), tuple(keys.K
 KINDS = {"controller": CONTROLLER_KINDS, "inverter": INVERTER_KINDS}
 USUAL = {"controller": "cascade", "inverter": "hysteresis"}
 
-WITHOUT_DRIVE = ("open", "unknown")  # controllers whose file says no drive: the current is that of the recording
+WITHOUT_LOOP = ("open", "unknown")  # controllers that close none: no command can be simulated
 
 _CASCADE = (
     *("position_gain_1_s", "speed_limit_rad_s", "speed_gain_Nms_rad", "integral_gain_Nm_rad"),
@@ -24,6 +24,22 @@ _DRIVES = {
     "current": ("current_limit_A",),
     "voltage": ("bus_voltage_V",),
 }
+_OF_CONTROLLER = {  # the drives that each controller may act through, the usual one first
+    "cascade": ("current", "hysteresis"),
+    "position": ("voltage", "current"),
+    "open": ("current", "voltage"),  # in which the recorded current is put in, or the voltage or duty
+    "unknown": ("current",),
+}
+
+
+def drives_of(controller: str) -> tuple[str, ...]:
+    """The drives that a controller may act through, the usual one first."""
+    return _OF_CONTROLLER[controller]
+
+
+def says_drive(controller: str, drive: str) -> bool:
+    """Whether a file of these kinds says its drive: one whose current is the recorded one has none to speak of."""
+    return controller not in WITHOUT_LOOP or (controller, drive) == ("open", "voltage")
 
 
 def layout(section: str, kinds: dict[str, str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -39,7 +55,7 @@ def layout(section: str, kinds: dict[str, str]) -> tuple[tuple[str, ...], tuple[
         return needed, ("output_limit",) if controller == "position" else ()
     if section == "inverter":
         needed = _DRIVES[inverter]
-        return ((), needed) if controller in WITHOUT_DRIVE else (needed, ())
+        return ((), needed) if controller in WITHOUT_LOOP else (needed, ())
     if full:
         needed = tuple(name for name in every if f"{section}.{name}" not in unread(controller, inverter))
         return needed, tuple(name for name in every if name not in needed)

@@ -15,6 +15,7 @@ from ema_model.quantities.titles import in_sentence, parameter_title, unit_of
 _OF_WINDOWS: dict[str, tuple[str, Side | None]] = {
     "turned": ("rad", MOTOR),
     "play": ("rad", MOTOR),
+    "faster": ("rad/s", MOTOR),
     "load": ("N·m", USER),
     "lag": ("s", None),
 }

@@ -280,6 +280,11 @@ def low_limit(path: str, controller: str = "") -> float:
     return -math.inf if path.startswith("effects.") or any_sign else 0.0
 
 
+def is_said(path: str, value: float) -> bool:
+    """Whether a value of "section.parameter" says anything: its default may stand for none at all."""
+    return math.isfinite(value) and not (value == 0.0 and path.split(".")[-1] in _POSITIVE)
+
+
 def check_value(section: str, name: str, value: Any, where: str, shown: str = "") -> None:
     """Raises InputError for what is no number, or not one that this parameter can have; shown: its name in files."""
     shown = shown or name

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 from ema_model.actuator import keys
 from ema_model.actuator.actuator import Actuator
-from ema_model.actuator.layout import CONTROLLER_KINDS, INVERTER_KINDS, KINDS, WITHOUT_DRIVE, layout
+from ema_model.actuator.layout import CONTROLLER_KINDS, INVERTER_KINDS, KINDS, drives_of, layout, says_drive
 from ema_model.actuator.naming import on_axes
-from ema_model.actuator.parameters import SECTIONS, Facts, default_of, facts_of, numbers
+from ema_model.actuator.parameters import SECTIONS, Facts, default_of, facts_of, is_said, numbers
 from ema_model.actuator.unread import settings_read, unread
 from ema_model.files.written import inline
 from ema_model.quantities.axes import Axes
@@ -47,11 +47,11 @@ def _given(name: str, table: dict[str, Any]) -> dict[str, Any]:
 def _section(actuator: Actuator, section: str) -> dict[str, Any]:
     kinds = {"controller": actuator.controller.kind, "inverter": actuator.inverter.kind}
     silent = unread(**kinds)
-    is_kind = section in KINDS and not (section == "inverter" and kinds["controller"] in WITHOUT_DRIVE)
+    is_kind = section in KINDS and (section != "inverter" or says_drive(kinds["controller"], kinds["inverter"]))
     entries: dict[str, Any] = {"kind": kinds[section]} if is_kind else {}
     for name in (name for names in layout(section, kinds) for name in names):
         value, path = float(getattr(getattr(actuator, section), name)), f"{section}.{name}"
-        if math.isfinite(value) and path not in silent:
+        if is_said(path, value) and path not in silent:
             entries[on_axes(path, actuator.axes).name] = _entry(actuator, path, value)
     return entries
 
@@ -147,8 +147,7 @@ def kinds_of_actuators() -> tuple[tuple[str, str], ...]:
     return tuple(
         (controller, drive)
         for controller, drive in product(CONTROLLER_KINDS, INVERTER_KINDS)
-        if (controller, drive) not in (("position", "hysteresis"), ("cascade", "voltage"))
-        and (controller not in WITHOUT_DRIVE or drive == "current")
+        if drive in drives_of(controller)
     )
 
 
@@ -185,14 +184,14 @@ def usual_tolerance(facts: Facts) -> str:
 
 
 def _kind(controller: str, drive: str) -> str:
-    return controller if controller in WITHOUT_DRIVE else f"{controller} + {drive}"
+    return f"{controller} + {drive}" if says_drive(controller, drive) else controller
 
 
 def _default(path: str, having: list[str], needing: list[str]) -> str:
     if having == needing:
         return "needed"
     value = default_of(path)
-    shown = "none" if value is None or not math.isfinite(value) or abs(value) >= 1e9 else f"{value:g}"
+    shown = "none" if value is None or not is_said(path, value) or abs(value) >= 1e9 else f"{value:g}"
     return f"{shown}; needed with {', '.join(needing)}" if needing else shown
 
 

@@ -35,7 +35,8 @@ def usual_step(actuator: Actuator, sample_rate_Hz: float | None = None) -> float
     No step is longer than what recordings of that rate are simulated with.
     """
     controller, inverter = actuator.controller.kind, actuator.inverter.kind
-    longest = _LONGEST_STEP_S if controller == "position" else reader_step(controller, inverter)
+    is_slow = controller == "position" or actuator.takes_voltage
+    longest = _LONGEST_STEP_S if is_slow else reader_step(controller, inverter)
     rate = loop_rate(actuator)
     if rate > 0.0:
         longest = min(longest, math.tau / (_STEPS_A_PERIOD * rate))
@@ -59,12 +60,13 @@ def loop_rate(actuator: Actuator) -> float:
     """The fastest rate of the closed loop on its inertia, 1/s; 0 where nothing is closed.
 
     Of a cascade that of the speed loop, K_P/J.  Of a position loop the oscillation √(g τ T/J), where the gain g asks
-    for the drive's greatest torque T, or the decay (B + k_t²/R)/J with a voltage drive, whichever is faster.
+    for the drive's greatest torque T, or the decay (B + k_t²/R)/J with a voltage drive, whichever is faster; of a
+    voltage that is put in the decay alone.
     """
     motor, controller, inverter = actuator.motor, actuator.controller, actuator.inverter
     if controller.kind == "cascade":
         return controller.speed_gain_Nms_rad / motor.inertia_kgm2
-    if controller.kind != "position":
+    if controller.kind != "position" and not actuator.takes_voltage:
         return 0.0
     most = float(inverter.current_limit_A) * motor.torque_constant_Nm_A
     decay = motor.viscous_friction_Nms_rad

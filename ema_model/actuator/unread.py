@@ -51,13 +51,14 @@ _DRIVES = {
 INVERSE = "the controller is unknown, and inverse dynamics"
 _CURRENT_IN = "the recorded current or torque is put in as it is"
 _LOOP = {"apparent_inertia": "it is of inverse dynamics, for an unknown controller"}
+_VOLTAGE_IN = "the recorded voltage or duty is put in, and nothing is controlled"
 _SENSORS = {"unknown": {}, "open": {"current_gain current_bias_A": _CURRENT_IN, **_LOOP}}
 # Instead of the drive's, where a measured motion is put in and the current that it needs comes out.
 _MOTION_IN = {
     "inverter": {"bus_voltage_V hysteresis_band_A current_limit_A": f"{INVERSE} has no drive"},
     "motor": {
         "resistance_Ohm inductance_H emf_scale": f"{INVERSE} has no winding",
-        "pole_pairs rotor_offset_rad": f"{INVERSE} has no phases",
+        "rotor_offset_rad": f"{INVERSE} has no phases",
         "torque_limit_Nm": f"{INVERSE} asks for what a motion needs, without a limit",
     },
     "transmission": {
@@ -69,10 +70,14 @@ _MOTION_IN = {
 INVERSE_PLACES = ("current_reading", "electric_torque", "inverse_inertia", "moving_friction", "shaft_torque")
 WINDING_PLACES = ("back_emf", "bus_voltage", "winding_resistance")
 # Those of the drive's controller that a position controller has not, and that a voltage drive has not.
-SPEED_LOOP_PLACES = ("speed_reading", "speed_sample", "speed_command", "speed_gain", "integral_gain")
+SPEED_LOOP_PLACES = ("speed_reading", "speed_sample", "speed_command", "speed_gain", "integral_gain", "loop_torque")
+# The command, which an open loop has none of; what is only remembered of it there changes nothing.
+GOAL_PLACES = ("goal", "position_error")
 CURRENT_LOOP_PLACES = ("current_reference",)
 # All stages of a drive, and what the reading of a current changes, where the current is put in.
-CURRENT_IN_PLACES = (*SPEED_LOOP_PLACES, "position_error", "drive_output", *CURRENT_LOOP_PLACES, "current_reading")
+CURRENT_IN_PLACES = (*GOAL_PLACES, *SPEED_LOOP_PLACES, "drive_output", *CURRENT_LOOP_PLACES, "current_reading")
+# The same where a voltage is put in: what the drive computes may take effect late, and the current is measured.
+VOLTAGE_IN_PLACES = (*GOAL_PLACES, *SPEED_LOOP_PLACES, *CURRENT_LOOP_PLACES)
 
 
 def idle(places: Collection[str], has_states: bool, controller: str, inverter: str) -> str:
@@ -80,11 +85,13 @@ def idle(places: Collection[str], has_states: bool, controller: str, inverter: s
     at = set(places)
     if controller == "unknown" and (has_states or not at & set(INVERSE_PLACES)):
         return f"{INVERSE} does not simulate what it acts on"
-    if controller == "open" and at <= set(CURRENT_IN_PLACES):
+    if controller == "open" and inverter != "voltage" and at <= set(CURRENT_IN_PLACES):
         return f"in an open loop {_CURRENT_IN}"
+    if controller == "open" and at <= set(VOLTAGE_IN_PLACES):
+        return f"in an open loop {_VOLTAGE_IN}"
     if inverter == "current" and at <= set(WINDING_PLACES):
         return f"{NO_WINDING} for it to act on"
-    if controller == "position" and at <= set(SPEED_LOOP_PLACES):
+    if controller == "position" and at & set(SPEED_LOOP_PLACES) and at <= {"goal", *SPEED_LOOP_PLACES}:
         return "a position controller has no speed loop for it to act on"
     if inverter == "voltage" and at <= set(CURRENT_LOOP_PLACES):
         return "a voltage drive has no current loop for it to act on"
@@ -94,7 +101,8 @@ def idle(places: Collection[str], has_states: bool, controller: str, inverter: s
 def unread(controller: str, inverter: str) -> dict[str, str]:
     """Why no model reads it, by "section.parameter", for an actuator of these kinds."""
     drive = _MOTION_IN if controller == "unknown" else _DRIVES[inverter]
-    by_section = {**drive, "sensors": _SENSORS.get(controller, _LOOP), "controller": _CONTROLLERS[controller]}
+    sensors = _LOOP if inverter == "voltage" and controller == "open" else _SENSORS.get(controller, _LOOP)
+    by_section = {**drive, "sensors": sensors, "controller": _CONTROLLERS[controller]}
     return {
         f"{section}.{name}": reason
         for section, reasons in by_section.items()

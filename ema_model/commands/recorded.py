@@ -32,13 +32,46 @@ def between(at_s: Array, time_s: Array, command: Array) -> Array:
     last = np.clip(np.searchsorted(time_s, at_s + _ROUNDING_S, side="right") - 1, 0, len(time_s) - 1)
     if np.all(step_s > 0.0):
         bent = np.append(False, jumps(np.diff(command) / step_s))
-        beside = np.convolve(~near | change | bent, np.ones(2 * _OF_A_CURVE + 1), mode="same")[: len(change)] > 0
+        cornered = _corners(command, time_s) & near
+        beside = (
+            np.convolve(~near | change | bent | cornered, np.ones(2 * _OF_A_CURVE + 1), mode="same")[: len(change)] > 0
+        )
         inside = np.append(~beside, False)[last] & (at_s >= time_s[0])
         from scipy.interpolate import Akima1DInterpolator  # takes a third of a second to import
 
         values[inside] = Akima1DInterpolator(time_s, command)(at_s[inside])
+        _around_corners(values, at_s, last, np.append(cornered, False), time_s, command)
     held = np.append(change & near, False)
     return np.where(held[last], command[last], values)
+
+
+def _corners(command: Array, time_s: Array) -> NDArray[np.bool_]:
+    """In which intervals of a sampled command (n,) two straight lines meet, (n − 1,): a triangle's, seldom at a sample.
+
+    The slope then changes on both sides of the interval, the same way, and hardly beyond.
+    """
+    found = np.zeros(len(command) - 1, dtype=bool)
+    slopes = np.diff(command) / np.diff(time_s)
+    changes = np.diff(slopes)
+    if len(changes) < 4:
+        return found
+    before, after = changes[1:-2], changes[2:-1]
+    beyond = np.maximum(np.abs(changes[:-3]), np.abs(changes[3:]))
+    least = np.maximum(_JUMP * beyond, _LEAST * np.ptp(slopes))
+    found[2:-2] = (before * after > 0.0) & (np.abs(before + after) > least)
+    return found
+
+
+def _around_corners(
+    values: Array, at_s: Array, last: NDArray[np.intp], cornered: NDArray[np.bool_], time_s: Array, command: Array
+) -> None:
+    """Puts in, at times within cornered intervals, the two lines that meet there: a chord cuts the corner off."""
+    at = np.flatnonzero(cornered[last] & (at_s >= time_s[0]))
+    i = last[at]
+    slopes = np.diff(command) / np.diff(time_s)
+    left = command[i] + slopes[i - 1] * (at_s[at] - time_s[i])
+    right = command[i + 1] + slopes[i + 1] * (at_s[at] - time_s[i + 1])
+    values[at] = np.where(slopes[i - 1] > slopes[i + 1], np.minimum(left, right), np.maximum(left, right))
 
 
 def jumps(command: Array) -> NDArray[np.bool_]:

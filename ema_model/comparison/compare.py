@@ -9,21 +9,26 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ema_model.actuator import Actuator, load_actuator
+from ema_model.actuator.all_is_read import check_represents
 from ema_model.actuator.naming import path_inside
 from ema_model.comparison.assemble import residuals_of
+from ema_model.comparison.free_simulation import Simulated, in_open_loop, is_by_motion, scored
+from ema_model.comparison.loop_lag import other_controller
 from ema_model.comparison.result import Compared, Comparison, SignalError
-from ema_model.comparison.verdict import judge, judged
+from ema_model.comparison.verdict import judge, judged, silence
 from ema_model.effects import find
 from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.estimation import Calibration, Floor, after_fit, floor, of_unseen, taken_up
 from ema_model.estimation import calibrate as fit
-from ema_model.estimation.floor import band, least, spread, twin_error
+from ema_model.estimation.floor import band, least, spread, tells_nothing, twin_error
 from ema_model.estimation.problem import SIGNALS
 from ema_model.faults import checked, named
 from ema_model.models import Model, Window, model_for
 from ema_model.models.delay_of_drive import with_delay_of_drive
+from ema_model.models.later import later
 from ema_model.models.measured_motion import evaluation_stretches, fit_stretches
 from ema_model.quantities.numbers import check_number
+from ema_model.recordings import SIGNALS as SIGNAL_KINDS
 from ema_model.recordings import Measurement
 from ema_model.recordings.health.card import health_of
 from ema_model.recordings.read import check_same_actuator, prepared
@@ -118,6 +123,8 @@ def _compare(
     pooled = [judged(window.measured.keys() & one.keys()) for window, one in zip(plant.windows, after)]
     known_to = spread(floors, pooled)
     judgement = judge(residuals, errors, fitted_to, actuator, [one.name for one in recordings], known_to)
+    lag = other_controller(plant, fitted_to, before, judgement.over_floor)
+    unsaid = [sentence for one in compared if (sentence := silence(one, actuator)) and not judgement.uninformative]
     held: Sequence[Compared] = ()
     if unseen:
         tell("holding it against what was not fitted")
@@ -125,6 +132,10 @@ def _compare(
         held = _compare(
             unseen, calibration.actuator, calibration.k, None, False, None, signals, (), tell, known
         ).recordings
+    simulation: Mapping[str, Simulated] = {}
+    if elsewhere is None:
+        tell("simulating it freely")
+        simulation = _free(plant, recordings, unseen, compared, held, calibration.actuator)
     return Comparison(
         actuator=actuator,
         calibration=fitted_to,
@@ -137,18 +148,48 @@ def _compare(
         worst_regions=judgement.worst_regions,
         events=judgement.events,
         adequate=judgement.adequate,
+        uninformative=judgement.uninformative,
         over_floor=judgement.over_floor,
         floor_band=band(known_to, least(floors, pooled)),
-        sentences=judgement.sentences,
-        warnings=judgement.warnings,
+        sentences=[*([] if lag is None else [lag.blamed(fitted_to, judgement.over_floor)]), *judgement.sentences],
+        warnings=[*judgement.warnings, *unsaid],
         holdout=held,
+        simulation=simulation,
     )
+
+
+def _free(
+    plant: Model,
+    recordings: Sequence[Measurement],
+    unseen: Sequence[Measurement],
+    compared: Sequence[Compared],
+    held: Sequence[Compared],
+    calibrated: Actuator,
+) -> dict[str, Simulated]:
+    """The free simulation's errors, by signal: what a loop's model shows is one; a measured motion is put aside."""
+    if is_by_motion(plant):
+        found = in_open_loop(recordings, unseen, calibrated)
+        return {calibrated.axes.signal(name): one for name, one in found.items()}
+
+    def joined(parts: Sequence[Compared]) -> dict[str, tuple[Array, Array]]:
+        names = dict.fromkeys(name for one in parts for name in one.errors)
+        return {
+            name: (
+                np.concatenate([one.measured[name] for one in parts if name in one.errors]),
+                np.concatenate([one.model[name] for one in parts if name in one.errors]),
+            )
+            for name in names
+        }
+
+    return scored(joined(compared), joined(held))
 
 
 def _with_settings(
     actuator: Actuator, effects: Mapping[str, Mapping[str, float]] | None
 ) -> dict[str, dict[str, float]]:
     added = {name: find(name, actuator.axes).settings(dict(given)) for name, given in (effects or {}).items()}
+    for name in added:
+        check_represents(actuator, name)
     return {**actuator.effects, **added}
 
 
@@ -195,14 +236,17 @@ def _everywhere(
         return fitted, floors, calibration.before, calibration.signals
     plant = model_for(measurements, actuator, stretches=evaluation_stretches(measurements, actuator))
     before, after, whole = [], [], []
-    started = {window.first: i for i, window in enumerate(fitted.windows)}
+    started = {(window.recording, window.first): i for i, window in enumerate(fitted.windows)}
     for place, window in enumerate(plant.windows):
-        i = started.get(window.first)
+        i = started.get((window.recording, window.first))
         for target, model, faults, start in (
-            (before, actuator, actuator.k, (0.0, 0.0)),
+            (before, actuator, actuator.k, (0.0, 0.0, 0.0)),
             (after, calibration.actuator, calibration.k, calibration.start_of(i)),
         ):
             one = plant.signals(place, model, faults, *start)
+            if target is after and f"lag {window.recording}" in calibration.starts:  # as its logger has it
+                late = np.full((1, 1), calibration.starts[f"lag {window.recording}"].value)
+                one["current_A"] = later(one["current_A"], late, window.block_s)
             target.append({name: values[0] for name, values in one.items()})
         parts = [one for its, one in zip(fitted.windows, floors) if its.recording == window.recording]
         whole.append(_typical_floor(parts, window))
@@ -254,7 +298,14 @@ def _compared(
     initial = {name: joined([before[i][name] for i in chosen]) for name in names}
     model = {name: joined([after[i][name] for i in chosen]) for name in names}
     sigma = {name: joined([floors[i].sigma(name) for i in chosen]) for name in names}
-    errors = {name: signal_error(measured[name], initial[name], model[name], sigma[name]) for name in names}
+    errors = {}
+    for name in names:
+        noise = joined([np.full(plant.windows[i].blocks, floors[i].noise[name]) for i in chosen])
+        silent = tells_nothing(measured[name], name, noise, sigma[name])
+        error = signal_error(measured[name], initial[name], model[name], sigma[name])
+        about = float(np.mean(measured[name])) if SIGNAL_KINDS[name].kind == "position" else 0.0
+        size = float(np.sqrt(np.mean((measured[name] - about) ** 2)))
+        errors[name] = replace(error, signal_rms=size, silent=silent)
     shown = actuator.axes.outside
     return Compared(
         name=measurement.name,
@@ -284,13 +335,17 @@ def signal_error(measured: Array, initial: Array, model: Array, sigma: Array) ->
 
 
 def _together(compared: Sequence[Compared]) -> dict[str, SignalError]:
-    names = list(dict.fromkeys(name for one in compared for name in one.errors))
-    return {
-        name: signal_error(
-            *(
-                np.concatenate([getattr(one, part)[name] for one in compared if name in one.errors])
-                for part in ("measured", "initial", "model", "sigma")
-            )
+    found = {}
+    for name in dict.fromkeys(name for one in compared for name in one.errors):
+        having = [one for one in compared if name in one.errors]
+        parts = ("measured", "initial", "model", "sigma")
+        error = signal_error(*(np.concatenate([getattr(one, part)[name] for one in having]) for part in parts))
+        silent = [one.errors[name].silent for one in having]
+        sizes = [one.errors[name].signal_rms for one in having]
+        weights = [len(one.time_s) for one in having]
+        found[name] = replace(
+            error,
+            signal_rms=float(np.sqrt(np.average(np.square(sizes), weights=weights))),
+            silent=silent[0] if all(silent) else "",
         )
-        for name in names
-    }
+    return found

@@ -246,12 +246,13 @@ class Explanation:
     signal: str
     variable: str
     modulator: str  # "1", "current", "sign_speed"
-    r2: float  # cross-validated share of the residual's power beyond noise and floor, at most 1
+    r2: float  # cross-validated share of the residual's power as it is, noise and floor within it, at most 1
     significant: bool
     centres: Array  # (bins,) of the variable, in its unit (the angle from 0 to 2π)
     curve: Array  # (bins,) mean residual over modulator, in the signal's unit (over A for the current)
     error: Array  # (bins,) its standard error
     sentence: str  # "The residual current repeats with the motor's angle."
+    beyond_noise: float = 0.0  # the share of the power beyond noise and floor alone, −1 … 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -312,6 +313,7 @@ def explain(residuals: Residuals, signal: str, axes: Axes) -> list[Explanation]:
         ]
         candidates = sorted(finalists, key=lambda one: -one.merit) + candidates[_FINALISTS:]
     total = float(y @ y)
+    whole = float(np.sum((used.values * used.weight) ** 2))  # spikes and all
     expected = float(len(y))  # of noise alone, known within √2n
     beyond = max(total - expected, 3.0 * np.sqrt(2.0 * expected))
     floor = _floor_power(residuals, signal, used)
@@ -321,7 +323,7 @@ def explain(residuals: Residuals, signal: str, axes: Axes) -> list[Explanation]:
         steady = one.t > _LEAST_T or (one.t > _LEAST_T_WHITE and white > _LEAST_WHITE)
         significant = steady and one.gain > _LEAST_DROP * total and one.gain > floor
         centres, curve, error = _binned(residuals, used, one.variable, one.modulator)
-        r2 = float(np.clip(one.gain / beyond, -1.0, 1.0))
+        r2 = one.gain / whole if whole > 0.0 else 0.0
         found.append(
             Explanation(
                 signal=axes.signal(signal),
@@ -333,6 +335,7 @@ def explain(residuals: Residuals, signal: str, axes: Axes) -> list[Explanation]:
                 curve=curve,
                 error=error,
                 sentence=explanation_sentence(axes.signal(signal), one.variable, one.modulator, r2),
+                beyond_noise=float(np.clip(one.gain / beyond, -1.0, 1.0)),
             )
         )
     # A curve that is not significant does not go before one that is.

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -18,11 +19,14 @@ if TYPE_CHECKING:
     from ema_model.actuator import Actuator
     from ema_model.comparison.events import Event
     from ema_model.comparison.explain import Order
+    from ema_model.comparison.free_simulation import Simulated
     from ema_model.estimation.calibrate import Calibration
     from ema_model.recordings import Measurement
     from ema_model.recordings.health.card import Health
 
 Array = NDArray[np.float64]
+
+COMPARISON_VERDICTS = ("adequate", "not_adequate", "uninformative")
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +53,8 @@ class SignalError:
     nrmse: float  # rmse over the range of the measured signal
     noise_floor: float  # noise and model floor, rms
     mean_absolute: float
+    signal_rms: float = math.nan  # of what was measured; of a position about its mean
+    silent: str = ""  # why the signal tells nothing of the model, as of `estimation.floor.tells_nothing`
 
     def quantity(self, signal: Quantity) -> Quantity:
         """The signal in the prefix that all numbers of its error are written with."""
@@ -90,3 +96,10 @@ class Comparison(InWords):
     warnings: Sequence[str] = field(default_factory=tuple)
     events: Sequence[Event] = field(default_factory=tuple)  # what happened at one moment of a recording
     holdout: Sequence[Compared] = field(default_factory=tuple)  # not fitted, beside the calibrated model
+    uninformative: bool = False  # the recordings tell nothing of the model, so that it is not adequate either
+    simulation: Mapping[str, Simulated] = field(default_factory=dict)  # of the model running freely, by signal
+
+    @property
+    def verdict(self) -> str:
+        """One of `COMPARISON_VERDICTS`."""
+        return "uninformative" if self.uninformative else "adequate" if self.adequate else "not_adequate"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, TypedDict, TypeVar, cast
 
 import numpy as np
@@ -9,10 +10,12 @@ from msgspec import Meta
 
 from ema_model.actuator.naming import on_axes
 from ema_model.comparison.events import Event
-from ema_model.comparison.result import Compared, Comparison, Region, SignalError
+from ema_model.comparison.free_simulation import Simulated, without
+from ema_model.comparison.result import COMPARISON_VERDICTS, Compared, Comparison, Region, SignalError
 from ema_model.estimation import Calibrated, Calibration
 from ema_model.quantities.axes import Axes
 from ema_model.quantities.numbers import IntervalJson
+from ema_model.quantities.signals import SIGNALS
 from ema_model.recordings.health.card import HealthJson
 
 _Value = TypeVar("_Value")
@@ -28,6 +31,27 @@ class SignalErrorJson(TypedDict):
     ]
     rmse_initial: Annotated[float | None, Meta(description="rmse before the calibration, with the file's parameters")]
     mean_absolute: Annotated[float | None, Meta(description="mean of |measurement − model|")]
+    informative: Annotated[
+        bool, Meta(description="false: the signal is constant, or no larger than its floor, and tells nothing")
+    ]
+
+
+class SimulatedJson(TypedDict):
+    """How far the model is from one signal when it runs freely from the recordings' first state on."""
+
+    rmse: Annotated[float | None, Meta(description="rms error over all fitted recordings; null: see reason")]
+    mae: Annotated[float | None, Meta(description="mean absolute error, likewise")]
+    percent_of_range: Annotated[float | None, Meta(description="rmse, % of the measured signal's range")]
+    reason: Annotated[str, Meta(description="why there is no number; empty where there is one")]
+    holdout_rmse: Annotated[float | None, Meta(description="rmse of recordings that were not fitted; null: none")]
+    holdout_mae: Annotated[float | None, Meta(description="mae of the same")]
+    holdout_percent_of_range: Annotated[float | None, Meta(description="percent_of_range of the same")]
+    holdout_reason: Annotated[str, Meta(description="why there is no number of those that were held out")]
+    holdout_rmse_at_fitted_offset: Annotated[
+        float | None,
+        Meta(description="holdout_rmse in open loop with the fitted recordings' offset, not with their own"),
+    ]
+    unit: Annotated[str, Meta(description="of rmse and mae")]
 
 
 class ParameterJson(TypedDict):
@@ -51,7 +75,10 @@ class CalibrationJson(TypedDict):
     ]
     starts: Annotated[
         dict[str, ParameterJson],
-        Meta(description="where the recordings start: turned N is the motor's offset, play N where in the backlash"),
+        Meta(
+            description="of the recordings: turned N is the motor's offset at the start, faster N its speed's, play N "
+            "where in the backlash it was, lag N by how much later than the positions the current was recorded"
+        ),
     ]
     outside_tolerance: Annotated[list[str], Meta(description="parameters that end at the edge of their tolerance")]
     confounded: Annotated[list[list[str]], Meta(description="pairs of parameters that are known only together")]
@@ -63,7 +90,7 @@ class ExplanationJson(TypedDict):
     variable: Annotated[str, Meta(description="motor_angle, user_position, motor_speed, acceleration, current, …")]
     modulator: Annotated[str, Meta(description="what the curve is multiplied by: 1, current or sign_speed")]
     r2: Annotated[
-        float | None, Meta(description="share of the residual's power beyond the floor, cross-validated; at most 1")
+        float | None, Meta(description="share of the residual's power as it is, cross-validated; shares overlap")
     ]
     significant: Annotated[bool, Meta(description="whether noise alone would seldom show as much")]
     signal: Annotated[str, Meta(description="whose residual it is")]
@@ -126,6 +153,7 @@ class ComparedJson(HeldOutJson):
 class ComparisonJson(TypedDict):
     """Where the model fails beside the recordings of one actuator."""
 
+    verdict: Annotated[str, Meta(description=f"one of {', '.join(COMPARISON_VERDICTS)}")]
     adequate: Annotated[bool, Meta(description="whether what is left may be noise and the model's own floor")]
     over_floor: Annotated[
         float | None, Meta(description="rms error pooled over signals, in units of the floor; 1 is the floor")
@@ -140,6 +168,10 @@ class ComparisonJson(TypedDict):
     orders: Annotated[list[OrderJson], Meta(description="of the primary residual, strongest first; significant ones")]
     worst_regions: Annotated[list[RegionJson], Meta(description="where the model fails most, worst first")]
     events: Annotated[list[EventJson], Meta(description="what happened at one moment")]
+    simulation: Annotated[
+        dict[str, SimulatedJson],
+        Meta(description="of the model running freely, driven by the command, or in open loop; by signal"),
+    ]
     recordings: Annotated[list[ComparedJson], Meta(description="those that were fitted, one by one")]
     holdout: Annotated[list[HeldOutJson], Meta(description="those that were not fitted, beside the calibrated model")]
 
@@ -147,6 +179,7 @@ class ComparisonJson(TypedDict):
 def as_dict(comparison: Comparison) -> ComparisonJson:
     """Everything but the series, in numbers and texts that JSON can hold; unknown numbers are None."""
     document: ComparisonJson = {
+        "verdict": comparison.verdict,
         "adequate": comparison.adequate,
         "over_floor": comparison.over_floor,
         "floor_band": list(comparison.floor_band),
@@ -173,6 +206,7 @@ def as_dict(comparison: Comparison) -> ComparisonJson:
         ],
         "worst_regions": [_region(one) for one in comparison.worst_regions],
         "events": [event_dict(one) for one in comparison.events],
+        "simulation": simulation_dict(comparison.simulation),
         "recordings": [_compared(one) for one in comparison.recordings],
         "holdout": [{"name": one.name, "signals": _errors(one)} for one in comparison.holdout],
     }
@@ -217,6 +251,26 @@ def event_dict(one: Event) -> EventJson:
     }
 
 
+def simulation_dict(simulation: Mapping[str, Simulated]) -> dict[str, SimulatedJson]:
+    """The free simulation's errors by signal; numbers that are not known are NaN."""
+    found: dict[str, SimulatedJson] = {}
+    for name, one in simulation.items():
+        held = one.holdout or without("")
+        found[name] = {
+            "rmse": one.fitted.rmse,
+            "mae": one.fitted.mae,
+            "percent_of_range": one.fitted.percent_of_range,
+            "reason": one.fitted.reason,
+            "holdout_rmse": held.rmse,
+            "holdout_mae": held.mae,
+            "holdout_percent_of_range": held.percent_of_range,
+            "holdout_reason": held.reason,
+            "holdout_rmse_at_fitted_offset": (one.at_fitted_offset or without("")).rmse,
+            "unit": SIGNALS[name].unit,
+        }
+    return found
+
+
 def _error(error: SignalError) -> SignalErrorJson:
     return {
         "rmse": error.rmse,
@@ -224,6 +278,7 @@ def _error(error: SignalError) -> SignalErrorJson:
         "noise_floor": error.noise_floor,
         "rmse_initial": error.rmse_initial,
         "mean_absolute": error.mean_absolute,
+        "informative": not error.silent,
     }
 
 

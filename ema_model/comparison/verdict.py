@@ -15,18 +15,16 @@ from ema_model.comparison.events import Event, events
 from ema_model.comparison.explain import Explanation, Order, explain, residual_orders, used_blocks
 from ema_model.comparison.regions import worst_regions
 from ema_model.comparison.residuals import Residuals
-from ema_model.comparison.result import Region, SignalError
+from ema_model.comparison.result import Compared, Region, SignalError
 from ema_model.comparison.sentences import OPEN_LOOP, order_sentence
 from ema_model.estimation import Calibration
-from ema_model.estimation.floor import CORRELATED_S
+from ema_model.estimation.floor import CONSTANT, CORRELATED_S, ORDER_OF_PRIMARY, POSITIONS, SPEED
 from ema_model.quantities.numbers import Quantity
 from ema_model.quantities.shown import of_residual, of_signal
 from ema_model.quantities.titles import in_sentence
 from ema_model.recordings import SIGNALS
 
 Array = NDArray[np.float64]
-
-ORDER_OF_PRIMARY = ("current_A", "motor_torque_Nm", "user_position_rad", "motor_position_rad", "motor_speed_rad_s")
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +38,7 @@ class Judgement:
     worst_regions: Sequence[Region]
     events: Sequence[Event]
     adequate: bool
+    uninformative: bool
     over_floor: float
     sentences: Sequence[str]
     warnings: Sequence[str]
@@ -53,7 +52,7 @@ def judge(
     recordings: Sequence[str] = (),
     spread: float = 0.0,
 ) -> Judgement:
-    """Explains the residual of the first signal of interest: the current, where it is measured.
+    """Explains the residual of the first signal of interest, the current where it is measured, if it tells anything.
 
     recordings: their names, for what happened at one moment of one; spread: as of `most_of_floor`.
     """
@@ -65,6 +64,9 @@ def judge(
     names = judged(residuals.values)
     error = over_floor(residuals, names)
     within = error <= most_of_floor(spread) and not lasting(residuals, names)
+    if errors[actuator.axes.signal(primary)].silent:
+        warnings = _warnings(residuals, primary, calibration, actuator)
+        return _nothing_told(residuals, errors, primary, actuator, error, warnings)
     adequate = not significant and within and (calibration is None or calibration.converged)
     shown = actuator.axes.signal(primary)
     happened = [] if adequate else events(residuals, names, recordings, actuator)
@@ -83,15 +85,51 @@ def judge(
         worst_regions=() if adequate else regions,
         events=happened,
         adequate=adequate,
+        uninformative=False,
         over_floor=error,
         sentences=sentences,
         warnings=_warnings(residuals, primary, calibration, actuator),
     )
 
 
+def _nothing_told(
+    residuals: Residuals,
+    errors: Mapping[str, SignalError],
+    first: str,
+    actuator: Actuator,
+    over_floor: float,
+    warnings: Sequence[str],
+) -> Judgement:
+    """Of recordings whose first signal tells nothing: no explanation, no region, and no word of a model that suits."""
+    shown = actuator.axes.signal(first)
+    why = silent_sentence(of_signal(first, actuator.axes), errors[shown])
+    sentence = f"These recordings tell nothing of the model: {why}."
+    return Judgement(residuals, shown, (), (), (), (), False, True, over_floor, [sentence], warnings)
+
+
+def silent_sentence(signal: Quantity, error: SignalError) -> str:
+    """'the equivalent current is no larger, 0.91 A rms, than its floor, 5.36 A'."""
+    title, shown = in_sentence(signal.title), signal.scaled([error.signal_rms, error.noise_floor])
+    if error.silent == CONSTANT:
+        return f"the {title} does not change"
+    size, floor = shown.text(error.signal_rms), shown.text(error.noise_floor)
+    return f"the {title} is no larger, {size} rms, than what noise and the model's own floor may leave, {floor}"
+
+
+def silence(one: Compared, actuator: Actuator) -> str:
+    """That the first signal of one recording tells nothing; "" where it does."""
+    inside = {actuator.axes.signal(name): name for name in ORDER_OF_PRIMARY}
+    first = next((name for name in inside if name in one.errors), None)
+    if first is None or not one.errors[first].silent:
+        return ""
+    why = silent_sentence(of_signal(first, actuator.axes), one.errors[first])
+    return f"{one.name or 'The recording'} tells nothing of the model: {why}."
+
+
 def judged(signals: Iterable[str]) -> list[str]:
-    """Those whose error is pooled: a speed is mostly a position's difference."""
-    return [name for name in signals if name != "motor_speed_rad_s"]
+    """Those whose error is pooled: a speed is mostly a position's difference, and counts where there is none."""
+    names = list(signals)
+    return [name for name in names if name != SPEED or not set(POSITIONS) & set(names)]
 
 
 def most_of_floor(spread: float) -> float:
@@ -153,7 +191,7 @@ def _summary(signal: Quantity, error: SignalError, adequate: bool) -> str:
 
 
 def _warnings(residuals: Residuals, primary: str, calibration: Calibration | None, actuator: Actuator) -> list[str]:
-    found = [OPEN_LOOP] if actuator.controller.kind == "open" else []
+    found = [OPEN_LOOP] if actuator.controller.kind == "open" and not actuator.takes_voltage else []
     if used_blocks(residuals, primary) is None:
         title = in_sentence(SIGNALS[primary].title)
         found.append(f"Of the {title} too little can be judged: the motor stands, or the drive is at its limits.")

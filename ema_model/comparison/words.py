@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
+from ema_model.comparison.free_simulation import Score, Simulated, without
 from ema_model.comparison.result import Compared, Comparison, Region, SignalError
 from ema_model.comparison.sentences import dependence
 from ema_model.estimation.calibrate import calibration_table
-from ema_model.quantities.axes import ROTARY
-from ema_model.quantities.numbers import number
+from ema_model.quantities.axes import ROTARY, Axes
+from ema_model.quantities.numbers import Quantity, number
 from ema_model.quantities.shown import of_residual, of_signal
 from ema_model.quantities.titles import in_sentence
 from ema_model.quantities.variables import of_variable
@@ -19,6 +20,11 @@ from ema_model.recordings.noise import least_noise
 from ema_model.text import Document, Lines, Note, Severity, Table
 
 _NEAR_FLOOR, _FAR_FROM_FLOOR = 1.2, 2.0  # error over floor, from which on one is looked at, and stands out
+FREE_NOTE = (
+    "Free simulation: the model runs from the recordings' first state on, driven by the command alone, or in open loop "
+    "by the recorded current, torque or force; nothing of the measured motion is fed back. Where the controller is not "
+    "known, position and speed at the start and one constant offset of what is put in are estimated in each recording."
+)
 _TOLD = 2.0  # times the least that any noise can be, from which on a recording tells it
 _MOST_TOLD = 6  # held-out recordings, each in a line of its own
 
@@ -35,7 +41,7 @@ def held_out(one: Compared) -> str:
 
 def verdict(result: Comparison) -> str:
     """'not adequate'."""
-    return "adequate" if result.adequate else "not adequate"
+    return result.verdict.replace("_", " ")
 
 
 def of_floor(result: Comparison) -> str:
@@ -48,8 +54,16 @@ def of_floor(result: Comparison) -> str:
 def document_of(result: Comparison) -> Document:
     """All that is shown of it in words."""
     notes = [Note(warning) for warning in result.warnings]
+    free = free_simulation(result.simulation, result.actuator.axes)
     return Document(
-        [Lines([*result.sentences, of_floor(result)]), *notes, errors(result), *_recordings(result), *_why(result)]
+        [
+            Lines([*result.sentences, of_floor(result)]),
+            *notes,
+            errors(result),
+            *free,
+            *_recordings(result),
+            *_why(result),
+        ]
     )
 
 
@@ -80,11 +94,42 @@ def _errors(title: str, result: Comparison, of: Sequence[tuple[str, str, SignalE
         numbers = [number(shown.factor * one) for one in (*before, error.rmse, floor)]
         mean, share = number(shown.factor * error.mean_absolute), f"{number(100.0 * error.nrmse)} %"
         rows.append([name, *numbers, mean, share, number(over)])
-        units.append(f"{shown.unit}{said}")
-        severities.append(_severity(over) if math.isfinite(over) else "note")
+        units.append(f"{shown.unit}{said}{', uninformative' if error.silent else ''}")
+        severities.append(_severity(over) if math.isfinite(over) and not error.silent else "note")
     head = ["before"] if result.calibration is not None else []
     head += ["rms error", "floor", "mean |e|", "of range", "error / floor"]
     return Table(head, rows, title, units, severities=severities)
+
+
+def free_simulation(simulation: Mapping[str, Simulated], axes: Axes) -> list[Table | Lines]:
+    """The errors of the model running freely, and a line for each signal that has none."""
+    if not simulation:
+        return []
+    held = any(one.holdout is not None for one in simulation.values())
+    rows, units, said = [], [], []
+    for name, one in simulation.items():
+        scores = [one.fitted, *([one.holdout or without("")] if held else [])]
+        shown = of_signal(name, axes).scaled([score.rmse for score in scores])
+        rows.append([shown.title, *(cell for score in scores for cell in _score(score, shown))])
+        units.append(shown.unit)
+        for what, score in zip(("", " on what was not fitted"), scores):
+            if score.reason:
+                said.append(f"No free simulation of the {in_sentence(shown.title)}{what}: {score.reason}.")
+        if one.at_fitted_offset is not None and math.isfinite(one.at_fitted_offset.rmse):
+            size = shown.text(one.at_fitted_offset.rmse)
+            said.append(
+                f"Held out, with the fitted recordings' offset instead of its own, the {in_sentence(shown.title)} "
+                f"is off by {size} rms."
+            )
+    head = ["rms error", "mean |e|", "of range"]
+    head += ["held out: rms", "mean |e|", "of range"] if held else []
+    return [Table(head, rows, "free simulation", units), *([Lines(said)] if said else [])]
+
+
+def _score(score: Score, shown: Quantity) -> list[str]:
+    """rms error, mean absolute error, and share of the range; '–' where there is none."""
+    numbers = [number(shown.factor * one) if math.isfinite(one) else "–" for one in (score.rmse, score.mae)]
+    return [*numbers, f"{number(score.percent_of_range)} %" if math.isfinite(score.percent_of_range) else "–"]
 
 
 def _has_floor(signal: str, error: SignalError) -> bool:
@@ -123,7 +168,9 @@ def _why(result: Comparison) -> Iterator[Table | Lines]:
         for one in result.explained_by[:6]:
             rows.append([dependence(one.variable, one.modulator), f"{100.0 * one.r2:.1f} %"])
             remarks.append("" if one.significant else "within noise")
-        yield Table(("cross-validated",), rows, "what explains the residual", remarks, "share of its variance")
+        yield Table(
+            ("cross-validated",), rows, "what explains the residual", remarks, "share of its variance; shares overlap"
+        )
     if result.orders:
         told = of_residual(result.primary, axes, result.residuals.torque_constant)
         shown = told.scaled(result.orders[0].amplitude)

@@ -19,6 +19,10 @@ ALIKE = 0.95
 # of two that are alike, what both leave may fall a little more with the wrong one (the study's pair 9000: 0.998).
 NEAR_AS_MUCH = 0.9
 
+# Cosine between what two laws of friction, by place and by speed, change, from which on the motion does not tell them
+# apart (a robot's joint that goes back and forth: 0.88, and what was held out prefers the one that tells less).
+ONE_MOTION = 0.85
+
 # So many rivals may stand beside an effect; more say that the recordings do not tell which it is (MODEL §6).
 LARGEST_GROUP = 3
 

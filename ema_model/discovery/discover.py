@@ -19,10 +19,11 @@ from ema_model.discovery.observed.repeated import repeated
 from ema_model.discovery.result import Candidate, Discovery, Experiment
 from ema_model.discovery.steps.begin import begun
 from ema_model.discovery.steps.path import Story
-from ema_model.discovery.steps.second_opinion import support_of
+from ema_model.discovery.steps.second_opinion import other_loop, support_of
 from ema_model.discovery.steps.step import refreshed
 from ema_model.discovery.steps.verdict import explains_all, verdict_of
 from ema_model.discovery.steps.walking import named_in, walk
+from ema_model.discovery.verify import free_simulation
 from ema_model.discovery.words import as_well, held_back, mismatch, untold
 from ema_model.effects import CATALOGUE
 from ema_model.errors import InputError, quoted
@@ -101,6 +102,7 @@ def result_of(
     faults = {name: calibration.parameters[name] for name in story.current.faults}
     outside = outside_tolerance(story.data, story.current)
     freed = [one for one in added if one.stands_for]
+    lag = other_loop(story) if story.current.plant.simulates_commands else story.loop_lag
     told = {*names, *(rival for one in named for rival in one.same_as)}  # refused at an earlier step, or not
     return Discovery(
         verdict=verdict_of(story, named, unknown, interrupted),
@@ -123,18 +125,22 @@ def result_of(
         warnings=[
             *story.warnings,
             *(one.sentence for one in events),
-            *mismatch(story.controller_seen, calibration.actuator.axes),
+            *mismatch(story.controller_seen, calibration.actuator.axes, lag),
             *([story.transmission_seen.sentence(calibration.actuator)] if story.transmission_seen else ()),
+            *([story.two_masses_seen.sentence(calibration.actuator)] if story.two_masses_seen else ()),
             *(one.sentence for one in story.disagreements),
             *held_back(story.current.held, calibration.actuator.axes),
             *as_well(story.ties, story.added, story.current.faults),
         ],
         controller_seen=story.controller_seen,
+        loop_lag=lag,
         transmission_seen=story.transmission_seen,
+        two_masses_seen=story.two_masses_seen,
         disagreements=story.disagreements,
         repeated=repeated(story.data, story.held, calibration.actuator),
         events=events,
         freed=freed,
+        simulation=free_simulation(story.data, story.held, story.current),
     )
 
 

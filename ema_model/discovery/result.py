@@ -11,10 +11,13 @@ from numpy.typing import NDArray
 from ema_model.actuator import Actuator
 from ema_model.comparison.events import Event
 from ema_model.comparison.explain import Explanation
+from ema_model.comparison.free_simulation import Simulated
+from ema_model.comparison.loop_lag import LoopLag
 from ema_model.discovery.criteria import EVIDENCE, FAR
 from ema_model.discovery.observed.controller import ControllerSeen
 from ema_model.discovery.observed.repeated import Repeated
 from ema_model.discovery.observed.transmission import TransmissionSeen
+from ema_model.discovery.observed.two_masses import TwoMasses
 from ema_model.estimation import Calibrated, Calibration, Floor
 from ema_model.estimation.model_fit import Data
 from ema_model.models import Model
@@ -29,6 +32,7 @@ VERDICTS = (
     "unknown_effect",
     "not_converged",
     "not_repeatable",
+    "uninformative",
     "interrupted",
 )
 
@@ -42,6 +46,14 @@ class Candidate:
     settings: dict[str, float]
     untestable_reason: str = ""
     refitted_drop: float | None = None  # of χ², where it was refitted
+    cannot_represent: str = ""  # why the model has no place for it, whatever is recorded
+
+    @property
+    def obstacle(self) -> str:
+        """Why it is not tried, of the model or of the recordings, in words; "" where it may be."""
+        if self.cannot_represent:
+            return f"this model cannot represent it: {self.cannot_represent}"
+        return self.untestable_reason
 
     @property
     def drop(self) -> float:
@@ -165,10 +177,13 @@ class Discovery(InWords):
     not_claimed: Mapping[str, str] = field(default_factory=dict)  # effects that the data would pay for, and why not
     warnings: Sequence[str] = field(default_factory=tuple)
     controller_seen: ControllerSeen | None = None  # where the drive's controller is not the file's
+    loop_lag: LoopLag | None = None  # likewise, where the position follows its command another way than the file's
     transmission_seen: TransmissionSeen | None = None  # where no model covers it and it is not the file's
+    two_masses_seen: TwoMasses | None = None  # where a second mass swings on the motor's and no model holds it
     disagreements: Sequence[Contradiction] = field(default_factory=tuple)  # held-out recordings at odds with the fitted
     repeated: Repeated | None = None  # where a command was recorded twice
     events: Sequence[Event] = field(default_factory=tuple)  # what happened at one moment of a recording
+    simulation: Mapping[str, Simulated] = field(default_factory=dict)  # of the last model running freely, by signal
     freed: Sequence[Added] = field(default_factory=tuple)  # effects that are a base parameter's value beyond tolerance
 
     @property
@@ -186,5 +201,5 @@ class Discovery(InWords):
         """Best first: by what a refit gave, then by what was predicted; last what these recordings cannot show."""
         return sorted(
             self.candidates,
-            key=lambda one: (bool(one.untestable_reason), one.refitted_drop is None, -one.drop),
+            key=lambda one: (bool(one.obstacle), one.refitted_drop is None, -one.drop),
         )

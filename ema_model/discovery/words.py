@@ -16,17 +16,21 @@ from ema_model.actuator import Actuator
 from ema_model.actuator.naming import on_axes
 from ema_model.actuator.readings import sentences as phrases_of
 from ema_model.comparison.criteria import BAND
+from ema_model.comparison.loop_lag import BLAMED, LoopLag
 from ema_model.comparison.sentences import dependence
 from ema_model.comparison.summary import (
     CalibrationJson,
     EventJson,
     ParameterJson,
+    SimulatedJson,
     calibration_dict,
     event_dict,
     parameter_dict,
     plain,
+    simulation_dict,
 )
 from ema_model.comparison.verdict import ORDER_OF_PRIMARY, most_of_floor
+from ema_model.comparison.words import free_simulation
 from ema_model.discovery.criteria import FAR
 from ema_model.discovery.observed.controller import ControllerSeen
 from ema_model.discovery.result import VERDICTS, Added, Candidate, Change, Discovery, Experiment, Rung, misses_unseen
@@ -37,7 +41,7 @@ from ema_model.errors import InputError
 from ema_model.estimation import Calibrated
 from ema_model.faults import BY_NAME, FAULTS, NAMES, cause_of, causes, vector
 from ema_model.quantities.axes import Axes
-from ema_model.quantities.numbers import IntervalJson, amount, number, with_uncertainty
+from ema_model.quantities.numbers import IntervalJson, Quantity, amount, number, with_uncertainty
 from ema_model.quantities.shown import of_signal
 from ema_model.quantities.sides import USER
 from ema_model.quantities.titles import all_of, in_sentence
@@ -107,7 +111,11 @@ def _of_orders(one: Change, axes: Axes) -> str:
 
 
 def value(one: Calibrated) -> str:
-    """'12.2 ± 0.70 mN·m': with half of the 90 % interval."""
+    """'12.2 ± 0.70 mN·m': with half of the 90 % interval; its ends where physics cuts them."""
+    if one.cut:
+        shown = Quantity("", one.unit).scaled([one.value, *one.interval90])
+        middle, low, high = (number(shown.factor * each) for each in (one.value, *one.interval90))
+        return f"{middle} ({low} … {high}, cut at its physical limit) {shown.unit}".rstrip()
     half = 0.5 * (one.interval90[1] - one.interval90[0])
     return with_uncertainty(one.value, half, one.unit)
 
@@ -292,7 +300,38 @@ def added(found: Discovery) -> Iterator[Facts]:
     for one in (*found.effects, *found.freed):
         effect = find(one.name)
         lines = [f"it belongs to {FAMILIES[effect.family]}"] if effect.family == "drive" else []
+        lines += [f"order {of:g}: {said}" for of in _orders_of(one) if (said := of_the_poles(of, found.actuator))]
         yield Facts(_parameters(found, one), f"{effect.title}: {effect.equation}", lines)
+
+
+_STRAIN_WAVE = 1.0 / 30.0  # gear ratio, from which on a single stage is usually a strain wave gear's
+
+
+def _orders_of(one: Added) -> list[float]:
+    return [one.chosen["order"]] if "order" in one.chosen else []
+
+
+def of_the_poles(order: float, actuator: Actuator) -> str:
+    """What else than teeth and slots has an order of the motor: its currents by the pole pairs, a strain wave gear.
+
+    A phase current that is off by a constant ripples the torque once an electrical turn, phases that are read with
+    different gains twice, an inverter's dead time six times; a wave generator is an ellipse, and turns with the motor.
+    """
+    if actuator.axes.motor == "linear":
+        return ""
+    pairs = actuator.motor.pole_pairs
+    causes = {
+        1.0: "offsets of the phase currents",
+        2.0: "phase currents of unequal gain",
+        6.0: "the inverter's dead time",
+    }
+    told = []
+    if pairs > 1.0 and (cause := causes.get(order / pairs)):
+        times = {1.0: "once", 2.0: "twice", 6.0: "six times"}[order / pairs]
+        told.append(f"{times} an electrical turn, as {cause} would ripple, too")
+    if order == 2.0 and abs(actuator.transmission.gear_ratio) <= _STRAIN_WAVE and actuator.axes.user == "rotary":
+        told.append("twice a turn of the motor, as a strain wave gear's generator would, too")
+    return "; ".join(told)
 
 
 def _parameters(found: Discovery, one: Added) -> dict[str, str]:
@@ -343,12 +382,12 @@ def candidates(found: Discovery) -> Table | None:
     rows = [
         [
             effect_title(one.name),
-            "–" if one.untestable_reason else f"{one.predicted_drop:.0f}",
+            "–" if one.obstacle else f"{one.predicted_drop:.0f}",
             _refitted(one),
         ]
         for one in found.ranked
     ]
-    remarks = [one.untestable_reason or "" for one in found.ranked]
+    remarks = [one.obstacle for one in found.ranked]
     return Table(("predicted", "refitted"), rows, "candidates", remarks, "(fall of χ²)")
 
 
@@ -383,10 +422,11 @@ NOT_REPEATABLE = (
 )
 
 
-def mismatch(seen: ControllerSeen | None, axes: Axes) -> list[str]:
-    """That the controller is not what the file says, and what was seen instead."""
+def mismatch(seen: ControllerSeen | None, axes: Axes, lag: LoopLag | None = None) -> list[str]:
+    """That the controller is not what the file says, and what was seen instead: of its law, and how late it follows."""
+    late = "" if lag is None else f" {lag.sentence}"
     if seen is None:
-        return []
+        return [] if lag is None else [f"{BLAMED}{late}"]
     parts = []
     for gain in seen.gains:
         if seen.holds and gain.differs:
@@ -399,9 +439,9 @@ def mismatch(seen: ControllerSeen | None, axes: Axes) -> list[str]:
     left, best = (f"{100.0 * share:.0f} %" for share in (seen.left_by_file, seen.left))
     form = "" if seen.holds else ", so that it is of another form"
     return [
-        f"The controller is not what the file says. {told}Of that current the file's controller leaves {left} "
-        f"unexplained, the best one of the same form {best}{form}. What the measured motion needs of the motor is "
-        "reported instead, without a controller."
+        f"{BLAMED} {told}Of that current the file's controller leaves {left} "
+        f"unexplained, the best one of the same form {best}{form}.{late} What the measured motion needs of the motor "
+        "is reported instead, without a controller."
     ]
 
 
@@ -515,6 +555,7 @@ class CandidateJson(TypedDict):
     refitted_drop: Annotated[float | None, Meta(description="of χ², by the refit; null: it was not refitted")]
     settings: Annotated[dict[str, float | None], Meta(description="its best settings, by the names in files")]
     untestable_reason: Annotated[str, Meta(description="why these recordings cannot show it; empty where they can")]
+    cannot_represent: Annotated[str, Meta(description="why this model has no place for it; empty where it has one")]
 
 
 class UnknownJson(TypedDict):
@@ -522,7 +563,7 @@ class UnknownJson(TypedDict):
 
     variable: Annotated[str, Meta(description="motor_angle, user_position, motor_speed, acceleration, current, …")]
     modulator: Annotated[str, Meta(description="what the curve is multiplied by: 1, current or sign_speed")]
-    r2: Annotated[float | None, Meta(description="share of the residual's power beyond the floor, cross-validated")]
+    r2: Annotated[float | None, Meta(description="share of the residual's power, as it is, cross-validated")]
     curve: Annotated[
         list[list[float | None]],
         Meta(description="rows of the variable, the mean residual there and its standard error, in SI units"),
@@ -586,6 +627,16 @@ class TransmissionSeenJson(TypedDict):
     frequency_Hz: Annotated[float | None, Meta(description="Hz, of the user on a shaft that gives, the motor held")]
 
 
+class TwoMassesJson(TypedDict):
+    """Two masses joined by a spring, seen in the motor alone, from torque to speed."""
+
+    antiresonance_Hz: Annotated[float, Meta(description="at which the load swings alone and holds the motor")]
+    resonance_Hz: Annotated[float, Meta(description="at which motor and load swing against each other")]
+    inertia_ratio: Annotated[float, Meta(description="the load's inertia over the motor's")]
+    stiffness: Annotated[float, Meta(description="of what joins them, at the motor: N·m/rad, of a linear motor N/m")]
+    coherence: Annotated[float, Meta(description="of the motion with the torque, mean over the frequencies that count")]
+
+
 class DisagreementJson(TypedDict):
     """A held-out recording that contradicts the fitted ones."""
 
@@ -612,6 +663,10 @@ class DiscoveryJson(TypedDict):
     calibration: Annotated[CalibrationJson, Meta(description="of the last model")]
     effects: Annotated[list[AddedJson], Meta(description="that are missing, in the order in which they were added")]
     ladder: Annotated[list[RungJson], Meta(description="the error after each change of the model")]
+    simulation: Annotated[
+        dict[str, SimulatedJson],
+        Meta(description="of the last model running freely, driven by the command, or in open loop; by signal"),
+    ]
     candidates: Annotated[list[CandidateJson], Meta(description="all effects of the first search, best first")]
     faults: Annotated[dict[str, ParameterJson], Meta(description="k1 … k8 that the last model has, 0 … 1")]
     parameters_outside_tolerance: Annotated[list[str], Meta(description="section.name, beyond their tolerance")]
@@ -625,6 +680,7 @@ class DiscoveryJson(TypedDict):
     controller_mismatch: Annotated[bool, Meta(description="whether the drive's controller is not the file's")]
     controller_seen: Annotated[ControllerSeenJson | None, Meta(description="what it is instead")]
     transmission_seen: Annotated[TransmissionSeenJson | None, Meta(description="where it is not the file's")]
+    two_masses_seen: Annotated[TwoMassesJson | None, Meta(description="where the motor shows a second mass")]
     disagreements: Annotated[list[DisagreementJson], Meta(description="held-out recordings at odds with the fitted")]
     events: Annotated[list[EventJson], Meta(description="what happened at one moment")]
     warnings: Annotated[list[str], Meta(description="what the answer must be read with")]
@@ -641,6 +697,7 @@ def as_dict(found: Discovery) -> DiscoveryJson:
         "calibration": calibration_dict(found.calibration, axes),
         "effects": [_added(one, axes) for one in found.effects],
         "ladder": [_rung(rung, axes, is_believable) for rung in found.ladder],
+        "simulation": simulation_dict(found.simulation),
         "candidates": [_candidate(one, axes) for one in found.candidates],
         "faults": {name: parameter_dict(one) for name, one in found.faults.items()},
         "parameters_outside_tolerance": [on_axes(name, axes).path for name in found.parameters_outside_tolerance],
@@ -665,9 +722,10 @@ def as_dict(found: Discovery) -> DiscoveryJson:
         "remaining": {"rmse": found.ladder[-1].rmse if is_believable else None, "at_floor": found.at_floor},
         "not_claimed": dict(found.not_claimed),
         "next_experiment": _experiment(found.next_experiment),
-        "controller_mismatch": found.controller_seen is not None,
+        "controller_mismatch": found.controller_seen is not None or found.loop_lag is not None,
         "controller_seen": _seen(found.controller_seen, axes),
         "transmission_seen": None if seen is None else TransmissionSeenJson(**asdict(seen)),
+        "two_masses_seen": None if found.two_masses_seen is None else TwoMassesJson(**asdict(found.two_masses_seen)),
         "disagreements": [
             {
                 "recording": one.recording,
@@ -696,6 +754,7 @@ def _candidate(one: Candidate, axes: Axes) -> CandidateJson:
         "refitted_drop": one.refitted_drop,
         "settings": {names[name]: value for name, value in one.settings.items()},
         "untestable_reason": one.untestable_reason,
+        "cannot_represent": one.cannot_represent,
     }
 
 
@@ -775,6 +834,7 @@ VERDICT_WORDS = {
     "unknown_effect": "something is missing that none of the known effects explains",
     "not_converged": "the calibration has not converged; what looks like missing physics may be an unfinished fit",
     "not_repeatable": "the run does not repeat itself, so that a comparison over time means nothing",
+    "uninformative": "these recordings tell nothing of the model: what they hold is constant, or within its floor",
     "interrupted": "the search was cut off before it had added anything",
 }
 _MOVED, _MOST_MOVED = 0.5, 3  # σ of a tolerance, from which on a parameter's own value is worth a word; of those
@@ -794,7 +854,7 @@ def verdict_name(found: Discovery) -> str:
 def headline(found: Discovery) -> str:
     """The verdict in one sentence; in two where the controller is not the file's."""
     if found.controller_seen is None:
-        return _answer(found)
+        return _answer(found) if found.loop_lag is None else f"{BLAMED} {_answer(found)}"
     if found.verdict == "adequate" and not found.parameters_outside_tolerance and not found.not_claimed:
         return "The controller is not what the file says; without it, motion and current show nothing else missing."
     return f"The controller is not what the file says. Without it: {in_sentence(_answer(found))}"
@@ -818,6 +878,9 @@ def _answer(found: Discovery) -> str:
         return "No physics is missing, but not all parameters are within their tolerance."
     if found.verdict == "adequate" and found.not_claimed:
         return "No more is left than a true model leaves, and nothing that was tried can be claimed for it."
+    if found.verdict in ("unknown_effect", "partly_explained") and found.two_masses_seen is not None:
+        also = f"{_named(found)}; and " if _named(found) else ""
+        return f"The model lacks {also}{found.two_masses_seen.short}."
     if found.verdict == "partly_explained":
         return f"Found in part: {_named(found) or 'a curve'}{f', and {faulty}' if faulty else ''}; {remains(found)}."
     if found.verdict == "unknown_effect" and found.at_floor and found.transmission_seen is not None:
@@ -996,7 +1059,8 @@ def _faulty(found: Discovery) -> str:
 
 def document_of(found: Discovery) -> Document:
     """All that is shown of it in words: the verdict and what follows, the effects, the ladder, the candidates."""
-    tables = (ladder(found), per_recording(found), candidates(found))
+    tables = (ladder(found), *free_simulation(found.simulation, found.actuator.axes))
+    tables += (per_recording(found), candidates(found))
     asked = next_experiment(found)
     return Document(
         [

@@ -15,7 +15,7 @@ from ema_model.quantities.sides import MOTOR, NEITHER, USER, Side
 from ema_model.quantities.titles import labelled, parameter_title, unit_of
 from ema_model.quantities.variables import VARIABLES
 
-__all__ = ["ADVANCE", "MOTOR", "NEITHER", "PLACES", "USER", "Effect", "Parameter"]  # what effects' files need
+__all__ = ["ADVANCE", "ANGLES", "MOTOR", "NEITHER", "PLACES", "USER", "Effect", "Parameter"]  # what effects' files need
 
 # Where effects can act: the arguments of each place.  The first is the value that the base model, or the
 # effect before, has found there; an effect's function returns it changed.  time, s, counts from the recording's start.
@@ -48,21 +48,24 @@ PLACES = {
     "motor_angle_reading": ("theta",),
     "motor_speed_reading": ("omega", "theta"),
     # the drive's controller, in the order in which it works (`ema_model.kernels.drive_step`)
+    "goal": ("goal", "gear", "begins", "dt"),
     "position_error": ("error", "begins", "dt"),
     "speed_reading": ("speed", "begins", "dt"),
     "speed_sample": ("speed", "begins", "dt"),
     "speed_command": ("wanted", "limit", "begins", "dt"),
     "speed_gain": ("gain",),
     "integral_gain": ("gain", "speed_gain"),
+    "loop_torque": ("torque", "begins", "dt"),
     "drive_output": ("output", "begins", "dt"),
     "current_reference": ("reference", "begins", "dt"),
 }
 # Places of the drive, each passed once a step.  An effect with states returns there its changed value and all of its
 # new states, as a tuple; begins: whether this is the first step, before which its states say nothing.
 STAGES = (
-    *("position_error", "speed_reading", "speed_sample", "speed_command", "speed_gain", "integral_gain"),
-    *("drive_output", "current_reference"),
+    *("goal", "position_error", "speed_reading", "speed_sample", "speed_command", "speed_gain", "integral_gain"),
+    *("loop_torque", "drive_output", "current_reference"),
 )
+ANGLES = ("phase_rad", "angle_rad")  # parameters of which any value is as likely as another
 # What an effect is of: a part of the actuator, or of what drives and measures it.
 FAMILIES = {
     "mechanics": "the actuator's mechanics",
@@ -155,6 +158,8 @@ class Effect:
     the places and their arguments); each takes the effect's parameters, in order, as its last arguments.
     `placed`: parameters that are places along `against`, each with the shares of its range in the recordings at which
     one begins to look for it; all have as many.
+    `terms`: effects that are terms of its series about a point, the simplest first: what a short travel, or a narrow
+    range of what it acts by, shows of it.
     `beside`: linear parameters that do nothing by default, each with the share of its range at which one looks at what
     it does beside the first.
     """
@@ -176,6 +181,7 @@ class Effect:
     at_speeds: tuple[float, ...] = ()  # of a first parameter that is a speed: shares of the top speed to look for it at
     placed: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     beside: Mapping[str, float] = field(default_factory=dict)
+    terms: tuple[str, ...] = ()
     by_direction: bool = False  # told from what does not turn over with the direction: needs motion both ways
     turns: Side | None = None  # of a part that turns on that side: there is none on a linear axis
     against: str = "time"  # of `quantities.variables`: what its residual follows; time where it follows nothing else
@@ -201,6 +207,11 @@ class Effect:
     def is_periodic(self) -> bool:
         """Whether it has an order and a phase, so that a model may hold it several times."""
         return {"order", "phase_rad"} <= {parameter.name for parameter in self.parameters}
+
+    @property
+    def phase(self) -> str:
+        """The angle of which the effect is as its sine, the first parameter being the amplitude; "" where none is."""
+        return next((one.name for one in self.parameters if one.name in ANGLES), "")
 
     @property
     def neutral(self) -> dict[str, float]:

@@ -32,7 +32,7 @@ EFFECT = Effect(
         Parameter("end_rad", "user position θ_2 at which it ends", 0.002, -100.0, 100.0, side=USER),
     ),
     severities=(0.3, 0.6, 1.2),
-    placed={"begin_rad": (0.0, 0.2, 0.4, 0.6), "end_rad": (0.4, 0.6, 0.8, 1.0)},
+    placed={"begin_rad": (0.0, 0.2, 0.4, 0.6, 0.0), "end_rad": (0.4, 0.6, 0.8, 1.0, 1.0)},
     places=(moving_friction,),
     shows="in the current by direction, over a part of the user's travel",
     against="user_position",

@@ -52,10 +52,10 @@ EFFECT = Effect(
     ),
     parameters=(
         Parameter(
-            "stiffness_Nm_rad", "stiffness K at the user", 28400.0, 100.0, 1e6, side=USER, linear=(1.42e6, 1e3, 1e12)
+            "stiffness_Nm_rad", "stiffness K at the user", 28400.0, 1e-3, 1e6, side=USER, linear=(1.42e6, 1e3, 1e12)
         ),
         Parameter("damping_Nms_rad", "damping C at the user", 60.0, 0.0, 1e4, side=USER, linear=(3000.0, 0.0, 1e8)),
-        Parameter("inertia_kgm2", "inertia J_u of the user", 0.2, 1e-3, 100.0, side=USER, linear=(10.0, 1e-3, 1e5)),
+        Parameter("inertia_kgm2", "inertia J_u of the user", 0.2, 1e-8, 100.0, side=USER, linear=(10.0, 1e-3, 1e5)),
     ),
     severities=(64000.0, 28400.0, 7100.0),  # the mode at 90, 60, 30 Hz
     places=(user_position, shaft_torque),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -13,7 +14,15 @@ from ema_model.actuator.naming import on_axes
 from ema_model.estimation.floor import CORRELATED_S, Floor, local_rms
 from ema_model.estimation.least_squares import descended
 from ema_model.estimation.problem import Problem
-from ema_model.estimation.unknowns import ECCENTRICITY, K_SIGMA, Unknown, polar, starts_of, unknowns_of
+from ema_model.estimation.unknowns import (
+    ECCENTRICITY,
+    K_SIGMA,
+    Unknown,
+    physical_limits,
+    polar,
+    starts_of,
+    unknowns_of,
+)
 from ema_model.faults import NAMES, named
 from ema_model.models import Model
 from ema_model.models.model import Signals
@@ -174,7 +183,8 @@ def calibration_table(fit: Calibration, axes: Axes, among: Collection[str] | Non
         low, high = (number(edge, 4) for edge in one.interval90)
         moved = f"{round(one.z, 2) + 0.0:+.2f}".replace("-", "−")
         rows.append([_title(path, axes), number(one.initial, 4), number(one.value, 4), f"{low} … {high}", moved])
-        remarks.append(f"{one.unit}{'  at its bound' if one.at_bound else ''}".strip())
+        said = f"{'  at its bound' if one.at_bound else ''}{'  interval cut at its physical limit' if one.cut else ''}"
+        remarks.append(f"{one.unit}{said}".strip())
     if not rows:
         return None
     state = "converged" if fit.converged else "NOT converged"
@@ -220,12 +230,14 @@ class Calibrated:
     unit: str
     z: float  # σ from the file's value
     at_bound: bool
+    spread: float | None = None  # 1 σ of the value before its interval was cut; half the interval's own without it
+    cut: bool = False  # whether the interval ends where the parameter's physics does
 
     @property
     def sigma(self) -> float:
         """1 σ of the value, in its unit."""
         low, high = self.interval90
-        return 0.5 * (high - low) / HALF_90
+        return 0.5 * (high - low) / HALF_90 if self.spread is None else self.spread
 
 
 @dataclass(frozen=True, eq=False)
@@ -234,7 +246,7 @@ class Calibration:
 
     converged: bool
     parameters: dict[str, Calibrated]  # "section.parameter", k1…k8
-    starts: dict[str, Calibrated]  # of the windows: "turned 0" and "play 0", rad at the motor
+    starts: dict[str, Calibrated]  # of the windows: "turned 0" and "play 0", rad at the motor, "faster 0", rad/s
     actuator: Actuator  # with the fitted values, and with k for its faults
     k: Array  # (8,)
     residual: Array  # (values,), model − measurement over the floor that weights the fit
@@ -250,10 +262,14 @@ class Calibration:
     confounded: tuple[tuple[str, str], ...]  # pairs that trade against each other
     free: tuple[str, ...]
 
-    def start_of(self, window: int | None) -> tuple[float, float]:
-        """Where a fitted window began: the motor's angle and its place in the play, rad at the motor; 0 if unknown."""
-        turned, play = (self.starts.get(f"{kind} {window}") for kind in ("turned", "play"))
-        return 0.0 if turned is None else turned.value, 0.0 if play is None else play.value
+    def start_of(self, window: int | None) -> tuple[float, float, float]:
+        """How a fitted window began beyond what was measured; 0 if unknown.
+
+        The motor's angle and its place in the play, rad at the motor, and its speed, rad/s.
+        """
+        found = (self.starts.get(f"{kind} {window}") for kind in ("turned", "play", "faster"))
+        turned, play, faster = (0.0 if one is None else one.value for one in found)
+        return turned, play, faster
 
     @property
     def as_result(self) -> Calibration:
@@ -464,8 +480,19 @@ def calibrated(problem: Problem, x: Array, covariance: Array, most: float = 1.0)
         half = HALF_90 * u.sigma * min(most, float(np.sqrt(covariance[i, i])))
         at_bound = driven_to_bound(u, float(x[i]))
         unit = on_axes(u.name, axes).unit
-        found[u.name] = Calibrated(value, u.nominal, (value - half, value + half), unit, float(x[i]), at_bound)
+        ends, cut = within(value, half, physical_limits(u.name, problem.model.actuator))
+        found[u.name] = Calibrated(value, u.nominal, ends, unit, float(x[i]), at_bound, half / HALF_90, cut)
     return {**found, **_eccentricity(problem, x, covariance)} if "k6" in found else found
+
+
+def within(value: float, half: float, limits: tuple[float, float]) -> tuple[tuple[float, float], bool]:
+    """The ends of value ± half inside a parameter's physical limits, and whether they were cut there.
+
+    A friction is not negative, and a ratio of static to sliding friction not below 1, however little a recording says.
+    """
+    low, high = value - half, value + half
+    least, most = min(limits[0], value), max(limits[1], value)
+    return (max(low, least), min(high, most)), low < least or high > most
 
 
 def driven_to_bound(unknown: Unknown, x: float) -> bool:
@@ -484,10 +511,12 @@ def _eccentricity(problem: Problem, x: Array, covariance: Array) -> dict[str, Ca
     halves = HALF_90 * min(K_SIGMA, along), min(0.5, HALF_90 * across / max(2.0 * np.pi * size, 1e-9))
     scores = float(k[5] - file[5]) / K_SIGMA, 2.0 * np.pi * float(file[5]) * turned / K_SIGMA
     at_bounds = not 0.01 * K_SIGMA < k[5] < 1.0 - 0.01 * K_SIGMA, False
-    return {
-        name: Calibrated(float(k[i]), float(file[i]), (float(k[i]) - half, float(k[i]) + half), "", z, bool(at_bound))
-        for name, i, half, z, at_bound in zip(("k6", "k7"), ECCENTRICITY, halves, scores, at_bounds)
-    }
+    found = {}
+    limits = (0.0, 1.0), (-math.inf, math.inf)  # an angle has none
+    for name, i, half, z, at_bound, of in zip(("k6", "k7"), ECCENTRICITY, halves, scores, at_bounds, limits):
+        ends, cut = within(float(k[i]), half, of)
+        found[name] = Calibrated(float(k[i]), float(file[i]), ends, "", z, bool(at_bound), half / HALF_90, cut)
+    return found
 
 
 def _confounded(unknowns: Sequence[Unknown], covariance: NDArray[np.floating]) -> tuple[tuple[str, str], ...]:

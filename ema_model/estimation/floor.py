@@ -13,6 +13,7 @@ from ema_model.actuator import Actuator
 from ema_model.models import Model, Window
 from ema_model.models.model import Signals
 from ema_model.quantities.numbers import HALF_90
+from ema_model.quantities.signals import SIGNALS
 from ema_model.recordings.noise import SCATTER, white_noise
 
 # --- how well a floor is known: between which multiples of it the error of a true model lies --------------------------
@@ -64,6 +65,45 @@ def band(spread: float, least: float = 1.0) -> tuple[float, float]:
     return max(0.0, 1.0 - half) * least, 1.0 + half
 
 
+# --- whether a signal tells anything at all of a model ----------------------------------------------------------------
+
+CONSTANT, BELOW_FLOOR = "constant", "floor"  # why one does not
+
+
+def tells_nothing(values: Array, name: str, noise: Array | float, floor: Array | float) -> str:
+    """Why a signal (n,) tells nothing of any model; "" where it does.
+
+    `CONSTANT`, or `BELOW_FLOOR` where what it has beyond its noise is no larger than the floor, so that a model which
+    says nothing would pass as well.  A position counts from its mean, a current, a torque and a speed from 0.
+    name: the signal's inside; noise, floor: standard deviations in its unit, numbers or (n,).
+    """
+    if not np.ptp(values) > _ROUNDING * np.max(np.abs(values)):
+        return CONSTANT
+    from_mean = SIGNALS[name].kind == "position"
+    size2 = float(np.var(values) if from_mean else np.mean(values**2))
+    beyond = size2 - float(np.mean(np.square(noise)))
+    return "" if beyond > float(np.mean(np.square(floor))) else BELOW_FLOOR
+
+
+# Whose residual is explained: what drives the motor, where it is measured; a loop's motion follows any physics.
+ORDER_OF_PRIMARY = ("current_A", "motor_torque_Nm", "user_position_rad", "motor_position_rad", "motor_speed_rad_s")
+
+
+def silent(windows: Sequence[Window], floors: Sequence[Floor]) -> tuple[str, str]:
+    """The first signal of `ORDER_OF_PRIMARY`, and `tells_nothing` of it in all recordings; "" where one tells."""
+    name = next((name for name in ORDER_OF_PRIMARY if any(name in one.measured for one in windows)), "")
+    found = ""
+    having = [(window, one) for window, one in zip(windows, floors) if name in window.measured]
+    for recording in dict.fromkeys(window.recording for window, _ in having):
+        parts = [pair for pair in having if pair[0].recording == recording]
+        values = np.concatenate([window.measured[name] for window, _ in parts])
+        noise = np.concatenate([np.full(window.blocks, one.noise[name]) for window, one in parts])
+        found = tells_nothing(values, name, noise, np.concatenate([one.sigma(name) for _, one in parts]))
+        if not found:
+            break
+    return name, found
+
+
 # --- the floor of a comparison: what a perfect Monitor Model would still differ from a recording by -------------------
 # Two parts, for each signal and block: the sensors' noise, estimated from the recording itself, and the model floor,
 # how far the Monitor Model is from its three-phase twin under the same command (MODEL §2). The twin differs most in
@@ -78,6 +118,7 @@ CORRELATED_S = 0.025  # how long the model's error, and a sensor's inaccuracy, s
 _LEAST_OF_NOISE = 0.5  # that is always taken for the sensors'
 _STILL = 8.0  # of a position's noise, within which it stands
 POSITIONS = ("motor_position_rad", "user_position_rad")
+SPEED = "motor_speed_rad_s"  # which counts where no position is: it is mostly one's difference
 
 
 @dataclass(frozen=True, eq=False)

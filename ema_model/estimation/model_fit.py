@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator, Tolerance
 from ema_model.effects import find
+from ema_model.effects.effect import ANGLES
 from ema_model.estimation import Calibration, Floor, after_fit, calibrate, default_free, floor, of_unseen, taken_up
 from ema_model.estimation.floor import band, least, spread, twin_error
 from ema_model.models import Model, model_for
@@ -23,7 +24,6 @@ Array = NDArray[np.float64]
 _SHARE = 0.5  # 1 σ of an effect's parameter, of the value that its fingerprint suggests
 _ORDER_SHARE = 1e-3  # of an order along a linear axis: it was found as exactly as the travel tells it
 _ANGLE_SIGMA = 0.7  # rad
-ANGLES = ("phase_rad", "angle_rad")  # parameters of which any value is as likely as another
 _ALIKE = 0.02  # of a floor, that two may differ by
 
 

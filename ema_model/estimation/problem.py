@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.errors import InputError
-from ema_model.estimation.floor import Floor
+from ema_model.estimation.floor import POSITIONS, SPEED, Floor
 from ema_model.estimation.unknowns import ECCENTRICITY, Unknown, to_k, to_vector
 from ema_model.models import Model
 from ema_model.models.closed_loop import LOAD
@@ -22,11 +22,22 @@ from ema_model.side_by_side import windows
 Array = NDArray[np.float64]
 
 _EXACT = 1e-4  # of a tolerance, within which a parameter counts as its file's value
+_LARGEST_RATIO = 0.5  # of a step, as a logarithm
 DIVERGED = 1e6  # floors, that a run which diverges counts as at most
 
 TOGETHER = 2 * LANES  # candidates: a block of lanes on each of two cores
 
 SIGNALS = ("current_A", "motor_torque_Nm", "motor_position_rad", "user_position_rad")  # that are fitted
+
+
+def fitted_signals(asked: Mapping[str, float], measured: Container[str]) -> dict[str, float]:
+    """Of the signals that are asked for, with weights, those of a recording that are fitted.
+
+    Where both positions are asked for and none was measured, its speed stands for them.
+    """
+    found = {name: weight for name, weight in asked.items() if name in measured}
+    stands_in = all(name in asked and name not in measured for name in POSITIONS) and SPEED in measured
+    return {**found, SPEED: asked.get(SPEED, 1.0)} if stands_in else found
 
 
 class Rig(NamedTuple):
@@ -36,6 +47,7 @@ class Rig(NamedTuple):
     k: Array
     turned_rad: Any  # numbers, or (n,)
     play_rad: Any
+    faster_rad_s: Any
     effects: Effects
 
 
@@ -64,6 +76,7 @@ class Problem:
         self._step = np.array([u.step for u in unknowns])
         self._k = np.asarray(model.actuator.k if k is None else k, dtype=float)
         self._nominal, self._sigma = (np.array([getattr(u, one) for u in unknowns]) for one in ("nominal", "sigma"))
+        self._scale = np.array([u.is_scale for u in unknowns], dtype=bool)
         self._faults = [(i, u.place) for i, u in enumerate(unknowns) if u.kind == "fault"]
         self._lags = {u.place: i for i, u in enumerate(unknowns) if u.kind == "lag"}  # by recording
         self._eccentricity = [i for i, place in self._faults if place in ECCENTRICITY]  # both parts, or none
@@ -83,7 +96,10 @@ class Problem:
         """Sets other floors, and what the model is known to lack, by window and signal, (blocks,), which is added."""
         self.floors, self.added = list(floors), list(added)
         self.weights = [
-            {name: weight / one.fit_sigma(name) for name, weight in self._asked.items() if name in window.measured}
+            {
+                name: weight / one.fit_sigma(name)
+                for name, weight in fitted_signals(self._asked, window.measured).items()
+            }
             for window, one in zip(self.model.windows, self.floors)
         ]
         self.values = sum(len(values) for weights in self.weights for values in weights.values())
@@ -98,7 +114,10 @@ class Problem:
         return np.concatenate([*errors, x * self.prior], axis=1)
 
     def jacobians(self, x: Array, *, in_whole_blocks: bool = False) -> tuple[Array, Array]:
-        """Residuals (n, m) and their derivatives (n, m, unknowns) by central differences.
+        """Residuals (n, m) and their derivatives (n, m, unknowns) by central differences, of scales in their logarithm.
+
+        Where a gain, a torque constant and a resistance act by their ratio alone, only steps by ratios leave the
+        signals as they are along it; equal steps up and down show information that is not there.
 
         A window is simulated in one population, for the unknowns that act in it: not for where the others start.
         in_whole_blocks: no block of lanes is begun for a part of it; the unknowns that bend the signals least then
@@ -127,7 +146,7 @@ class Problem:
     ) -> tuple[Array, Array]:
         """A window's part of the residuals of x (n, values) and of others (l, values); slopes, too, is written."""
         n, acting = len(x), self._acting[window]
-        low, high = np.maximum(x - self._step, self.low), np.minimum(x + self._step, self.high)
+        low, high = (np.clip(self.moved(x, by), self.low, self.high) for by in (-self._step, self._step))
         far = np.where(high - x >= x - low, high, low)
         both = _room(n, len(acting), len(others)) if in_whole_blocks else len(acting)
         sides, side = acting[:both], acting[both:]
@@ -138,9 +157,23 @@ class Problem:
         shown = self._errors(np.concatenate([points.reshape(-1, self.count), others]), window)
         errors = shown[: n * lanes].reshape(n, lanes, -1)
         here, below, above, there = np.split(errors, [1, 1 + both, 1 + 2 * both], axis=1)
-        slopes[:, sides] = (above - below) / (high - low)[:, sides, None]
-        slopes[:, side] = (there - here) / (far - x)[:, side, None]
+        slopes[:, sides] = (above - below) / self._distance(x, low, high)[:, sides, None]
+        slopes[:, side] = (there - here) / self._distance(x, x, far)[:, side, None]
         return errors[:, 0], shown[n * lanes :]
+
+    def moved(self, x: Array, by: Array) -> Array:
+        """x (…, unknowns) that is moved by so many σ (…, unknowns), of scales by a ratio that begins as such a step."""
+        values = self._nominal + self._sigma * x
+        scales = self._scale & (values > 0.0)
+        ratio = np.exp(np.clip(by * self._sigma / np.where(scales, values, 1.0), -_LARGEST_RATIO, _LARGEST_RATIO))
+        return np.where(scales, (values * ratio - self._nominal) / self._sigma, x + by)
+
+    def _distance(self, x: Array, start: Array, end: Array) -> Array:
+        """From start to end, in σ, as a derivative at x has it: of scales the logarithm of their ratio."""
+        values, of_start, of_end = (self._nominal + self._sigma * one for one in (x, start, end))
+        logarithmic = self._scale & (values > 0.0) & (of_start > 0.0) & (of_end > 0.0)
+        ratio = np.divide(of_end, of_start, out=np.ones_like(values), where=logarithmic)
+        return np.where(logarithmic, np.log(ratio) * values / self._sigma, end - start)
 
     def has_room_for(self, others: int) -> bool:
         """Whether so many candidates stand together with the derivatives of one, all to both sides."""
@@ -172,7 +205,7 @@ class Problem:
     def _places(self, window: int) -> dict[str, int]:
         """Of the kinds that are not all windows' alike: where a window's own stands."""
         recording = self.model.windows[window].recording
-        return {"turned": window, "play": window, "load": recording, "lag": recording}
+        return {"turned": window, "play": window, "faster": window, "load": recording, "lag": recording}
 
     def parts(self) -> list[tuple[int, str, slice]]:
         """Where the residuals of each window's signals stand: window, signal, rows."""
@@ -244,7 +277,8 @@ class Problem:
         if "load" in own:
             effects = {**effects, LOAD: {"torque_Nm": own["load"]}}
         actuator = self.model.actuator.varied(self.parameters(x))
-        return Rig(actuator, self.k(x), own.get("turned", 0.0), own.get("play", 0.0), effects)
+        turned, play, faster = (own.get(kind, 0.0) for kind in ("turned", "play", "faster"))
+        return Rig(actuator, self.k(x), turned, play, faster, effects)
 
 
 def _room(n: int, count: int, others: int) -> int:

@@ -20,9 +20,9 @@ from ema_model.actuator.naming import on_axes
 from ema_model.actuator.parameters import low_limit
 from ema_model.effects import find
 from ema_model.errors import InputError, did_you_mean, quoted
-from ema_model.estimation.floor import POSITIONS, Floor
+from ema_model.estimation.floor import POSITIONS, SPEED, Floor
 from ema_model.faults import NAMES
-from ema_model.models import Model
+from ema_model.models import Model, Window
 from ema_model.models.closed_loop import LOAD
 
 Array = NDArray[np.float64]
@@ -44,12 +44,12 @@ _UNRECORDED_LOAD = 0.05  # 1 σ of a load that was not recorded, of the motor's 
 class Unknown:
     """One number that a fit moves: nominal + σ·x, low ≤ x ≤ high; σ is its prior."""
 
-    name: str  # "section.parameter", "effects.name.parameter", k1…k8, "turned 0", "play 0", "load 0", "lag 0"
+    name: str  # "section.parameter", "effects.name.parameter", k1…k8; or kind and place: "turned 0", "lag 0"
     nominal: float
     sigma: float
     low: float = -BOUND
     high: float = BOUND
-    kind: Literal["parameter", "fault", "turned", "play", "load", "lag"] = "parameter"
+    kind: Literal["parameter", "fault", "turned", "play", "faster", "load", "lag"] = "parameter"
     place: int = 0  # of a fault: which; of a start: its window; of a load and of a lag: its recording
     step: float = _STEP  # of the difference that a derivative is taken by
 
@@ -57,6 +57,11 @@ class Unknown:
     def is_base(self) -> bool:
         """Whether it is a parameter of the actuator's file, and none of an effect."""
         return self.kind == "parameter" and not self.name.startswith("effects.")
+
+    @property
+    def is_scale(self) -> bool:
+        """Whether it is a positive quantity, which acts by its ratios: a resistance, an inertia, a gain."""
+        return self.kind == "parameter" and self.nominal > 0.0 and self.nominal + self.sigma * self.low > 0.0
 
 
 def to_vector(k: ArrayLike) -> Array:
@@ -113,14 +118,21 @@ def _parameter(actuator: Actuator, name: str) -> Unknown:
             f"free may be {', '.join(known)}{did_you_mean(name, [*NAMES, *known])}"
         )
     nominal, sigma = actuator.value(name), actuator.tolerances[name].sigma
-    low, high = low_limit(name, actuator.controller.kind), math.inf
-    if name.startswith("effects."):
-        _, effect, parameter = name.split(".")
-        low, high = next((p.low, p.high) for p in find(effect, actuator.axes).parameters if p.name == parameter)
+    low, high = physical_limits(name, actuator)
     # Zero itself is no inertia.
     low = low + 1e-3 * abs(nominal) if low == 0.0 else low
     below, above = (_room(limit, nominal) / sigma for limit in (low, high))
     return Unknown(name, nominal, sigma, max(-BOUND, -below), min(BOUND, above))
+
+
+def physical_limits(name: str, actuator: Actuator) -> tuple[float, float]:
+    """Between which "section.parameter", "effects.name.parameter" or k1…k8 has a meaning, in its unit."""
+    if name in NAMES:
+        return (-math.inf, math.inf) if NAMES.index(name) in ECCENTRICITY else (0.0, 1.0)
+    if name.startswith("effects."):
+        _, effect, parameter = name.split(".")
+        return next((p.low, p.high) for p in find(effect, actuator.axes).parameters if p.name == parameter)
+    return (low_limit(name, actuator.controller.kind), math.inf) if "." in name else (-math.inf, math.inf)
 
 
 def _room(limit: float, nominal: float) -> float:
@@ -131,6 +143,9 @@ def _room(limit: float, nominal: float) -> float:
 
 def starts_of(model: Model, floors: Sequence[Floor], *, worn: bool, exact: bool = False) -> list[Unknown]:
     """Where the motor and the play were at each window's first sample, beyond what it says.
+
+    Of a motor that a voltage is put in, its speed as well: such recordings begin anywhere in a motion, and no loop
+    brings it back.
 
     worn: the play may be far wider than the file says.  exact: the recordings are a simulation's, whose sensors are
     known but for their noise.
@@ -144,6 +159,10 @@ def starts_of(model: Model, floors: Sequence[Floor], *, worn: bool, exact: bool 
     found = []
     for i, (window, floor) in enumerate(zip(model.windows, floors)):
         samples = math.sqrt(window.samples_per_block)
+        if model.actuator.takes_voltage:
+            found.append(Unknown(f"faster {i}", 0.0, _speed_at_start(window, floor), kind="faster", place=i))
+            if not any(name in window.measured for name in POSITIONS):
+                continue
         motor = floor.noise.get("motor_position_rad", half_play) * samples
         user = floor.noise.get("user_position_rad", tau * widest) * samples / tau
         turned = math.hypot(motor, 0.0 if exact else _TURNED_RAD)
@@ -151,6 +170,14 @@ def starts_of(model: Model, floors: Sequence[Floor], *, worn: bool, exact: bool 
         found += [Unknown(f"turned {i}", 0.0, turned, kind="turned", place=i)] if turned > _LEAST_START_RAD else []
         found += [Unknown(f"play {i}", 0.0, play, kind="play", place=i)] if play > _LEAST_START_RAD else []
     return found
+
+
+def _speed_at_start(window: Window, floor: Floor) -> float:
+    """1 σ of the motor's speed at a window's start, rad/s, beyond the measured one or the measured position's slope."""
+    if SPEED in floor.noise:
+        return floor.noise[SPEED] * math.sqrt(window.samples_per_block)
+    position = next(window.measured[name] for name in POSITIONS if name in window.measured)
+    return float(np.max(np.abs(np.diff(position)))) / window.block_s
 
 
 def loads_of(model: Model) -> list[Unknown]:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.actuator.naming import on_axes
-from ema_model.estimation.floor import CORRELATED_S
+from ema_model.estimation.floor import CORRELATED_S, silent
 from ema_model.identification.fit import Fitted
 from ema_model.quantities.titles import in_sentence
 from ema_model.recordings import SIGNALS as SIGNAL_NAMES
@@ -35,10 +35,15 @@ class Adequacy:
     adequate: bool
     ratio: float  # of what is left over what is expected, the worst of all signals and of the worst shape
     reason: str
+    uninformative: bool = False  # the recordings tell nothing, whatever model they are held against
 
 
 def adequacy(found: Fitted) -> Adequacy:
     """Judges a best fit."""
+    name, why = silent(found.problem.model.windows, found.problem.floors)
+    if why:
+        title = in_sentence(SIGNAL_NAMES[name].title)
+        return Adequacy(False, 1.0, f"the {title} is constant, or no larger than its floor", uninformative=True)
     sizes = _sizes(found)
     for name, (size, slow) in sizes.items():
         if size > _SIZE or slow > _SLOW:

@@ -33,6 +33,7 @@ class IdentificationJson(TypedDict):
     ambiguous: Annotated[list[list[str]], Meta(description="groups of k that the recordings cannot separate")]
     hardly_known: Annotated[list[str], Meta(description="k that could be nearly anything")]
     separated_by: Annotated[str, Meta(description="the run that would tell them, as options of `emaviz simulate`")]
+    uninformative: Annotated[bool, Meta(description="whether the recordings tell nothing, whatever the model")]
     adequate: Annotated[bool, Meta(description="whether the model with this k leaves no more than the floor")]
     warnings: Annotated[list[str], Meta(description="what the answer must be read with")]
     physical: Annotated[dict[str, float], Meta(description="what k means in this actuator, units in the names")]
@@ -78,6 +79,7 @@ def as_dict(answer: Identification, actuator: Actuator, holdout_rmse: float | No
         "ambiguous": [list(group) for group in sure.ambiguous],
         "hardly_known": list(sure.hardly_known),
         "separated_by": sure.separated_by.options if sure.separated_by else "",
+        "uninformative": bool(sure.uninformative),
         "adequate": bool(sure.adequate),
         "warnings": list(sure.warnings),
         "physical": readings(answer.k, actuator),

@@ -53,6 +53,7 @@ class Uncertainty:
     ambiguous: tuple[tuple[str, ...], ...]  # groups that these recordings cannot separate
     hardly_known: tuple[str, ...] = ()  # k, without the angle k7, that could be nearly anything
     adequate: bool = True  # the model with this k leaves no more than the floor
+    uninformative: bool = False  # the recordings tell nothing of any model
     warnings: tuple[str, ...] = ()
     separated_by: Suggestion | None = None  # the run that would tell the groups apart, and the hardly known
     covariance: Array = field(default_factory=lambda: np.zeros((FAULTS, FAULTS)))  # of k
@@ -88,6 +89,7 @@ def uncertainty(found: Fitted, k: Array) -> Uncertainty:
         ambiguous=groups,
         hardly_known=hardly,
         adequate=best.fit.adequate,
+        uninformative=best.fit.uninformative,
         warnings=(*_warnings(best.fit), *logged_apart(found, best.of_x)),
         separated_by=separating(found, best.covariance, unclear) if unclear else None,
         covariance=best.covariance,
@@ -309,6 +311,8 @@ def _groups(covariance: Array) -> tuple[tuple[str, ...], ...]:
 def _warnings(fit: Adequacy) -> tuple[str, ...]:
     if fit.adequate:
         return ()
+    if fit.uninformative:
+        return (f"The recordings tell nothing of the faults: {fit.reason}.",)
     return (
         f"The model does not fit, whatever k: {fit.reason}. What is found here may stand in for physics that the model "
         "lacks; Discover, on the same recordings, looks for it.",

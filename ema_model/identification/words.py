@@ -23,6 +23,8 @@ CORRECTED = (
 def verdict(answer: Identification) -> str:
     """The short one: healthy, which k are not, or that nothing can be told."""
     sure = answer.uncertainty
+    if sure.uninformative:
+        return "uninformative: the recordings tell nothing of the faults"
     if not sure.adequate:
         return "the model does not fit: no fault can be told"
     return "healthy" if sure.healthy else f"not healthy: {', '.join(sure.alarms) or 'no single k stands out'}"
@@ -76,6 +78,8 @@ def remarks(answer: Identification) -> list[Remark]:
 
 def _health(answer: Identification) -> Remark:
     sure = answer.uncertainty
+    if sure.uninformative:
+        return Remark("uninformative", "the recordings tell nothing of the faults", "bad")
     if not sure.adequate:
         return Remark("the model does not fit", "no fault can be told", "bad")
     if sure.healthy:

@@ -23,8 +23,10 @@ __all__ = [
     "drive_output",
     "electric_torque",
     "friction",
+    "goal",
     "integral_gain",
     "inverse_inertia",
+    "loop_torque",
     "motor_angle_reading",
     "motor_speed_reading",
     "moving_friction",
@@ -119,6 +121,12 @@ def motor_speed_reading(omega, theta, s, first, p, i):
 
 
 @scalar
+def goal(goal, gear, begins, dt, s, first, p, i):
+    """The command that the position loop follows, rad at the user."""
+    return goal
+
+
+@scalar
 def position_error(error, begins, dt, s, first, p, i):
     """The position error that the controller acts on, rad at the user."""
     return error
@@ -152,6 +160,12 @@ def speed_gain(gain, s, first, p, i):
 def integral_gain(gain, speed_gain, s, first, p, i):
     """The speed loop's integral gain, N·m/rad."""
     return gain
+
+
+@scalar
+def loop_torque(torque, begins, dt, s, first, p, i):
+    """What the speed loop asks for beside its proportional action, N·m."""
+    return torque
 
 
 @scalar

@@ -13,6 +13,7 @@ from ema_model.physics.rows import (
     BEGUN,
     CURRENT_PER_TORQUE,
     DERIVATIVE_GAIN,
+    GEAR_RATIO,
     INTEGRAL,
     INTEGRAL_GAIN,
     INTEGRATOR_REST,
@@ -30,7 +31,9 @@ from .composition import (
     current_reference,
     drive_acts,
     drive_output,
+    goal,
     integral_gain,
+    loop_torque,
     position_error,
     speed_command,
     speed_gain,
@@ -73,7 +76,8 @@ def advance_drive(s, first, p, i, command, told, omega, supply, dt):
     """
     begins = s[BEGUN * LANES + i] == 0.0
     limit = p[SPEED_LIMIT * LANES + i]
-    error = position_error(command - told, begins, dt, s, first, p, i)
+    wished = goal(command, p[GEAR_RATIO * LANES + i], begins, dt, s, first, p, i)
+    error = position_error(wished - told, begins, dt, s, first, p, i)
     read = speed_sample(speed_reading(omega, begins, dt, s, first, p, i), begins, dt, s, first, p, i)
     position_gain = p[POSITION_GAIN * LANES + i]
     wanted = speed_command(speed_reference(error, position_gain, limit), limit, begins, dt, s, first, p, i)
@@ -97,7 +101,8 @@ def advance_drive(s, first, p, i, command, told, omega, supply, dt):
         most,
         dt,
     )
-    output = control(command, error, speed_error, remembered, position_gain, gain, current_per_torque, most)
+    beside = loop_torque(remembered, begins, dt, s, first, p, i)
+    output = control(wished, error, speed_error, beside, position_gain, gain, current_per_torque, most)
     put_out = drive_output(output, begins, dt, s, first, p, i)
     s[INTEGRAL * LANES + i] = integral if supply > 0.0 else 0.0
     s[SPEED_ERROR * LANES + i] = speed_error

@@ -1,6 +1,7 @@
 """The actuator in its loop: command and load in, all signals out of the Monitor Model.
 
-In an open loop the recorded current, torque or force is what is put in, and the motion alone is compared.
+In an open loop the recorded current, torque or force is what is put in, and the motion alone is compared; or with a
+voltage drive a recorded voltage or duty, and the motion and the current are.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ _CHUNK = 20_000  # blocks that are simulated at once
 
 
 class ClosedLoop:
-    """Recordings whose command and controller are known, or whose current is put in, cut into windows.
+    """Recordings whose command and controller are known, or whose current or voltage is put in, cut into windows.
 
     Each starts from its own first sample.
     """
@@ -57,7 +58,7 @@ class ClosedLoop:
         if not measurements:
             raise InputError("one recording or more is needed")
         self.actuator = actuator
-        self.simulates_commands = actuator.controller.kind != "open"
+        self.simulates_commands = actuator.controller.kind != "open" or actuator.takes_voltage
         self.effects = {
             name: find(name, actuator.axes).settings(dict(given)) for name, given in (effects or {}).items()
         }
@@ -89,6 +90,7 @@ class ClosedLoop:
         k: ArrayLike | None = None,
         turned_rad: ArrayLike = 0.0,
         play_rad: ArrayLike = 0.0,
+        faster_rad_s: ArrayLike = 0.0,
         effects: Effects | None = None,
         *,
         even: bool = False,
@@ -98,7 +100,7 @@ class ClosedLoop:
         if even:
             mean = np.full_like(window.load, window.load.mean())
             window = replace(window, load=mean, supply=np.ones_like(window.supply))
-        return self._simulated(window, actuator, k, turned_rad, play_rad, effects)
+        return self._simulated(window, actuator, k, turned_rad, play_rad, faster_rad_s, effects)
 
     def twin(
         self,
@@ -140,6 +142,7 @@ class ClosedLoop:
         k: Array,
         turned_rad: ArrayLike,
         play_rad: ArrayLike,
+        faster_rad_s: ArrayLike,
         effects: Effects,
     ) -> Signals:
         """As in `Model`."""
@@ -157,7 +160,7 @@ class ClosedLoop:
             others,
             load_Nm=load,
             start_rad=window.user_rad + np.asarray(turned_rad) * actuator.transmission.gear_ratio,
-            start_speed_rad_s=window.speed_rad_s,
+            start_speed_rad_s=window.speed_rad_s + np.asarray(faster_rad_s),
             start_play_rad=window.play_rad + np.asarray(play_rad),
             start_integral_Nm=window.integral_Nm(actuator, k, turned_rad, play_rad),
             start_time_s=window.begins_s,
@@ -192,19 +195,23 @@ class ClosedLoop:
         k: ArrayLike | None = None,
         turned_rad: ArrayLike = 0.0,
         play_rad: ArrayLike = 0.0,
+        faster_rad_s: ArrayLike = 0.0,
         effects: Effects | None = None,
     ) -> Signals:
         actuator = (actuator or self.actuator).varied(window.values)
         k = np.atleast_2d(np.asarray(actuator.k if k is None else k, dtype=float))
         if window.input == "motor_torque_Nm":  # which is put in as it is
             actuator = actuator.varied({"motor.torque_constant_Nm_A": 1.0})
-        rows = monitor_rows(actuator, k, self.stack, self.effects if effects is None else effects)
+        effects = self.effects if effects is None else effects
+        if window.input == "motor_voltage_V":  # which is measured behind all that the supply does to it
+            effects = {**effects, **_of_supply({**actuator.effects, **effects})}
+        rows = monitor_rows(actuator, k, self.stack, effects)
         tau = actuator.transmission.gear_ratio
         state = initial_state(
             actuator,
             len(rows),
             window.user_rad + np.asarray(turned_rad) * tau,
-            window.speed_rad_s,
+            window.speed_rad_s + np.asarray(faster_rad_s),
             window.play_rad + np.asarray(play_rad),
             self.stack,
             window.integral_Nm(actuator, k, turned_rad, play_rad),
@@ -250,6 +257,15 @@ def _load_and_others(window: LoopWindow, effects: Effects) -> tuple[Array, Effec
     pull = effects.get(LOAD, {"torque_Nm": 0.0})["torque_Nm"]
     others = {name: settings for name, settings in effects.items() if name != LOAD}
     return window.load.mean() + np.asarray(pull), others
+
+
+def _of_supply(effects: Effects) -> Effects:
+    """Of the effects, those that act on the bus voltage alone, with settings that do nothing."""
+    return {
+        name: find(name).neutral
+        for name in effects
+        if {place.__name__ for place in find(name).places} == {"bus_voltage"}
+    }
 
 
 def _each(value: ArrayLike) -> Array:

@@ -20,7 +20,8 @@ def with_delay_of_drive(actuator: Actuator, measurements: Sequence[Measurement])
     Without it, what the loop loses of its damping is taken for a torque constant or a current sensor that is off.
     As it is where its drive is the three-phase model's, which is not a digital one, or where no drive is simulated.
     """
-    if actuator.controller.kind not in ("cascade", "position") or actuator.has_reference_model:
+    is_simulated = actuator.controller.kind in ("cascade", "position") or actuator.takes_voltage
+    if not is_simulated or actuator.has_reference_model:
         return actuator
     if _DELAY in actuator.effects or not any(one.free for one in actuator.tolerances.values()):
         return actuator

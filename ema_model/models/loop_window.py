@@ -8,11 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ema_model.actuator import Actuator
+from ema_model.actuator.actuator import CURRENT_INPUTS, VOLTAGE_INPUTS
 from ema_model.actuator.steps import coarsest_step
 from ema_model.commands.recorded import between
 from ema_model.errors import InputError, quoted
 from ema_model.models.model import Window
 from ema_model.recordings import SIGNALS, Measurement
+from ema_model.recordings.columns import MOST_DUTY
 from ema_model.recordings.noise import beating, held, is_of_grid
 from ema_model.recordings.read import WITHOUT_COMMAND
 from ema_model.simulation.pack import integral_at_start
@@ -31,10 +33,10 @@ BLOCK_S = 0.5e-3  # means over it take the chopping ripple away, which no low-fi
 class LoopWindow(Window):
     """A window with its inputs, (steps,), and its start; measured are block means of `COMPARED`, as recorded."""
 
-    command: Array  # rad; A or N·m in an open loop
+    command: Array  # rad; in an open loop A, N·m, V or a share of the bus voltage
     input: str  # the signal that it is of, by its name inside
     load: Array  # N·m at the user
-    supply: Array  # bus voltage over nominal; 0 where the drive is off
+    supply: Array  # bus voltage over nominal, or in an open loop in V; 0 where the drive is off
     steps_per_sample: int
     step_s: float
     user_rad: float  # where it starts: the motor's angle as a user's, rad
@@ -82,7 +84,7 @@ def cut(
     block_s: 0 compares every sample.  Raises InputError if nothing can be compared.
     """
     put_in = input_of(measurement, actuator)
-    known = [name for name in COMPARED if name != "current_A" or put_in == "command_rad"]
+    known = [name for name in COMPARED if name != "current_A" or put_in not in CURRENT_INPUTS]
     if not any(name in measurement for name in known):
         wanted = ", ".join(measurement.shown(name) for name in known)
         raise InputError(f"{quoted(measurement.name)}: nothing to compare; one of {wanted} is needed")
@@ -91,6 +93,8 @@ def cut(
     steps = steps_per_sample(period, min(actuator.step_s, coarsest_step(period)))
     step_s = period / steps
     values = {path: value for rule in actuator.rules_for(measurement.name) for path, value in rule.values.items()}
+    if put_in == "motor_voltage_V" or (put_in == "duty" and "bus_voltage_V" in measurement):
+        values["inverter.bus_voltage_V"] = 1.0  # what is put in, or the supply beside it, is in V already
     windows = []
     for run in stretches or measurement.runs:
         blocks = (run.stop - run.start - 1) // samples
@@ -146,14 +150,28 @@ def cut(
 
 
 def input_of(measurement: Measurement, actuator: Actuator) -> str:
-    """The signal that is put in: the command, in an open loop the current or torque; InputError without one."""
+    """The signal that is put in: the command, in an open loop the current or torque, or the voltage or duty.
+
+    InputError without one, and for a duty of a supply that is not known.
+    """
     if actuator.controller.kind != "open":
         has_input = "current_A" in measurement or "motor_torque_Nm" in measurement
         measurement.require("command_rad", without=WITHOUT_COMMAND if has_input else "")
         return "command_rad"
-    found = [name for name in ("current_A", "motor_torque_Nm") if name in measurement]
+    inputs = VOLTAGE_INPUTS if actuator.takes_voltage else CURRENT_INPUTS
+    found = [name for name in inputs if name in measurement]
     if not found:
-        measurement.require("current_A")
+        measurement.require(inputs[0], without=f"or {inputs[1]}")
+    if found[0] == "duty" and (most := float(np.max(np.abs(measurement["duty"])))) > MOST_DUTY:
+        raise InputError(
+            f"{quoted(measurement.name)}: its duty goes to {most:g}, and a share of the bus voltage is within ±1; say "
+            "what full is by --map, as duty=COLUMN[/255] or duty=COLUMN[%]"
+        )
+    if found[0] == "duty" and "bus_voltage_V" not in measurement and actuator.inverter.bus_voltage_V == 0.0:
+        raise InputError(
+            f"{quoted(measurement.name)}: a duty is a share of the bus voltage, which is not known; say it in the "
+            "actuator's file, [inverter] bus_voltage_V, or map a column to bus_voltage_V"
+        )
     return found[0]
 
 
@@ -163,7 +181,7 @@ def _inputs(
     """Command, load and supply at every step; linear between samples, but for jumps and the drive's switch."""
     time = measurement.time_s[run] - measurement.time_s[run.start]
     at = np.arange(steps) * step_s - actuator.sensors.delay_s
-    if put_in != "command_rad" and measurement.side.sampling != "instantaneous":  # of each period its own mean
+    if put_in in CURRENT_INPUTS and measurement.side.sampling != "instantaneous":  # of each period its own mean
         held = np.clip(np.floor(at / measurement.sample_period_s + 1e-6).astype(int) + 1, 0, time.size - 1)
         command: Array = measurement[put_in][run][held].astype(float)
     else:
@@ -172,8 +190,9 @@ def _inputs(
     loads = np.zeros(steps) if load is None else np.interp(at, time, load[run])
     bus = measurement.get("bus_voltage_V")
     supply = np.ones(steps)
-    if bus is not None and actuator.inverter.kind == "voltage":
-        supply = np.interp(at, time, bus[run]) / actuator.inverter.bus_voltage_V
+    if bus is not None and actuator.inverter.kind == "voltage" and put_in != "motor_voltage_V":
+        nominal = 1.0 if put_in == "duty" else actuator.inverter.bus_voltage_V
+        supply = np.interp(at, time, bus[run]) / nominal
     enabled = measurement.get("drive_enabled")
     if enabled is not None:
         held = np.clip(np.searchsorted(time, at, side="right") - 1, 0, time.size - 1)

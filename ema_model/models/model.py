@@ -79,6 +79,7 @@ class Model(Protocol):
         k: ArrayLike | None = None,
         turned_rad: ArrayLike = 0.0,
         play_rad: ArrayLike = 0.0,
+        faster_rad_s: ArrayLike = 0.0,
         effects: Effects | None = None,
         *,
         even: bool = False,
@@ -86,8 +87,9 @@ class Model(Protocol):
         """What a window's sensors would show, all that is measured there and more: k (n, 8) → (n, blocks) each.
 
         actuator, k, effects: in place of the model's own.  Parameters of the actuator and of effects, turned_rad (the
-        motor's angle at the start, rad, beyond the measured one) and play_rad (the same for its place in the play)
-        may be arrays (n,).  even: under the window's mean load and a supply that does not change.
+        motor's angle at the start, rad, beyond the measured one), play_rad (the same for its place in the play) and
+        faster_rad_s (for its speed) may be arrays (n,).
+        even: under the window's mean load and a supply that does not change.
         """
         ...
 
@@ -110,6 +112,7 @@ class Model(Protocol):
         k: Array,
         turned_rad: ArrayLike,
         play_rad: ArrayLike,
+        faster_rad_s: ArrayLike,
         effects: Effects,
     ) -> Signals:
         """Those of a few at once, k (n, 8), all else as of `signals`: (n, blocks) each."""

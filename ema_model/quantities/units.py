@@ -127,6 +127,9 @@ _COUNTS = re.compile(
 )
 
 
+_SHARE = re.compile(r"(?:of|1?/)([1-9][0-9]{1,6})")
+
+
 def plain(text: str) -> str:
     """A unit's text as the table spells it: "N·m" is nm, "rad_per_s" and "rad s⁻¹" are rad/s."""
     text = unicodedata.normalize("NFKC", text.replace("º", "°")).strip().lower()
@@ -155,7 +158,7 @@ def find_unit(text: str, dimension: str) -> Unit | None:
     """The unit of this dimension that the text names, or None.
 
     `counts/4096` is an encoder's counts of 4096 per turn, `counts/4096/s` its rate; without the number the
-    unit is known but cannot be converted: its numerator is NaN.
+    unit is known but cannot be converted: its numerator is NaN.  `/255` is a share in counts of 255.
     """
     return _spelt(plain(text), dimension)
 
@@ -169,6 +172,8 @@ def dimensions_of(text: str) -> list[str]:
 def _spelt(spelling: str, dimension: str) -> Unit | None:
     if spelling in UNITS.get(dimension, {}):
         return UNITS[dimension][spelling]
+    if not dimension and (share := _SHARE.fullmatch(spelling)):
+        return Unit(f"/{share[1]}", dimension, 1.0, float(share[1]))
     counts = _COUNTS.fullmatch(spelling)
     if counts and dimension == ("rad/s" if counts[2] or counts[4] else "rad"):
         per_turn = float(counts[3] or 0)
@@ -182,4 +187,4 @@ def _spelt(spelling: str, dimension: str) -> Unit | None:
 def known_units(dimension: str) -> list[str]:
     """The names of the units of a dimension."""
     names = list(dict.fromkeys(unit.name for unit in UNITS.get(dimension, {}).values()))
-    return [*names, *({"rad": ["counts/4096"], "rad/s": ["counts/4096/s"]}.get(dimension, []))]
+    return [*names, *({"rad": ["counts/4096"], "rad/s": ["counts/4096/s"], "": ["/255"]}.get(dimension, []))]

@@ -24,6 +24,7 @@ Array = NDArray[np.float64]
 
 _LATE_START_S = 1e5  # clocks of a computer start later than any recording lasts
 _MOST = 1e30  # so that no product overflows
+MOST_DUTY = 1.5  # a share of the bus voltage is within ±1, but for offsets
 WITHOUT_DELAY = ("time_s", "segment")  # which say when all others are
 _FORM = "write signal=column[unit], e.g. motor_speed_rad_s=speed[rpm]"
 NUMBERS = {"sign": 1, "scale": 1.0, "offset": 0.0, "delay_s": 0.0}  # of a column, and what they are where left out
@@ -339,7 +340,8 @@ def without_unit(columns: Collection[str]) -> list[str]:
 
 def _reading_with_unit(entry: MappedColumn) -> str:
     unit = f" [{entry.unit}]" if entry.unit and not unit_in_name(entry.column, entry.signal) else ""
-    return f"{shown(entry.column)}{unit}"
+    why = f" ({entry.reason.rpartition('; ')[2]})" if unit and entry.signal == "duty" else ""
+    return f"{shown(entry.column)}{unit}{why}"
 
 
 # --- guesses which column is which signal, and in which unit, from the names and, where given, the numbers ------------
@@ -406,6 +408,8 @@ def doubt(entry: MappedColumn) -> str:
     """Why a guess must not be used before somebody has said so, in plain words; "" for one that is sure."""
     if entry.rivals:
         return f"{listed(map(repr, map(shown, entry.rivals)))} may be it as well"
+    if entry.signal == "duty" and entry.confidence < _SURE:
+        return entry.reason
     if entry.signal != "time_s" and not entry.unit and entry.column != entry.signal and SIGNALS[entry.signal].unit:
         return "it has no unit"  # the unit of time shows in its steps
     return entry.reason if entry.confidence < _SURE else ""
@@ -441,13 +445,32 @@ def _checked(guess: Guess, values: ArrayLike | None) -> Guess:
             return _time_unit(guess, float(np.median(steps)))
         return guess
     largest = float(np.max(np.abs(numbers)))
+    if guess.signal == "duty" and not guess.unit and largest > MOST_DUTY:
+        return _duty_unit(guess, largest)
     if guess.unit or guess.confidence == 1.0:
         return guess
-    if guess.signal == "duty" and 1.5 < largest <= 100.5:
-        return replace(guess, unit="%", reason=f"{guess.reason}; up to {largest:.3g}, so in percent")
     if guess.signal == "temperature_C" and largest > 200.0:
         return replace(guess, unit="K", reason=f"{guess.reason}; up to {largest:.3g}, so in kelvin")
     return guess
+
+
+# Full scales that duties are counted in: percent, timers and the words of their registers.
+_FULL_DUTIES = (
+    *(100, 127, 128, 255, 256, 511, 512, 999, 1000, 1023, 1024, 2047, 2048, 4095, 4096, 8191, 8192, 9999, 10_000),
+    *(16_383, 16_384, 32_767, 32_768, 65_535, 65_536),
+)
+
+
+def _duty_unit(guess: Guess, largest: float) -> Guess:
+    """The scale of a duty that goes beyond ±1: plain where it goes to a full scale, else to be asked for."""
+    full = next((one for one in _FULL_DUTIES if largest <= one * (1.0 + 1e-9)), None)
+    if full is None:
+        return replace(guess, confidence=0.5, reason=f"it goes up to {largest:g}, and nothing says what is full")
+    unit = "%" if full == 100 else f"/{full}"
+    if largest > 0.995 * full and (full == 100 or largest == full):
+        return replace(guess, unit=unit, reason=f"{guess.reason}; up to {largest:g}, so that {full} is full")
+    reason = f"it goes up to {largest:g}, and nothing says whether {full} is full"
+    return replace(guess, unit=unit, confidence=0.5, reason=reason)
 
 
 def _time_unit(guess: Guess, step: float) -> Guess:

@@ -12,6 +12,7 @@ from typing import TypeVar, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ema_model.commands import recorded
 from ema_model.errors import InputError
 from ema_model.files.opened import listed, shown
 from ema_model.quantities.axes import Axes
@@ -179,6 +180,7 @@ def gear_in_words(gear_ratio: float, axes: Axes) -> str:
 
 Default = TypeVar("Default")
 
+_OF_A_CURVE = 4  # samples, below which no curve is drawn through them
 _MOST_SAMPLES = 100_000_000
 _SELDOM = 0.01  # of all steps, up to which long ones are gaps
 _JITTER = 1e-3  # of the period, from which on the samples count as off the grid
@@ -343,8 +345,9 @@ class Measurement(InWords):
     def resampled(self, period_s: float) -> Measurement:
         """The signals on a grid of equal steps that starts with the first sample (of each run).
 
-        Between samples signals are linear and states held; nothing is filtered, so a grid much coarser than
-        the samples folds fast contents down.  Raises InputError for a period that gives no usable grid.
+        Between samples signals are linear, positions smooth, a command is as it is simulated, and states are held;
+        nothing is filtered, so a grid much coarser than the samples folds fast contents down.  Raises InputError for a
+        period that gives no usable grid.
         """
         if not (np.isfinite(period_s) and period_s > 0.0):
             raise InputError(f"the sample period must be a time above 0 s, not {period_s:g}")
@@ -364,8 +367,23 @@ class Measurement(InWords):
         resampled = {}
         for name, values in self.signals.items():
             state = name in SIGNALS and SIGNALS[name].kind == "state"
-            resampled[name] = values[run][held] if state else np.interp(grid, time, values[run])
+            if name == "command_rad":  # it is known exactly, and a chord would leave it where it bends
+                resampled[name] = recorded.between(grid, time, values[run])
+            elif name in SIGNALS and SIGNALS[name].kind == "position" and time.size > _OF_A_CURVE:
+                resampled[name] = _curved(grid, time, values[run])
+            else:
+                resampled[name] = values[run][held] if state else np.interp(grid, time, values[run])
         return {**resampled, "time_s": grid}
+
+
+def _curved(at_s: Array, time_s: Array, position: Array) -> Array:
+    """A position (n,) at other times within its own, on Akima's curve.
+
+    Where a sample was lost, a chord leaves a motor that speeds up by 5,000 rad/s² by 0.6 mrad in a gap of 1 ms.
+    """
+    from scipy.interpolate import Akima1DInterpolator  # takes a third of a second to import
+
+    return Akima1DInterpolator(time_s, position)(np.clip(at_s, time_s[0], time_s[-1]))
 
 
 def _frozen(values: ArrayLike) -> Array:

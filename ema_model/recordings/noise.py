@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 # What no sensor and no simulation resolves, by the kind of signal, in its unit: the noise of one that hardly tells its
 # own, because it was calculated or does not change.
-_FINEST = {"position": 1e-9, "speed": 1e-6, "current": 1e-6, "torque": 1e-8}
+_FINEST = {"position": 1e-9, "speed": 1e-6, "current": 1e-6, "torque": 1e-8, "force": 1e-6}
 
 _ORDERS = range(3, 9)  # of the differences: a smooth motion has no third ones, but where it is sampled slowly
 _LEVEL = 0.98  # of an order's noise, that the next order's must reach: noise is white, and motion is not

@@ -16,6 +16,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
+from ema_model.actuator.actuator import CURRENT_INPUTS, VOLTAGE_INPUTS
 from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.files.limits import COLUMNS, FILE_BYTES, RUNS, megabytes
 from ema_model.files.opened import check_user_file, listed, reason, refusal, shown
@@ -433,7 +434,8 @@ def _between(actuator: Actuator) -> list[str]:
 
 Needs = Sequence[Sequence[str]]  # of each group one signal, the first that there is; names inside
 COMMAND_ALONE: Needs = (("time_s",), ("command_rad",))
-INPUT_ALONE: Needs = (("time_s",), ("current_A", "motor_torque_Nm"))
+INPUT_ALONE: Needs = (("time_s",), CURRENT_INPUTS)
+VOLTAGE_ALONE: Needs = (("time_s",), VOLTAGE_INPUTS)
 WITHOUT_COMMAND = (  # the end of a line that asks for one
     "where no command was recorded, add --open-loop to compare or discover, "
     'or choose an actuator with [controller] kind = "unknown"'
@@ -514,6 +516,8 @@ def how_to_read(
     for entry in given.entries:
         known = known.with_entry(entry)
     settled = {entry.column for entry in known.entries} | {"", *SIGNALS}
+    if "duty" not in {entry.signal for entry in known.entries}:
+        settled -= {"duty"}  # whose name says no scale
     there = _there(actuator, known, header) | ({"time_s"} if hints.rate_Hz else set())
     needs = needed(actuator, is_map=side.kind == "map")
     missing = {name for group in needs if there.isdisjoint(group) for name in group}
@@ -523,15 +527,28 @@ def how_to_read(
         read_columns(path, max_bytes=max_bytes, hints=hints) if columns is None else columns, known=known
     )
     fresh = [entry for entry in guess.entries if entry.column not in settled]
+    fresh = [entry for entry in fresh if entry.column != entry.signal or entry.unit]
     if hints.rate_Hz:  # whatever looks like a time is none
         fresh = [entry for entry in fresh if entry.signal != "time_s"]
     if of_actuator:  # its file says what matters in its recordings, so that only what is needed is sought beside
-        fresh = [entry for entry in fresh if actuator.axes.inside({entry.signal: 0}).keys() & missing]
+        sought = {*missing, "duty"} if "duty" in header else missing
+        fresh = [entry for entry in fresh if actuator.axes.inside({entry.signal: 0}).keys() & sought]
     doubts = tuple((entry, why) for entry in fresh if (why := doubt(entry)))
     sure = tuple(entry for entry in fresh if not doubt(entry))
     export = known_export(header)
     remarks = (export.sentence,) if export is not None and export.names else ()
     return Reading(ColumnMapping((*known.entries, *sure), guess.unmapped), sure, doubts, remarks=remarks)
+
+
+def signals_in(
+    path: str | os.PathLike[str], actuator: Actuator, mapping: Sequence[str] = (), *, hints: Hints = NONE
+) -> set[str]:
+    """The signals, by their names inside, that a file has or can be given, as `read` would take its columns."""
+    path = os.fspath(path)
+    hints = hints_of(path, _side_file(path, actuator, None, FILE_BYTES), hints)
+    reading = how_to_read(path, actuator, mapping, hints=hints)
+    entries = ColumnMapping((*reading.mapping.entries, *(entry for entry, _ in reading.doubts)))
+    return _there(actuator, entries, read_header(path, FILE_BYTES, hints))
 
 
 def needed(actuator: Actuator, *, is_map: bool = False) -> Needs:
@@ -541,7 +558,7 @@ def needed(actuator: Actuator, *, is_map: bool = False) -> Needs:
     if actuator.controller.kind == "unknown":
         return (("time_s",), _POSITIONS, ("current_A", "motor_torque_Nm"))
     if actuator.controller.kind == "open":
-        return (*INPUT_ALONE, _MOTION)
+        return (*VOLTAGE_ALONE, ("current_A", *_MOTION)) if actuator.takes_voltage else (*INPUT_ALONE, _MOTION)
     return (*COMMAND_ALONE, ("current_A", *_MOTION))
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ema_model.actuator import Actuator
-from ema_model.actuator.layout import WITHOUT_DRIVE
+from ema_model.actuator.layout import WITHOUT_LOOP
 from ema_model.commands import Command
 from ema_model.errors import InputError, quoted
 from ema_model.recordings import Measurement
@@ -91,7 +91,7 @@ _RATE_HZ: dict[str, float] = dict(zip(FITNESSES, (10_000.0, 100_000.0)))
 
 def can_be_explored(actuator: Actuator) -> bool:
     """Whether any model can follow a command."""
-    return actuator.controller.kind not in WITHOUT_DRIVE
+    return actuator.controller.kind not in WITHOUT_LOOP
 
 
 def note(actuator: Actuator) -> str:

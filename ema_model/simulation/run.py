@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ema_model.actuator import Actuator
-from ema_model.actuator.layout import WITHOUT_DRIVE
+from ema_model.actuator.layout import WITHOUT_LOOP
 from ema_model.commands import COMMANDS, Command, command
 from ema_model.effects import find
 from ema_model.errors import InputError, quoted
@@ -251,7 +251,7 @@ def simulate_monitors(
     """The Monitor Model's signals for every k of (n, 8), in one run of the population; as `simulate_monitor`."""
     k = np.atleast_2d(np.asarray(k, dtype=float))
     effects = {name: find(name, actuator.axes).settings(dict(given)) for name, given in (effects or {}).items()}
-    if actuator.controller.kind in WITHOUT_DRIVE:
+    if actuator.controller.kind in WITHOUT_LOOP:
         raise InputError(f"{quoted(actuator.name)}: its controller is not known, so that no command can be simulated")
     stack = stack_at_hand(actuator, effects, circuit, "traces")
     period = _steps_per_sample(run, actuator.step_s)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
-from ema_model.actuator.layout import WITHOUT_DRIVE
+from ema_model.actuator.layout import WITHOUT_LOOP
 from ema_model.commands import command
 from ema_model.effects import Effect, find
 from ema_model.errors import InputError
@@ -109,7 +109,7 @@ class EffectRuns:
 
     def is_compiled(self, name: str) -> bool:
         """Whether a run with that effect begins at once; else its kernel is compiled first."""
-        if self.actuator.controller.kind in WITHOUT_DRIVE:
+        if self.actuator.controller.kind in WITHOUT_LOOP:
             return True  # it is refused at once
         return is_compiled(stack_at_hand(self.actuator, {name}, "reduced", "traces"), "traces")
 

@@ -16,7 +16,7 @@ from ema_model.errors import InputError, quoted
 from ema_model.quantities.axes import Axes
 from ema_model.recordings import Measurement, read
 from ema_model.recordings.formats.text_layout import Hints
-from ema_model.recordings.read import COMMAND_ALONE, INPUT_ALONE, Needs
+from ema_model.recordings.read import COMMAND_ALONE, INPUT_ALONE, VOLTAGE_ALONE, Needs, signals_in
 from ema_model.recordings.recording_set import (
     check_held_out,
     column_of_runs,
@@ -130,12 +130,23 @@ def hints_of(arguments: argparse.Namespace) -> Hints:
 def actuator_of(arguments: argparse.Namespace) -> Actuator:
     """The actuator that --actuator names, without its controller where --open-loop asks for that."""
     actuator = load_actuator(arguments.actuator)
-    return actuator.in_open_loop() if getattr(arguments, "open_loop", False) else actuator
+    if not getattr(arguments, "open_loop", False):
+        return actuator
+    files = files_to_read(arguments)[0]
+    return actuator.in_open_loop(_recorded(files[0], arguments, actuator) if files else ())
 
 
 def input_of(arguments: argparse.Namespace, actuator: Actuator) -> Measurement:
-    """The recording of --input, whose current or torque is put in."""
-    return read_one(arguments.input, arguments, actuator.in_open_loop(), needs=INPUT_ALONE)
+    """The recording of --input, whose current or torque, or voltage or duty, is put in."""
+    opened = actuator.in_open_loop(_recorded(arguments.input, arguments, actuator))
+    return read_one(arguments.input, arguments, opened, needs=VOLTAGE_ALONE if opened.takes_voltage else INPUT_ALONE)
+
+
+def _recorded(file: str, arguments: argparse.Namespace, actuator: Actuator) -> set[str]:
+    """The signals of a file, where they decide what is put in; of a drive without a voltage they do not."""
+    if actuator.inverter.kind != "voltage":
+        return set()
+    return signals_in(file, actuator, arguments.mapping, hints=Hints(arguments.header_line, arguments.encoding))
 
 
 def faults_of(arguments: argparse.Namespace, known: Mapping[str, float] | None = None) -> Any:
@@ -166,6 +177,16 @@ def effects_of(arguments: argparse.Namespace, axes: Axes) -> dict[str, dict[str,
             raise InputError(f"--effect {quoted(name)}: given twice; write it once")
         effects[effect.name] = effect.settings(given)
     return effects
+
+
+def effects_to_fit(arguments: argparse.Namespace) -> list[str]:
+    """Effects of the library that --effect names without any value: their values are what the recordings ask for."""
+    if not arguments.effect:
+        return []
+    from ema_model.effects.user.entries import kind_of
+
+    parts = [text.partition(":") for text in arguments.effect]
+    return [name for name, _, rest in parts if not split_at_commas(rest) and kind_of(name) is None]
 
 
 def split_at_commas(text: str) -> list[str]:

@@ -188,7 +188,8 @@ def add_effects(parser: argparse.ArgumentParser) -> None:
         default=[],
         type=_with_effect,
         metavar="NAME:param=value,…",
-        help="a physical effect, or your own torque 'user_torque:expression=c*omega,c=-1e-4'; repeat for more",
+        help="a physical effect, or your own torque 'user_torque:expression=c*omega,c=-1e-4'; repeat for more; "
+        "without values it is fitted, where anything is",
     )
 
 
@@ -273,5 +274,5 @@ def add_open_loop(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--open-loop",
         action="store_true",
-        help="leave the controller out: the recorded current, torque or force goes in, and the motion is compared",
+        help="leave the controller out: the recorded current, torque or force goes in; of a voltage drive, its voltage",
     )

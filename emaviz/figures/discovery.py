@@ -165,20 +165,19 @@ def candidates(found: Discovery, *, dark: bool = False) -> go.Figure:
         )
     most = max([1.0, *(one.predicted_drop for one in shown), *(value for value in refitted if value is not None)])
     for place, one in enumerate(shown):
-        if one.untestable_reason:
+        if one.obstacle:
             chart.add_annotation(
                 x=0.0,
                 y=place,
-                text="cannot be shown by these recordings",
+                text="not in this model" if one.cannot_represent else "cannot be shown by these recordings",
                 showarrow=False,
                 xanchor="left",
                 xshift=6,
                 font={"size": 11, "color": theme.EDGE},
-                hovertext=theme.plain(one.untestable_reason),
+                hovertext=theme.plain(one.obstacle),
             )
     ticks = [
-        f'<span style="color:{theme.EDGE}">{name}</span>' if one.untestable_reason else name
-        for name, one in zip(names, shown)
+        f'<span style="color:{theme.EDGE}">{name}</span>' if one.obstacle else name for name, one in zip(names, shown)
     ]
     chart.update_xaxes(range=[0.0, 1.08 * most])
     chart.update_yaxes(tickvals=list(range(len(shown))), ticktext=ticks, showgrid=False, nticks=0)

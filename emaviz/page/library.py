@@ -100,7 +100,7 @@ class EffectPage:
         if index == 0:
             middle, most = effect.severities[1], 1.25 * max(effect.severities)
             low, high = max(one.low, 0.0), min(one.high, most)
-        elif one.name in ("phase_rad", "angle_rad"):
+        elif one.name == effect.phase:
             middle, low, high = one.default, one.low, one.high
         else:
             middle, most = one.default, 3.0 * max(abs(one.default), 0.01 * (one.high - one.low))

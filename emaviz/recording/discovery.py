@@ -228,7 +228,7 @@ class DiscoveryWriter(RecordingWriter):
 
     def candidates(self) -> None:
         """The ranking as a table, and as bars in its order."""
-        chosen = [one for one in self._found.ranked if not one.untestable_reason]
+        chosen = [one for one in self._found.ranked if not one.obstacle]
         with self._file.lock:
             told = candidates(self._found) or Lines(["None was scored."])
             self._text(CANDIDATES, written("Candidates", [told]))

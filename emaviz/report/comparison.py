@@ -8,7 +8,16 @@ import numpy as np
 
 from ema_model.comparison.regions import worst_moment
 from ema_model.comparison.result import Comparison, Region
-from ema_model.comparison.words import details, errors, errors_by_recording, held_out, of_floor, verdict
+from ema_model.comparison.words import (
+    FREE_NOTE,
+    details,
+    errors,
+    errors_by_recording,
+    free_simulation,
+    held_out,
+    of_floor,
+    verdict,
+)
 from ema_model.estimation.calibrate import calibration_table, convergence, warnings
 from ema_model.quantities.numbers import number
 from ema_model.quantities.variables import VARIABLES, variable_title
@@ -20,6 +29,7 @@ from emaviz.figures.comparison import time_ranges
 from emaviz.report.page import (
     Figures,
     Section,
+    blocks,
     bullets,
     escape,
     folded,
@@ -61,7 +71,7 @@ _ERRORS_PER_SIGNAL_NOTE = (
 
 
 class ErrorsPerSignal(Section[Comparison]):
-    """A table over all recordings, and one for each signal by recording where there are several."""
+    """A table over all recordings, that of the free simulation, and one for each signal by recording."""
 
     title = "Errors"
     anchor = "errors"
@@ -69,6 +79,7 @@ class ErrorsPerSignal(Section[Comparison]):
     def body(self, subject: Comparison, figures: Figures) -> str:
         """Always there."""
         parts = [with_remarks(errors(subject)), paragraph(_ERRORS_PER_SIGNAL_NOTE, "small")]
+        parts.append(blocks(free_simulation(subject.simulation, subject.actuator.axes), FREE_NOTE))
         for name in subject.signals:
             if (told := errors_by_recording(subject, name)) is not None:
                 title = f"{comparison.quantity_of_signal(subject, name).title}, by recording"
@@ -294,5 +305,6 @@ SECTIONS: tuple[Section[Comparison], ...] = (
 def write_report(comparison: Comparison, path: str | Path) -> None:
     """Writes one HTML file that opens offline, whole or not at all; InputError where it cannot be written."""
     names = ", ".join(one.name or "recording" for one in comparison.recordings)
-    title = "Where the model fails" if not comparison.adequate else "The model is adequate"
+    titles = {"adequate": "The model is adequate", "uninformative": "The recordings tell nothing of the model"}
+    title = titles.get(comparison.verdict, "Where the model fails")
     write(path, page(title, f"{comparison.actuator.name} against {names}", SECTIONS, comparison))

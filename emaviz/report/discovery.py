@@ -10,6 +10,7 @@ from typing import Any
 import numba
 import numpy as np
 
+from ema_model.comparison.words import FREE_NOTE, free_simulation
 from ema_model.discovery import Discovery, words
 from ema_model.discovery.result import Added
 from ema_model.discovery.words import (
@@ -38,6 +39,7 @@ from emaviz.figures import discovery
 from emaviz.report.page import (
     Figures,
     Section,
+    blocks,
     bullets,
     document_table,
     escape,
@@ -102,6 +104,7 @@ class Ladder(Section[Told]):
             figures.place(discovery.error_ladder(found), 360, "error-ladder")
             + with_remarks(ladder(found))
             + paragraph(FLOOR_NOTE, "small")
+            + blocks(free_simulation(found.simulation, found.actuator.axes), FREE_NOTE)
             + document_table(ladder_by_signal(found), "Each signal")
             + document_table(per_recording(found), "Each recording")
         )

@@ -77,6 +77,12 @@ def with_remarks(told: Table) -> str:
     return table([told.title, *told.head, *([""] if beside else [])], rows, marked=_STRONG)
 
 
+def blocks(parts: Sequence[Table | Lines], note: str) -> str:
+    """Tables and lines of a result's document, one after another, and what is to be known of them; nothing for none."""
+    shown = [with_remarks(one) if isinstance(one, Table) else bullets(one.lines) for one in parts]
+    return "".join([*shown, paragraph(note, "small")]) if shown else ""
+
+
 def link(anchor: str, text: object) -> str:
     """A link to a place in the same page."""
     return f'<a href="#{escape(anchor)}">{escape(text)}</a>'

@@ -180,7 +180,7 @@ class Description:
 
     @property
     def drives(self) -> tuple[str, ...]:
-        """What its controller may act through; none where the recording's current counts."""
+        """What its controller may act through, or an open loop put in; none where there is no choice."""
         return DRIVES[self.controller]
 
     @property
@@ -188,7 +188,7 @@ class Description:
         """Its parameters, the gear first."""
         for path in asked(self.controller, self._drive):
             named, facts = on_axes(path, self.axes), facts_of(path, self.axes)
-            empty = unanswered(path, self.axes)
+            empty = unanswered(path, self.axes, self.controller)
             other = ("as the lead, 10 mm" if named.unit == "m/rad" else "500:1") if path == _GEAR else ""
             yield Question(path, named.title, named.unit, facts.meaning, empty, usual_tolerance(facts), other)
 

@@ -40,7 +40,7 @@ def of_units(found: UnitsCompared) -> Meaning:
 def of_discovery(found: Discovery) -> Meaning:
     """An actuator with a fault, or with another controller or parameters than its file's, is not as it should be."""
     if found.verdict == "adequate":
-        other = found.faults or found.parameters_outside_tolerance or found.controller_seen is not None
+        other = found.faults or found.parameters_outside_tolerance or found.controller_seen or found.loop_lag
         return "found" if other else "good"
     return "found" if found.verdict == "effects_found" else "warning"
 

@@ -6,7 +6,7 @@ import pytest
 from support.on_page import choose, field, wait_until
 
 from ema_model.actuator import load_actuator
-from ema_model.actuator.layout import WITHOUT_DRIVE
+from ema_model.actuator.layout import says_drive
 from ema_model.actuator.reference import kinds_of_actuators, parameter_rows
 from ema_model.errors import InputError
 from ema_model.quantities.axes import Axes
@@ -38,7 +38,7 @@ def test_it_writes_what_the_command_line_writes(tmp_path):
 @pytest.mark.parametrize(("controller", "drive"), kinds_of_actuators())
 def test_every_kind_is_asked_what_its_file_must_say(controller, drive, tmp_path):
     one = Description(controller=controller, drive=drive)
-    kind = controller if controller in WITHOUT_DRIVE else f"{controller} + {drive}"
+    kind = f"{controller} + {drive}" if says_drive(controller, drive) else controller
     rows = [row for row in parameter_rows() if kind in row.kinds]
     needed = {row.path for row in rows if row.default == "needed" or kind in row.default}
     assert needed and needed <= {question.path for question in one.questions}

@@ -16,9 +16,9 @@ from worked_actuators import BALL_SCREW, WORKED
 
 from ema_model.actuator import load_actuator, save_actuator
 from ema_model.actuator.keys import ENTRY, HEAD, KINDS, TABLES
-from ema_model.actuator.layout import WITHOUT_DRIVE, layout
+from ema_model.actuator.layout import layout, says_drive
 from ema_model.actuator.naming import on_axes
-from ema_model.actuator.parameters import SECTIONS, Facts, facts_of, numbers
+from ema_model.actuator.parameters import SECTIONS, Facts, facts_of, is_said, numbers
 from ema_model.actuator.reference import kinds_of_actuators, markdown, parameter_rows
 from ema_model.actuator.unread import unread
 from ema_model.commands import command
@@ -116,7 +116,9 @@ def test_every_file_that_is_written_passes_its_own_check(controller, axes, tmp_p
         silent = unread(**kinds)
         every = [f"{section}.{name}" for section in SECTIONS for one in layout(section, kinds) for name in one]
         values = {
-            path: actuator.value(path) for path in every if path not in silent and abs(actuator.value(path)) < 1e8
+            path: actuator.value(path)
+            for path in every
+            if path not in silent and abs(actuator.value(path)) < 1e8 and is_said(path, actuator.value(path))
         }
         said = [f"--set={on_axes(one, shown).path}={value!r}" for one, value in values.items()]
         said = [one for one in said if not (axes and "gear_ratio" in one)]
@@ -328,7 +330,7 @@ def test_reference_is_what_is_shipped_and_has_every_key():
         assert isinstance(facts_of(path, Axes()), Facts) and row.meaning
         section, _, name = path.partition(".")
         for controller, drive in kinds_of_actuators():
-            shown = controller if controller in WITHOUT_DRIVE else f"{controller} + {drive}"
+            shown = f"{controller} + {drive}" if says_drive(controller, drive) else controller
             read = name in sum(layout(section, {"controller": controller, "inverter": drive}), ())
             assert (shown in row.kinds) == (read and path not in unread(controller, drive)), (path, shown)
 
@@ -341,3 +343,29 @@ def test_facts_agree_with_each_other(axes):
         assert facts.low < facts.high and (far or facts.low <= facts.guess <= facts.high), path
         assert not (facts.tolerance and facts.sigma), path
         assert not facts.follows or facts.follows in _paths(), path
+
+
+SCREW = ("--user=linear", "--lead-mm=10", "--controller=cascade", "--drive=current")
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ((*SCREW, "--set=controller.position_gain_1_s=40"), "40.0 1/s of either side alone is 25133 rad/(m·s) here"),
+        ((*SCREW, "--set=controller.position_gain_1_s=25133"), None),
+        ((*SCREW, "--set=controller.position_gain_1_s=1.6e7"), "a position loop of 25465 1/s"),
+        (("--controller=cascade", "--gear=1/500", "--set=controller.position_gain_1_s=40"), "is 20000 1/s here"),
+        ((*SCREW, "--set=controller.position_gain_1_s=6e5"), "which is slower: it would swing"),
+        (
+            ("--controller=position", "--drive=current", "--set=controller.gain_1_rad=1e-3", "--gear=1/5000"),
+            "1/rad makes",
+        ),
+    ],
+)
+def test_a_position_gain_is_checked_in_its_unit(options, said, tmp_path, capsys):
+    """On mixed axes it holds 2π over the lead: a loop of 40 1/s is 628 times as much in rad/(m·s)."""
+    path = tmp_path / "mine.toml"
+    assert new(path, *options) == 0
+    capsys.readouterr()
+    found = [line for line in check(path, capsys=capsys)["implausible"] if "position loop" in line]
+    assert not found if said is None else len(found) == 1 and said in found[0], found

@@ -7,18 +7,19 @@ from functools import cache
 
 import numpy as np
 import pytest
+from support.unknown_drive import drive_of, logged
 
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
-from ema_model.comparison import compare
-from ema_model.comparison.words import errors, held_out
+from ema_model.comparison import as_dict, compare
+from ema_model.comparison.words import errors, held_out, verdict
 from ema_model.discovery import discover
 from ema_model.estimation.floor import floor
 from ema_model.identification.objective import Objective
 from ema_model.identification.run import identify
 from ema_model.models import ClosedLoop, InverseDynamics
 from ema_model.recordings import Measurement, SideFile
-from ema_model.simulation.run import Run, simulate_monitor, simulate_reference
+from ema_model.simulation.run import Run, Sensors, simulate_monitor, simulate_reference
 
 ACTUATOR = load_actuator()
 LOOSE = replace(ACTUATOR, controller=replace(ACTUATOR.controller, kind="unknown"))
@@ -58,7 +59,9 @@ def test_a_motion_with_a_current_that_has_no_noise_is_compared(recording):
     found = compare([recording], LOOSE, calibrate=False)
     errors = found.signals["current_A"]
     assert errors.noise_floor > 0.0 and found.sentences
-    assert found.adequate is (errors.rmse <= errors.noise_floor)
+    constant = bool(np.ptp(recording["current_A"]) == 0.0)
+    assert found.uninformative is constant
+    assert found.adequate is (not constant and errors.rmse <= errors.noise_floor)
 
 
 def test_a_noiseless_recording_of_a_perfect_model_is_searched_for_effects():
@@ -82,12 +85,13 @@ def test_a_hundred_samples_have_an_answer():
 
 
 @pytest.mark.parametrize("simulate", [simulate_reference, simulate_monitor])
-def test_where_nothing_moves_the_model_is_right_and_k_is_healthy(simulate):
+def test_where_nothing_moves_nothing_is_told_of_model_or_k(simulate):
     still = simulate(STILL, ACTUATOR)
     found = compare([still], ACTUATOR)
-    assert found.adequate and found.calibration is not None and found.calibration.converged
-    answer = identify(Objective([still], ACTUATOR), population=10, iterations=5)
-    assert answer.uncertainty.adequate and answer.uncertainty.healthy
+    assert found.verdict == "uninformative" and found.over_floor < 1.0
+    assert found.calibration is not None and found.calibration.converged
+    sure = identify(Objective([still], ACTUATOR), population=10, iterations=5).uncertainty
+    assert sure.uninformative and not sure.healthy and not sure.alarms
 
 
 def test_a_sensor_that_is_said_to_have_no_noise_still_has_a_floor():
@@ -144,3 +148,70 @@ def test_an_error_is_counted_in_floors_only_where_the_recording_tells_its_noise(
     [unseen] = compare([seen], ACTUATOR, holdout=[without_the_end(seen)]).holdout
     [speed] = [part for part in held_out(unseen).split(", ") if part.startswith("motor speed")]
     assert ("(floor " in speed) is told
+
+
+# --- recordings that tell nothing of the model -----------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def healthy() -> Measurement:
+    return simulate_reference(Run(duration_s=0.2), load_actuator())
+
+
+def silenced(recording: Measurement, **signals: float) -> Measurement:
+    """With these signals constant."""
+    return recording.with_signals(**{name: np.full(recording.samples, value) for name, value in signals.items()})
+
+
+STANDING = dict.fromkeys(
+    ("command_rad", "user_position_rad", "motor_position_rad", "motor_speed_rad_s", "current_A"), 0.0
+)
+
+
+@pytest.mark.parametrize(
+    "made",
+    [
+        lambda one: silenced(one, **STANDING),
+        lambda one: silenced(one, **{**STANDING, "current_A": 1.3}),
+        lambda one: silenced(one, current_A=0.0),
+        lambda one: Sensors(current_noise_A=0.2).record(silenced(one, **STANDING), 1),
+        lambda one: Sensors(current_noise_A=12.0).record(one, 1),
+    ],
+    ids=["all zeros", "constant", "a dead current sensor", "noise at rest", "noise above the current"],
+)
+def test_a_recording_that_tells_nothing_is_uninformative(healthy, made):
+    """Whatever the model: it is not adequate by what was never measured."""
+    result = compare([made(healthy)])
+    told = as_dict(result)
+    assert told["verdict"] == "uninformative" and not told["adequate"]
+    assert not told["explained_by"] and not told["worst_regions"] and not told["events"]
+    assert told["signals"]["current_A"]["informative"] is False
+    assert told["sentences"][0].startswith("These recordings tell nothing of the model: the equivalent current ")
+    assert "explains" not in str(result) and verdict(result) == "uninformative"
+
+
+def test_a_motion_differentiated_to_more_than_the_current_is_uninformative(tmp_path):
+    """A coarse encoder's floor, some amperes, beside a current that is smaller."""
+    found = compare([logged(1, noise_A=0.05, counts=1.0)], drive_of(tmp_path, leaves_out_reversals=False))
+    error = found.signals["current_A"]
+    print(error)
+    assert error.noise_floor > error.signal_rms * 0.9 and found.verdict == "uninformative"
+
+
+def test_one_recording_of_two_that_tells_nothing_is_named(healthy):
+    """The other one decides."""
+    sensors = Sensors(current_noise_A=0.1, encoder_bits=16)
+    still = replace(sensors.record(silenced(healthy, **STANDING), 2), name="parked")
+    both = as_dict(compare([replace(sensors.record(healthy, 1), name="moves"), still]))
+    assert both["verdict"] == "adequate"
+    assert [one["signals"]["current_A"]["informative"] for one in both["recordings"]] == [True, False]
+    assert any(one.startswith("parked tells nothing of the model: the equivalent current") for one in both["warnings"])
+
+
+@pytest.mark.long
+def test_neither_a_discovery_nor_an_identification_calls_it_adequate(healthy):
+    noisy = Sensors(current_noise_A=12.0).record(healthy, 1)
+    found = discover([noisy], candidates=["cogging_torque"], most_effects=1)
+    assert found.verdict == "uninformative" and "tell nothing" in str(found)
+    sure = identify(Objective([silenced(healthy, current_A=0.0)], load_actuator())).uncertainty
+    assert sure.uninformative and not sure.adequate and not sure.healthy and not sure.alarms

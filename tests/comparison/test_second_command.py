@@ -9,13 +9,13 @@ from ema_model.comparison import compare
 
 FASTER = ("sine", {"amplitude_rad": 0.015, "frequency_Hz": 6}, 1.0)  # half the angle, twice the acceleration
 HINGE = {"hinge_moment": {"stiffness_Nm_rad": 1000.0}}
-_APART = 0.1  # in R²; directness, the tie-break, is worth 0.02
+_APART = 0.1  # of what may be explained; directness, the tie-break, is worth 0.02
 
 
 def _ahead(seed: int, commands) -> float:
-    """R² of the user's position less that of the acceleration."""
+    """What the user's position explains, of what may be explained at all, less what the acceleration does."""
     found = compare(recorded(seed, commands=commands, effects=HINGE), ACTUATOR)
-    r2 = {one.variable: one.r2 for one in found.explained_by if one.modulator == "1"}
+    r2 = {one.variable: one.beyond_noise for one in found.explained_by if one.modulator == "1"}
     assert found.explained_by[0].variable == "user_position" and found.explained_by[0].significant
     return r2["user_position"] - r2["acceleration"]
 

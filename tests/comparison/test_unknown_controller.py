@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from support.unknown_drive import drive_of, logged
 
-from ema_model.actuator import Actuator
+from ema_model.actuator import Actuator, Tolerance
 from ema_model.comparison import compare
 from ema_model.comparison.criteria import SLOW
 from ema_model.comparison.verdict import slow_ratio
@@ -33,3 +35,31 @@ def test_a_true_model_is_adequate_and_at_its_floor(actuator, rate_Hz, noise_A, c
     assert max(slow_ratio(one.residuals, "current_A") for one in found) < 0.75 * SLOW
     assert sum(one.adequate for one in found) >= len(SEEDS) - 1
     assert sum(low <= one <= high for one, (low, high) in zip(error, (each.floor_band for each in found))) >= 9
+
+
+def test_an_interval_ends_where_the_parameter_s_physics_does(tmp_path):
+    """Of a static friction sliding tells nothing: its tolerance stays, but for what would be below zero."""
+    actuator = drive_of(tmp_path, leaves_out_reversals=False)
+    loose = {**actuator.tolerances, "motor.static_friction_Nm": Tolerance(0.01, True)}
+    result = compare([logged(1)], replace(actuator, tolerances=loose))
+    assert result.calibration is not None
+    one = result.calibration.parameters["motor.static_friction_Nm"]
+    print(one)
+    assert one.interval90[0] == 0.0 and one.cut and one.interval90[1] > one.value
+    assert one.sigma == pytest.approx(0.01, rel=0.05)  # of which the cut takes nothing
+    assert "interval cut at its physical limit" in str(result)
+    sure = result.calibration.parameters["motor.inertia_kgm2"]
+    assert not sure.cut and sure.value == pytest.approx(0.5 * sum(sure.interval90))
+
+
+def test_a_share_of_the_residual_is_of_the_residual_as_it_is(actuator):
+    """A hidden torque beside noise of its size explains a part of what is left, not all that stands above the noise."""
+    recording = logged(3, 500.0, 0.2, None, hidden=lambda angle, speed: 0.011 * np.sin(angle))
+    noisy = compare([recording], actuator)
+    residual, best = noisy.residuals.values["current_A"], noisy.explained_by[0]
+    size = float(np.std(0.011 / 0.05 * np.sin(noisy.residuals.variables["motor_angle"])))
+    print(best.variable, best.r2, best.beyond_noise, size**2 / np.mean(residual**2))
+    assert best.variable == "motor_angle" and best.significant
+    assert best.r2 < best.beyond_noise <= 1.0 and best.r2 < 0.97
+    assert best.r2 <= size**2 / np.mean(residual**2) + 0.1
+    assert f"{100.0 * best.r2:.0f} % of the residual" in best.sentence

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from ema_model.discovery.candidates.harmonics import Further
@@ -212,3 +213,42 @@ def test_far_above_the_floor_what_was_not_fitted_tells_apart(monkeypatch, held, 
     best, rest = claim._chosen(SimpleNamespace(data=None, held=object(), current=None), trials)
     assert best is trials[first]
     assert rest == ([trials[1 - first]] if tied else [])
+
+
+@pytest.mark.parametrize(
+    ("names", "cosine", "is_one"),
+    [
+        (("saturating_friction", "friction_zone"), 0.88, True),
+        (("friction_zone", "quadratic_drag"), 0.88, True),
+        (("saturating_friction", "friction_zone"), 0.8, False),
+        (("saturating_friction", "quadratic_drag"), 0.95, False),
+        (("friction_zone", "hinge_moment"), 0.95, False),
+        (("saturating_friction", "cogging_torque"), 0.95, False),
+    ],
+)
+def test_laws_of_place_and_of_speed_are_one_where_they_change_the_same(names, cosine, is_one):
+    """cosine: between what the two change of the residual."""
+    before = np.array([3.0, -2.0])
+    changes = np.array([1.0, 0.0]), 0.7 * np.array([cosine, np.sqrt(1.0 - cosine**2)])
+    best, other = (
+        Trial(Candidate(name, 100.0, {}), {name: {}}, SimpleNamespace(residual=before + change), 100.0)
+        for name, change in zip(names, changes)
+    )
+    story = SimpleNamespace(current=SimpleNamespace(residual=before))
+    assert claim._one_motion(story, best, other) == claim._one_motion(story, other, best) == is_one
+
+
+@pytest.mark.parametrize(("short_of", "first"), [(3.0, "hinge_moment"), (30.0, "pendulum_load")])
+def test_of_an_effect_and_a_term_of_its_series_that_tells_as_much_it_is_the_term(monkeypatch, short_of, first):
+    """short_of: evidence by which the spring tells less than the weight of an arm, of which it is a term."""
+    monkeypatch.setattr(claim, "ratio", lambda data, found: 1.0)
+    monkeypatch.setattr(claim, "evidence", lambda data, small, large: short_of)
+    monkeypatch.setattr(claim, "price", lambda data, current, trial: 8.0)
+    trials = [
+        Trial(Candidate(name, drop, {}), {name: {}}, SimpleNamespace(), drop)
+        for name, drop in (("pendulum_load", 1000.0), ("hinge_moment", 1000.0 - short_of))
+    ]
+    best, others = claim._chosen(SimpleNamespace(data=None, held=None, current=None), trials)
+    assert best.candidate.name == first and len(others) == (short_of < 10.0)
+    assert claim._of_other_parts(trials[1], trials[:1]) == [], "the series is no other cause than its term"
+    assert claim._without_series(trials) == trials[1:]

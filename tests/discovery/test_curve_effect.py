@@ -101,7 +101,7 @@ def residuals(signal: str, values: np.ndarray, **variables: np.ndarray) -> Resid
 
 def explanation(signal: str, variable: str, modulator: str = "1") -> Explanation:
     none = np.zeros(0)
-    return Explanation(signal, variable, modulator, 1.0, True, none, none, none, "")
+    return Explanation(signal, variable, modulator, 1.0, 1.0, True, none, none, none, "")
 
 
 def torque(effect, **at: float) -> float:

@@ -24,6 +24,10 @@ CASES = {
     "speed_filter": (2e-3, [CHIRP, STEPS], 0.45),
     "speed_loop_gain": (-0.6, [CHIRP, STEPS], 0.45),
     "speed_loop_integral": (200.0, [CHIRP, STEPS], 0.45),
+    "velocity_feedforward": (0.7, [CHIRP], 0.45),
+    "goal_rate_limit": (0.35, [STEPS], 0.45),
+    "goal_gain": (0.03, [CHIRP, STEPS], 0.45),
+    "goal_delay": (6e-3, [CHIRP, STEPS], 0.45),
 }
 
 

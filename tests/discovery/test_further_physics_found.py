@@ -102,7 +102,7 @@ def test_places_are_the_effects_own_parameters(name):
     effect = CATALOGUE[name]
     assert set(effect.placed) <= {one.name for one in effect.parameters}
     assert len({len(shares) for shares in effect.placed.values()}) == 1
-    assert effect.against in ("user_position", "time")
+    assert effect.against in ("user_position", "motor_speed", "time")
 
 
 @pytest.mark.long

@@ -48,3 +48,12 @@ def test_no_rounding_takes_a_candidate_out_of_its_range(start, sign):
     first = find("load_dependent_friction").parameters[0]
     assert first.low <= candidate.settings["ratio"] <= first.high
     assert candidate.settings["ratio"] == pytest.approx(first.high if sign > 0.0 else first.low)
+
+
+@pytest.mark.parametrize(("torque_Nm", "times"), [(169.2, 100.0), (0.1, 1.0)])
+def test_a_strong_case_is_as_strong_as_the_machine(torque_Nm, times):
+    """Teeth of a motor of a hundred times the torque pull a hundred times as hard: they are not within its noise."""
+    shown = [{"motor_torque_Nm": np.array([0.0, -torque_Nm])}]
+    found = SimpleNamespace(calibration=SimpleNamespace(signals=shown, actuator=load_actuator()))
+    cogging = find("cogging_torque")
+    assert score._strong(found, cogging) == pytest.approx(times * cogging.severities[2])

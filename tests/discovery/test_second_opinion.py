@@ -49,6 +49,38 @@ def test_the_drives_own_gain_is_seen_on_the_measured_motion(healthy):
         assert seen.differs == gain.differs == differs
 
 
+def without(one, *names):
+    return replace(one, signals={name: values for name, values in one.signals.items() if name not in names})
+
+
+@pytest.fixture(scope="module")
+def fed_forward():
+    return recorded(11, commands=[MOTION], noise_A=0.2, effects={"velocity_feedforward": {"ratio": 1.0}})
+
+
+def test_a_law_that_is_another_one_is_seen_in_a_torque_too(healthy, fed_forward):
+    """It stands for the current; a position is not made of the other's where there is play."""
+    currents = ("current_A", *(f"phase_{one}_current_A" for one in "abc"))
+    for recordings, differs in ((fed_forward, True), (healthy, False)):
+        seen = controller_seen(InverseDynamics(recordings, ACTUATOR), ACTUATOR)
+        by_torque, few = (
+            controller_seen(InverseDynamics(recordings, ACTUATOR), ACTUATOR, measurements=[without(*recordings, *gone)])
+            for gone in (currents, ("user_position_rad",))
+        )
+        assert seen is not None and by_torque is not None and few is None
+        assert seen.differs == by_torque.differs == differs
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("gone", [("user_position_rad",), ("motor_position_rad", "motor_speed_rad_s")])
+def test_a_loop_that_follows_another_way_is_told_with_one_position(gone, fed_forward):
+    found = discover([without(one, *gone) for one in fed_forward], ACTUATOR, candidates=FEW)
+    assert as_dict(found)["controller_mismatch"] and found.loop_lag is not None
+    assert abs(found.loop_lag.measured_s) < 2e-4 and found.loop_lag.of_file_s == pytest.approx(5e-3, rel=0.06)
+    assert "The controller is not what the file says. The position follows its command after" in str(found)
+    assert "nothing shows another control law" not in str(found)
+
+
 def test_missing_physics_is_not_blamed_on_the_controller(cogging):
     seen = controller_seen(InverseDynamics(cogging, ACTUATOR), ACTUATOR)
     assert seen is not None and not seen.differs

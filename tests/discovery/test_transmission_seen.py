@@ -89,6 +89,7 @@ def test_it_needs_both_positions(healthy):
 def test_nothing_is_adequate_beside_it(monkeypatch):
     monkeypatch.setattr("ema_model.discovery.steps.verdict.explains_all", lambda story: True)
     monkeypatch.setattr("ema_model.discovery.steps.verdict.lasts", lambda data, found: False)
+    monkeypatch.setattr("ema_model.discovery.steps.verdict.silence", lambda *_: "")
     found = SimpleNamespace(calibration=SimpleNamespace(converged=True))
     named: Any = object()
     story: Any = SimpleNamespace(
@@ -124,5 +125,5 @@ def test_the_headline_says_what_is_explained_and_what_is_not(seen, at_floor, sai
     found: Any = SimpleNamespace(verdict="unknown_effect", at_floor=at_floor, transmission_seen=seen)
     found.faults, found.parameters_outside_tolerance, found.effects, found.unknown = {}, [], [], None
     found.controller_seen, found.curve, found.ladder = None, None, [SimpleNamespace(rmse=1.352, holdout_rmse=None)]
-    found.not_claimed = {}
+    found.not_claimed, found.loop_lag, found.two_masses_seen = {}, None, None
     assert headline(found) == said

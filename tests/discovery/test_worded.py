@@ -8,6 +8,7 @@ from dataclasses import replace
 import pytest
 from support.discovered import with_cogging
 
+from ema_model.actuator import load_actuator
 from ema_model.discovery import words
 from ema_model.discovery.result import Change, StoodIn
 from ema_model.discovery.words import (
@@ -16,6 +17,7 @@ from ema_model.discovery.words import (
     effect_title,
     masked,
     moved,
+    of_the_poles,
     rung_label,
     sentences,
     untold,
@@ -116,3 +118,30 @@ def test_a_parameter_that_is_surely_another_than_the_files_is_told(value, half, 
     told = moved(replace(found, verdict=verdict, calibration=calibration, parameters_outside_tolerance=[]))
     line = "Within tolerance, but not as the file has it: motor viscous friction 0.02130 ± 0.00020 N·m·s/rad"
     assert [text.startswith(line) for text in told] == [True] * said
+
+
+@pytest.mark.parametrize(
+    ("order", "told"),
+    [
+        (7.0, "once an electrical turn, as offsets of the phase currents would ripple, too"),
+        (14.0, "twice an electrical turn, as phase currents of unequal gain would ripple, too"),
+        (42.0, "six times an electrical turn, as the inverter's dead time would ripple, too"),
+        (2.0, "twice a turn of the motor, as a strain wave gear's generator would, too"),
+        (12.0, ""),
+    ],
+)
+def test_an_order_of_the_poles_or_of_a_wave_generator_is_said_beside_cogging(order, told):
+    """Of any drive: an unknown controller's file may say the pole pairs, too."""
+    values = {"motor.pole_pairs": 7.0, "transmission.gear_ratio": 1.0 / 101.0}
+    for actuator in (load_actuator(), load_actuator().without_controller()):
+        assert of_the_poles(order, actuator.with_values(values)) == told
+    assert of_the_poles(2.0, load_actuator().with_values(values | {"transmission.gear_ratio": 0.2})) == ""
+
+
+def test_a_file_without_a_controller_may_say_its_pole_pairs(tmp_path):
+    (tmp_path / "joint.toml").write_text(
+        '[controller]\nkind = "unknown"\n[motor]\ntorque_constant_Nm_A = 0.1\ninertia_kgm2 = 1e-4\npole_pairs = 7.0\n'
+        "viscous_friction_Nms_rad = 1e-5\nstatic_friction_Nm = 0.01\ndynamic_friction_Nm = 0.01\n",
+        encoding="utf-8",
+    )
+    assert load_actuator(tmp_path / "joint.toml").motor.pole_pairs == 7.0

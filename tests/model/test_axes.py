@@ -59,6 +59,7 @@ AT_MOTOR = {
     "motor.torque_limit_Nm": "torque",
     "motor.rotor_offset_rad": "angle",
     "transmission.viscous_friction_Nms_rad": "damping",
+    "effects.acceleration_feedforward.inertia_kgm2": "inertia",
     "effects.asymmetric_friction.viscous_part_Nms_rad": "damping",
     "effects.cogging_torque.amplitude_Nm": "torque",
     "effects.encoder_eccentricity.amplitude_rad": "angle",
@@ -67,9 +68,11 @@ AT_MOTOR = {
     "effects.quadratic_drag.speed_rad_s": "speed",
     "effects.screw_lead_error.period_rad": "angle",
     "effects.stribeck_friction.speed_rad_s": "speed",
+    "effects.saturating_friction.half_speed_rad_s": "speed",
     "effects.viscous_friction.coefficient_Nms_rad": "damping",
     "turned 0": "angle",
     "play 0": "angle",
+    "faster 0": "speed",
 }
 AT_USER = {
     "controller.integrator_window_rad": "angle",
@@ -86,6 +89,7 @@ AT_USER = {
     "effects.dead_band.half_width_rad": "angle",
     "effects.friction_zone.begin_rad": "angle",
     "effects.friction_zone.end_rad": "angle",
+    "effects.goal_rate_limit.rate_rad_s": "speed",
     "effects.one_sided_spring.contact_rad": "angle",
     "effects.one_sided_spring.stiffness_Nm_rad": "stiffness",
     "effects.position_sensor_eccentricity.amplitude_rad": "angle",

@@ -14,9 +14,13 @@ from ema_model.actuator.parameters import Inverter
 from ema_model.actuator.unread import idle
 from ema_model.commands import command
 from ema_model.effects import CATALOGUE
+from ema_model.effects.acceleration_feedforward import goal as accelerated
+from ema_model.effects.acceleration_feedforward import loop_torque as pushed
 from ema_model.effects.computation_delay import drive_output as delayed
 from ema_model.effects.current_loop_lag import current_reference as lagged
 from ema_model.effects.dead_band import position_error
+from ema_model.effects.goal_delay import goal as goal_delayed
+from ema_model.effects.goal_rate_limit import goal as limited
 from ema_model.effects.sampled_control import drive_output as held
 from ema_model.effects.sampled_control import speed_sample
 from ema_model.effects.speed_loop_integral import integral_gain
@@ -113,7 +117,56 @@ def test_an_integral_gain_never_turns_round():
     assert integral_gain(0.4, 0.01, -100.0) == 0.0
 
 
+def test_a_goal_moves_no_faster_than_its_limit_and_arrives():
+    jump = np.r_[0.0, np.full(2999, 0.02)]
+    moved = passed(lambda goal, *rest: limited(goal, GEAR, *rest), jump, 1.0, states=1)
+    np.testing.assert_allclose(moved, np.minimum(0.02, TIME), atol=2e-5)
+    free = passed(lambda goal, *rest: limited(goal, GEAR, *rest), WAVE, 1e9, states=1)
+    np.testing.assert_array_equal(free, WAVE)
+
+
+@pytest.mark.parametrize("delay", [4e-3, 0.012])
+def test_a_goal_s_delay_shifts_it(delay):
+    slow = np.sin(2.0 * np.pi * 10.0 * TIME)
+    late = passed(lambda goal, *rest: goal_delayed(goal, GEAR, *rest), slow, delay, states=6)
+    told = slice(round(4.0 / 3.0 * delay / DT) + 2, None)
+    bend = (2.0 * np.pi * 10.0) ** 2 * ((delay / 3.0) ** 2 + DT**2) / 8.0
+    np.testing.assert_allclose(late[told], np.sin(2.0 * np.pi * 10.0 * (TIME - delay))[told], atol=bend + 1e-9)
+
+
+def test_an_acceleration_is_fed_forward_as_its_torque():
+    """Of a command at a constant acceleration a: J_f a/τ, after the smoothing, from whatever speed it begins at."""
+    inertia, smoothing, rate = 2e-5, 1e-3, 40.0
+    for begins_at in (0.0, 3.0):
+        own, torque = [0.0] * 4, []
+        for n, at in enumerate(TIME):
+            told, *own = accelerated(begins_at * at + 0.5 * rate * at**2, GEAR, n == 0, DT, inertia, smoothing, *own)
+            torque.append(pushed(0.1, n == 0, DT, inertia, smoothing, *own)[0])
+        assert told == begins_at * TIME[-1] + 0.5 * rate * TIME[-1] ** 2
+        rise = 0.1 + inertia * rate / GEAR * (1.0 - np.exp(-TIME / smoothing))
+        np.testing.assert_allclose(torque, rise, atol=0.02 * inertia * rate / GEAR)
+
+
 # --- in the loop ----------------------------------------------------------------------------------------------------
+
+
+def test_with_all_of_its_speed_fed_forward_a_motor_does_not_trail_a_ramp():
+    """It does by its speed over the position gain without, and by a share of that in proportion."""
+    ramp = Run(command("ramp", {"slope_rad_s": 0.2}), 0.2)
+    trails = []
+    for share in (0.0, 0.5, 1.0):
+        run = simulated(ramp, velocity_feedforward=share) if share else simulated(ramp)
+        trails.append(float(np.mean((run["command_rad"] - run["user_position_rad"])[-200:])))
+    friction = trails[2]  # what friction takes is left
+    assert trails[0] - friction == pytest.approx(0.2 / (IDEAL.controller.position_gain_1_s * GEAR), rel=0.02)
+    assert trails[1] - friction == pytest.approx(0.5 * (trails[0] - friction), rel=0.02)
+
+
+def test_a_goal_s_gain_is_the_command_s():
+    scaled = Run(command("step", {"final_rad": 1.04 * 5e-3}), 0.1)
+    one, other = simulated(STEP, goal_gain=0.04), simulated(scaled)
+    for name in SIGNALS:
+        np.testing.assert_allclose(one[name], other[name], atol=1e-9 * np.max(np.abs(other[name])))
 
 
 @pytest.mark.long
@@ -228,4 +281,4 @@ def test_a_drive_that_is_not_simulated_has_no_effects():
         assert not idle(places, bool(effect.states), "cascade", "hysteresis"), name
     of = {name: {place.__name__ for place in CATALOGUE[name].places} for name in DRIVE}
     acting = {name for name in DRIVE if not idle(of[name], False, "position", "voltage")}
-    assert acting == {"computation_delay", "dead_band", "sampled_control"}
+    assert acting == {"computation_delay", "dead_band", "goal_delay", "goal_gain", "goal_rate_limit", "sampled_control"}

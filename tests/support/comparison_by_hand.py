@@ -150,7 +150,7 @@ def _explanations() -> list[Explanation]:
         ("current", "sign_speed", 0.21, True, "The residual current grows with the current, against the motion."),
         ("acceleration", "1", -0.02, False, "The acceleration tells nothing."),
     )
-    return [Explanation("current_A", v, m, r2, sure, none, none, none, text) for v, m, r2, sure, text in told]
+    return [Explanation("current_A", v, m, r2, r2, sure, none, none, none, text) for v, m, r2, sure, text in told]
 
 
 def _by_angle(residuals: Residuals) -> Region:

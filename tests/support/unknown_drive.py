@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -40,16 +40,20 @@ def logged(
     hidden: Callable[[Array, Array], Array] | None = None,
     name: str = "moves",
     times: float = 1.0,
+    reach: float = 1.0,
+    strokes: Sequence[tuple[float, float]] = ((40.0, 0.7), (12.0, 1.9), (4.0, 2.3)),
 ) -> Measurement:
     """Of that motor, with other values within their tolerances, begun and ended in mid-motion.
 
     counts: of the encoder, per radian; hidden(angle, speed): a torque, N·m, that the file does not know of; times: by
-    which all is faster.
+    which all is faster; reach: by which all angles are greater; strokes: amplitudes,
+    rad, and frequencies, Hz, of the sines that the motion is made of.
     """
     random = np.random.default_rng(seed)
     time = np.arange(0.0, 4.0, 1.0 / rate_Hz)
-    rate, size = 2.0 * np.pi * times * np.array([[0.7], [1.9], [2.3]]), np.array([[40.0], [12.0], [4.0]])
-    phase = rate * time + random.uniform(0.0, 2.0 * np.pi, (3, 1))
+    size, rate = (np.array(each)[:, None] for each in zip(*strokes))
+    size, rate = reach * size, 2.0 * np.pi * times * rate
+    phase = rate * time + random.uniform(0.0, 2.0 * np.pi, (len(strokes), 1))
     angle, speed = np.sum(size * np.sin(phase), axis=0), np.sum(size * rate * np.cos(phase), axis=0)
     torque = -1.05e-4 * np.sum(size * rate**2 * np.sin(phase), axis=0) + 2.5e-5 * speed + 0.011 * np.sign(speed)
     if hidden is not None:

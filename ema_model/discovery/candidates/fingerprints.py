@@ -15,6 +15,7 @@ from ema_model.actuator import Actuator
 from ema_model.actuator.unread import idle
 from ema_model.discovery.evidence.extents import Ranges, moves_both_ways, ranges_of, top_speed
 from ema_model.effects import Effect, find
+from ema_model.effects.effect import USER
 from ema_model.estimation.model_fit import Data, Fit
 
 Array = NDArray[np.float64]
@@ -42,11 +43,12 @@ class Fingerprint:
 
 
 def variants(
-    effect: Effect, orders: Sequence[float], top_rad_s: float = 0.0, ranges: Ranges | None = None
+    effect: Effect, orders: Sequence[float], top_rad_s: float = 0.0, ranges: Ranges | None = None, gear: float = 1.0
 ) -> list[list[dict[str, float]]]:
-    """Settings to try; those of one entry are columns of one fingerprint.
+    """Settings to try; those of one entry are columns of one fingerprint: of a phase, its sine and cosine.
 
-    top_rad_s: the motor's top speed; ranges: of the variables, for effects that begin at a place along one.
+    top_rad_s: the motor's top speed, and gear what the user moves by it; ranges: of the variables, for effects that
+    begin at a place along one.
     """
     names = [parameter.name for parameter in effect.parameters]
     first = effect.parameters[0].name
@@ -58,8 +60,8 @@ def variants(
             for order in orders
             if low <= order <= high
         ]
-    if "phase_rad" in names:
-        return [[{first: middle, "phase_rad": phase} for phase in (0.0, 0.5 * np.pi)]]
+    if effect.phase:
+        return [[{first: middle, effect.phase: phase} for phase in (0.0, 0.5 * np.pi)]]
     if effect.placed:
         low, high = (ranges or {}).get(effect.against, (0.0, 0.0))
         own = {one.name: one for one in effect.parameters}
@@ -69,7 +71,8 @@ def variants(
         within = [at for at in places if all(own[name].low <= value <= own[name].high for name, value in at.items())]
         return [[{first: middle, **place}] for place in within] if high > low else []
     low, high = effect.parameters[0].low, effect.parameters[0].high
-    speeds = [share * top_rad_s for share in effect.at_speeds]
+    top = top_rad_s * (gear if effect.parameters[0].side == USER else 1.0)
+    speeds = [share * top for share in effect.at_speeds]
     beside = [{first: effect.nothing, name: value} for name, value in _beside(effect).items()]
     usual = (*effect.severities, *(speed for speed in speeds if low <= speed <= high))
     return [[{first: one}, *beside] for one in usual]
@@ -85,8 +88,8 @@ def fingerprints(data: Data, found: Fit, names: Iterable[str], orders: Sequence[
     effects = [find(name, found.actuator.axes) for name in names if name not in found.effects]
     if not moves_both_ways(found):
         effects = [one for one in effects if not one.by_direction]
-    top, ranges = top_speed(found), ranges_of(found)
-    tried = [(effect, settings) for effect in effects for settings in variants(effect, orders, top, ranges)]
+    top, ranges, gear = top_speed(found), ranges_of(found), found.calibration.actuator.transmission.gear_ratio
+    tried = [(effect, settings) for effect in effects for settings in variants(effect, orders, top, ranges, gear)]
     lanes = [(effect, one) for effect, settings in tried for one in settings]
     if not lanes:
         return []

@@ -10,9 +10,10 @@ import numpy as np
 
 from ema_model.discovery.criteria import HALF, LEAST_BIC
 from ema_model.discovery.result import Candidate
-from ema_model.effects import Effect, find
+from ema_model.effects import CATALOGUE, Effect, find
+from ema_model.effects.effect import ANGLES
 from ema_model.estimation import default_free
-from ema_model.estimation.model_fit import ANGLES, Data, Fit, fit, with_effect
+from ema_model.estimation.model_fit import Data, Fit, fit, with_effect
 from ema_model.quantities.axes import Axes
 
 Progress = Callable[[str], None]
@@ -184,7 +185,7 @@ def promising(
 
     expected: the evidence that is predicted for each; without it, the fall of χ².  What would be a parameter of the
     actuator that stands at its bound is refitted where it would take a fair share of χ², too: others have gone out of
-    its way.
+    its way.  So are the terms of an effect's series, which only a refit has at all of their parameters.
     """
     told = {c.name: c.predicted_drop for c in ranked} | dict(expected or {})
     values = len(current.residual)
@@ -193,7 +194,7 @@ def promising(
     chosen = [
         c
         for c in ranked
-        if not c.untestable_reason
+        if not c.obstacle
         and c.predicted_drop > _SCORE * max(material, needed[c.name])
         and told[c.name] > _SCORE * needed[c.name]
     ]
@@ -201,7 +202,9 @@ def promising(
     known = current.calibration.parameters
     bent = [c for c in ranked if (path := find(c.name).duplicates) in known and known[path].at_bound]
     least = _BENT * max((c.predicted_drop for c in ranked), default=0.0)
-    return best + [c for c in bent if c not in best and c.predicted_drop >= least and not c.untestable_reason]
+    best += [c for c in bent if c not in best and c.predicted_drop >= least and not c.obstacle]
+    terms = {term for c in best if c.name in CATALOGUE for term in CATALOGUE[c.name].terms}
+    return best + [c for c in ranked if c.name in terms and c not in best and not c.obstacle]
 
 
 def with_drops(ranked: Sequence[Candidate], trials: Sequence[Trial]) -> list[Candidate]:

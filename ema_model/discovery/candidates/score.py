@@ -16,11 +16,13 @@ from ema_model.discovery.candidates.fingerprints import Fingerprint
 from ema_model.discovery.candidates.let_go import Freed, at_bounds, let_go
 from ema_model.discovery.evidence.extents import greatest
 from ema_model.discovery.result import Candidate
-from ema_model.effects import Effect, find
+from ema_model.effects import MOTOR, Effect, find
 from ema_model.estimation.model_fit import Fit
 
 Array = NDArray[np.float64]
 
+_TORQUES = ("N·m", "N")
+_OWN_TORQUE = 1.692  # N·m, of the motor of which the library's severities are (MODEL §1: 22.5 A × 0.0752)
 _LEAST_ENERGY = 25.0  # χ² of a strong case of the effect, below which these recordings cannot show it
 
 
@@ -172,19 +174,28 @@ def _scored(
     else:
         drop = given + float(toward @ amounts)
         settings[first.name] = first.nearest(settings[first.name] * math.hypot(*amounts))
-        settings["phase_rad"] = math.atan2(float(amounts[1]), float(amounts[0]))
+        settings[effect.phase] = math.atan2(float(amounts[1]), float(amounts[0]))
     return Candidate(one.name, 0.0 if reason else max(0.0, drop), settings, reason)
 
 
 def _strong(found: Fit, effect: Effect) -> float:
     """A strong case of an effect's first parameter; of one that counts by a signal's size, what this machine may have.
 
-    The library's own machine has other currents.
+    The library's own machine has other currents, and other torques: a greater motor's teeth pull as much harder.
     """
     first = effect.parameters[0]
+    if first.side is MOTOR and first.unit in _TORQUES:
+        usual = find(effect.name).severities[2]  # of the library's machine
+        return max(effect.severities[2], usual * _greatest_torque(found) / _OWN_TORQUE)
     size = greatest(found, first.plausible_at) if first.plausible_at else 0.0
     most = first.plausible[1]
     return max(effect.severities[2], most / size) if most and size else effect.severities[2]
+
+
+def _greatest_torque(found: Fit) -> float:
+    """What the motor gives at most, N·m; of a linear one N; 0 where neither torque nor current is known."""
+    constant = found.calibration.actuator.value("motor.torque_constant_Nm_A")
+    return max(greatest(found, "motor_torque_Nm"), abs(constant) * greatest(found, "current_A"))
 
 
 def _beyond_the_file(found: Fit, one: Fingerprint, effect: Effect, amounts: Array, drop: float) -> Candidate:

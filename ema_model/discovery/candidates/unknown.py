@@ -48,7 +48,7 @@ def curve_instead(
     if explanation is None:
         return None
     stands_in = bool(stands_for(current, best))
-    if not stands_in and best.drop > _HALF * explanation.r2 * current.chi2:
+    if not stands_in and best.drop > _HALF * explanation.beyond_noise * current.chi2:
         return None
     curve = curve_for(data, held, current, explanation, tell)
     if curve is None:

@@ -42,13 +42,15 @@ def moves_both_ways(found: Fit) -> bool:
 
 
 def ranges_of(found: Fit) -> Ranges:
-    """What the user's position goes through, where it is known."""
+    """What the user's position goes through, and how fast the motor turns from standstill on, where it is known."""
     user, tau = [], found.actuator.transmission.gear_ratio
+    top = top_speed(found)
+    ranges = {"motor_speed": (0.0, top)} if top > 0.0 else {}
     for window, signals in zip(found.plant.windows, found.calibration.signals):
         motor = signals.get("motor_position_rad", window.context.get("motor_position_rad"))
         shown = signals.get("user_position_rad", None if motor is None else tau * motor)
         user += [] if shown is None else [np.min(shown), np.max(shown)]
-    return {"user_position": (float(min(user)), float(max(user)))} if user else {}
+    return ranges | ({"user_position": (float(min(user)), float(max(user)))} if user else {})
 
 
 def _speeds(found: Fit) -> list[Array]:

@@ -28,7 +28,8 @@ from ema_model.discovery.evidence.remaining import at_floor, left_by, may_be_tru
 from ema_model.discovery.evidence.stability import disagreement
 from ema_model.discovery.evidence.uncertainty import with_intervals
 from ema_model.effects import catalogue_name, find
-from ema_model.estimation.model_fit import ANGLES, Data, Fit, floor_ratio
+from ema_model.effects.effect import ANGLES
+from ema_model.estimation.model_fit import Data, Fit, floor_ratio
 from ema_model.quantities.numbers import number, with_uncertainty
 from ema_model.quantities.titles import in_sentence
 from ema_model.recordings import SIGNALS
@@ -95,7 +96,7 @@ def outdone(data: Data, before: Fit, after: Fit) -> str:
     signal, residual, left = used_left(data, before, after)
     total = float(residual @ residual)
     beyond = max(total - len(residual), 3.0 * np.sqrt(2.0 * len(residual)))
-    tells = curve.r2 * beyond  # of χ² of the signal that is explained
+    tells = curve.beyond_noise * beyond  # of χ² of the signal that is explained
     colours = [float(colour_of(data, after)[rows][0]) for name, rows in signals_of(data, after.plant) if name == signal]
     scale = colours[0] if colours else 1.0
     enough = AS_MUCH * tells - TIE * scale

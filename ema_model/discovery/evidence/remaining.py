@@ -25,6 +25,7 @@ from ema_model.comparison.explain import (
 from ema_model.comparison.explain import orders as orders_of
 from ema_model.comparison.residuals import Residuals
 from ema_model.comparison.verdict import ORDER_OF_PRIMARY, lasting, most_of_floor
+from ema_model.estimation.floor import silent
 from ema_model.estimation.model_fit import Data, Fit, floor_ratio, twins_of
 
 Array = NDArray[np.float64]
@@ -52,6 +53,11 @@ def at_floor(data: Data, found: Fit) -> bool:
 def within_band(data: Data, found: Fit) -> bool:
     """Whether a fit leaves no more than a true model does, as `compare` has it."""
     return floor_ratio(data, found.plant, found.calibration.signals) <= most_of_floor(data.floor_spread)
+
+
+def silence(data: Data, found: Fit) -> str:
+    """Why the recordings tell nothing of the model, as of `tells_nothing`: of the signal that is explained."""
+    return silent(found.plant.windows, data.told_in)[1]
 
 
 def may_be_true(data: Data, found: Fit) -> bool:

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from ema_model.discovery.criteria import APART, DISAGREES, LATE_BY, PHASES_APART
 from ema_model.discovery.evidence.counted import colour, signals_of
 from ema_model.effects import catalogue_name, find
-from ema_model.estimation.model_fit import ANGLES, Data, Fit
+from ema_model.effects.effect import ANGLES
+from ema_model.estimation.model_fit import Data, Fit
 
 Array = NDArray[np.float64]
 

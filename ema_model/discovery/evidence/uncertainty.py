@@ -39,7 +39,10 @@ def with_intervals(data: Data, found: Fit) -> Calibration:
     by_file = np.sum(covariance**2, axis=1)  # of it, what the tolerances leave open
     wider = np.sqrt(np.maximum(1.0 + (most**2 - 1.0) * by_file / variance, _by_pieces(data, found) / variance))
     told = calibrated(problem, calibration.x, covariance * np.outer(wider, wider), most)
-    parameters = {n: replace(one, interval90=told[n].interval90) for n, one in calibration.parameters.items()}
+    parameters = {
+        name: replace(one, interval90=told[name].interval90, spread=told[name].spread, cut=told[name].cut)
+        for name, one in calibration.parameters.items()
+    }
     return replace(calibration, parameters=parameters).as_result
 
 

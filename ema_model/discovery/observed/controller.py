@@ -25,7 +25,6 @@ from ema_model.recordings import Measurement
 
 Array = NDArray[np.float64]
 
-_SIGNALS = ("command_rad", "user_position_rad", "motor_position_rad", "current_A")
 _HALF_S = 12e-3  # half width of the motion's filter
 _WINDOW_S = 0.25  # beyond which what is slow is taken out: several times K_P/K_I of usual drives
 _STEP = 3  # rows in such a half width
@@ -136,21 +135,21 @@ def controller_seen(
 
 
 def _runs(measurement: Measurement, actuator: Actuator) -> Iterator[_Run]:
-    if measurement.is_map or any(name not in measurement for name in _SIGNALS):
+    recorded = None if measurement.is_map else _recorded(measurement, actuator)
+    if recorded is None:
         return
-    controller, sensors = actuator.controller, actuator.sensors
+    controller = actuator.controller
     period = measurement.sample_period_s
     gain = controller.position_gain_1_s * float(faults.physical(actuator.k).gain_factor)
     for run in measurement.runs:
         if run.stop - run.start < 10 * _HALF_S / period:
             continue
-        command, user, motor, current = (measurement[name][run] for name in _SIGNALS)
+        command, user, motor, raw = (values[run] for values in recorded)
         motion = motion_of(motor, period, _HALF_S)
         omega = np.gradient(motor, period)
         behind = command - user
         wanted = np.clip(gain * behind, -controller.speed_limit_rad_s, controller.speed_limit_rad_s)
         error = wanted - omega
-        raw = (current - sensors.current_bias_A) / sensors.current_gain
         limited = np.abs(raw) > _AT_LIMIT * actuator.current_limit_A
         held = limited
         if controller.integral_gain_Nm_rad > 0.0:  # without it nobody has set a window
@@ -165,6 +164,28 @@ def _runs(measurement: Measurement, actuator: Actuator) -> Iterator[_Run]:
             slope=_quick(motion, np.gradient(error, period), width),
             rows=_rows(held, motion.kernel.size + width // 2, max(1, round(_HALF_S / _STEP / period))),
         )
+
+
+def _recorded(measurement: Measurement, actuator: Actuator) -> tuple[Array, Array, Array, Array] | None:
+    """Command, the user's and the motor's position, and the current; None where the recording lacks one.
+
+    A position that was not recorded follows from the other by the gear, where there is no play: a stiff loop makes a
+    current of half a play, too.  A current follows from the motor's torque.
+    """
+    command, user = measurement.get("command_rad"), measurement.get("user_position_rad")
+    motor, current = measurement.get("motor_position_rad"), measurement.get("current_A")
+    torque, tau = measurement.get("motor_torque_Nm"), actuator.transmission.gear_ratio
+    if current is not None:
+        current = (current - actuator.sensors.current_bias_A) / actuator.sensors.current_gain
+    elif torque is not None:
+        current = torque / actuator.motor.torque_constant_Nm_A
+    known = sum(one is not None for one in (user, motor))
+    if command is None or current is None or known < (2 if actuator.transmission.backlash_rad else 1):
+        return None
+    at_user = tau * motor if user is None and motor is not None else user
+    at_motor = user / tau if motor is None and user is not None else motor
+    assert at_user is not None and at_motor is not None
+    return command, at_user, at_motor, current
 
 
 def _quick(motion: Motion, values: Array, width: int) -> Array:

@@ -6,8 +6,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from ema_model.actuator import Actuator
+from ema_model.actuator.all_is_read import check_represents
 from ema_model.comparison.compare import weights_of
+from ema_model.comparison.loop_lag import other_controller
 from ema_model.comparison.sentences import OPEN_LOOP
+from ema_model.discovery.candidates.refit import settings_in, tried
 from ema_model.discovery.criteria import FAR
 from ema_model.discovery.observed.repeatability import by_inverse_dynamics, is_lost, with_divergence
 from ema_model.discovery.result import Change
@@ -15,7 +18,7 @@ from ema_model.discovery.steps.path import Story
 from ema_model.discovery.steps.step import Step, rung_of
 from ema_model.discovery.words import NOT_REPEATABLE, OPEN_LOOP_LEFT
 from ema_model.errors import InputError
-from ema_model.estimation.model_fit import Data, fit, floor_ratio, gather, in_floors_of
+from ema_model.estimation.model_fit import Data, fit, floor_ratio, gather, in_floors_of, with_effect
 from ema_model.models.delay_of_drive import with_delay_of_drive
 from ema_model.models.measured_motion import fit_stretches
 from ema_model.recordings import Measurement
@@ -97,7 +100,38 @@ def calibrated_story(
     if not data.weighs_as(far):
         base = fit(data, actuator, base.starts, tell)
     data, held = in_floors_of(base, data, held)
-    return Story(data, held, [Step(base, rung_of(Change(), base, data, held), ())], not is_lost(lost))
+    story = Story(data, held, [Step(base, rung_of(Change(), base, data, held), ())], not is_lost(lost))
+    if base.plant.simulates_commands:  # before what is missing is kept from driving parameters to their bounds
+        left = floor_ratio(data.before_fit, base.plant, base.calibration.signals)
+        story.loop_lag = other_controller(base.plant, base.calibration, base.calibration.before, left)
+    return story
+
+
+def with_fitted_effects(
+    measurements: Sequence[Measurement],
+    actuator: Actuator,
+    names: Sequence[str],
+    tell: Progress = lambda text: None,
+) -> Actuator:
+    """The actuator with these effects at what the recordings ask for, free to be calibrated about it.
+
+    Their values are first guessed by the score of their fingerprints, at the best order of a periodic one, and then
+    fitted, all together.  What the recordings cannot show begins at the library's usual values, what the file has at
+    the file's.  Raises InputError for an effect that the model has no place for.
+    """
+    for name in names:
+        check_represents(actuator, name)
+    compile_library(actuator)
+    story = calibrated_story(measurements, actuator, (), None, tell)
+    tell("looking for the effects' values")
+    found = {one.name: one for one in story.ranked(names) if not one.obstacle and one.predicted_drop > 0.0}
+    guessed = {name: found[name].settings for name in names if name in found}
+    if guessed:
+        trial = tried(story.data, story.current, next(iter(found.values())), guessed, tell)
+        guessed = settings_in(trial.fit, guessed)
+    for name in names:
+        actuator = with_effect(actuator, name, guessed.get(name, actuator.effects.get(name, {})))
+    return actuator
 
 
 def _data(recordings: Sequence[Measurement], actuator: Actuator, signals: Sequence[str] | None) -> Data | None:

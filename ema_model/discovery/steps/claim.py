@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
+import numpy as np
+
 from ema_model.discovery.candidates.harmonics import Further, further_orders
 from ema_model.discovery.candidates.paid_for import price
 from ema_model.discovery.candidates.refit import Trial, stands_for
-from ema_model.discovery.criteria import ALIKE, FAR, HALF, LARGEST_GROUP, SECOND, TIE
+from ema_model.discovery.criteria import ALIKE, FAR, HALF, LARGEST_GROUP, ONE_MOTION, SECOND, TIE
 from ema_model.discovery.evidence.counted import evidence
 from ema_model.discovery.evidence.objections import against, ratio
 from ema_model.discovery.steps.path import Story
@@ -37,6 +39,10 @@ def claimed(story: Story, accepted: Sequence[Trial], tell: Progress) -> Claim | 
     by_orders: list[Trial] = []  # refused, each with the further orders of its law
     while left:
         best, others = _chosen(story, left)
+        others += [
+            trial for trial in left if trial is not best and trial not in others and _one_motion(story, best, trial)
+        ]
+        others = _without_series(others)
         further = _further(story, best, tell)
         more, reason = None if further is None else further.trial, ""
         apart = _of_other_parts(best, others)
@@ -69,7 +75,7 @@ def _chosen(story: Story, accepted: Sequence[Trial]) -> tuple[Trial, list[Trial]
 
     Of what cannot be told apart, a parameter outside its tolerance comes after an effect, and what takes parameters
     farther from the file, or has more of its own, after what does not.  Far above the floor what was not fitted tells
-    them apart.
+    them apart.  Of an effect and a term of its series that tells as much, it is the term.
     """
     first = accepted[0]
     is_far = ratio(story.data, first.fit) > FAR
@@ -78,7 +84,8 @@ def _chosen(story: Story, accepted: Sequence[Trial]) -> tuple[Trial, list[Trial]
         for trial in accepted
         if _short_of(story, trial, first) < TIE or (is_far and trial.drop > ALIKE * first.drop)
     ]
-    effects = [trial for trial in tied if not stands_for(story.current, trial)] or tied[:1]
+    simplest = _simplest(story, tied)
+    effects = [trial for trial in simplest if not stands_for(story.current, trial)] or simplest[:1]
     if not is_far or story.held is None:
         best = min(effects, key=lambda trial: _short_of(story, trial, first) + price(story.data, story.current, trial))
         return best, [trial for trial in tied if trial is not best]
@@ -86,6 +93,16 @@ def _chosen(story: Story, accepted: Sequence[Trial]) -> tuple[Trial, list[Trial]
     best = min(effects, key=lambda trial: unseen[trial.candidate.name])
     near = unseen[best.candidate.name] / ALIKE
     return best, [trial for trial in tied if trial is not best and unseen[trial.candidate.name] <= near]
+
+
+def _simplest(story: Story, tied: Sequence[Trial]) -> list[Trial]:
+    """Those of which no term of the series tells as much: where one does, the motion shows no more than that."""
+
+    def is_a_term(other: Trial, trial: Trial) -> bool:
+        terms = find(trial.candidate.name).terms
+        return other.candidate.name in terms and _short_of(story, other, trial) < TIE
+
+    return [trial for trial in tied if not any(is_a_term(other, trial) for other in tied)]
 
 
 def _short_of(story: Story, trial: Trial, first: Trial) -> float:
@@ -101,11 +118,35 @@ def _halves(story: Story, best: Trial, more: Trial) -> bool:
     return holdout_error(story.held, more.fit) < HALF * holdout_error(story.held, best.fit)
 
 
+def _one_motion(story: Story, best: Trial, other: Trial) -> bool:
+    """Whether two laws of friction, one by place and one by speed, are one in the motion that was recorded.
+
+    An axis that goes back and forth is always as fast at the same place: what the laws change is then nearly the same,
+    and what else the model lacks decides which of them tells more; what was held out may prefer the other.
+    """
+    laws = [find(trial.candidate.name) for trial in (best, other)]
+    if {law.against for law in laws} != {"user_position", "motor_speed"} or any(law.is_load for law in laws):
+        return False
+    if any(place.__name__ != "moving_friction" for law in laws for place in law.places):
+        return False
+    one, two = (trial.fit.residual - story.current.residual for trial in (best, other))
+    return float(one @ two) > ONE_MOTION * float(np.linalg.norm(one) * np.linalg.norm(two))
+
+
+def _without_series(others: Sequence[Trial]) -> list[Trial]:
+    """Those of which no term of the series is among them: what a constant does, an arm's weight does at some angle."""
+    names = {trial.candidate.name for trial in others}
+    return [trial for trial in others if names.isdisjoint(find(trial.candidate.name).terms)]
+
+
 def _of_other_parts(best: Trial, others: Sequence[Trial]) -> list[Trial]:
-    """Those that are of another part than the best: a drive's delays are alike, and any of them names the drive."""
-    if find(best.candidate.name).family != "drive":
-        return list(others)
-    return [trial for trial in others if find(trial.candidate.name).family != "drive"]
+    """Those that are of another part than the best: a drive's delays are alike, and any of them names the drive.
+
+    What has the best as a term of its series is the same, seen over a short travel.
+    """
+    name, is_drive = best.candidate.name, find(best.candidate.name).family == "drive"
+    apart = [trial for trial in others if name not in find(trial.candidate.name).terms]
+    return [trial for trial in apart if find(trial.candidate.name).family != "drive"] if is_drive else apart
 
 
 def _better_law(story: Story, trial: Trial, refused: Sequence[Trial]) -> Trial | None:

@@ -12,7 +12,9 @@ from itertools import takewhile
 import numpy as np
 from numpy.typing import NDArray
 
+from ema_model.actuator.all_is_read import cannot_represent
 from ema_model.comparison.explain import Explanation
+from ema_model.comparison.loop_lag import LoopLag
 from ema_model.discovery.candidates.faults import fault_for, fault_trial, tried_faults, without_fault
 from ema_model.discovery.candidates.fingerprints import Fingerprint, fingerprints, may_act, of_the_file
 from ema_model.discovery.candidates.refit import Trial, again, is_near, promising, stands_for, tried
@@ -24,6 +26,7 @@ from ema_model.discovery.evidence.remaining import Left, at_floor, left_by
 from ema_model.discovery.evidence.uncertainty import settled
 from ema_model.discovery.observed.controller import ControllerSeen
 from ema_model.discovery.observed.transmission import TransmissionSeen
+from ema_model.discovery.observed.two_masses import TwoMasses
 from ema_model.discovery.result import Added, Candidate, Change, Contradiction, Rung
 from ema_model.discovery.steps.step import Step, change_of, refreshed, rung_of, stood_in
 from ema_model.effects import CATALOGUE, catalogue_name, find
@@ -38,7 +41,6 @@ Array = NDArray[np.float64]
 
 _LEADS = 0.5  # of the greatest fall of χ², from which on a trial is refitted from the file's values, too
 _MOST_PITCHES = 8  # along a linear motor, each of which is simulated
-_NOT_LOOKED_FOR = ("pendulum_load",)  # whoever has an arm on the shaft knows of it
 
 
 @dataclass
@@ -54,7 +56,9 @@ class Story:
     refused: dict[str, str] = field(default_factory=dict)  # effects that are not claimed, and what speaks against each
     support: dict[str, tuple[str, ...]] = field(default_factory=dict)  # models that bear out an effect, by its name
     controller_seen: ControllerSeen | None = None  # where it is not the file's
+    loop_lag: LoopLag | None = None  # likewise, as the first fit of the loop showed it
     transmission_seen: TransmissionSeen | None = None  # where the user's position leaves the motor's
+    two_masses_seen: TwoMasses | None = None  # where a second mass swings on the motor's and no model holds it
     disagreements: list[Contradiction] = field(default_factory=list)  # of held-out recordings
     _calm: dict[Fit, Fit] = field(default_factory=dict)  # fits by those that they were settled from
     _prints: list[Fingerprint] = field(default_factory=list)
@@ -94,18 +98,24 @@ class Story:
         return left_by(self.data, self.current)
 
     def ranked(self, names: Sequence[str] | None = None, left: Left | None = None) -> list[Candidate]:
-        """All effects (or these) with the fall of χ² that is predicted for each, the most promising first."""
+        """All effects (or these) with the fall of χ² that is predicted for each, the most promising first.
+
+        What the model has no place for comes last, with the reason.
+        """
         known = self.current.actuator.effects
         actuator = self.current.actuator
-        looked_for = [name for name in CATALOGUE if name not in _NOT_LOOKED_FOR and may_act(name, actuator)]
-        wanted = [name for name in names or looked_for if name not in known and name not in _NOT_LOOKED_FOR]
+        looked_for = [name for name in CATALOGUE if may_act(name, actuator)]
+        wanted = [name for name in names or looked_for if name not in known]
+        barred = {name: reason for name in wanted if (reason := cannot_represent(actuator, name))}
+        wanted = [name for name in wanted if name not in barred]
         given = [name for name in self.of_the_file if name not in {one.key for one in self.added}]
         orders = (left or self.left()).orders
         if actuator.axes.motor == "linear":
             orders = orders[:_MOST_PITCHES]  # the rest are there to tell what noise is
         self._prints = fingerprints(self.data, self.current, wanted, orders)
         self._prints += of_the_file(self.current, [name for name in given if not names or name in names])
-        return scored(self.current, self._prints)
+        left_out = [Candidate(name, 0.0, {}, cannot_represent=reason) for name, reason in barred.items()]
+        return scored(self.current, self._prints) + left_out
 
     def signatures(self, ranked: Sequence[Candidate]) -> dict[str, Array]:
         """What each candidate, of the last `ranked`, would take from what is measured less the model.
@@ -149,7 +159,7 @@ class Story:
         nearest = []
         for candidate in ranked:
             prints = [one for one in self._prints if one.name == candidate.name and find(one.name).at_speeds]
-            if prints and not candidate.untestable_reason:
+            if prints and not candidate.obstacle:
                 best = min(prints, key=lambda one: float(np.sum((self.current.residual + one.columns[:, 0]) ** 2)))
                 nearest.append(replace(candidate, settings=best.settings))
         return fits(self.trial, nearest, tell)

@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 
 from ema_model.actuator import Actuator, Tolerance
 from ema_model.actuator.unread import INVERSE_PLACES
-from ema_model.comparison.criteria import BAND
+from ema_model.comparison.criteria import BAND, MISSED
+from ema_model.comparison.loop_lag import LoopLag
 from ema_model.discovery.candidates.paid_for import pays
 from ema_model.discovery.criteria import APART, GONE, HALF, HEARD, LOOP_TOLD, MUCH_BETTER
 from ema_model.discovery.evidence.objections import ratio
@@ -107,6 +108,7 @@ def _seen(story: Story, other: Story) -> ControllerSeen | None:
 def taken_over(story: Story, opinion: Opinion) -> None:
     """Goes on with inverse dynamics: what its effects are, the closed loop has no say in but to agree."""
     opinion = opinion.again(story)
+    story.loop_lag = other_loop(story)
     both = [
         mine.name for mine in story.added for its in opinion.story.added if mine.name == its.name and _agree(mine, its)
     ]
@@ -120,8 +122,13 @@ def taken_over(story: Story, opinion: Opinion) -> None:
     story.steps[0] = replace(first, rung=replace(first.rung, change=Change("without_controller")))
     if opinion.blames_controller:
         story.controller_seen = opinion.seen
-    else:
+    elif story.loop_lag is None:
         story.warnings.append(LOOP_UNTOLD)
+
+
+def other_loop(story: Story) -> LoopLag | None:
+    """How late the loop was seen to follow its command, where what was added since has not explained it."""
+    return story.loop_lag if ratio(story.data, story.current) >= MISSED else None
 
 
 def compared(story: Story, opinion: Opinion, tell: Callable[[str], None]) -> None:

@@ -65,7 +65,7 @@ class Look:
         """Candidates that are worth a refit, the best first."""
         if self.assessment is None:
             return []
-        return [one for one in self.assessment.candidates if not one.untestable_reason and self.is_worth(one)]
+        return [one for one in self.assessment.candidates if not one.obstacle and self.is_worth(one)]
 
     def candidate(self, name: str) -> Candidate | None:
         """The candidate of that name."""
@@ -137,7 +137,7 @@ def assessed(story: Story) -> Assessment:
     """What the last model of a story leaves; takes a second, and the first time a compilation."""
     left = story.left()
     ranked = with_faults(story, story.ranked(None, left))
-    worth = [one for one in ranked if not one.untestable_reason]
+    worth = [one for one in ranked if not one.obstacle]
     found = signatures(story, worth)
     rivals = {one.name: found[one.name] for one in worth if one.predicted_drop > _RIVAL and one.name in found}
     return Assessment(left, ranked, found, alike(rivals))

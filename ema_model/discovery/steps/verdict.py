@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ema_model.comparison.explain import Explanation
-from ema_model.discovery.evidence.remaining import lasts, within_band
+from ema_model.discovery.evidence.remaining import lasts, silence, within_band
 from ema_model.discovery.result import Added, misses_unseen
 from ema_model.discovery.steps.path import Story
 
@@ -19,6 +19,8 @@ def verdict_of(story: Story, named: Sequence[Added], unknown: Explanation | None
     done = explains_all(story) and story.transmission_seen is None
     if named:
         return "effects_found" if done else "partly_explained"
+    if silence(story.data, story.current):
+        return "uninformative"
     if not story.base.calibration.converged and not story.added:
         return "not_converged"  # an unfinished fit looks exactly like missing physics
     if done:

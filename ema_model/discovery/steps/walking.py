@@ -14,6 +14,7 @@ from ema_model.discovery.criteria import FAR, HALF, LOOP_TOLD, TOLD_WELL
 from ema_model.discovery.evidence.objections import ratio
 from ema_model.discovery.evidence.remaining import Left, at_floor
 from ema_model.discovery.observed.transmission import transmission_seen
+from ema_model.discovery.observed.two_masses import two_masses_seen
 from ema_model.discovery.result import Candidate
 from ema_model.discovery.steps.beside_a_fault import beside_a_fault
 from ema_model.discovery.steps.claim import claimed
@@ -73,7 +74,9 @@ def walk(
                 else:
                     compared(story, opinion, tell)
     if not story.current.plant.simulates_commands:
-        story.transmission_seen = transmission_seen(story.data.measurements, story.current.calibration.actuator)
+        seen = story.data.measurements, story.current.calibration.actuator
+        story.transmission_seen = transmission_seen(*seen)
+        story.two_masses_seen = None if at_floor(story.data, story.current) else two_masses_seen(*seen)
     story.disagreements = contradictions(story, tell)
     return walked
 

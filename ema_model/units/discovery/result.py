@@ -51,7 +51,6 @@ class UnitsDiscovered(InWords):
 
     @property
     def undecided(self) -> tuple[str, ...]:
-        """Units of which nothing can be said: not converged, or not repeatable."""
-        return tuple(
-            name for name, one in self.discoveries.items() if one.verdict in ("not_converged", "not_repeatable")
-        )
+        """Units of which nothing can be said: not converged, not repeatable, or of recordings that tell nothing."""
+        nothing = ("not_converged", "not_repeatable", "uninformative")
+        return tuple(name for name, one in self.discoveries.items() if one.verdict in nothing)

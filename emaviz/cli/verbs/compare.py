@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from ema_model.errors import InputError
@@ -62,17 +63,27 @@ def run(arguments: argparse.Namespace) -> int:
         return by_unit.run(arguments, actuator)
     k, weights = given.faults_of(arguments, actuator.faults), given.weights_of(arguments.signals)
     effects = given.effects_of(arguments, actuator.axes)
+    to_fit = given.effects_to_fit(arguments) if arguments.calibrate else []
 
     def compute(fitted: list[Measurement], held: list[Measurement], progress: output.Progress) -> flow.Answer:
         from ema_model.comparison import as_dict, compare  # takes a second: recordings are refused before
 
+        model, fixed, free = actuator, effects, arguments.free
+        if to_fit:
+            from ema_model.discovery.steps.begin import with_fitted_effects
+
+            fixed = {name: settings for name, settings in effects.items() if name not in to_fit}
+            beside = replace(actuator, effects={**actuator.effects, **fixed})
+            model = with_fitted_effects(fitted, beside, to_fit, progress.show)
+        if free is not None:
+            free = [*free, *(path for path in model.tolerances if path.split(".")[1] in to_fit)]
         result = compare(
             fitted,
-            actuator,
+            model,
             k=k,
-            effects=effects,
+            effects=fixed,
             calibrate=arguments.calibrate,
-            free=arguments.free,
+            free=free,
             signals=weights,
             holdout=held,
             on_progress=progress.show,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from ema_model.errors import InputError
@@ -57,14 +58,16 @@ def documents() -> tuple[type, ...]:
 
 def run(arguments: argparse.Namespace) -> int:
     """Identifies; once interrupted, the best so far."""
+    from ema_model.actuator.all_is_read import check_represents
     from emaviz.cli import flow, given
 
     actuator = given.actuator_of(arguments)
-    if effects := given.effects_of(arguments, actuator.axes):
-        from ema_model.estimation.model_fit import with_effect
-
-        for name, settings in effects.items():
-            actuator = with_effect(actuator, name, settings)
+    effects = given.effects_of(arguments, actuator.axes)
+    for name in effects:
+        check_represents(actuator, name)
+    to_fit = given.effects_to_fit(arguments) if arguments.files else []
+    given_values = {name: settings for name, settings in effects.items() if name not in to_fit}
+    actuator = replace(actuator, effects={**actuator.effects, **given_values})
     truth = given.faults_of(arguments) if arguments.fault or not arguments.files else None
 
     def read(*of: Any) -> tuple[list[Measurement], list[Measurement]]:
@@ -72,7 +75,7 @@ def run(arguments: argparse.Namespace) -> int:
         return fitted or [_simulated(arguments, actuator, truth)], held
 
     def compute(fitted: list[Measurement], held: list[Measurement], progress: output.Progress) -> flow.Answer:
-        return _identified(arguments, actuator, truth, fitted, held, progress)
+        return _identified(arguments, actuator, to_fit, truth, fitted, held, progress)
 
     return flow.run(arguments, actuator, compute, read)
 
@@ -80,12 +83,17 @@ def run(arguments: argparse.Namespace) -> int:
 def _identified(
     arguments: argparse.Namespace,
     actuator: Actuator,
+    to_fit: list[str],
     truth: np.ndarray | None,
     fitted: list[Measurement],
     held: list[Measurement],
     progress: output.Progress,
 ) -> flow.Answer:
     # These take a second: recordings are refused before.
+    if to_fit:
+        from ema_model.discovery.steps.begin import with_fitted_effects
+
+        actuator = with_fitted_effects(fitted, actuator, to_fit, progress.show)
     from ema_model.identification.objective import Objective
     from ema_model.identification.run import SEARCH_SHARE, identify
     from ema_model.identification.summary import as_dict

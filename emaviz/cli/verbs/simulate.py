@@ -29,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--input",
         type=files.RECORDING,
         metavar="RUN.csv",
-        help="open loop: a recording whose current, torque or force is put in, in place of a command",
+        help="open loop: a recording whose current, torque, force, voltage or duty is put in, in place of a command",
     )
     options.add_actuator(parser)
     options.add_run(parser)

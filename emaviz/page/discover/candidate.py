@@ -45,7 +45,7 @@ _BAR = "rgba(240,140,0,.28)"
 def label(look: Look, one: Candidate) -> str:
     """The lines of a card; its first is the effect's or fault's name."""
     title = effect_title(one.name)
-    if one.untestable_reason:
+    if one.obstacle:
         return title
     lines = [title]
     if look.is_worth(one):
@@ -88,7 +88,7 @@ def style(look: Look | None, shown: Sequence[tuple[str, Candidate | None]], open
         share = 100.0 * look.share(one) if look.is_worth(one) else 0.0
         bar = f"background-image:linear-gradient(to right,{_BAR} {share:.1f}%,transparent {share:.1f}%)!important;"
         edge = "#f08c00" if one.name == opened else "rgba(134,142,150,.5)" if share else "rgba(134,142,150,.25)"
-        grey = "opacity:.55;" if one.untestable_reason else ""
+        grey = "opacity:.55;" if one.obstacle else ""
         rules.append(f"{button}{{{_CARD}{bar}{grey}border-left:3px solid {edge}}}")
         rules.append(f"{button} .mantine-Button-inner{{justify-content:flex-start}}")
         rules.append(f"{button} .mantine-Button-label{{{_LABEL}}}{button} .mantine-Button-label::first-line")
@@ -234,7 +234,7 @@ class EffectView:
         actuator = look.found.actuator
         is_fault = one.name in BY_NAME
         self._text.content = about_fault(one.name, actuator) if is_fault else about(find(one.name, actuator.axes))
-        self._untestable = bool(one.untestable_reason)
+        self._untestable = bool(one.obstacle)
         self._enable()
         self._plot.visible = not self._untestable
         if not self._untestable:
@@ -243,8 +243,8 @@ class EffectView:
 
 def head(look: Look, one: Candidate) -> Html:
     """What adding it is expected to do."""
-    if one.untestable_reason:
-        why = one.untestable_reason[:1].upper() + one.untestable_reason[1:]
+    if one.obstacle:
+        why = one.obstacle[:1].upper() + one.obstacle[1:]
         return html('<div {}><span style="color:{}">▲ {}.</span></div>', BOX, COLOURS["warning"], why)
     if not look.is_worth(one):
         return html("<div {}>No evidence for it: adding it would not reduce the error significantly.</div>", BOX)

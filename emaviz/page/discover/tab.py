@@ -537,7 +537,7 @@ class DiscoverPanel:
     def _groups(self) -> list[tuple[Any, list[Any], list[Candidate]]]:
         known = self._look.assessment.candidates if self._look and self._look.assessment else ()
         worth = self._look.promising[: len(self._worth)] if self._look else []
-        never = [one for one in known if one.untestable_reason]
+        never = [one for one in known if one.obstacle]
         little = [one for one in known if one not in worth and one not in never]
         return [
             (self._cards_folder, self._worth, worth),

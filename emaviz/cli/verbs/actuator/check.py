@@ -106,7 +106,7 @@ def _left(share: float) -> str:
 
 
 def _document(actuator: Actuator, found: dict[str, list[str]], arguments: argparse.Namespace) -> Document:
-    from ema_model.actuator.layout import WITHOUT_DRIVE
+    from ema_model.actuator.layout import says_drive
     from ema_model.actuator.naming import on_axes
     from ema_model.quantities.titles import in_sentence
 
@@ -114,7 +114,8 @@ def _document(actuator: Actuator, found: dict[str, list[str]], arguments: argpar
     count = sum(map(len, found.values()))
     state = "nothing to complain of" if not count else f"{count} thing{'s' if count > 1 else ''} to look at"
     told_of = [in_sentence(on_axes(path, actuator.axes).title) for path in free]
-    drive = "" if actuator.controller.kind in WITHOUT_DRIVE else f", drive {actuator.inverter.kind}"
+    kinds = actuator.controller.kind, actuator.inverter.kind
+    drive = f", drive {kinds[1]}" if says_drive(*kinds) else ""
     lines = [
         f"{actuator.name}: {state}",
         f"controller {actuator.controller.kind}{drive}; free to calibrate: {', '.join(told_of) or 'nothing'}",

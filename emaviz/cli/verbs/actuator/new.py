@@ -110,10 +110,12 @@ def _kinds(arguments: argparse.Namespace) -> tuple[str, str, list[str]]:
     if controller is None:
         raise InputError(f"{_HERE}: say --controller {', '.join(KINDS['controller'])}; unknown is always an answer")
     drives = DRIVES[controller]
-    if not drives:
+    if not drives or (controller == "open" and drive != "voltage"):
         reason = "the recorded current or torque is put in" if controller == "open" else "inverse dynamics has none"
-        left_out = drive not in (None, "unknown")
-        return controller, "current", [f"--drive {drive} is left out: {reason}"] if left_out else []
+        if drive not in (None, "unknown"):
+            return controller, "current", [f"--drive {drive} is left out: {reason}"]
+        other = f"{reason}; --drive voltage is for a recorded voltage or duty"
+        return controller, "current", [f"--drive is not given: {other}"] if controller == "open" else []
     if drive is None:
         return controller, drives[0], [f"--drive is not given: {drives[0]}, {KINDS['inverter'][drives[0]]}, is taken"]
     if drive == "unknown" and controller == "cascade":

@@ -32,7 +32,7 @@ def ask(document: dict[str, Any], arguments: argparse.Namespace) -> None:
     shown = actuator_axes(document)
     for path in asked(arguments.controller, arguments.drive if drives else "current"):
         section, name = path.partition(".")[0], on_axes(path, shown).name
-        if name not in document.get(section, {}) and (entry := _number(path, shown)) is not None:
+        if name not in document.get(section, {}) and (entry := _number(path, shown, arguments.controller)) is not None:
             document.setdefault(section, {})[name] = entry
 
 
@@ -60,8 +60,8 @@ def _sample_rate() -> float | None:
             print(f"  {error}")
 
 
-def _number(path: str, axes: Any) -> dict[str, Any] | None:
-    named, facts, usual = on_axes(path, axes), facts_of(path, axes), unanswered(path, axes)
+def _number(path: str, axes: Any, controller: str) -> dict[str, Any] | None:
+    named, facts, usual = on_axes(path, axes), facts_of(path, axes), unanswered(path, axes, controller)
     while True:
         text = input(f"{named.title}: {facts.meaning}{f', {named.unit}' if named.unit else ''} [{usual}] ").strip()
         if not text:
